@@ -1,0 +1,298 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later
+ * Raybundle: diffuse global illumination of a scene by bundles of parallel global lines, baked to
+ * the corners and vertices of its meshes.
+ *
+ * This is the whole C99 interface, in the order a caller needs it:
+ *   scene (images, materials, meshes, instances, lights, world) -> bake (settings, progress,
+ * execute)
+ *   -> light per corner or vertex, report.
+ *
+ * Conventions
+ * - Units: metres, W/m^2 (emission, irradiance), W/(m^2 sr) (radiance), W/sr (intensity). All
+ * colours are linear RGB, three floats.
+ * - Every fallible function returns an rb_error; rb_get_error_message() explains the last failure
+ * of the calling thread and names the object concerned. Output parameters are untouched on failure.
+ * - Arrays are pointer + count, are read or written only during the call, and stay the caller's. No
+ *   memory of the caller is kept.
+ * - Handles are not shared between threads without the caller's own locking. Different handles may
+ * be used from different threads at once.
+ */
+#ifndef RAYBUNDLE_H
+#define RAYBUNDLE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(_WIN32)
+#define RB_API __declspec(dllexport)
+#else
+#define RB_API __attribute__((visibility("default")))
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------------------------------------------
+ * Version and errors
+ * ----------------------------------------------------------------------------------------------------
+ */
+
+/* Raised by one whenever a signature or a meaning below changes; a caller built for another one
+ * must not go on. */
+#define RB_ABI_VERSION 1
+
+/* RB_ABI_VERSION of the library that was loaded. */
+RB_API int32_t rb_get_abi_version(void);
+
+/* Release of the library, "major.minor.patch". Static memory. */
+RB_API const char* rb_get_version(void);
+
+typedef enum rb_error {
+    RB_ERROR_NONE = 0,
+    RB_ERROR_UNKNOWN = 1,
+    RB_ERROR_INVALID_ARGUMENT = 2, /* the message names the argument or the object */
+    RB_ERROR_INVALID_OPERATION =
+        3, /* the call came at the wrong time, e.g. results before a bake */
+    RB_ERROR_OUT_OF_MEMORY = 4,
+    RB_ERROR_UNSUPPORTED_HARDWARE = 5,
+    RB_ERROR_CANCELLED = 6 /* the progress function returned false */
+} rb_error;
+
+/* What the last failing call of this thread said, or "" if none failed yet. Valid until the next
+ * failing call of this thread. */
+RB_API const char* rb_get_error_message(void);
+
+/* ------------------------------------------------------------------------------------------------------
+ * Scene: what the user has, copied in
+ * ----------------------------------------------------------------------------------------------------
+ */
+
+typedef struct rb_scene_impl* rb_scene;
+
+/* Makes an empty scene in *scene; the caller releases it. */
+RB_API rb_error rb_new_scene(rb_scene* scene);
+
+/* Frees the scene. NULL is allowed. A bake keeps what it needs, so the scene may go first. */
+RB_API void rb_release_scene(rb_scene scene);
+
+typedef enum rb_image_extension {
+    RB_IMAGE_REPEAT = 0,
+    RB_IMAGE_EXTEND = 1, /* border pixels go on */
+    RB_IMAGE_CLIP = 2    /* black outside */
+} rb_image_extension;
+
+/* Adds an image of width * height linear RGB pixels, bottom row first as in Blender. Id in *image.
+ */
+RB_API rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, int32_t height,
+                             const float* rgb, rb_image_extension extension, int32_t* image);
+
+/* Adds a material. reflectance and emission hold six floats: RGB of the front side, then of the
+ * back side. reflectance is the diffuse albedo; values of 1 or more are clamped to 0.999 with a
+ * warning in the report. emission is the exitance in W/m^2 (pi times the radiance). Id in
+ * *material. */
+RB_API rb_error rb_add_material(rb_scene scene, const char* name, const float reflectance[6],
+                                const float emission[6], int32_t* material);
+
+/* Adds weight (RGB) times the image, averaged over each patch, to the reflectance of both sides.
+ * The meshes that use the material need UVs (rb_set_mesh_uvs). */
+RB_API rb_error rb_set_material_image(rb_scene scene, int32_t material, int32_t image,
+                                      const float weight[3]);
+
+/* Adds weight (RGB) times the mesh's corner colours (rb_set_mesh_corner_colors), averaged over each
+ * patch, to the reflectance of both sides. */
+RB_API rb_error rb_set_material_corner_colors(rb_scene scene, int32_t material,
+                                              const float weight[3]);
+
+/* Adds a mesh of planar or nearly planar n-gons, which may be concave.
+ *   vertices         3 * vertex_count floats, object space, metres
+ *   corner_vertices  corner_count vertex indices, face after face
+ *   face_offsets     face_count + 1 ascending positions in corner_vertices; a face needs 3 corners
+ * or more face_materials   face_count material ids, or NULL for a grey (0.8) default material Faces
+ * of zero area are left out with a warning in the report. Id in *mesh. */
+RB_API rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices,
+                            size_t vertex_count, const int32_t* corner_vertices,
+                            size_t corner_count, const int32_t* face_offsets, size_t face_count,
+                            const int32_t* face_materials, int32_t* mesh);
+
+/* Optional: 3 * corner_count floats, the unit shading normal at each corner. Corners of one vertex
+ * whose normals agree across an edge belong to one smooth region and get one value. Without it two
+ * faces are smooth where they are coplanar. */
+RB_API rb_error rb_set_mesh_corner_normals(rb_scene scene, int32_t mesh, const float* normals,
+                                           size_t corner_count);
+
+/* Optional: 2 * edge_count vertex indices, the edges across which nothing is averaged although the
+ * normals agree (marked sharp by the user). */
+RB_API rb_error rb_set_mesh_sharp_edges(rb_scene scene, int32_t mesh, const int32_t* vertices,
+                                        size_t edge_count);
+
+/* Optional: 2 * corner_count floats, image coordinates at each corner. */
+RB_API rb_error rb_set_mesh_uvs(rb_scene scene, int32_t mesh, const float* uvs,
+                                size_t corner_count);
+
+/* Optional: 3 * corner_count floats, linear RGB at each corner. */
+RB_API rb_error rb_set_mesh_corner_colors(rb_scene scene, int32_t mesh, const float* rgb,
+                                          size_t corner_count);
+
+typedef enum rb_role {
+    RB_ROLE_BAKE = 0,   /* takes part in the light and gets a result */
+    RB_ROLE_OCCLUDE = 1 /* takes part in the light, has no result */
+} rb_role;
+
+typedef enum rb_side { RB_SIDE_FRONT = 0, RB_SIDE_BACK = 1 } rb_side;
+
+/* Places a mesh in the world. transform holds 12 floats, the rows of a 3 x 4 matrix, object to
+ * world; a matrix that mirrors keeps the front sides outside, as in Blender. side is the side whose
+ * light is the result. Id in *instance. */
+RB_API rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name,
+                                const float transform[12], rb_role role, rb_side side,
+                                int32_t* instance);
+
+typedef enum rb_point_shape {
+    RB_POINT_DISK =
+        0, /* a disk of the given radius that faces the receiver (Blender's soft falloff) */
+    RB_POINT_SPHERE = 1 /* a sphere of the given radius */
+} rb_point_shape;
+
+/* Adds a point light. intensity is RGB in W/sr; radius may be 0. Id in *light. */
+RB_API rb_error rb_add_point_light(rb_scene scene, const char* name, const float position[3],
+                                   const float intensity[3], float radius, rb_point_shape shape,
+                                   int32_t* light);
+
+/* Makes a spot light of a point light: world_to_light holds 9 floats, rows of the 3 x 3 matrix into
+ * the space in which the cone looks along -Z (a scaled light has an elliptic cone); angle is the
+ * full opening in radians, blend in [0, 1] the soft share of it. dims_by_cosine: the intensity also
+ * falls with the cosine to the axis, as in Blender up to 3.4. */
+RB_API rb_error rb_set_light_cone(rb_scene scene, int32_t light, const float world_to_light[9],
+                                  float angle, float blend, bool dims_by_cosine);
+
+/* Adds a sun: direction points towards it, irradiance is RGB in W/m^2 at normal incidence, angle
+ * the full angular diameter in radians. Id in *light. */
+RB_API rb_error rb_add_sun_light(rb_scene scene, const char* name, const float direction[3],
+                                 const float irradiance[3], float angle, int32_t* light);
+
+typedef enum rb_area_shape { RB_AREA_RECTANGLE = 0, RB_AREA_ELLIPSE = 1 } rb_area_shape;
+
+/* Adds a one-sided area light that blocks no light itself: the parallelogram (or the ellipse in it)
+ * centre +- axis_u +- axis_v, shining towards cross(axis_u, axis_v), with constant radiance (RGB).
+ * Id in *light. */
+RB_API rb_error rb_add_area_light(rb_scene scene, const char* name, const float centre[3],
+                                  const float axis_u[3], const float axis_v[3],
+                                  const float radiance[3], rb_area_shape shape, int32_t* light);
+
+/* Sets the constant radiance (RGB) of the world around the scene; black by default. */
+RB_API rb_error rb_set_world(rb_scene scene, const float radiance[3]);
+
+/* ------------------------------------------------------------------------------------------------------
+ * Bake
+ * ----------------------------------------------------------------------------------------------------
+ */
+
+typedef struct rb_bake_impl* rb_bake;
+
+/* Makes a bake with default settings in *bake; the caller releases it. */
+RB_API rb_error rb_new_bake(rb_bake* bake);
+
+/* Frees the bake. NULL is allowed. */
+RB_API void rb_release_bake(rb_bake bake);
+
+/* Settings by name; an unknown name, a wrong type or a value out of range is
+ * RB_ERROR_INVALID_ARGUMENT. float  target_error    relative noise at which bundles stop (0.02)
+ *   float  patch_size      edge of a patch in metres, 0 = automatic (0)
+ *   int    max_patches     most patches that subdivision may make (100000)
+ *   int    min_bundles, max_bundles   bounds of the number of bundles (64, 4096)
+ *   int    lines_per_bundle   0 = automatic: two lines per mean patch (0)
+ *   float  memory_limit    for the exchanges, in MB (4096)
+ *   int    seed, threads   threads 0 = all (0, 0)
+ *   float  regularization  of the reconstruction: weight of slope changes across edges (0.02)
+ *   string solver LINE_REUSE, first_shot GATHER, directions LOW_DISCREPANCY | RANDOM,
+ *          projector AUTO | FRAGMENT_LISTS, small_patches CENTRE_SAMPLING, reconstruction
+ * LEAST_SQUARES
+ */
+RB_API rb_error rb_set_bake_int(rb_bake bake, const char* name, int32_t value);
+RB_API rb_error rb_set_bake_float(rb_bake bake, const char* name, float value);
+RB_API rb_error rb_set_bake_string(rb_bake bake, const char* name, const char* value);
+
+/* The present value of a setting, which before any rb_set_bake_* is the default. */
+RB_API rb_error rb_get_bake_int(rb_bake bake, const char* name, int32_t* value);
+RB_API rb_error rb_get_bake_float(rb_bake bake, const char* name, float* value);
+RB_API rb_error rb_get_bake_string(rb_bake bake, const char* name, const char** value);
+
+typedef enum rb_stage {
+    RB_STAGE_PATCHES = 0,
+    RB_STAGE_FIRST_SHOT = 1,
+    RB_STAGE_BUNDLES = 2,
+    RB_STAGE_SOLVE = 3,
+    RB_STAGE_RECONSTRUCTION = 4
+} rb_stage;
+
+/* Called from the thread that runs rb_execute_bake, with the share of the stage that is done (0 to
+ * 1). Return false to cancel. */
+typedef bool (*rb_progress_function)(void* user, rb_stage stage, double fraction);
+
+/* Sets (or with NULL removes) the progress function of a bake. */
+RB_API rb_error rb_set_bake_progress(rb_bake bake, rb_progress_function function, void* user);
+
+/* Bakes the scene. May be called again, also with another scene and after a cancel: when geometry
+ * and the settings of the lines are unchanged, patches and traced lines are used again and only the
+ * light is solved anew (relighting). On failure the results of the last successful run are kept. */
+RB_API rb_error rb_execute_bake(rb_bake bake, rb_scene scene);
+
+typedef enum rb_output {
+    RB_OUTPUT_COMBINED = 0, /* radiance that leaves: (emission + reflectance * irradiance) / pi */
+    RB_OUTPUT_LIGHTING = 1, /* irradiance / pi: light on a white surface */
+    RB_OUTPUT_DIRECT =
+        2, /* the part of LIGHTING that comes straight from lights, emission and world */
+    RB_OUTPUT_INDIRECT = 3 /* the rest of LIGHTING */
+} rb_output;
+
+/* Writes the result of an instance with role RB_ROLE_BAKE to rgb, 3 * count floats in the order of
+ * the mesh's corners; count must be the number of corners. */
+RB_API rb_error rb_get_corner_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
+                                    size_t count);
+
+/* The same per vertex: the mean of the vertex's corners, weighted by their angle. */
+RB_API rb_error rb_get_vertex_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
+                                    size_t count);
+
+/* The report of the last successful rb_execute_bake as JSON (UTF-8) in *json; valid until the bake
+ * runs again or is released. Keys: docs/c_api.md. */
+RB_API rb_error rb_get_report(rb_bake bake, const char** json);
+
+/* ------------------------------------------------------------------------------------------------------
+ * Conforming subdivision of a mesh, for callers whose mesh is too coarse for its light
+ * ----------------------------------------------------------------------------------------------------
+ */
+
+typedef struct rb_subdivision_impl* rb_subdivision;
+
+/* Triangulates a mesh (arrays as in rb_add_mesh) and bisects longest edges until none is longer
+ * than max_edge metres, without T-junctions. Result in *subdivision; the caller releases it. */
+RB_API rb_error rb_new_subdivision(const float* vertices, size_t vertex_count,
+                                   const int32_t* corner_vertices, size_t corner_count,
+                                   const int32_t* face_offsets, size_t face_count, float max_edge,
+                                   rb_subdivision* subdivision);
+
+/* Frees the subdivision. NULL is allowed. */
+RB_API void rb_release_subdivision(rb_subdivision subdivision);
+
+/* Number of vertices and of triangles. */
+RB_API rb_error rb_get_subdivision_size(rb_subdivision subdivision, size_t* vertex_count,
+                                        size_t* triangle_count);
+
+/* Copies the result: vertices (3 * vertex_count), triangles (3 * triangle_count vertex indices),
+ * source_faces (triangle_count), and for each of the 3 * triangle_count new corners the three
+ * corners of the source mesh it lies between (source_corners, 9 * triangle_count) and their
+ * weights, which sum to 1 (source_weights, likewise). The counts must be those of
+ * rb_get_subdivision_size. */
+RB_API rb_error rb_get_subdivision(rb_subdivision subdivision, float* vertices, size_t vertex_count,
+                                   int32_t* triangles, int32_t* source_faces,
+                                   int32_t* source_corners, float* source_weights,
+                                   size_t triangle_count);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/bake.h"
+
+#include "api/border.h"
+
+using namespace raybundle;
+
+struct rb_bake_impl {
+    Bake bake;
+};
+
+rb_error rb_new_bake(rb_bake* bake) {
+    return guarded([&] {
+        need(bake, "bake");
+        *bake = new rb_bake_impl;
+    });
+}
+
+void rb_release_bake(rb_bake bake) { delete bake; }
+
+rb_error rb_set_bake_int(rb_bake bake, const char* name, int32_t value) {
+    return guarded([&] {
+        need(bake, "bake");
+        bake->bake.settings.set(nameOf(name), int(value));
+    });
+}
+
+rb_error rb_set_bake_float(rb_bake bake, const char* name, float value) {
+    return guarded([&] {
+        need(bake, "bake");
+        bake->bake.settings.set(nameOf(name), value);
+    });
+}
+
+rb_error rb_set_bake_string(rb_bake bake, const char* name, const char* value) {
+    return guarded([&] {
+        need(bake, "bake");
+        bake->bake.settings.set(nameOf(name), nameOf(value));
+    });
+}
+
+rb_error rb_get_bake_int(rb_bake bake, const char* name, int32_t* value) {
+    return guarded([&] {
+        need(bake, "bake");
+        need(value, "value");
+        bake->bake.settings.get(nameOf(name), *value);
+    });
+}
+
+rb_error rb_get_bake_float(rb_bake bake, const char* name, float* value) {
+    return guarded([&] {
+        need(bake, "bake");
+        need(value, "value");
+        bake->bake.settings.get(nameOf(name), *value);
+    });
+}
+
+rb_error rb_get_bake_string(rb_bake bake, const char* name, const char** value) {
+    return guarded([&] {
+        need(bake, "bake");
+        need(value, "value");
+        *value = bake->bake.settings.get(nameOf(name)).c_str();
+    });
+}
+
+rb_error rb_set_bake_progress(rb_bake bake, rb_progress_function function, void* user) {
+    return guarded([&] {
+        need(bake, "bake");
+        bake->bake.progress = Progress(function, user);
+    });
+}
+
+rb_error rb_execute_bake(rb_bake bake, rb_scene scene) {
+    return guarded([&] {
+        need(bake, "bake");
+        need(scene, "scene");
+        bake->bake.run(scene->scene);
+    });
+}
+
+namespace {
+
+void copyLight(const std::vector<glm::vec3>& light, float* rgb, size_t count) {
+    needCount(count, light.size(), "count");
+    needArray(rgb, count, "rgb");
+    if (count) std::memcpy(rgb, light.data(), count * sizeof(glm::vec3));
+}
+
+}  // namespace
+
+rb_error rb_get_corner_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
+                             size_t count) {
+    return guarded([&] {
+        need(bake, "bake");
+        copyLight(bake->bake.instanceLight(instance).perCorner(output), rgb, count);
+    });
+}
+
+rb_error rb_get_vertex_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
+                             size_t count) {
+    return guarded([&] {
+        need(bake, "bake");
+        copyLight(bake->bake.instanceLight(instance).perVertex(output), rgb, count);
+    });
+}
+
+rb_error rb_get_report(rb_bake bake, const char** json) {
+    return guarded([&] {
+        need(bake, "bake");
+        need(json, "json");
+        if (!bake->bake.hasRun())
+            throw Error(RB_ERROR_INVALID_OPERATION, "there is no report before a bake");
+        *json = bake->bake.reportJson().c_str();
+    });
+}

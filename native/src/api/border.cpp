@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "api/border.h"
+
+namespace {
+
+thread_local std::string lastMessage;
+
+}  // namespace
+
+namespace raybundle {
+
+// Keeping the message may itself run out of memory; the code still arrives.
+rb_error fail(rb_error code, const char* message) noexcept {
+    try {
+        lastMessage = message;
+    } catch (...) {
+        lastMessage.clear();
+    }
+    return code;
+}
+
+void need(const void* pointer, const char* name) {
+    if (!pointer) throw invalidArgument(std::string(name) + " must not be NULL");
+}
+
+void needArray(const void* pointer, size_t count, const char* name) {
+    if (count > 0) need(pointer, name);
+    // Indices into all arrays must fit 32 bits.
+    if (count > size_t(INT32_MAX))
+        throw invalidArgument(std::string(name) + " has too many elements");
+}
+
+void needCount(size_t given, size_t wanted, const char* what) {
+    if (given != wanted)
+        throw invalidArgument(std::string(what) + " must be " + std::to_string(wanted) + ", not " +
+                              std::to_string(given));
+}
+
+void needFinite(const float* values, size_t count, const char* what) {
+    for (size_t i = 0; i < count; ++i)
+        if (!std::isfinite(values[i]))
+            throw invalidArgument(std::string(what) + " " + std::to_string(i) +
+                                  " is not a finite number");
+}
+
+Mesh makeMesh(const char* name, const float* vertices, size_t vertexCount,
+              const int32_t* cornerVertices, size_t cornerCount, const int32_t* faceOffsets,
+              size_t faceCount) {
+    needArray(vertices, vertexCount, "vertices");
+    needArray(cornerVertices, cornerCount, "corner_vertices");
+    needArray(faceOffsets, faceCount, "face_offsets");
+    Mesh mesh;
+    mesh.name = nameOf(name);
+    mesh.vertices = vectors<glm::vec3>(vertices, vertexCount);
+    if (cornerCount) mesh.cornerVertices.assign(cornerVertices, cornerVertices + cornerCount);
+    mesh.faceOffsets = {0};
+    if (faceCount) mesh.faceOffsets.assign(faceOffsets, faceOffsets + faceCount + 1);
+    return mesh;
+}
+
+}  // namespace raybundle
+
+int32_t rb_get_abi_version(void) { return RB_ABI_VERSION; }
+
+const char* rb_get_version(void) { return RAYBUNDLE_VERSION; }
+
+const char* rb_get_error_message(void) { return lastMessage.c_str(); }

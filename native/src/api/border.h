@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What the extern "C" functions share: argument checks, copies, and the one place where exceptions
+// become codes and a message.
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <glm/glm.hpp>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "bake/error.h"
+#include "raybundle/raybundle.h"
+#include "scene/scene.h"
+
+struct rb_scene_impl {
+    raybundle::Scene scene;
+};
+
+namespace raybundle {
+
+// Keeps the message for rb_get_error_message of this thread and returns the code.
+rb_error fail(rb_error code, const char* message) noexcept;
+
+// Runs the body of an API function; whatever it throws becomes a code and a message.
+template <class Body>
+rb_error guarded(const Body& body) noexcept {
+    try {
+        body();
+        return RB_ERROR_NONE;
+    } catch (const Error& error) {
+        return fail(error.code, error.what());
+    } catch (const std::bad_alloc&) {
+        return fail(RB_ERROR_OUT_OF_MEMORY, "out of memory");
+    } catch (const std::exception& error) {
+        return fail(RB_ERROR_UNKNOWN, error.what());
+    } catch (...) {
+        return fail(RB_ERROR_UNKNOWN, "unknown error");
+    }
+}
+
+// Each throws Error(INVALID_ARGUMENT) that names the argument.
+void need(const void* pointer, const char* name);
+void needArray(const void* pointer, size_t count, const char* name);
+void needCount(size_t given, size_t wanted, const char* what);
+void needFinite(const float* values, size_t count, const char* what);
+
+inline std::string nameOf(const char* name) { return name ? name : ""; }
+inline glm::vec3 vec3(const float* v) { return {v[0], v[1], v[2]}; }
+
+template <class V>
+std::vector<V> vectors(const float* values, size_t count) {
+    std::vector<V> result(count);
+    if (count) std::memcpy(static_cast<void*>(result.data()), values, count * sizeof(V));
+    return result;
+}
+
+// The arrays of rb_add_mesh, copied; indices are checked later, by Scene::addMesh.
+Mesh makeMesh(const char* name, const float* vertices, size_t vertexCount,
+              const int32_t* cornerVertices, size_t cornerCount, const int32_t* faceOffsets,
+              size_t faceCount);
+
+}  // namespace raybundle

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+
+#include "api/border.h"
+
+using namespace raybundle;
+
+rb_error rb_new_scene(rb_scene* scene) {
+    return guarded([&] {
+        need(scene, "scene");
+        *scene = new rb_scene_impl;
+    });
+}
+
+void rb_release_scene(rb_scene scene) { delete scene; }
+
+rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, int32_t height,
+                      const float* rgb, rb_image_extension extension, int32_t* image) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(image, "image");
+        if (width <= 0 || height <= 0)
+            throw invalidArgument("image \"" + nameOf(name) + "\" has no pixels");
+        const size_t pixels = size_t(width) * size_t(height);
+        needArray(rgb, pixels, "rgb");
+        if (extension != RB_IMAGE_REPEAT && extension != RB_IMAGE_EXTEND &&
+            extension != RB_IMAGE_CLIP)
+            throw invalidArgument("there is no image extension " + std::to_string(int(extension)));
+        *image = scene->scene.addImage(
+            {nameOf(name), width, height, extension, vectors<glm::vec3>(rgb, pixels)});
+    });
+}
+
+rb_error rb_add_material(rb_scene scene, const char* name, const float reflectance[6],
+                         const float emission[6], int32_t* material) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(reflectance, "reflectance");
+        need(emission, "emission");
+        need(material, "material");
+        Material made;
+        made.name = nameOf(name);
+        made.reflectance = {vec3(reflectance), vec3(reflectance + 3)};
+        made.emission = {vec3(emission), vec3(emission + 3)};
+        *material = scene->scene.addMaterial(std::move(made));
+    });
+}
+
+rb_error rb_set_material_image(rb_scene scene, int32_t material, int32_t image,
+                               const float weight[3]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(weight, "weight");
+        needFinite(weight, 3, "weight");
+        Material& target = scene->scene.material(material);
+        scene->scene.checkImage(image);
+        target.image = image;
+        target.imageWeight = vec3(weight);
+    });
+}
+
+rb_error rb_set_material_corner_colors(rb_scene scene, int32_t material, const float weight[3]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(weight, "weight");
+        needFinite(weight, 3, "weight");
+        Material& target = scene->scene.material(material);
+        target.usesCornerColors = true;
+        target.cornerColorWeight = vec3(weight);
+    });
+}
+
+rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices, size_t vertex_count,
+                     const int32_t* corner_vertices, size_t corner_count,
+                     const int32_t* face_offsets, size_t face_count, const int32_t* face_materials,
+                     int32_t* mesh) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(mesh, "mesh");
+        Mesh made = makeMesh(name, vertices, vertex_count, corner_vertices, corner_count,
+                             face_offsets, face_count);
+        if (face_materials) made.faceMaterials.assign(face_materials, face_materials + face_count);
+        *mesh = scene->scene.addMesh(std::move(made));
+    });
+}
+
+rb_error rb_set_mesh_corner_normals(rb_scene scene, int32_t mesh, const float* normals,
+                                    size_t corner_count) {
+    return guarded([&] {
+        need(scene, "scene");
+        Mesh& target = scene->scene.mesh(mesh);
+        needCount(corner_count, target.cornerCount(), "corner_count");
+        needArray(normals, corner_count, "normals");
+        needFinite(normals, 3 * corner_count, "normal component");
+        target.cornerNormals = vectors<glm::vec3>(normals, corner_count);
+    });
+}
+
+rb_error rb_set_mesh_sharp_edges(rb_scene scene, int32_t mesh, const int32_t* vertices,
+                                 size_t edge_count) {
+    return guarded([&] {
+        need(scene, "scene");
+        Mesh& target = scene->scene.mesh(mesh);
+        needArray(vertices, edge_count, "vertices");
+        std::vector<uint64_t> edges;
+        for (size_t e = 0; e < edge_count; ++e) {
+            for (size_t end = 2 * e; end < 2 * e + 2; ++end)
+                if (vertices[end] < 0 || size_t(vertices[end]) >= target.vertices.size())
+                    throw invalidArgument("mesh \"" + target.name + "\": sharp edge " +
+                                          std::to_string(e) + " uses vertex " +
+                                          std::to_string(vertices[end]));
+            edges.push_back(edgeKey(vertices[2 * e], vertices[2 * e + 1]));
+        }
+        std::sort(edges.begin(), edges.end());
+        target.sharpEdges = std::move(edges);
+    });
+}
+
+rb_error rb_set_mesh_uvs(rb_scene scene, int32_t mesh, const float* uvs, size_t corner_count) {
+    return guarded([&] {
+        need(scene, "scene");
+        Mesh& target = scene->scene.mesh(mesh);
+        needCount(corner_count, target.cornerCount(), "corner_count");
+        needArray(uvs, corner_count, "uvs");
+        needFinite(uvs, 2 * corner_count, "UV component");
+        target.uvs = vectors<glm::vec2>(uvs, corner_count);
+    });
+}
+
+rb_error rb_set_mesh_corner_colors(rb_scene scene, int32_t mesh, const float* rgb,
+                                   size_t corner_count) {
+    return guarded([&] {
+        need(scene, "scene");
+        Mesh& target = scene->scene.mesh(mesh);
+        needCount(corner_count, target.cornerCount(), "corner_count");
+        needArray(rgb, corner_count, "rgb");
+        needFinite(rgb, 3 * corner_count, "colour component");
+        target.cornerColors = vectors<glm::vec3>(rgb, corner_count);
+    });
+}
+
+rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name, const float transform[12],
+                         rb_role role, rb_side side, int32_t* instance) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(transform, "transform");
+        need(instance, "instance");
+        if (role != RB_ROLE_BAKE && role != RB_ROLE_OCCLUDE)
+            throw invalidArgument("there is no role " + std::to_string(int(role)));
+        if (side != RB_SIDE_FRONT && side != RB_SIDE_BACK)
+            throw invalidArgument("there is no side " + std::to_string(int(side)));
+        Instance made{nameOf(name), mesh, glm::dmat4(1.0), role, side};
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 4; ++column)
+                made.transform[column][row] = double(transform[4 * row + column]);
+        *instance = scene->scene.addInstance(std::move(made));
+    });
+}
+
+rb_error rb_add_point_light(rb_scene scene, const char* name, const float position[3],
+                            const float intensity[3], float radius, rb_point_shape shape,
+                            int32_t* light) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(position, "position");
+        need(intensity, "intensity");
+        need(light, "light");
+        if (shape != RB_POINT_DISK && shape != RB_POINT_SPHERE)
+            throw invalidArgument("there is no point shape " + std::to_string(int(shape)));
+        Light made;
+        made.name = nameOf(name);
+        made.position = vec3(position);
+        made.strength = vec3(intensity);
+        made.radius = double(radius);
+        made.pointShape = shape;
+        *light = scene->scene.addLight(std::move(made));
+    });
+}
+
+rb_error rb_set_light_cone(rb_scene scene, int32_t light, const float world_to_light[9],
+                           float angle, float blend, bool dims_by_cosine) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(world_to_light, "world_to_light");
+        needFinite(world_to_light, 9, "matrix element");
+        Light& target = scene->scene.light(light);
+        if (target.kind != Light::Kind::POINT)
+            throw invalidArgument("light \"" + target.name + "\" is not a point light");
+        if (!(angle >= 0 && std::isfinite(angle)) || !(blend >= 0 && blend <= 1))
+            throw invalidArgument("light \"" + target.name + "\": angle or blend out of range");
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column)
+                target.worldToCone[column][row] = double(world_to_light[3 * row + column]);
+        target.hasCone = true;
+        target.coneAngle = double(angle);
+        target.coneBlend = double(blend);
+        target.coneDims = dims_by_cosine;
+    });
+}
+
+rb_error rb_add_sun_light(rb_scene scene, const char* name, const float direction[3],
+                          const float irradiance[3], float angle, int32_t* light) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(direction, "direction");
+        need(irradiance, "irradiance");
+        need(light, "light");
+        Light made;
+        made.name = nameOf(name);
+        made.kind = Light::Kind::SUN;
+        made.direction = vec3(direction);
+        made.strength = vec3(irradiance);
+        made.angle = double(angle);
+        *light = scene->scene.addLight(std::move(made));
+    });
+}
+
+rb_error rb_add_area_light(rb_scene scene, const char* name, const float centre[3],
+                           const float axis_u[3], const float axis_v[3], const float radiance[3],
+                           rb_area_shape shape, int32_t* light) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(centre, "centre");
+        need(axis_u, "axis_u");
+        need(axis_v, "axis_v");
+        need(radiance, "radiance");
+        need(light, "light");
+        if (shape != RB_AREA_RECTANGLE && shape != RB_AREA_ELLIPSE)
+            throw invalidArgument("there is no area shape " + std::to_string(int(shape)));
+        Light made;
+        made.name = nameOf(name);
+        made.kind = Light::Kind::AREA;
+        made.position = vec3(centre);
+        made.axisU = vec3(axis_u);
+        made.axisV = vec3(axis_v);
+        made.strength = vec3(radiance);
+        made.areaShape = shape;
+        *light = scene->scene.addLight(std::move(made));
+    });
+}
+
+rb_error rb_set_world(rb_scene scene, const float radiance[3]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(radiance, "radiance");
+        needFinite(radiance, 3, "world radiance");
+        scene->scene.worldRadiance = glm::max(vec3(radiance), glm::vec3(0.0f));
+    });
+}

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "api/border.h"
+#include "patches/conforming_subdivision.h"
+
+using namespace raybundle;
+
+struct rb_subdivision_impl {
+    ConformingSubdivision subdivision;
+};
+
+rb_error rb_new_subdivision(const float* vertices, size_t vertex_count,
+                            const int32_t* corner_vertices, size_t corner_count,
+                            const int32_t* face_offsets, size_t face_count, float max_edge,
+                            rb_subdivision* subdivision) {
+    return guarded([&] {
+        need(subdivision, "subdivision");
+        if (!(max_edge > 0)) throw invalidArgument("max_edge must be positive");
+        // A scene checks the mesh as it checks every other.
+        Scene scene;
+        const int32_t mesh = scene.addMesh(makeMesh("", vertices, vertex_count, corner_vertices,
+                                                    corner_count, face_offsets, face_count));
+        *subdivision =
+            new rb_subdivision_impl{subdivideConforming(scene.meshes[size_t(mesh)], max_edge)};
+    });
+}
+
+void rb_release_subdivision(rb_subdivision subdivision) { delete subdivision; }
+
+rb_error rb_get_subdivision_size(rb_subdivision subdivision, size_t* vertex_count,
+                                 size_t* triangle_count) {
+    return guarded([&] {
+        need(subdivision, "subdivision");
+        need(vertex_count, "vertex_count");
+        need(triangle_count, "triangle_count");
+        *vertex_count = subdivision->subdivision.vertices.size();
+        *triangle_count = subdivision->subdivision.triangles.size();
+    });
+}
+
+rb_error rb_get_subdivision(rb_subdivision subdivision, float* vertices, size_t vertex_count,
+                            int32_t* triangles, int32_t* source_faces, int32_t* source_corners,
+                            float* source_weights, size_t triangle_count) {
+    return guarded([&] {
+        need(subdivision, "subdivision");
+        const ConformingSubdivision& s = subdivision->subdivision;
+        needCount(vertex_count, s.vertices.size(), "vertex_count");
+        needCount(triangle_count, s.triangles.size(), "triangle_count");
+        auto copy = [](const auto& values, void* to, const char* name) {
+            needArray(to, values.size(), name);
+            if (!values.empty()) std::memcpy(to, values.data(), values.size() * sizeof(values[0]));
+        };
+        copy(s.vertices, vertices, "vertices");
+        copy(s.triangles, triangles, "triangles");
+        copy(s.sourceFaces, source_faces, "source_faces");
+        copy(s.sourceCorners, source_corners, "source_corners");
+        copy(s.sourceWeights, source_weights, "source_weights");
+    });
+}

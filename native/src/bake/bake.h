@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bake/instance_light.h"
+#include "bake/progress.h"
+#include "bake/report.h"
+#include "bake/settings.h"
+#include "bundles/line_counts.h"
+#include "patches/patches.h"
+#include "scene/scene.h"
+#include "transport/first_shot.h"
+#include "transport/line_reuse.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// One bake: settings in, light per corner and a report out. Keeps patches and traced lines for the
+// next run on the same geometry.
+class Bake {
+  public:
+    Bake();
+    ~Bake();
+
+    Settings settings;
+    Progress progress;
+
+    // The whole method, stage by stage.
+    void run(const Scene& scene);
+
+    bool hasRun() const { return ran; }
+    const std::string& reportJson() const { return json; }
+
+    // The result of an instance with role BAKE; throws Error if there is none.
+    const InstanceLight& instanceLight(int32_t instance) const;
+
+  private:
+    struct Trace;
+    struct Solution;
+
+    void runStages(const Scene& scene);
+    void makePatches(const Scene& scene, Report& report);
+    Solution solveToTarget(const Scene& scene, const FirstShot& shot, Report& report);
+    void traceBundles(uint32_t count, Report& report);
+    void balanceEnergy(const FirstShot& shot, const Solution& solution, const Scene& scene,
+                       Report& report) const;
+    std::vector<InstanceLight> reconstruct(const Scene& scene, const Solution& solution,
+                                           Report& report) const;
+
+    std::unique_ptr<Trace> trace;  // of the last run's geometry
+    std::vector<InstanceLight> light;
+    std::string json;
+    bool ran = false;
+};
+
+}  // namespace raybundle

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/geometry_hash.h"
+
+#include <cstring>
+#include <vector>
+
+namespace raybundle {
+namespace {
+
+// 64-bit words mixed one after the other, after MurmurHash2 (Appleby, public domain).
+class Hasher {
+  public:
+    void add(const void* data, size_t bytes) {
+        const unsigned char* at = static_cast<const unsigned char*>(data);
+        mix(bytes);
+        for (; bytes >= 8; bytes -= 8, at += 8) {
+            uint64_t word;
+            std::memcpy(&word, at, 8);
+            mix(word);
+        }
+        uint64_t rest = 0;
+        std::memcpy(&rest, at, bytes);
+        mix(rest);
+    }
+    template <class T>
+    void add(const std::vector<T>& values) {
+        add(values.data(), values.size() * sizeof(T));
+    }
+    uint64_t value() const { return state; }
+
+  private:
+    void mix(uint64_t word) {
+        constexpr uint64_t kMultiplier = 0xc6a4a7935bd1e995ull;
+        word *= kMultiplier;
+        word ^= word >> 47;
+        word *= kMultiplier;
+        state = (state ^ word) * kMultiplier;
+    }
+
+    uint64_t state = 0x9e3779b97f4a7c15ull;
+};
+
+}  // namespace
+
+uint64_t geometryHash(const Scene& scene, const Settings& settings) {
+    Hasher hasher;
+    for (const Mesh& mesh : scene.meshes) {
+        hasher.add(mesh.vertices);
+        hasher.add(mesh.cornerVertices);
+        hasher.add(mesh.faceOffsets);
+    }
+    for (const Instance& instance : scene.instances) {
+        hasher.add(&instance.mesh, sizeof(instance.mesh));
+        hasher.add(&instance.transform, sizeof(instance.transform));
+    }
+    hasher.add(&settings.patchSize, sizeof(float));
+    for (int value : {settings.maxPatches, settings.linesPerBundle, settings.seed})
+        hasher.add(&value, sizeof(value));
+    for (const std::string* name :
+         {&settings.directions, &settings.projector, &settings.smallPatches})
+        hasher.add(name->data(), name->size());
+    return hasher.value();
+}
+
+}  // namespace raybundle

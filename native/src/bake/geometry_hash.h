@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "bake/settings.h"
+#include "scene/scene.h"
+
+namespace raybundle {
+
+// A hash of all that patches and traced lines depend on: positions, faces, transforms and the
+// settings of patches and lines. Light, materials, names and roles do not enter. Two scenes with
+// equal hashes are taken to have equal geometry (64 bits).
+uint64_t geometryHash(const Scene& scene, const Settings& settings);
+
+}  // namespace raybundle

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/instance_light.h"
+
+#include <glm/gtc/constants.hpp>
+
+#include "bake/error.h"
+
+namespace raybundle {
+
+std::vector<glm::vec3> InstanceLight::perCorner(rb_output output) const {
+    std::vector<glm::vec3> radiance(direct.size());
+    for (size_t c = 0; c < radiance.size(); ++c) {
+        glm::vec3 perArea(0.0f);
+        switch (output) {
+            case RB_OUTPUT_COMBINED:
+                perArea = exitance[c];
+                break;
+            case RB_OUTPUT_LIGHTING:
+                perArea = direct[c] + indirect[c];
+                break;
+            case RB_OUTPUT_DIRECT:
+                perArea = direct[c];
+                break;
+            case RB_OUTPUT_INDIRECT:
+                perArea = indirect[c];
+                break;
+            default:
+                throw invalidArgument("there is no output " + std::to_string(int(output)));
+        }
+        radiance[c] = perArea / glm::pi<float>();
+    }
+    return radiance;
+}
+
+std::vector<glm::vec3> InstanceLight::perVertex(rb_output output) const {
+    const std::vector<glm::vec3> corners = perCorner(output);
+    std::vector<glm::vec3> vertices(vertexCount, glm::vec3(0.0f));
+    std::vector<float> weights(vertexCount, 0.0f);
+    for (size_t c = 0; c < corners.size(); ++c) {
+        vertices[size_t(cornerVertices[c])] += cornerAngles[c] * corners[c];
+        weights[size_t(cornerVertices[c])] += cornerAngles[c];
+    }
+    for (size_t v = 0; v < vertices.size(); ++v)
+        if (weights[v] > 0) vertices[v] /= weights[v];
+    return vertices;
+}
+
+}  // namespace raybundle

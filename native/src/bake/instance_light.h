@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "raybundle/raybundle.h"
+
+namespace raybundle {
+
+// The light of one instance, as the caller gets it.
+struct InstanceLight {
+    std::string name;
+    bool isBaked = false;
+    std::vector<int32_t> cornerVertices;
+    size_t vertexCount = 0;
+    std::vector<float> cornerAngles;          // radians, weights of the mean at a vertex
+    std::vector<glm::vec3> direct, indirect;  // per corner, irradiance, W/m^2
+    std::vector<glm::vec3> exitance;          // per corner, emission included, W/m^2
+
+    // Radiance, W/(m^2 sr), of an output, per corner.
+    std::vector<glm::vec3> perCorner(rb_output output) const;
+    // The same per vertex: the mean of its corners, weighted by their angles.
+    std::vector<glm::vec3> perVertex(rb_output output) const;
+};
+
+}  // namespace raybundle

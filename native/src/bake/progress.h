@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "bake/error.h"
+#include "raybundle/raybundle.h"
+
+namespace raybundle {
+
+// Tells the caller which stage of a bake runs and how far it is, and lets the caller cancel. Used
+// from the thread that runs the bake alone.
+class Progress {
+  public:
+    Progress() = default;
+    Progress(rb_progress_function function, void* user) : function(function), user(user) {}
+
+    // Reports the share (0 to 1) of a stage that is done. Throws Error(CANCELLED) if the caller
+    // wants to stop.
+    void report(rb_stage stage, double fraction) const {
+        if (function && !function(user, stage, fraction))
+            throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
+    }
+
+  private:
+    rb_progress_function function = nullptr;
+    void* user = nullptr;
+};
+
+}  // namespace raybundle

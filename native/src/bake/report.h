@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "raybundle/raybundle.h"
+
+namespace raybundle {
+
+struct Report {
+    struct Object {
+        std::string name;
+        size_t corners = 0;
+        std::string status;
+    };
+    struct Skip {
+        std::string what, why;
+        uint64_t count = 0;
+    };
+    std::array<double, 5> seconds{};  // per rb_stage
+    double totalSeconds = 0;
+    size_t patches = 0;
+    uint32_t bundles = 0;
+    uint64_t lines = 0;
+    size_t exchanges = 0;  // merged pairs of patch sides
+    uint64_t shadowRays = 0;
+    double estimatedError = 0;                      // relative noise
+    double emitted = 0, absorbed = 0, escaped = 0;  // W, sum of the channels
+    std::vector<Object> objects;
+    std::vector<std::string> warnings;
+    std::vector<Skip> skipped;
+
+    // |emitted - absorbed - escaped| / emitted
+    double balanceError() const;
+    // The whole report; keys as in docs/c_api.md.
+    std::string json() const;
+};
+
+}  // namespace raybundle

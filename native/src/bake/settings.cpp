@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/settings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "bake/error.h"
+
+namespace raybundle {
+namespace {
+
+template <class T>
+struct Number {
+    const char* name;
+    T Settings::*member;
+    T least, most;
+};
+
+const std::vector<Number<int>>& integers() {
+    static const std::vector<Number<int>> table = {
+        {"max_patches", &Settings::maxPatches, 1, 1 << 28},
+        {"min_bundles", &Settings::minBundles, 2, 1 << 24},
+        {"max_bundles", &Settings::maxBundles, 2, 1 << 24},
+        {"lines_per_bundle", &Settings::linesPerBundle, 0, 1 << 26},
+        {"seed", &Settings::seed, 0, INT32_MAX},
+        {"threads", &Settings::threads, 0, 1024},
+    };
+    return table;
+}
+
+const std::vector<Number<float>>& floats() {
+    static const std::vector<Number<float>> table = {
+        {"target_error", &Settings::targetError, 1e-5f, 10.0f},
+        {"patch_size", &Settings::patchSize, 0.0f, 1e9f},
+        {"memory_limit", &Settings::memoryLimit, 1.0f, 1e9f},
+        {"regularization", &Settings::regularization, 0.0f, 1e3f},
+    };
+    return table;
+}
+
+struct Choice {
+    const char* name;
+    std::string Settings::*member;
+    std::vector<const char*> values;
+};
+
+const std::vector<Choice>& choices() {
+    static const std::vector<Choice> table = {
+        {"solver", &Settings::solver, {"LINE_REUSE"}},
+        {"first_shot", &Settings::firstShot, {"GATHER"}},
+        {"directions", &Settings::directions, {"LOW_DISCREPANCY", "RANDOM"}},
+        {"projector", &Settings::projector, {"AUTO", "FRAGMENT_LISTS"}},
+        {"small_patches", &Settings::smallPatches, {"CENTRE_SAMPLING"}},
+        {"reconstruction", &Settings::reconstruction, {"LEAST_SQUARES"}},
+    };
+    return table;
+}
+
+template <class Table>
+const auto& find(const Table& table, const std::string& name) {
+    const auto found =
+        std::find_if(table.begin(), table.end(), [&](const auto& row) { return name == row.name; });
+    if (found == table.end())
+        throw invalidArgument("there is no setting \"" + name + "\" of this type");
+    return *found;
+}
+
+template <class T>
+void setNumber(Settings& settings, const std::vector<Number<T>>& table, const std::string& name,
+               T value) {
+    const Number<T>& number = find(table, name);
+    if (!(value >= number.least && value <= number.most))
+        throw invalidArgument("setting \"" + name + "\" must lie between " +
+                              std::to_string(number.least) + " and " + std::to_string(number.most));
+    settings.*number.member = value;
+}
+
+}  // namespace
+
+void Settings::set(const std::string& name, int value) {
+    setNumber(*this, integers(), name, value);
+}
+
+void Settings::set(const std::string& name, float value) {
+    setNumber(*this, floats(), name, value);
+}
+
+void Settings::set(const std::string& name, const std::string& value) {
+    const Choice& choice = find(choices(), name);
+    std::string known;
+    for (const char* candidate : choice.values) {
+        if (value == candidate) {
+            this->*choice.member = value;
+            return;
+        }
+        known += known.empty() ? candidate : std::string(", ") + candidate;
+    }
+    throw invalidArgument("setting \"" + name + "\" must be one of " + known + ", not \"" + value +
+                          "\"");
+}
+
+void Settings::get(const std::string& name, int& value) const {
+    value = this->*find(integers(), name).member;
+}
+
+void Settings::get(const std::string& name, float& value) const {
+    value = this->*find(floats(), name).member;
+}
+
+const std::string& Settings::get(const std::string& name) const {
+    return this->*find(choices(), name).member;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bundles/line_counts.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace raybundle {
+namespace {
+
+// An exchange seen from one of its ends: partner, half and lines packed into one key, so that
+// sorting the keys brings equal partners together.
+uint32_t partnerOf(uint64_t key) { return uint32_t(key >> 32); }
+uint32_t halfOf(uint64_t key) { return uint32_t(key >> 31) & 1; }
+uint32_t linesOf(uint64_t key) { return uint32_t(key) & 0x7fffffffu; }
+
+// Sides are handled in blocks of 2^kBlockBits rows: a block is the unit of parallel work.
+constexpr uint32_t kBlockBits = 8;
+
+// Memory without the zeros that a vector would write first.
+template <class T>
+std::unique_ptr<T[]> uninitialised(size_t n) {
+    return std::unique_ptr<T[]>(new T[n]);
+}
+
+}  // namespace
+
+LineCounts::LineCounts(size_t sideCount)
+    : sky(sideCount, {0, 0}),
+      total(sideCount, {0, 0}),
+      touching(sideCount, 0),
+      rows(sideCount + 1, 0),
+      entries(new LineCount[0]) {}
+
+size_t LineCounts::byteCount() const {
+    return rows.back() * sizeof(LineCount) + rows.size() * sizeof(size_t) +
+           sideCount() * (2 * sizeof(sky[0]) + sizeof(touching[0]));
+}
+
+std::vector<float> LineCounts::exposedShare() const {
+    std::vector<float> share(sideCount(), 1.0f);
+    for (size_t i = 0; i < share.size(); ++i) {
+        const float open = float(total[i][0] + total[i][1]);
+        if (touching[i] > 0) share[i] = open / (open + float(touching[i]));
+    }
+    return share;
+}
+
+void LineCounts::add(const std::array<std::vector<BundleLines>, 2>& added) {
+    const size_t n = sideCount();
+    std::vector<std::pair<const BundleLines*, uint32_t>> bundles;  // and their half
+    for (uint32_t half = 0; half < 2; ++half)
+        for (const BundleLines& bundle : added[half]) {
+            bundles.emplace_back(&bundle, half);
+            for (uint32_t side : bundle.sky) ++sky[side][half];
+            for (uint32_t side : bundle.touching) ++touching[side];
+            lines += bundle.lines;
+        }
+
+    // Sort the directed exchanges by block, stably in the order of the bundles.
+    const size_t blocks = (n >> kBlockBits) + 1;
+    std::vector<std::vector<size_t>> places(bundles.size(), std::vector<size_t>(blocks, 0));
+    tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
+        for (const Exchange& e : bundles[b].first->exchanges) {
+            ++places[b][e.i >> kBlockBits];
+            ++places[b][e.j >> kBlockBits];
+        }
+    });
+    std::vector<size_t> blockBegin(blocks + 1, 0);
+    size_t place = 0;
+    for (size_t block = 0; block < blocks; ++block) {
+        blockBegin[block] = place;
+        for (std::vector<size_t>& ofBundle : places) {
+            const size_t count = ofBundle[block];
+            ofBundle[block] = place;
+            place += count;
+        }
+    }
+    blockBegin[blocks] = place;
+    const auto keys = uninitialised<uint64_t>(place);
+    const auto rowOf = uninitialised<uint8_t>(place);  // within the block
+    tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
+        const uint64_t half = uint64_t(bundles[b].second) << 31;
+        auto put = [&](uint32_t row, uint32_t partner, uint32_t count) {
+            const size_t at = places[b][row >> kBlockBits]++;
+            keys[at] = uint64_t(partner) << 32 | half | count;
+            rowOf[at] = uint8_t(row & ((1u << kBlockBits) - 1));
+        };
+        for (const Exchange& e : bundles[b].first->exchanges) {
+            put(e.i, e.j, e.lines);
+            put(e.j, e.i, e.lines);
+        }
+    });
+
+    // In each block: group by row, sort each row, merge equal partners with the row's old entries.
+    std::vector<size_t> merged(n + 1, 0);
+    std::vector<std::unique_ptr<LineCount[]>> mergedBlocks(blocks);
+    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+        const size_t firstRow = block << kBlockBits,
+                     lastRow = std::min(n, (block + 1) << kBlockBits);
+        if (firstRow >= lastRow) return;
+        std::vector<size_t> begin(lastRow - firstRow + 1, 0);
+        for (size_t k = blockBegin[block]; k < blockBegin[block + 1]; ++k) ++begin[rowOf[k] + 1u];
+        std::partial_sum(begin.begin(), begin.end(), begin.begin());
+        const auto grouped = uninitialised<uint64_t>(begin.back());
+        std::vector<size_t> fill(begin.begin(), begin.end() - 1);
+        for (size_t k = blockBegin[block]; k < blockBegin[block + 1]; ++k)
+            grouped[fill[rowOf[k]]++] = keys[k];
+
+        mergedBlocks[block] =
+            uninitialised<LineCount>(begin.back() + rows[lastRow] - rows[firstRow]);
+        LineCount* out = mergedBlocks[block].get();
+        for (size_t row = firstRow; row < lastRow; ++row) {
+            uint64_t* key = grouped.get() + begin[row - firstRow];
+            uint64_t* const lastKey = grouped.get() + begin[row - firstRow + 1];
+            std::sort(key, lastKey);
+            const LineCount* old = rowBegin(uint32_t(row));
+            const LineCount* const lastOld = rowEnd(uint32_t(row));
+            LineCount* const firstOut = out;
+            while (key < lastKey || old < lastOld) {
+                LineCount count{0, {0, 0}};
+                if (key == lastKey || (old < lastOld && old->side <= partnerOf(*key)))
+                    count = *old++;
+                else
+                    count.side = partnerOf(*key);
+                for (; key < lastKey && partnerOf(*key) == count.side; ++key)
+                    count.lines[halfOf(*key)] += linesOf(*key);
+                *out++ = count;
+            }
+            merged[row + 1] = size_t(out - firstOut);
+        }
+    });
+
+    // Put the blocks one behind the other.
+    std::partial_sum(merged.begin(), merged.end(), merged.begin());
+    auto joined = uninitialised<LineCount>(merged[n]);
+    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+        const size_t firstRow = block << kBlockBits,
+                     lastRow = std::min(n, (block + 1) << kBlockBits);
+        if (firstRow >= lastRow) return;
+        std::copy_n(mergedBlocks[block].get(), merged[lastRow] - merged[firstRow],
+                    joined.get() + merged[firstRow]);
+        for (size_t row = firstRow; row < lastRow; ++row) {
+            total[row] = sky[row];
+            for (size_t k = merged[row]; k < merged[row + 1]; ++k) {
+                total[row][0] += joined[k].lines[0];
+                total[row][1] += joined[k].lines[1];
+            }
+        }
+    });
+    rows = std::move(merged);
+    entries = std::move(joined);
+}
+
+}  // namespace raybundle

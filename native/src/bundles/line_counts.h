@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The line counts of all bundles traced so far: how many lines join two patch sides (c_ij,
+// symmetric), how many leave the scene from a side (the sky column), and how many leave a side in
+// all (m_i). c_ij / m_i estimates the form factor F_ij (thesis section 2.3.2, eq. 2.30).
+//
+// Differs from the thesis: lines that leave the scene count in m_i (method.md 3.8). The two
+// independent halves of the bundles are counted apart for the error estimate. Counts are integers
+// and are merged before any floating-point work, so that the result does not depend on the number
+// of threads.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "bundles/fragment_lists.h"
+
+namespace raybundle {
+
+struct LineCount {
+    uint32_t side;                  // the other end
+    std::array<uint32_t, 2> lines;  // per half
+};
+
+class LineCounts {
+  public:
+    explicit LineCounts(size_t sideCount);
+
+    // Adds the lines of some bundles; lines[h] belong to half h.
+    void add(const std::array<std::vector<BundleLines>, 2>& lines);
+
+    size_t sideCount() const { return sky.size(); }
+    // Merged pairs i < j.
+    size_t exchangeCount() const { return rows.back() / 2; }
+    size_t byteCount() const;
+
+    // Row i of the symmetric matrix, ordered by the other side.
+    const LineCount* rowBegin(uint32_t i) const { return entries.get() + rows[i]; }
+    const LineCount* rowEnd(uint32_t i) const { return entries.get() + rows[i + 1]; }
+
+    // The share of each side that does not lie against another surface: 0 to 1, and 1 without
+    // lines.
+    std::vector<float> exposedShare() const;
+
+    std::vector<std::array<uint32_t, 2>> sky;    // per side and half: lines that leave the scene
+    std::vector<std::array<uint32_t, 2>> total;  // per side and half: m_i
+    std::vector<uint32_t> touching;              // per side: lines that end where it is covered
+    uint64_t lines = 0;                          // that met the scene
+
+  private:
+    std::vector<size_t> rows;  // per side, into entries; one more at the end
+    std::unique_ptr<LineCount[]> entries;
+};
+
+}  // namespace raybundle

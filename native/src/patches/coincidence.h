@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <tuple>
+#include <vector>
+
+#include "patches/patches.h"
+
+namespace raybundle {
+
+// Per face of a mesh: whether it belongs to a part that encloses a volume, that is, whether each
+// edge of the part has exactly two faces, which turn alike.
+std::vector<bool> closedFaces(const Mesh& mesh);
+
+// Which of two parallel surfaces that lie in the same place comes first along a direction. Depth
+// cannot tell, but solids can: the surface by which the direction leaves a solid comes before any
+// sheet between, and that before the surface by which it enters the next solid; so nothing shines
+// between a cupboard and the wall it stands against. Two of a kind are ordered by their index, the
+// same from both directions. (Of surfaces that meet at an angle, depth knows the order.) aEnters:
+// the direction looks at the front of parent a.
+inline bool comesBefore(const Patches& patches, uint32_t a, bool aEnters, uint32_t b,
+                        bool bEnters) {
+    auto rank = [&](uint32_t parent, bool enters) {
+        const int kind = !patches.parents[parent].isSolid ? 1 : enters ? 2 : 0;
+        return std::make_tuple(kind, enters ? -int64_t(parent) : int64_t(parent));
+    };
+    return rank(a, aEnters) < rank(b, bEnters);
+}
+
+// Whether two parents are parallel, within what rounding does to coinciding faces.
+inline bool areParallel(const Parent& a, const Parent& b) {
+    const glm::dvec3 n = glm::cross(glm::dvec3(a.a), glm::dvec3(a.b));
+    const glm::dvec3 m = glm::cross(glm::dvec3(b.a), glm::dvec3(b.b));
+    const double cosine = glm::dot(n, m);
+    return cosine * cosine > 0.9999 * glm::dot(n, n) * glm::dot(m, m);
+}
+
+}  // namespace raybundle

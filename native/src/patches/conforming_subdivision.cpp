@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Longest-edge bisection on OpenMesh's half-edges (the rule of its
+// Subdivider::Uniform::LongestEdgeT). Differs: faces keep their source triangle through the splits;
+// edges with more than two faces, which OpenMesh cannot hold, are cut open, and may then be
+// bisected differently on their sides.
+#include "patches/conforming_subdivision.h"
+
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#include <OpenMesh/Core/Utils/PropertyManager.hh>
+#include <algorithm>
+#include <queue>
+
+#include "bake/error.h"
+#include "scene/triangulation.h"
+
+namespace raybundle {
+namespace {
+
+struct Traits : OpenMesh::DefaultTraits {
+    using Point = OpenMesh::Vec3d;
+    using Normal = OpenMesh::Vec3d;
+};
+using TriMesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+
+constexpr size_t kMaxTriangles = size_t(1) << 26;
+
+// A triangle of the source mesh before any bisection.
+struct SourceTriangle {
+    int32_t face;
+    std::array<int32_t, 3> corner;
+};
+
+OpenMesh::Vec3d point(const Mesh& mesh, int32_t corner) {
+    const glm::vec3& p = mesh.vertices[size_t(mesh.cornerVertices[size_t(corner)])];
+    return {p.x, p.y, p.z};
+}
+
+// Barycentric coordinates of a point in the plane of a triangle.
+std::array<float, 3> barycentric(const OpenMesh::Vec3d& p,
+                                 const std::array<OpenMesh::Vec3d, 3>& t) {
+    const OpenMesh::Vec3d normal = (t[1] - t[0]) % (t[2] - t[0]);
+    const double scale = normal | normal;
+    std::array<float, 3> weights{1, 0, 0};
+    if (scale <= 0) return weights;
+    weights[1] = float((normal | ((t[2] - p) % (t[0] - p))) / scale);
+    weights[2] = float((normal | ((t[0] - p) % (t[1] - p))) / scale);
+    weights[0] = 1 - weights[1] - weights[2];
+    return weights;
+}
+
+}  // namespace
+
+ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
+    omerr().disable();  // what it would print is handled below
+    TriMesh mesh;
+    OpenMesh::FProp<int> sourceTriangle(mesh);
+    std::vector<SourceTriangle> sourceTriangles;
+    std::vector<TriMesh::VertexHandle> handles;
+    for (const glm::vec3& v : source.vertices) handles.push_back(mesh.add_vertex({v.x, v.y, v.z}));
+
+    for (size_t f = 0; f < source.faceCount(); ++f) {
+        std::vector<glm::dvec3> points;
+        for (int32_t c = source.faceOffsets[f]; c < source.faceOffsets[f + 1]; ++c)
+            points.push_back(source.vertices[size_t(source.cornerVertices[size_t(c)])]);
+        for (const std::array<int, 3>& t : triangulate(points)) {
+            SourceTriangle triangle{int32_t(f), {}};
+            std::array<TriMesh::VertexHandle, 3> v;
+            for (int k = 0; k < 3; ++k) {
+                triangle.corner[size_t(k)] = source.faceOffsets[f] + t[size_t(k)];
+                v[size_t(k)] =
+                    handles[size_t(source.cornerVertices[size_t(triangle.corner[size_t(k)])])];
+            }
+            if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) continue;
+            TriMesh::FaceHandle face = mesh.add_face(v[0], v[1], v[2]);
+            // An edge with more than two faces: give this face vertices of its own. (Copied first,
+            // since adding one moves the points.)
+            if (!face.is_valid()) {
+                const std::array<OpenMesh::Vec3d, 3> p{mesh.point(v[0]), mesh.point(v[1]),
+                                                       mesh.point(v[2])};
+                face = mesh.add_face(mesh.add_vertex(p[0]), mesh.add_vertex(p[1]),
+                                     mesh.add_vertex(p[2]));
+            }
+            sourceTriangle[face] = int(sourceTriangles.size());
+            sourceTriangles.push_back(triangle);
+        }
+    }
+
+    // Bisect the longest edge until all are short enough.
+    using Entry = std::pair<double, int>;  // squared length, edge index
+    std::priority_queue<Entry> queue;
+    const double enough = double(maxEdge) * maxEdge;
+    auto push = [&](TriMesh::EdgeHandle edge) {
+        const double length2 = mesh.calc_edge_sqr_length(edge);
+        if (length2 > enough) queue.emplace(length2, edge.idx());
+    };
+    for (auto edge : mesh.edges()) push(edge);
+    while (!queue.empty()) {
+        const auto [length2, index] = queue.top();
+        queue.pop();
+        const TriMesh::EdgeHandle edge(index);
+        if (mesh.calc_edge_sqr_length(edge) != length2) continue;  // was split meanwhile
+        const TriMesh::VertexHandle middle = mesh.add_vertex(mesh.calc_edge_midpoint(edge));
+        mesh.split_copy(edge, middle);
+        for (auto spoke : mesh.voh_range(middle)) push(mesh.edge_handle(spoke));
+        if (mesh.n_faces() > kMaxTriangles)
+            throw invalidArgument("mesh \"" + source.name + "\": an edge length of " +
+                                  std::to_string(maxEdge) + " would need too many triangles");
+    }
+
+    ConformingSubdivision result;
+    for (auto v : mesh.vertices()) {
+        const OpenMesh::Vec3d& p = mesh.point(v);
+        result.vertices.emplace_back(float(p[0]), float(p[1]), float(p[2]));
+    }
+    for (auto face : mesh.faces()) {
+        const SourceTriangle& origin = sourceTriangles[size_t(sourceTriangle[face])];
+        const std::array<OpenMesh::Vec3d, 3> corners{point(source, origin.corner[0]),
+                                                     point(source, origin.corner[1]),
+                                                     point(source, origin.corner[2])};
+        std::array<int32_t, 3> triangle;
+        size_t k = 0;
+        for (auto v : mesh.fv_range(face)) {
+            triangle[k++] = v.idx();
+            result.sourceCorners.push_back(origin.corner);
+            result.sourceWeights.push_back(barycentric(mesh.point(v), corners));
+        }
+        result.triangles.push_back(triangle);
+        result.sourceFaces.push_back(origin.face);
+    }
+    return result;
+}
+
+}  // namespace raybundle

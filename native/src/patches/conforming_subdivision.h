@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "scene/scene.h"
+
+namespace raybundle {
+
+// A triangle mesh without T-junctions, cut from another mesh.
+struct ConformingSubdivision {
+    std::vector<glm::vec3> vertices;
+    std::vector<std::array<int32_t, 3>> triangles;  // into vertices
+    std::vector<int32_t> sourceFaces;               // per triangle, face of the source mesh
+    // Per corner of each triangle: corners of the source mesh it lies between, and their weights.
+    std::vector<std::array<int32_t, 3>> sourceCorners;
+    std::vector<std::array<float, 3>> sourceWeights;
+};
+
+// Triangulates a mesh and bisects longest edges until none is longer than maxEdge, in the mesh's
+// units. Throws Error(INVALID_ARGUMENT) if that would take more than 2^26 triangles.
+ConformingSubdivision subdivideConforming(const Mesh& mesh, float maxEdge);
+
+}  // namespace raybundle

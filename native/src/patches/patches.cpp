@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/patches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "bake/error.h"
+#include "patches/coincidence.h"
+#include "patches/reflectance.h"
+#include "scene/triangulation.h"
+
+namespace raybundle {
+
+uint32_t Parent::patchAt(float s, float t) const {
+    auto cell = [](float x, int n) { return std::clamp(int(x * n), 0, n - 1); };
+    if (!isTriangle) return cell(t, countB) * countA + cell(s, countA);
+    const int n = countA;
+    const int row = cell(t, n);
+    // Row t of a triangle has n - row upright triangles with n - row - 1 upside-down ones between.
+    const int column = std::clamp(int(s * n), 0, n - 1 - row);
+    const bool upsideDown = (s * n - column) + (t * n - row) > 1.0f && column < n - 1 - row;
+    return row * (2 * n - row) + 2 * column + (upsideDown ? 1 : 0);
+}
+
+glm::vec2 Parent::pointOn(uint32_t patchInParent, glm::vec2 uv) const {
+    if (!isTriangle)
+        return {(patchInParent % countA + uv.x) / countA, (patchInParent / countA + uv.y) / countB};
+    const int n = countA;
+    // Invert row * (2n - row) <= index; float rounding is put right by the two loops.
+    int row = int(n - std::sqrt(std::max(0.0, double(n) * n - patchInParent)));
+    while (row > 0 && uint32_t(row * (2 * n - row)) > patchInParent) --row;
+    while (uint32_t((row + 1) * (2 * n - row - 1)) <= patchInParent) ++row;
+    const int inRow = int(patchInParent) - row * (2 * n - row);
+    // Fold the unit square onto the lower triangle.
+    if (uv.x + uv.y > 1.0f) uv = glm::vec2(1.0f) - uv;
+    const glm::vec2 base(inRow / 2, row);
+    return (inRow % 2 ? base + glm::vec2(1.0f) - uv : base + uv) / float(n);
+}
+
+namespace {
+
+// The s and t with d = s a + t b, by the dual basis; d is projected into the plane of a and b.
+std::pair<float, float> affine(const glm::vec3& a, const glm::vec3& b, const glm::vec3& d) {
+    const float aa = glm::dot(a, a), ab = glm::dot(a, b), bb = glm::dot(b, b);
+    const float det = aa * bb - ab * ab;
+    return {(bb * glm::dot(d, a) - ab * glm::dot(d, b)) / det,
+            (aa * glm::dot(d, b) - ab * glm::dot(d, a)) / det};
+}
+
+}  // namespace
+
+std::array<float, 4> Cell::weights(const glm::vec3& point) const {
+    const auto [s, t] = affine(a, b, point - origin);
+    if (isTriangle()) return {1 - s - t, s, t, 0};
+    return {(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t};
+}
+
+glm::vec3 Patches::point(uint32_t patch, glm::vec2 uv) const {
+    const Parent& parent = parents[parentOf[patch]];
+    return parent.position(parent.pointOn(patch - parent.firstPatch, uv));
+}
+
+uint32_t Patches::patchAt(uint32_t parentIndex, const glm::vec3& point) const {
+    const Parent& parent = parents[parentIndex];
+    const auto [s, t] = affine(parent.a, parent.b, point - parent.origin);
+    return parent.firstPatch + parent.patchAt(s, t);
+}
+
+namespace {
+
+// A triangle is bisected along its longest edge while it is longer than this many times its height
+// and than two patches: a grid of n^2 slivers would waste patches.
+constexpr double kMaxElongation = 4.0;
+// Share of the edge by which the fourth corner of a parallelogram may be off.
+constexpr double kParallelogramTolerance = 1e-4;
+constexpr int kMaxGrid = 4096;
+
+// Walks over the faces of all instances and appends vertices, cells and parents.
+class Subdivision {
+  public:
+    Subdivision(const Scene& scene, Patches& patches) : scene(scene), patches(patches) {}
+
+    void placeInstances() {
+        std::vector<glm::dvec3> world;
+        glm::dvec3 low(INFINITY), high(-INFINITY);
+        for (const Instance& instance : scene.instances) {
+            firstVertex.push_back(world.size());
+            for (const glm::vec3& vertex : scene.meshes[instance.mesh].vertices) {
+                world.push_back(glm::dvec3(instance.transform * glm::dvec4(vertex, 1.0)));
+                low = glm::min(low, world.back());
+                high = glm::max(high, world.back());
+            }
+        }
+        if (world.empty()) return;
+        patches.centre = 0.5 * (low + high);
+        diagonal = glm::length(high - low);
+        patches.vertices.reserve(world.size());
+        for (const glm::dvec3& vertex : world) {
+            patches.vertices.push_back(glm::vec3(vertex - patches.centre));
+            patches.radius = std::max(patches.radius, glm::length(patches.vertices.back()));
+        }
+    }
+
+    void cutFaces(double size) {
+        for (size_t i = 0; i < scene.instances.size(); ++i) {
+            const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
+            const std::vector<bool> closed = closedFaces(mesh);
+            const size_t firstParent = patches.parents.size();
+            size_t degenerate = 0;
+            for (size_t f = 0; f < mesh.faceCount(); ++f)
+                if (!cutFace(uint32_t(i), int32_t(f), size)) ++degenerate;
+            for (size_t p = firstParent; p < patches.parents.size(); ++p)
+                patches.parents[p].isSolid = closed[size_t(patches.parents[p].face)];
+            patches.degenerateFaces += degenerate;
+            if (degenerate)
+                patches.warnings.push_back("object \"" + scene.instances[i].name +
+                                           "\": " + std::to_string(degenerate) +
+                                           " faces of zero area were left out");
+        }
+    }
+
+    double diagonal = 0;
+
+  private:
+    using Triangle = std::array<uint32_t, 3>;  // into Patches::vertices
+
+    bool cutFace(uint32_t instance, int32_t face, double size) {
+        const Mesh& mesh = scene.meshes[scene.instances[instance].mesh];
+        const int32_t begin = mesh.faceOffsets[face], end = mesh.faceOffsets[face + 1];
+        // A mirroring transform turns the winding, but the front stays outside as in Blender.
+        const bool mirrored = glm::determinant(glm::dmat3(scene.instances[instance].transform)) < 0;
+        std::vector<int32_t> corners;
+        for (int32_t c = begin; c < end; ++c) corners.push_back(c);
+        if (mirrored) std::reverse(corners.begin(), corners.end());
+        std::vector<glm::dvec3> points;
+        for (int32_t c : corners) points.push_back(patches.vertices[worldVertex(instance, c)]);
+
+        if (corners.size() == 4 && isParallelogram(points)) {
+            const uint32_t cell = addCell(instance, face, points[0], points[1], points[3],
+                                          {corners[0], corners[1], corners[2], corners[3]});
+            Parent parent = makeParent(instance, face, cell, points[0], points[1], points[3]);
+            for (int k = 0; k < 4; ++k) parent.vertex[k] = worldVertex(instance, corners[k]);
+            parent.isTriangle = false;
+            parent.countA = gridCount(glm::length(parent.a), size);
+            parent.countB = gridCount(glm::length(parent.b), size);
+            patches.parents.push_back(parent);
+            return true;
+        }
+        bool any = false;
+        for (const std::array<int, 3>& t : triangulate(points)) {
+            const Triangle triangle{worldVertex(instance, corners[t[0]]),
+                                    worldVertex(instance, corners[t[1]]),
+                                    worldVertex(instance, corners[t[2]])};
+            if (isDegenerate(triangle)) continue;
+            any = true;
+            const uint32_t cell = addCell(instance, face, points[t[0]], points[t[1]], points[t[2]],
+                                          {corners[t[0]], corners[t[1]], corners[t[2]], -1});
+            cutTriangle(instance, face, cell, triangle, size);
+        }
+        return any;
+    }
+
+    uint32_t worldVertex(uint32_t instance, int32_t corner) const {
+        return uint32_t(firstVertex[instance] +
+                        scene.meshes[scene.instances[instance].mesh].cornerVertices[corner]);
+    }
+
+    static bool isParallelogram(const std::vector<glm::dvec3>& p) {
+        const double longest = std::max(glm::length(p[1] - p[0]), glm::length(p[3] - p[0]));
+        const double off = glm::length(p[0] - p[1] + p[2] - p[3]);
+        const double area = glm::length(glm::cross(p[1] - p[0], p[3] - p[0]));
+        return off <= kParallelogramTolerance * longest && area > 1e-6 * longest * longest;
+    }
+
+    bool isDegenerate(const Triangle& v) const {
+        const glm::dvec3 p0 = patches.vertices[v[0]], p1 = patches.vertices[v[1]],
+                         p2 = patches.vertices[v[2]];
+        const double longest =
+            std::max({glm::length(p1 - p0), glm::length(p2 - p1), glm::length(p0 - p2)});
+        return glm::length(glm::cross(p1 - p0, p2 - p0)) <= 1e-7 * longest * longest;
+    }
+
+    static uint16_t gridCount(double length, double size) {
+        // A hundredth of a patch of slack, so that a length of exactly n patches stays n.
+        return uint16_t(std::clamp(int(std::ceil(length / size - 0.01)), 1, kMaxGrid));
+    }
+
+    uint32_t addCell(uint32_t instance, int32_t face, const glm::dvec3& p0, const glm::dvec3& pa,
+                     const glm::dvec3& pb, const std::array<int32_t, 4>& corner) {
+        Cell cell;
+        cell.origin = glm::vec3(p0);
+        cell.a = glm::vec3(pa - p0);
+        cell.b = glm::vec3(pb - p0);
+        cell.corner = corner;
+        cell.instance = instance;
+        cell.face = face;
+        patches.cells.push_back(cell);
+        return uint32_t(patches.cells.size()) - 1;
+    }
+
+    static Parent makeParent(uint32_t instance, int32_t face, uint32_t cell, const glm::dvec3& p0,
+                             const glm::dvec3& pa, const glm::dvec3& pb) {
+        Parent parent;
+        parent.origin = glm::vec3(p0);
+        parent.a = glm::vec3(pa - p0);
+        parent.b = glm::vec3(pb - p0);
+        parent.normal = glm::vec3(glm::normalize(glm::cross(pa - p0, pb - p0)));
+        parent.instance = instance;
+        parent.face = face;
+        parent.cell = cell;
+        parent.vertex = {0, 0, 0, 0};
+        return parent;
+    }
+
+    void cutTriangle(uint32_t instance, int32_t face, uint32_t cell, const Triangle& v,
+                     double size) {
+        const glm::dvec3 p[3] = {patches.vertices[v[0]], patches.vertices[v[1]],
+                                 patches.vertices[v[2]]};
+        int longest = 0;
+        double length[3];
+        for (int k = 0; k < 3; ++k) {
+            length[k] = glm::length(p[(k + 1) % 3] - p[k]);
+            if (length[k] > length[longest]) longest = k;
+        }
+        const double doubleArea = glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+        const double height = doubleArea / length[longest];
+        if (length[longest] > kMaxElongation * height && length[longest] > 2 * size) {
+            const uint32_t v0 = v[longest], v1 = v[(longest + 1) % 3], v2 = v[(longest + 2) % 3];
+            const uint32_t middle = middleVertex(v0, v1);
+            cutTriangle(instance, face, cell, {v0, middle, v2}, size);
+            cutTriangle(instance, face, cell, {middle, v1, v2}, size);
+            return;
+        }
+        Parent parent = makeParent(instance, face, cell, p[0], p[1], p[2]);
+        std::copy(v.begin(), v.end(), parent.vertex.begin());
+        // As many patches as squares of the patch size would cover, but no edge much longer.
+        const double byArea = std::sqrt(0.5 * doubleArea) / size;
+        const double byLength = length[longest] / (2.0 * size);
+        parent.countA = parent.countB = gridCount(std::max(byArea, byLength), 1.0);
+        patches.parents.push_back(parent);
+    }
+
+    // Neighbouring faces that bisect the same edge share the new vertex.
+    uint32_t middleVertex(uint32_t v0, uint32_t v1) {
+        const auto key = std::minmax(v0, v1);
+        const auto found = middles.find(key);
+        if (found != middles.end()) return found->second;
+        patches.vertices.push_back(0.5f * (patches.vertices[v0] + patches.vertices[v1]));
+        const uint32_t middle = uint32_t(patches.vertices.size()) - 1;
+        middles.emplace(key, middle);
+        return middle;
+    }
+
+    const Scene& scene;
+    Patches& patches;
+    std::vector<size_t> firstVertex;  // per instance, into Patches::vertices
+    std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
+};
+
+size_t numberPatches(Patches& patches) {
+    size_t count = 0;
+    for (Parent& parent : patches.parents) {
+        parent.firstPatch = uint32_t(count);
+        count += parent.patchCount();
+    }
+    return count;
+}
+
+// The grids were made for one patch size; makes them coarser by a factor.
+void coarsen(Patches& patches, double factor) {
+    for (Parent& parent : patches.parents) {
+        parent.countA = uint16_t(std::max(1.0, std::floor(parent.countA / factor)));
+        parent.countB = parent.isTriangle
+                            ? parent.countA
+                            : uint16_t(std::max(1.0, std::floor(parent.countB / factor)));
+    }
+}
+
+}  // namespace
+
+Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
+    Patches patches;
+    Subdivision subdivision(scene, patches);
+    subdivision.placeInstances();
+    if (patches.vertices.empty()) return patches;
+    patches.size = patchSize > 0 ? patchSize : float(subdivision.diagonal / 64);
+    if (!(patches.size > 0)) patches.size = 1;
+    subdivision.cutFaces(patches.size);
+
+    // Fit into maxPatches; a parent keeps at least one patch.
+    while (numberPatches(patches) > std::max(maxPatches, patches.parents.size())) {
+        coarsen(patches, 1.1);
+        patches.size *= 1.1f;
+    }
+    const size_t count = numberPatches(patches);
+    if (count > size_t(1) << 30)
+        throw invalidArgument("the scene has too many faces: " + std::to_string(count) +
+                              " patches");
+    patches.parentOf.resize(count);
+    patches.area.resize(count);
+    for (size_t i = 0; i < patches.parents.size(); ++i) {
+        const Parent& parent = patches.parents[i];
+        const uint32_t end = parent.firstPatch + parent.patchCount();
+        std::fill(patches.parentOf.begin() + parent.firstPatch, patches.parentOf.begin() + end,
+                  uint32_t(i));
+        std::fill(patches.area.begin() + parent.firstPatch, patches.area.begin() + end,
+                  parent.area() / parent.patchCount());
+        patches.totalArea += parent.area();
+    }
+    assignMaterials(scene, patches);
+    return patches;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Patches: the finest units of transport. A face of the user's mesh is cut into parents (triangles
+// and parallelograms), and a parent into equal patches by a regular grid in its affine coordinates:
+//
+//   point = origin + s * a + t * b,   parallelogram: s, t in [0, 1];  triangle: s, t >= 0, s + t <=
+//   1
+//
+// so that whoever meets a parent at a point knows the patch without a search, and projecting the
+// parents costs the same however fine the patches are.
+//
+// Differs from the thesis (section 4.2, which projects each patch by itself): see docs/method.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "scene/scene.h"
+
+namespace raybundle {
+
+struct Parent {
+    glm::vec3 origin, a, b;  // metres, relative to Patches::centre
+    glm::vec3 normal;        // of the front, unit: along cross(a, b)
+    std::array<uint32_t, 4>
+        vertex;  // into Patches::vertices, in order around; [3] unused by triangles
+    uint32_t firstPatch = 0;
+    uint16_t countA = 1, countB = 1;  // grid along a and b; equal for triangles
+    bool isTriangle = true;
+    bool isSolid = false;   // part of a surface that encloses a volume
+    uint32_t instance = 0;  // into Scene::instances
+    int32_t face = 0;       // of the instance's mesh
+    // The mesh triangle or quad that the parent is part of, for interpolation between its corners:
+    // one of Patches::cells.
+    uint32_t cell = 0;
+
+    uint32_t patchCount() const { return isTriangle ? countA * countA : countA * countB; }
+    // The patch at affine coordinates (s, t), counted within the parent. Clamps to the parent.
+    uint32_t patchAt(float s, float t) const;
+    // The point (u, v) in [0, 1]^2 of a patch, in affine coordinates of the parent; uniform by
+    // area.
+    glm::vec2 pointOn(uint32_t patchInParent, glm::vec2 uv) const;
+    glm::vec3 position(glm::vec2 st) const { return origin + st.x * a + st.y * b; }
+    float area() const { return glm::length(glm::cross(a, b)) * (isTriangle ? 0.5f : 1.0f); }
+};
+
+// A triangle or parallelogram of the user's mesh, over whose corners the result is interpolated.
+struct Cell {
+    glm::vec3 origin, a, b;         // as in Parent
+    std::array<int32_t, 4> corner;  // of the mesh; [3] is -1 for a triangle
+    uint32_t instance = 0;
+    int32_t face = 0;
+
+    bool isTriangle() const { return corner[3] < 0; }
+    // Weight of each corner at a point: barycentric in a triangle, bilinear in a parallelogram.
+    std::array<float, 4> weights(const glm::vec3& point) const;
+};
+
+// Two indices a patch: side 2 * p is its front, 2 * p + 1 its back.
+struct Patches {
+    glm::dvec3 centre{
+        0.0};          // world position of the local origin, so that floats stay exact far away
+    float radius = 0;  // of a sphere around the centre that holds everything, metres
+    std::vector<glm::vec3> vertices;  // metres, relative to centre
+    std::vector<Parent> parents;
+    std::vector<Cell> cells;
+    std::vector<uint32_t> parentOf;      // per patch
+    std::vector<float> area;             // per patch, m^2
+    std::vector<glm::vec3> reflectance;  // per side
+    std::vector<glm::vec3> emission;     // per side, W/m^2
+    double totalArea = 0;                // of all patches, one side, m^2
+    float size = 0;                      // target edge of a patch, metres
+    std::vector<std::string> warnings;
+    size_t degenerateFaces = 0;  // left out
+
+    size_t count() const { return area.size(); }
+    size_t sideCount() const { return 2 * area.size(); }
+    // Unit normal of a side.
+    glm::vec3 normal(uint32_t side) const {
+        const glm::vec3& front = parents[parentOf[side / 2]].normal;
+        return side % 2 ? -front : front;
+    }
+    // The point (u, v) in [0, 1]^2 of a patch, relative to centre.
+    glm::vec3 point(uint32_t patch, glm::vec2 uv) const;
+    // The patch of a parent at a point in its plane.
+    uint32_t patchAt(uint32_t parent, const glm::vec3& point) const;
+};
+
+// Cuts all instances of the scene into patches with edges of about `patchSize` metres (0: a 64th of
+// the scene's diagonal), coarser if there would be more than maxPatches, and gives each its
+// reflectance (mean over its area) and emission.
+Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches);
+
+}  // namespace raybundle

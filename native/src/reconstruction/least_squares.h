@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// LEAST_SQUARES: from patch sides to the corners of the user's mesh. The corner values are those
+// whose linear interpolation over the faces has, patch by patch, the mean that transport found:
+//
+//   minimise  sum_p A_p (mean_p(f) - H_p)^2  +  alpha sum_e area_e height_e^2 (slope change across
+//   e)^2
+//
+// Source: Kavan, Bargteil and Sloan, "Least Squares Vertex Baking" (EGSR 2011), also for the
+// regulariser, which leaves linear light alone. Differs: the data are means over patches, not point
+// samples, so that light that is linear comes out exactly up to the mesh's border; a twist term for
+// quads takes the place of their diagonal; patches (or shares of patches) that lie against another
+// surface, which nobody sees, do not count, so that contacts are neither dark nor leaking.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "patches/patches.h"
+#include "reconstruction/smooth_regions.h"
+#include "scene/scene.h"
+
+namespace raybundle {
+
+// Where an instance's cells and parents lie in Patches.
+struct InstanceRange {
+    uint32_t firstCell = 0, lastCell = 0;      // [first, last)
+    uint32_t firstParent = 0, lastParent = 0;  // [first, last)
+};
+
+// exposed: per side, the share of it that counts. Reconstructs several fields (each per side) on
+// one side of an instance. Returns for each field one value per node of the regions, none negative.
+std::vector<std::vector<glm::vec3>> leastSquares(
+    const Patches& patches, const InstanceRange& range, const SmoothRegions& regions, rb_side side,
+    const std::vector<float>& exposed, float regularization,
+    const std::vector<const std::vector<glm::vec3>*>& fields);
+
+}  // namespace raybundle

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/smooth_regions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace raybundle {
+namespace {
+
+// Shading normals that differ by less than about 1 degree are the same.
+constexpr float kSameNormal = 0.99985f;
+
+// One directed edge of a cell, for pairing with its neighbour's.
+struct HalfEdge {
+    uint64_t key;
+    uint32_t cell;
+    int32_t from, to;  // corners
+    bool ascending;    // from the smaller vertex to the larger
+};
+
+uint32_t root(std::vector<uint32_t>& parent, uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+}  // namespace
+
+SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, uint32_t first,
+                            uint32_t last) {
+    std::vector<HalfEdge> halfEdges;
+    for (uint32_t c = first; c < last; ++c) {
+        const int n = cells[c].isTriangle() ? 3 : 4;
+        for (int k = 0; k < n; ++k) {
+            const int32_t from = cells[c].corner[k], to = cells[c].corner[(k + 1) % n];
+            const int32_t a = mesh.cornerVertices[from], b = mesh.cornerVertices[to];
+            halfEdges.push_back({edgeKey(a, b), c, from, to, a < b});
+        }
+    }
+    std::sort(halfEdges.begin(), halfEdges.end(), [](const HalfEdge& a, const HalfEdge& b) {
+        return std::make_pair(a.key, a.from) < std::make_pair(b.key, b.from);
+    });
+
+    auto normalAt = [&](uint32_t cell, int32_t corner) {
+        if (!mesh.cornerNormals.empty()) return glm::vec3(mesh.cornerNormals[corner]);
+        return glm::normalize(glm::cross(cells[cell].a, cells[cell].b));
+    };
+    auto joins = [&](const HalfEdge& e, int32_t corner, const HalfEdge& f, int32_t other) {
+        return glm::dot(normalAt(e.cell, corner), normalAt(f.cell, other)) >= kSameNormal;
+    };
+
+    SmoothRegions regions;
+    std::vector<uint32_t> parent(mesh.cornerCount());
+    std::iota(parent.begin(), parent.end(), 0u);
+    for (size_t i = 0; i < halfEdges.size();) {
+        size_t end = i + 1;
+        while (end < halfEdges.size() && halfEdges[end].key == halfEdges[i].key) ++end;
+        const HalfEdge& e = halfEdges[i];
+        const HalfEdge& f = halfEdges[end - 1];
+        const bool joinable =
+            end - i == 2 &&
+            !std::binary_search(mesh.sharpEdges.begin(), mesh.sharpEdges.end(), e.key) &&
+            e.ascending != f.ascending &&
+            mesh.faceMaterials[cells[e.cell].face] == mesh.faceMaterials[cells[f.cell].face];
+        i = end;
+        if (!joinable) continue;
+        const bool start = joins(e, e.from, f, f.to), finish = joins(e, e.to, f, f.from);
+        if (start) parent[root(parent, uint32_t(e.from))] = root(parent, uint32_t(f.to));
+        if (finish) parent[root(parent, uint32_t(e.to))] = root(parent, uint32_t(f.from));
+        if (start && finish)
+            regions.edges.push_back({{e.cell, f.cell}, {e.from, e.to, f.to, f.from}});
+    }
+
+    regions.nodeOf.resize(mesh.cornerCount());
+    std::vector<uint32_t> nodeOfRoot(mesh.cornerCount(), UINT32_MAX);
+    for (uint32_t c = 0; c < mesh.cornerCount(); ++c) {
+        uint32_t& node = nodeOfRoot[root(parent, c)];
+        if (node == UINT32_MAX) node = regions.nodeCount++;
+        regions.nodeOf[c] = node;
+    }
+    return regions;
+}
+
+}  // namespace raybundle

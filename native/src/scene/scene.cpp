@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scene/scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bake/error.h"
+
+namespace raybundle {
+namespace {
+
+template <class T>
+T& checked(std::vector<T>& items, int32_t id, const char* what) {
+    if (id < 0 || size_t(id) >= items.size())
+        throw invalidArgument(std::string("there is no ") + what + " " + std::to_string(id));
+    return items[id];
+}
+
+template <class V>
+bool isFinite(const V& v) {
+    for (int i = 0; i < v.length(); ++i)
+        if (!std::isfinite(v[i])) return false;
+    return true;
+}
+
+template <class V>
+bool isFiniteAndPositive(const V& v) {
+    for (int i = 0; i < v.length(); ++i)
+        if (!std::isfinite(v[i]) || v[i] < 0) return false;
+    return true;
+}
+
+std::string quoted(const char* kind, const std::string& name) {
+    return std::string(kind) + " \"" + name + "\"";
+}
+
+template <class V>
+void checkAllFinite(const std::vector<V>& values, const std::string& object, const char* what) {
+    for (size_t i = 0; i < values.size(); ++i)
+        if (!isFinite(values[i]))
+            throw invalidArgument(object + ": " + what + " " + std::to_string(i) +
+                                  " is not a finite number");
+}
+
+}  // namespace
+
+std::vector<float> cornerAngles(const Mesh& mesh) {
+    std::vector<float> angles(mesh.cornerCount());
+    for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
+        for (int32_t c = begin; c < end; ++c) {
+            auto at = [&](int32_t corner) {
+                return glm::dvec3(mesh.vertices[size_t(mesh.cornerVertices[size_t(corner)])]);
+            };
+            const glm::dvec3 a = at(c == begin ? end - 1 : c - 1) - at(c);
+            const glm::dvec3 b = at(c + 1 == end ? begin : c + 1) - at(c);
+            angles[size_t(c)] = float(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
+        }
+    }
+    return angles;
+}
+
+int32_t Scene::addImage(Image image) {
+    const std::string object = quoted("image", image.name);
+    if (image.width <= 0 || image.height <= 0) throw invalidArgument(object + " has no pixels");
+    for (glm::vec3& pixel : image.pixels)
+        if (!isFiniteAndPositive(pixel)) pixel = glm::vec3(0.0f);
+    images.push_back(std::move(image));
+    return int32_t(images.size()) - 1;
+}
+
+int32_t Scene::addMaterial(Material material) {
+    // Reflectance of 1 or more makes light grow without end in a closed scene.
+    constexpr float kMaxReflectance = 0.999f;
+    const std::string object = quoted("material", material.name);
+    bool clamped = false;
+    for (int side = 0; side < 2; ++side) {
+        if (!isFiniteAndPositive(material.reflectance[side]) ||
+            !isFiniteAndPositive(material.emission[side]))
+            throw invalidArgument(object +
+                                  ": reflectance and emission must be finite and not negative");
+        const glm::vec3 limited = glm::min(material.reflectance[side], glm::vec3(kMaxReflectance));
+        clamped = clamped || limited != material.reflectance[side];
+        material.reflectance[side] = limited;
+    }
+    if (clamped) warnings.push_back(object + ": reflectance of 1 or more was clamped to 0.999");
+    materials.push_back(std::move(material));
+    return int32_t(materials.size()) - 1;
+}
+
+int32_t Scene::addMesh(Mesh mesh) {
+    const std::string object = quoted("mesh", mesh.name);
+    checkAllFinite(mesh.vertices, object, "vertex");
+    if (mesh.faceOffsets.empty() || mesh.faceOffsets.front() != 0 ||
+        size_t(mesh.faceOffsets.back()) != mesh.cornerVertices.size())
+        throw invalidArgument(object + ": face offsets must run from 0 to the number of corners");
+    for (size_t f = 0; f < mesh.faceCount(); ++f)
+        if (mesh.faceOffsets[f + 1] - mesh.faceOffsets[f] < 3)
+            throw invalidArgument(object + ": face " + std::to_string(f) +
+                                  " has fewer than 3 corners");
+    for (size_t c = 0; c < mesh.cornerVertices.size(); ++c)
+        if (mesh.cornerVertices[c] < 0 || size_t(mesh.cornerVertices[c]) >= mesh.vertices.size())
+            throw invalidArgument(object + ": corner " + std::to_string(c) + " uses vertex " +
+                                  std::to_string(mesh.cornerVertices[c]) + " of " +
+                                  std::to_string(mesh.vertices.size()));
+    for (int32_t id : mesh.faceMaterials)
+        if (id != -1) checked(materials, id, "material");
+    mesh.faceMaterials.resize(mesh.faceCount(), -1);
+    meshes.push_back(std::move(mesh));
+    return int32_t(meshes.size()) - 1;
+}
+
+int32_t Scene::addInstance(Instance instance) {
+    const std::string object = quoted("object", instance.name);
+    checked(meshes, instance.mesh, "mesh");
+    for (int column = 0; column < 4; ++column)
+        if (!isFinite(instance.transform[column]))
+            throw invalidArgument(object + ": its transform is not finite");
+    instances.push_back(std::move(instance));
+    return int32_t(instances.size()) - 1;
+}
+
+int32_t Scene::addLight(Light light) {
+    const std::string object = quoted("light", light.name);
+    if (!isFiniteAndPositive(light.strength))
+        throw invalidArgument(object + ": its strength must be finite and not negative");
+    if (!isFinite(light.position) || !isFinite(light.direction) || !isFinite(light.axisU) ||
+        !isFinite(light.axisV) || !std::isfinite(light.radius) || light.radius < 0 ||
+        !std::isfinite(light.angle) || light.angle < 0)
+        throw invalidArgument(object + ": its position and size must be finite");
+    if (light.kind == Light::Kind::SUN) {
+        if (glm::length(light.direction) == 0)
+            throw invalidArgument(object + ": its direction must not be zero");
+        light.direction = glm::normalize(light.direction);
+    }
+    lights.push_back(std::move(light));
+    return int32_t(lights.size()) - 1;
+}
+
+Material& Scene::material(int32_t id) { return checked(materials, id, "material"); }
+Mesh& Scene::mesh(int32_t id) { return checked(meshes, id, "mesh"); }
+Light& Scene::light(int32_t id) { return checked(lights, id, "light"); }
+
+void Scene::checkImage(int32_t id) const {
+    if (id < 0 || size_t(id) >= images.size())
+        throw invalidArgument("there is no image " + std::to_string(id));
+}
+
+const Material& Scene::materialOf(const Mesh& mesh, size_t face) const {
+    static const Material kDefault;
+    const int32_t id = mesh.faceMaterials[face];
+    return id < 0 ? kDefault : materials[id];
+}
+
+}  // namespace raybundle

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "raybundle/raybundle.h"
+
+namespace raybundle {
+
+// Linear RGB pixels, bottom row first.
+struct Image {
+    std::string name;
+    int width = 0;
+    int height = 0;
+    rb_image_extension extension = RB_IMAGE_REPEAT;
+    std::vector<glm::vec3> pixels;
+};
+
+// Reflectance (diffuse albedo) and emission (exitance, W/m^2) of the front [0] and the back [1]
+// side. The optional image and corner colours, each times its weight, are added to both
+// reflectances.
+struct Material {
+    std::string name;
+    std::array<glm::vec3, 2> reflectance{glm::vec3(0.8f), glm::vec3(0.8f)};
+    std::array<glm::vec3, 2> emission{glm::vec3(0.0f), glm::vec3(0.0f)};
+    int image = -1;
+    glm::vec3 imageWeight{0.0f};
+    bool usesCornerColors = false;
+    glm::vec3 cornerColorWeight{0.0f};
+};
+
+// N-gons over shared vertices, in object space. A corner is a position in cornerVertices; face f
+// has the corners faceOffsets[f] .. faceOffsets[f + 1] - 1.
+struct Mesh {
+    std::string name;
+    std::vector<glm::vec3> vertices;
+    std::vector<int32_t> cornerVertices;
+    std::vector<int32_t> faceOffsets;
+    std::vector<int32_t> faceMaterials;    // per face; -1 is the default material
+    std::vector<glm::vec3> cornerNormals;  // per corner, or empty
+    std::vector<uint64_t> sharpEdges;      // edgeKey of each, ascending
+    std::vector<glm::vec2> uvs;            // per corner, or empty
+    std::vector<glm::vec3> cornerColors;   // per corner, or empty
+
+    size_t faceCount() const { return faceOffsets.size() - 1; }
+    size_t cornerCount() const { return cornerVertices.size(); }
+};
+
+// An edge between two vertices, whichever comes first.
+inline uint64_t edgeKey(int32_t a, int32_t b) {
+    return uint64_t(a < b ? a : b) << 32 | uint64_t(a < b ? b : a);
+}
+
+// The angle of each corner, radians.
+std::vector<float> cornerAngles(const Mesh& mesh);
+
+// A mesh in the world. transform maps object space to world space (the last row is 0 0 0 1).
+struct Instance {
+    std::string name;
+    int32_t mesh = 0;
+    glm::dmat4 transform{1.0};
+    rb_role role = RB_ROLE_BAKE;
+    rb_side side = RB_SIDE_FRONT;
+};
+
+struct Light {
+    enum class Kind { POINT, SUN, AREA };
+    std::string name;
+    Kind kind = Kind::POINT;
+    // W/sr for POINT, W/m^2 at normal incidence for SUN, W/(m^2 sr) for AREA.
+    glm::dvec3 strength{0.0};
+    glm::dvec3 position{0.0};  // POINT, AREA: centre
+    double radius = 0.0;       // POINT
+    rb_point_shape pointShape = RB_POINT_DISK;
+    glm::dvec3 direction{0.0, 0.0, 1.0};  // SUN: unit vector towards it
+    double angle = 0.0;                   // SUN: full angular diameter, radians
+    glm::dvec3 axisU{0.0}, axisV{0.0};    // AREA: half extents; shines towards cross(axisU, axisV)
+    rb_area_shape areaShape = RB_AREA_RECTANGLE;
+    bool hasCone = false;         // POINT with a spot's cone
+    glm::dmat3 worldToCone{1.0};  // into the space where the cone looks along -Z
+    double coneAngle = 0.0;       // full opening, radians
+    double coneBlend = 0.0;       // soft share of the cone, 0 to 1
+    bool coneDims = false;        // the intensity falls with the cosine to the axis
+};
+
+// Everything the caller gave, as given, after validation. Nothing of it changes during a bake.
+class Scene {
+  public:
+    // Each adds one object and returns its id; throws Error(INVALID_ARGUMENT) that names the
+    // object.
+    int32_t addImage(Image image);
+    int32_t addMaterial(Material material);
+    int32_t addMesh(Mesh mesh);
+    int32_t addInstance(Instance instance);
+    int32_t addLight(Light light);
+
+    // Checks that an id was given out; `what` names its kind in the message.
+    Material& material(int32_t id);
+    Mesh& mesh(int32_t id);
+    Light& light(int32_t id);
+    void checkImage(int32_t id) const;
+
+    const Material& materialOf(const Mesh& mesh, size_t face) const;
+
+    std::vector<Image> images;
+    std::vector<Material> materials;
+    std::vector<Mesh> meshes;
+    std::vector<Instance> instances;
+    std::vector<Light> lights;
+    glm::vec3 worldRadiance{0.0f};      // W/(m^2 sr)
+    std::vector<std::string> warnings;  // what was changed to make the scene usable
+};
+
+}  // namespace raybundle

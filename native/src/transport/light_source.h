@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Light sources as the first shot sees them: points to sample, and where there is one the closed
+// form of the irradiance without occluders. Sources: Lambert's formula for polygons
+// (method.md 2.1); Blender's light units (docs/method.md, "Lights").
+#pragma once
+
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "patches/patches.h"
+#include "scene/scene.h"
+
+namespace raybundle {
+
+// What one sampled point of a source gives to a receiver if nothing is in between.
+struct LightSample {
+    glm::vec3 direction{0.0f};   // unit vector towards the sampled point
+    float distance = 0;          // metres; infinite for suns
+    glm::vec3 irradiance{0.0f};  // W/m^2, divided by the sample's probability; 0: receives nothing
+};
+
+// A ray that leaves a source with an equal share of its power.
+struct EmittedRay {
+    glm::vec3 origin{0.0f}, direction{0.0f};
+    float weight = 1;  // times the mean share
+};
+
+// Sample of a surface point `on` with normal onNormal and radiance towards the receiver; area: m^2
+// per sample.
+LightSample surfaceSample(const glm::vec3& point, const glm::vec3& normal, const glm::vec3& on,
+                          const glm::vec3& onNormal, const glm::vec3& radiance, float area);
+
+class LightSource {
+  public:
+    virtual ~LightSource() = default;
+
+    // Samples the source from a point with a unit normal; uv uniform in [0, 1)^2.
+    virtual LightSample sample(const glm::vec3& point, const glm::vec3& normal,
+                               glm::vec2 uv) const = 0;
+
+    // Irradiance without occluders in closed form, W/m^2, if the source has one.
+    virtual std::optional<glm::vec3> irradiance(const glm::vec3& point,
+                                                const glm::vec3& normal) const = 0;
+
+    // Whether no point within `radius` of a point with a unit normal can get any of its light,
+    // occluders aside. False where that is not certain.
+    virtual bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal,
+                              float radius) const = 0;
+
+    // A lower bound of the distance from a point to the source, metres.
+    virtual float distance(const glm::vec3& point) const = 0;
+
+    // Emitted power, W; zero for sources whose power depends on where their light arrives: suns,
+    // and disks that turn towards each receiver.
+    virtual glm::vec3 power() const = 0;
+
+    // A ray of the source's light; u uniform in [0, 1)^4. Not called when power() is zero.
+    virtual EmittedRay emit(const glm::vec4& u) const = 0;
+};
+
+// All sources of the scene whose light the first shot gathers: its lights, and the emissive faces
+// of sides that are marked. `patches` must outlive them.
+std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
+                                                       const std::vector<bool>& gatheredSides);
+
+// Irradiance at a point with a unit normal from a planar polygon of radiance 1 around it, by
+// Lambert's formula after clipping at the horizon; the polygon's side does not matter. m^2 and sr
+// cancel.
+double polygonIrradiance(const glm::dvec3& point, const glm::dvec3& normal,
+                         const glm::dvec3* polygon, int count);
+
+}  // namespace raybundle

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/line_reuse.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/gtc/constants.hpp>
+
+#include "transport/sobol.h"
+#include "transport/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+using Field = std::vector<glm::vec3>;  // per side
+
+constexpr int kMaxIterations = 1000;
+constexpr size_t kGrain = 2048;  // sides per task
+constexpr int kMaxSweeps = 64;   // over the starved sides
+constexpr float kSettled = 1e-5f;
+// Local rays per starved side: kLocalRays, less where there are many, to stay below kMostLocalRays
+// in all.
+constexpr size_t kLocalRays = 64, kFewLocalRays = 16, kMostLocalRays = 8 << 20;
+// Each step of the balancing halves the deviation of the measured areas from the true ones.
+constexpr int kBalanceSteps = 8;
+constexpr float kMaxLineWeight =
+    2.0f;  // and at least its inverse: a few lines cannot stand for many
+
+template <class Body>
+void forEachSide(size_t n, const Body& body) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
+        for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+    });
+}
+
+// In double and in an order that does not depend on the number of threads.
+glm::dvec3 dot(const Field& a, const Field& b) {
+    return tbb::parallel_deterministic_reduce(
+        tbb::blocked_range<size_t>(0, a.size(), kGrain), glm::dvec3(0.0),
+        [&](const auto& range, glm::dvec3 sum) {
+            for (size_t i = range.begin(); i < range.end(); ++i)
+                sum += glm::dvec3(a[i]) * glm::dvec3(b[i]);
+            return sum;
+        },
+        std::plus<>());
+}
+
+uint32_t linesOf(const std::array<uint32_t, 2>& lines, Half half) {
+    return half == Half::BOTH ? lines[0] + lines[1] : lines[size_t(half)];
+}
+
+// What a row is multiplied with: padded, so that one SIMD register holds a side.
+struct alignas(16) Padded {
+    float v[4];
+    Padded() : v{0, 0, 0, 0} {}
+    explicit Padded(const glm::vec3& x) : v{x.x, x.y, x.z, 0} {}
+};
+using PaddedField = std::vector<Padded>;  // per side
+
+template <class Lines>
+glm::vec3 rowTimes(const LineCounts& counts, size_t i, const PaddedField& x, const Lines& lines) {
+    Padded sum;
+    const LineCount* const end = counts.rowEnd(uint32_t(i));
+    for (const LineCount* c = counts.rowBegin(uint32_t(i)); c < end; ++c) {
+        const float weight = float(int32_t(lines(*c)));
+        const Padded& other = x[c->side];
+        for (int k = 0; k < 4; ++k) sum.v[k] += weight * other.v[k];
+    }
+    return {sum.v[0], sum.v[1], sum.v[2]};
+}
+
+// sum_j c_ij x_j
+glm::vec3 rowTimes(const LineCounts& counts, Half half, size_t i, const PaddedField& x) {
+    if (half == Half::BOTH)
+        return rowTimes(counts, i, x, [](const LineCount& c) { return c.lines[0] + c.lines[1]; });
+    return rowTimes(counts, i, x, [h = size_t(half)](const LineCount& c) { return c.lines[h]; });
+}
+
+// sum_j c_ij x_j and the lines to the sky
+float weightedLines(const LineCounts& counts, Half half, size_t i, const std::vector<float>& x) {
+    float sum = float(linesOf(counts.sky[i], half));
+    const LineCount* const end = counts.rowEnd(uint32_t(i));
+    for (const LineCount* c = counts.rowBegin(uint32_t(i)); c < end; ++c)
+        sum += float(int32_t(linesOf(c->lines, half))) * x[c->side];
+    return sum;
+}
+
+glm::dvec3 ratio(const glm::dvec3& a, const glm::dvec3& b) {
+    return {b.x > 0 ? a.x / b.x : 0, b.y > 0 ? a.y / b.y : 0, b.z > 0 ? a.z / b.z : 0};
+}
+
+}  // namespace
+
+LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const Field& gathered,
+                     const Field& emission, const glm::vec3& worldRadiance)
+    : patches(patches),
+      counts(counts),
+      gathered(gathered),
+      emission(emission),
+      worldRadiance(worldRadiance),
+      hasEmission(std::any_of(emission.begin(), emission.end(),
+                              [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
+
+glm::vec3 LineReuse::throughExposed(size_t side) const {
+    const float open = float(counts.total[side][0] + counts.total[side][1]);
+    const float touching = float(counts.touching[side]);
+    if (touching == 0) return gathered[side];
+    return open > 0 ? gathered[side] * (1 + touching / open) : glm::vec3(0.0f);
+}
+
+std::vector<float> LineReuse::lineWeights(Half half) const {
+    const size_t n = counts.sideCount();
+    std::vector<float> x(n, 1.0f);
+    if (half != Half::BOTH) return x;
+    const std::vector<float> exposed = counts.exposedShare();
+    double lines = 0, area = 0;
+    for (size_t i = 0; i < n; ++i) {
+        lines += linesOf(counts.total[i], half);
+        area += double(patches.area[i / 2] * exposed[i]);
+    }
+    std::vector<float> next(n);
+    for (int step = 0; step < kBalanceSteps; ++step) {
+        forEachSide(n, [&](size_t i) {
+            const float row = weightedLines(counts, half, i, x);
+            const float wanted = float(patches.area[i / 2] * exposed[i] * lines / area);
+            next[i] = row > 0 ? std::clamp(std::sqrt(x[i] * wanted / row), 1 / kMaxLineWeight,
+                                           kMaxLineWeight)
+                              : 1;
+        });
+        x.swap(next);
+    }
+    return x;
+}
+
+Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const {
+    const size_t n = counts.sideCount();
+    Irradiance result{Field(n), Field(n)};
+    const std::vector<float> x = lineWeights(half);
+    std::vector<float> m(n);  // weighted lines of each side
+    PaddedField scaled(n);    // what the matrix multiplies next
+    forEachSide(n, [&](size_t i) { scaled[i] = Padded(glm::vec3(x[i])); });
+    forEachSide(n, [&](size_t i) {
+        m[i] =
+            half == Half::BOTH
+                ? x[i] * (rowTimes(counts, half, i, scaled).x + float(linesOf(counts.sky[i], half)))
+                : float(linesOf(counts.total[i], half));
+    });
+
+    // Direct light.
+    const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
+    forEachSide(n, [&](size_t i) { scaled[i] = Padded(x[i] * emission[i]); });
+    forEachSide(n, [&](size_t i) {
+        result.direct[i] = throughExposed(i);
+        if (m[i] == 0) return;
+        glm::vec3 sum = float(linesOf(counts.sky[i], half)) * worldExitance;
+        if (hasEmission) sum += rowTimes(counts, half, i, scaled);
+        result.direct[i] += x[i] * sum / m[i];
+    });
+
+    // The scaling, the right-hand side and the first residual.
+    Field scale(n), lineScale(n), z(n), r(n), p(n), product(n);
+    forEachSide(n, [&](size_t i) {
+        scale[i] = m[i] > 0 ? glm::sqrt(patches.reflectance[i] / m[i]) : glm::vec3(0.0f);
+        lineScale[i] = x[i] * scale[i];
+        for (int c = 0; c < 3; ++c) z[i][c] = scale[i][c] > 0 ? reflected[i][c] / scale[i][c] : 0;
+        product[i] = scale[i] * m[i] * result.direct[i];  // the right-hand side, until the loop
+        scaled[i] = Padded(lineScale[i] * z[i]);
+    });
+    const glm::dvec3 enough = dot(product, product) * double(tolerance) * double(tolerance);
+    forEachSide(n, [&](size_t i) {
+        r[i] = product[i] - (z[i] - lineScale[i] * rowTimes(counts, half, i, scaled));
+        p[i] = r[i];
+    });
+
+    // Conjugate gradients, each channel with its own coefficients.
+    glm::dvec3 rr = dot(r, r);
+    int iterations = 0;
+    while (glm::any(glm::greaterThan(rr, enough)) && iterations < kMaxIterations) {
+        forEachSide(n, [&](size_t i) { scaled[i] = Padded(lineScale[i] * p[i]); });
+        forEachSide(n, [&](size_t i) {
+            product[i] = p[i] - lineScale[i] * rowTimes(counts, half, i, scaled);
+        });
+        const glm::vec3 alpha(ratio(rr, dot(p, product)));
+        forEachSide(n, [&](size_t i) {
+            z[i] += alpha * p[i];
+            r[i] -= alpha * product[i];
+        });
+        const glm::dvec3 next = dot(r, r);
+        const glm::vec3 beta(ratio(next, rr));
+        forEachSide(n, [&](size_t i) { p[i] = r[i] + beta * p[i]; });
+        rr = next;
+        ++iterations;
+    }
+
+    forEachSide(n, [&](size_t i) {
+        reflected[i] = scale[i] * z[i];
+        scaled[i] = Padded(x[i] * reflected[i]);
+    });
+    forEachSide(n, [&](size_t i) {
+        result.indirect[i] =
+            m[i] > 0 ? x[i] * rowTimes(counts, half, i, scaled) / m[i] : glm::vec3(0.0f);
+    });
+    return result;
+}
+
+size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minLines, uint32_t seed,
+                                     const std::vector<bool>& wanted, const Field& reflected,
+                                     Irradiance& irradiance) const {
+    auto linesAt = [&](uint32_t side) {
+        return float(counts.total[side][0] + counts.total[side][1]);
+    };
+    // In hand: the starved sides that are wanted, later those that their rays meet too.
+    std::vector<uint32_t> starved;
+    std::vector<bool> isOther(counts.sideCount());  // starved, not in hand yet
+    for (uint32_t i = 0; i < counts.sideCount(); ++i) {
+        const bool isStarved =
+            counts.total[i][0] + counts.total[i][1] + counts.touching[i] < minLines;
+        if (isStarved && wanted[i])
+            starved.push_back(i);
+        else
+            isOther[i] = isStarved;
+    }
+    const size_t rays =
+        starved.empty() ? 0
+                        : std::clamp(kMostLocalRays / starved.size(), kFewLocalRays, kLocalRays);
+
+    // Trace local rays and add up their direct light. The lines that the side has are
+    // cosine-distributed too: weigh all alike.
+    constexpr uint32_t kNone = UINT32_MAX;
+    const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
+    std::vector<uint32_t> hits;
+    Field fromLines;  // indirect irradiance times the lines
+    for (size_t first = 0; first < starved.size();) {
+        const size_t last = starved.size();
+        hits.resize(last * rays, kNone);
+        fromLines.resize(last);
+        tbb::parallel_for(first, last, [&](size_t k) {
+            const uint32_t side = starved[k];
+            const glm::vec3 normal = patches.normal(side);
+            glm::vec3 direct(0.0f);
+            for (size_t i = 0; i < rays; ++i) {
+                const glm::vec4 u = sobolPoint(uint32_t(i), hash(seed, side));
+                const auto hit = visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}),
+                                                     cosineDirection(normal, {u.z, u.w}));
+                if (hit) hits[k * rays + i] = *hit;
+                direct += hit ? emission[*hit] : worldExitance;
+            }
+            const float m = linesAt(side);
+            const glm::vec3 fromSources = throughExposed(side);
+            const glm::vec3 lineDirect = irradiance.direct[side] - fromSources;
+            irradiance.direct[side] = fromSources + (m * lineDirect + direct) / (m + float(rays));
+            fromLines[k] = m * irradiance.indirect[side];
+        });
+        for (size_t k = first * rays; k < last * rays; ++k)
+            if (hits[k] != kNone && isOther[hits[k]]) {
+                isOther[hits[k]] = false;
+                starved.push_back(hits[k]);
+            }
+        first = last;
+    }
+
+    // Starved sides may see each other: sweep until their reflected light has settled.
+    Field known = reflected, next(starved.size());
+    for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
+        tbb::parallel_for(size_t(0), starved.size(), [&](size_t k) {
+            const uint32_t side = starved[k];
+            glm::vec3 sum = fromLines[k];
+            for (size_t i = 0; i < rays; ++i)
+                if (const uint32_t hit = hits[k * rays + i]; hit != kNone) sum += known[hit];
+            irradiance.indirect[side] = sum / (linesAt(side) + float(rays));
+            next[k] =
+                patches.reflectance[side] * (irradiance.direct[side] + irradiance.indirect[side]);
+        });
+        glm::vec3 change(0.0f), most(0.0f);
+        for (size_t k = 0; k < starved.size(); ++k) {
+            change = glm::max(change, glm::abs(next[k] - known[starved[k]]));
+            most = glm::max(most, next[k]);
+            known[starved[k]] = next[k];
+        }
+        if (glm::all(glm::lessThanEqual(change, kSettled * most))) break;
+    }
+    return starved.size();
+}
+
+}  // namespace raybundle

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// LINE_REUSE: the radiosity system on the line counts of all bundles, solved to convergence.
+//
+//   H_i = direct_i + (1 / m_i) sum_j c_ij R_j,   R_i = rho_i H_i   (reflected exitance)
+//   direct_i = gathered_i + (sum_j c_ij E_j + sky_i pi L_world) / m_i
+//
+// With s_i = sqrt(rho_i / m_i) and R_i = s_i z_i it becomes (I - S C S) z = S M direct, symmetric
+// and positive definite, unit diagonal, solved by conjugate gradients for the three channels at
+// once.
+//
+// Sources: thesis section 2.3.2 (eq. 2.30: F = r_ij / r_i) and 2.1.4 (the radiosity system);
+// method.md 5.1 (c2). Differs: the thesis never solves on the counts; it transports power while it
+// traces. Each line is used for every bounce here. m_i counts the lines that leave the scene too,
+// so that rows sum to 1 and the system always contracts. The last solve weights each line by x_i
+// x_j, so that m_i becomes proportional to the true area of the patch while rows still sum to 1 and
+// the matrix stays symmetric (Sinkhorn scaling, method.md 1.3 c3): then no power is lost or made
+// between patches.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "bundles/line_counts.h"
+#include "patches/patches.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// Irradiance per side, W/m^2, in two parts.
+struct Irradiance {
+    std::vector<glm::vec3> direct;    // straight from sources, emission and world
+    std::vector<glm::vec3> indirect;  // after one reflection or more
+};
+
+// Which bundles a solve looks at.
+enum class Half { FIRST = 0, SECOND = 1, BOTH = 2 };
+
+class LineReuse {
+  public:
+    // gathered: direct irradiance of the first shot; emission: what the bundles carry; both per
+    // side, W/m^2. All references must outlive the object.
+    LineReuse(const Patches& patches, const LineCounts& counts,
+              const std::vector<glm::vec3>& gathered, const std::vector<glm::vec3>& emission,
+              const glm::vec3& worldRadiance);
+
+    // Solves until the residual is below `tolerance` of the right-hand side in every channel.
+    // `reflected` (R, per side, W/m^2) holds the first guess and takes the solution.
+    Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const;
+
+    // The factors x_i of the lines of each side in a solve: 1 for a half, balanced for both.
+    std::vector<float> lineWeights(Half half) const;
+
+    // Adds local rays (cosine distribution, weighted like the lines the side has) to the irradiance
+    // of wanted sides that have fewer than `minLines` lines, and to that of other such sides that
+    // these rays meet. Returns the number of sides.
+    size_t gatherStarvedSides(const Visibility& visibility, uint32_t minLines, uint32_t seed,
+                              const std::vector<bool>& wanted,
+                              const std::vector<glm::vec3>& reflected,
+                              Irradiance& irradiance) const;
+
+  private:
+    // What the first shot gathered over the whole patch came in through its exposed part: the
+    // irradiance there, W/m^2.
+    glm::vec3 throughExposed(size_t side) const;
+
+    const Patches& patches;
+    const LineCounts& counts;
+    const std::vector<glm::vec3>& gathered;
+    const std::vector<glm::vec3>& emission;
+    const glm::vec3 worldRadiance;
+    bool hasEmission = false;
+};
+
+}  // namespace raybundle

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/mesh_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <map>
+
+#include "transport/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+// A source of more parents than this has no closed form: sampling it is quicker.
+constexpr size_t kMaxPolygons = 16;
+
+// An edge's part of Lambert's sum: the angle it spans times the cosine of its normal; a and b are
+// relative to the receiver.
+double edgeTerm(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& normal) {
+    const glm::dvec3 c = glm::cross(a, b);
+    const double length = glm::length(c);
+    if (length <= 0) return 0;
+    // In float the angle keeps its relative precision, which is all that the sum needs.
+    return double(std::atan2(float(length), float(glm::dot(a, b)))) * glm::dot(c, normal) / length;
+}
+
+float strength(const glm::vec3& emission) { return emission.x + emission.y + emission.z; }
+
+}  // namespace
+
+double polygonIrradiance(const glm::dvec3& point, const glm::dvec3& normal,
+                         const glm::dvec3* polygon, int count) {
+    // Clip at the horizon of the receiver.
+    std::array<glm::dvec3, 8> clipped;
+    int n = 0;
+    for (int k = 0; k < count; ++k) {
+        const glm::dvec3 a = polygon[k] - point, b = polygon[(k + 1) % count] - point;
+        const double ha = glm::dot(a, normal), hb = glm::dot(b, normal);
+        if (ha > 0) clipped[n++] = a;
+        if ((ha > 0) != (hb > 0)) clipped[n++] = a + (ha / (ha - hb)) * (b - a);
+    }
+    double sum = 0;
+    for (int k = 0; k < n; ++k) {
+        const glm::dvec3 a = clipped[k], b = clipped[(k + 1) % n];
+        sum += edgeTerm(a, b, normal);
+    }
+    return 0.5 * std::abs(sum);
+}
+
+MeshSource::MeshSource(const Patches& patches, std::vector<uint32_t> parents,
+                       const std::array<glm::vec3, 2>& emission)
+    : patches(patches), parents(std::move(parents)), emission(emission) {
+    for (uint32_t parent : this->parents) {
+        total += patches.parents[parent].area();
+        areaUpTo.push_back(total);
+    }
+    boundSource();
+}
+
+LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
+                               glm::vec2 uv) const {
+    const auto [on, normal] = onSurface(uv);
+    const bool front = glm::dot(point - on, normal) > 0;
+    return surfaceSample(point, receiver, on, front ? normal : -normal,
+                         emission[front ? 0 : 1] / glm::pi<float>(), float(total));
+}
+
+std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
+                                                const glm::vec3& receiver) const {
+    if (parents.size() > kMaxPolygons) return std::nullopt;
+    if (const auto whole = outlineIrradiance(point, receiver)) return *whole;
+    glm::vec3 sum(0.0f);
+    for (uint32_t index : parents) {
+        const Parent& parent = patches.parents[index];
+        const bool front = glm::dot(point - parent.origin, parent.normal) > 0;
+        const glm::vec3 radiance = emission[front ? 0 : 1] / glm::pi<float>();
+        if (radiance == glm::vec3(0.0f)) continue;
+        const int count = parent.isTriangle ? 3 : 4;
+        glm::dvec3 corners[4];
+        for (int k = 0; k < count; ++k) corners[k] = patches.vertices[parent.vertex[k]];
+        sum += radiance * float(polygonIrradiance(point, receiver, corners, count));
+    }
+    return sum;
+}
+
+bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
+                              float radius) const {
+    if (glm::dot(receiver, centre - point) < -(radius + extent)) return true;
+    return isPlanar &&
+           emission[glm::dot(point - centre, planeNormal) > 0 ? 0 : 1] == glm::vec3(0.0f) &&
+           std::abs(glm::dot(point - centre, planeNormal)) > radius;
+}
+
+EmittedRay MeshSource::emit(const glm::vec4& r) const {
+    // Choose the side by its share of the power.
+    const float share0 = strength(emission[0]) / (strength(emission[0]) + strength(emission[1]));
+    const bool front = r.x < share0;
+    const float u = front ? r.x / share0 : (r.x - share0) / (1 - share0);
+    const auto [on, normal] = onSurface({std::min(u, 0.9999999f), r.y});
+    return {on, cosineDirection(front ? normal : -normal, {r.z, r.w}), 1};
+}
+
+// The closed form of a planar source that lies wholly above the receiver's horizon: the edges
+// inside it cancel, so its outline is enough.
+std::optional<glm::vec3> MeshSource::outlineIrradiance(const glm::vec3& point,
+                                                       const glm::vec3& receiver) const {
+    if (!isPlanar) return std::nullopt;
+    const glm::dvec3 p(point), n(receiver);
+    for (const auto& [a, b] : outline)
+        if (glm::dot(a - p, n) <= 0) return std::nullopt;
+    double sum = 0;
+    for (const auto& [a, b] : outline) sum += edgeTerm(a - p, b - p, n);
+    const bool front = glm::dot(point - centre, planeNormal) > 0;
+    return emission[front ? 0 : 1] / glm::pi<float>() * float(0.5 * std::abs(sum));
+}
+
+void MeshSource::findOutline() {
+    std::map<std::pair<uint32_t, uint32_t>, int> edges;
+    for (uint32_t index : parents) {
+        const Parent& parent = patches.parents[index];
+        const int n = parent.isTriangle ? 3 : 4;
+        for (int k = 0; k < n; ++k) {
+            const uint32_t a = parent.vertex[size_t(k)], b = parent.vertex[size_t((k + 1) % n)];
+            const auto opposite = edges.find({b, a});
+            if (opposite != edges.end())
+                edges.erase(opposite);
+            else
+                ++edges[{a, b}];
+        }
+    }
+    for (const auto& [edge, count] : edges)
+        outline.emplace_back(patches.vertices[edge.first], patches.vertices[edge.second]);
+}
+
+// Sphere around the source, and whether it lies in one plane with one front.
+void MeshSource::boundSource() {
+    glm::vec3 low(INFINITY), high(-INFINITY);
+    auto forEachVertex = [&](const auto& body) {
+        for (uint32_t index : parents) {
+            const Parent& parent = patches.parents[index];
+            for (int k = 0; k < (parent.isTriangle ? 3 : 4); ++k)
+                body(patches.vertices[parent.vertex[k]]);
+        }
+    };
+    forEachVertex([&](const glm::vec3& v) {
+        low = glm::min(low, v);
+        high = glm::max(high, v);
+    });
+    centre = 0.5f * (low + high);
+    extent = 0.5f * glm::length(high - low);
+    const Parent& first = patches.parents[parents.front()];
+    planeNormal = first.normal;
+    isPlanar = true;
+    forEachVertex([&](const glm::vec3& v) {
+        isPlanar = isPlanar && std::abs(glm::dot(v - centre, planeNormal)) <= 1e-5f * extent;
+    });
+    for (uint32_t index : parents) {
+        const Parent& parent = patches.parents[index];
+        isPlanar = isPlanar && glm::dot(parent.normal, planeNormal) > 0;
+    }
+    if (isPlanar && parents.size() <= kMaxPolygons) findOutline();
+}
+
+// A point uniform by area and the front's normal there.
+std::pair<glm::vec3, glm::vec3> MeshSource::onSurface(glm::vec2 uv) const {
+    const double at = uv.x * total;
+    const size_t k = std::min<size_t>(
+        size_t(std::upper_bound(areaUpTo.begin(), areaUpTo.end(), at) - areaUpTo.begin()),
+        parents.size() - 1);
+    const double before = k ? areaUpTo[k - 1] : 0;
+    const Parent& parent = patches.parents[parents[k]];
+    float s = float(std::clamp((at - before) / (areaUpTo[k] - before), 0.0, 1.0)), t = uv.y;
+    if (parent.isTriangle && s + t > 1) {
+        s = 1 - s;
+        t = 1 - t;
+    }
+    return {parent.position({s, t}), parent.normal};
+}
+
+}  // namespace raybundle

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "transport/light_source.h"
+
+namespace raybundle {
+
+// The emissive faces of one object and material.
+class MeshSource : public LightSource {
+  public:
+    // parents: into Patches::parents; emission: of their front and back, W/m^2. `patches` must
+    // outlive it.
+    MeshSource(const Patches& patches, std::vector<uint32_t> parents,
+               const std::array<glm::vec3, 2>& emission);
+
+    LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
+                       glm::vec2 uv) const override;
+    std::optional<glm::vec3> irradiance(const glm::vec3& point,
+                                        const glm::vec3& receiver) const override;
+    bool isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
+                      float radius) const override;
+    float distance(const glm::vec3& point) const override {
+        return glm::length(centre - point) - extent;
+    }
+    glm::vec3 power() const override { return float(total) * (emission[0] + emission[1]); }
+    EmittedRay emit(const glm::vec4& u) const override;
+
+  private:
+    std::optional<glm::vec3> outlineIrradiance(const glm::vec3& point,
+                                               const glm::vec3& receiver) const;
+    void boundSource();
+    void findOutline();
+    std::pair<glm::vec3, glm::vec3> onSurface(glm::vec2 uv) const;
+
+    const Patches& patches;
+    const std::vector<uint32_t> parents;
+    const std::array<glm::vec3, 2> emission;  // W/m^2, front and back
+    std::vector<double> areaUpTo;             // per parent, cumulative, m^2
+    double total = 0;                         // m^2
+    glm::vec3 centre{0.0f}, planeNormal{0.0f};
+    float extent = 0;  // radius of a sphere around centre, metres
+    bool isPlanar = false;
+    std::vector<std::pair<glm::dvec3, glm::dvec3>> outline;  // of a planar source, edge by edge
+};
+
+}  // namespace raybundle

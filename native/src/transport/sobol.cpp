@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/sobol.h"
+
+namespace raybundle {
+namespace {
+
+using Columns = std::array<std::array<uint32_t, 32>, 4>;
+
+// Primitive polynomials of degree s with coefficients a, and initial numbers m (Joe and Kuo).
+Columns sobolColumns() {
+    struct Polynomial {
+        int s;
+        uint32_t a;
+        std::array<uint32_t, 3> m;
+    };
+    const std::array<Polynomial, 3> polynomials = {
+        Polynomial{1, 0, {1, 0, 0}}, Polynomial{2, 1, {1, 3, 0}}, Polynomial{3, 1, {1, 3, 1}}};
+    Columns v{};
+    for (int k = 0; k < 32; ++k) v[0][k] = 1u << (31 - k);
+    for (int d = 0; d < 3; ++d) {
+        const auto& [s, a, m] = polynomials[d];
+        for (int k = 0; k < 32; ++k) {
+            if (k < s) {
+                v[d + 1][k] = m[k] << (31 - k);
+                continue;
+            }
+            v[d + 1][k] = v[d + 1][k - s] ^ (v[d + 1][k - s] >> s);
+            for (int i = 1; i < s; ++i)
+                if ((a >> (s - 1 - i)) & 1) v[d + 1][k] ^= v[d + 1][k - i];
+        }
+    }
+    return v;
+}
+
+// Most points are taken from the beginning of the sequence.
+constexpr uint32_t kTableSize = 1024;
+using Point = std::array<uint32_t, 4>;
+
+Point sobolBits(uint32_t index) {
+    static const Columns kColumns = sobolColumns();
+    Point point{};
+    for (int d = 0; d < 4; ++d)
+        for (uint32_t i = index, k = 0; i; i >>= 1, ++k)
+            if (i & 1) point[d] ^= kColumns[d][k];
+    return point;
+}
+
+const std::array<Point, kTableSize>& sobolTable() {
+    static const std::array<Point, kTableSize> table = [] {
+        std::array<Point, kTableSize> points;
+        for (uint32_t i = 0; i < kTableSize; ++i) points[i] = sobolBits(i);
+        return points;
+    }();
+    return table;
+}
+
+}  // namespace
+
+uint32_t hash(uint32_t a, uint32_t b) {
+    uint64_t z = (uint64_t(a) << 32 | b) + 0x9e3779b97f4a7c15ull;  // splitmix64
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+    return uint32_t(z ^ (z >> 31));
+}
+
+glm::vec4 sobolPoint(uint32_t index, uint32_t seed) {
+    const Point bits = index < kTableSize ? sobolTable()[index] : sobolBits(index);
+    glm::vec4 point;
+    // The top 24 bits fit a float and stay below 1.
+    for (int d = 0; d < 4; ++d)
+        point[d] = float((bits[d] ^ hash(seed, uint32_t(d))) >> 8) * 0x1p-24f;
+    return point;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <glm/gtc/constants.hpp>
+#include <utility>
+
+namespace raybundle {
+
+// Two unit vectors that make a right-handed frame with n.
+inline std::pair<glm::vec3, glm::vec3> frame(const glm::vec3& n) {
+    const glm::vec3 axis = std::abs(n.z) < 0.9f ? glm::vec3(0, 0, 1) : glm::vec3(1, 0, 0);
+    const glm::vec3 x = glm::normalize(glm::cross(axis, n));
+    return {x, glm::cross(n, x)};
+}
+
+// Shirley and Chiu, "A Low Distortion Map Between Disk and Square" (1997).
+inline glm::vec2 onDisk(glm::vec2 uv) {
+    const glm::vec2 p = 2.0f * uv - 1.0f;
+    if (p.x == 0 && p.y == 0) return p;
+    const float quarter = glm::quarter_pi<float>();
+    if (std::abs(p.x) > std::abs(p.y))
+        return p.x * glm::vec2(std::cos(quarter * p.y / p.x), std::sin(quarter * p.y / p.x));
+    return p.y * glm::vec2(std::sin(quarter * p.x / p.y), std::cos(quarter * p.x / p.y));
+}
+
+inline glm::vec3 cosineDirection(const glm::vec3& normal, glm::vec2 uv) {
+    const glm::vec2 d = onDisk(uv);
+    const auto [x, y] = frame(normal);
+    return x * d.x + y * d.y + normal * std::sqrt(std::max(0.0f, 1 - glm::dot(d, d)));
+}
+
+inline glm::vec3 uniformDirection(glm::vec2 uv) {
+    const float z = 1 - 2 * uv.x, r = std::sqrt(std::max(0.0f, 1 - z * z));
+    const float phi = glm::two_pi<float>() * uv.y;
+    return {r * std::cos(phi), r * std::sin(phi), z};
+}
+
+}  // namespace raybundle

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "visibility/visibility.h"
+
+#include <embree3/rtcore.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "bake/error.h"
+#include "patches/coincidence.h"
+
+namespace raybundle {
+namespace {
+
+// Share of the scene's radius: some tens of float rounding errors.
+constexpr float kRelativeOffset = 2e-6f;
+
+[[noreturn]] void fail(RTCError code, const char* what) {
+    throw Error(code == RTC_ERROR_OUT_OF_MEMORY ? RB_ERROR_OUT_OF_MEMORY : RB_ERROR_UNKNOWN,
+                std::string("the ray tracer failed: ") + what);
+}
+
+}  // namespace
+
+struct Visibility::Embree {
+    RTCDevice device = nullptr;
+    RTCScene scene = nullptr;
+    std::vector<uint32_t> parentOfTriangle;
+
+    ~Embree() {
+        if (scene) rtcReleaseScene(scene);
+        if (device) rtcReleaseDevice(device);
+    }
+};
+
+Visibility::Visibility(const Patches& patches)
+    : patches(patches),
+      surfaceOffset(kRelativeOffset * patches.radius),
+      embree(std::make_unique<Embree>()) {
+    embree->device = rtcNewDevice(nullptr);
+    if (!embree->device) fail(rtcGetDeviceError(nullptr), "no device");
+    embree->scene = rtcNewScene(embree->device);
+    // Robust: rays must not slip between neighbouring triangles.
+    rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+
+    for (size_t i = 0; i < patches.parents.size(); ++i) {
+        embree->parentOfTriangle.push_back(uint32_t(i));
+        if (!patches.parents[i].isTriangle) embree->parentOfTriangle.push_back(uint32_t(i));
+    }
+    const size_t triangles = embree->parentOfTriangle.size();
+    if (triangles > 0) {
+        RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        float* vertices = static_cast<float*>(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                    3 * sizeof(float), patches.vertices.size()));
+        uint32_t* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
+            geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), triangles));
+        if (!vertices || !indices) fail(rtcGetDeviceError(embree->device), "no memory");
+        std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
+        for (const Parent& parent : patches.parents) {
+            const auto& v = parent.vertex;
+            for (uint32_t index : {v[0], v[1], v[2]}) *indices++ = index;
+            if (!parent.isTriangle)
+                for (uint32_t index : {v[0], v[2], v[3]}) *indices++ = index;
+        }
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(embree->scene, geometry);
+        rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(embree->scene);
+    const RTCError error = rtcGetDeviceError(embree->device);
+    if (error != RTC_ERROR_NONE) fail(error, "building its tree");
+}
+
+Visibility::~Visibility() = default;
+
+namespace {
+
+// What the filter below needs to know of the ray; starts with Embree's own part.
+struct Start {
+    RTCIntersectContext context;
+    const Patches* patches;
+    const uint32_t* parentOfTriangle;
+    uint32_t parent;
+    bool isFront;      // the ray leaves the front of the parent
+    glm::vec3 normal;  // of the side
+    float zone;        // height over the side within which a hit coincides with it, metres
+};
+
+// Lets a ray pass the surface that it starts on, and what coincides with it on its other side.
+void passStart(const RTCFilterFunctionNArguments* args) {
+    const Start& start = *reinterpret_cast<const Start*>(args->context);
+    const uint32_t other = start.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    if (other == start.parent) {
+        args->valid[0] = 0;
+        return;
+    }
+    const glm::vec3 direction(RTCRayN_dir_x(args->ray, args->N, 0),
+                              RTCRayN_dir_y(args->ray, args->N, 0),
+                              RTCRayN_dir_z(args->ray, args->N, 0));
+    const float height = RTCRayN_tfar(args->ray, args->N, 0) * glm::dot(direction, start.normal);
+    if (height > start.zone) return;
+    const Parent& a = start.patches->parents[start.parent];
+    const Parent& b = start.patches->parents[other];
+    const float turn = glm::dot(glm::cross(b.a, b.b), direction);
+    // Faces of one object that the ray crosses the same way lie beside its start; of others, those
+    // that coincide with it may lie behind it.
+    const bool alike = a.instance == b.instance && (turn > 0) == start.isFront;
+    if (alike || (areParallel(a, b) &&
+                  !comesBefore(*start.patches, start.parent, !start.isFront, other, turn < 0)))
+        args->valid[0] = 0;
+}
+
+void setRay(RTCRay& ray, const glm::vec3& origin, const glm::vec3& direction, float distance) {
+    ray.org_x = origin.x;
+    ray.org_y = origin.y;
+    ray.org_z = origin.z;
+    ray.dir_x = direction.x;
+    ray.dir_y = direction.y;
+    ray.dir_z = direction.z;
+    ray.tnear = 0;
+    ray.tfar = distance;
+    ray.mask = ~0u;
+}
+
+}  // namespace
+
+struct Visibility::FromSide : Start {
+    FromSide(const Visibility& visibility, uint32_t side) {
+        rtcInitIntersectContext(&context);
+        context.filter = passStart;
+        patches = &visibility.patches;
+        parentOfTriangle = visibility.embree->parentOfTriangle.data();
+        parent = patches->parentOf[side / 2];
+        isFront = side % 2 == 0;
+        normal = patches->normal(side);
+        zone = 2 * visibility.surfaceOffset;
+    }
+    // Rays start this much behind the surface, so that they meet what coincides with it.
+    // Behind along the ray and not along the normal: the ray still passes through the point.
+    glm::vec3 origin(const glm::vec3& point, const glm::vec3& direction) const {
+        return point - direction * (0.5f * zone / std::max(0.01f, glm::dot(direction, normal)));
+    }
+};
+
+bool Visibility::isBlocked(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
+                           float distance) const {
+    FromSide start(*this, side);
+    const glm::vec3 origin = start.origin(point, direction);
+    RTCRay ray{};
+    if (std::isfinite(distance)) {
+        // Aim at the far end from the shifted origin, or the ray would pass beside it.
+        const glm::vec3 segment = point + distance * direction - origin;
+        const float length = glm::length(segment);
+        if (length <= 2 * surfaceOffset) return false;
+        setRay(ray, origin, segment / length, length - 2 * surfaceOffset);
+    } else {
+        setRay(ray, origin, direction, distance);
+    }
+    rtcOccluded1(embree->scene, &start.context, &ray);
+    return ray.tfar < 0;
+}
+
+std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& point,
+                                             const glm::vec3& direction) const {
+    FromSide start(*this, side);
+    RTCRayHit query{};
+    setRay(query.ray, start.origin(point, direction), direction,
+           std::numeric_limits<float>::infinity());
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(embree->scene, &start.context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+    const uint32_t parent = embree->parentOfTriangle[query.hit.primID];
+    const uint32_t patch = patches.patchAt(parent, point + query.ray.tfar * direction);
+    const bool front = glm::dot(patches.normal(2 * patch), direction) < 0;
+    return 2 * patch + (front ? 0 : 1);
+}
+
+bool Visibility::isFree(const glm::vec3& origin, const glm::vec3& direction) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay ray{};
+    setRay(ray, origin, direction, std::numeric_limits<float>::infinity());
+    rtcOccluded1(embree->scene, &context, &ray);
+    return ray.tfar >= 0;
+}
+
+}  // namespace raybundle

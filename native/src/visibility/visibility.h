@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The only code that knows Embree: is a segment free, and what does a ray meet first. All surfaces
+// block from both sides, as in Cycles.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+
+#include "patches/patches.h"
+
+namespace raybundle {
+
+class Visibility {
+  public:
+    // Builds the acceleration structure over the parents. `patches` must outlive it.
+    explicit Visibility(const Patches& patches);
+    ~Visibility();
+
+    // Whether something lies between a point on a side of a patch (relative to Patches::centre) and
+    // point + distance * direction (unit vector); distance may be infinite. The far end is kept a
+    // little off, since it usually lies on a surface. Of surfaces that coincide with the patch,
+    // those on its other side do not block (see comesBefore).
+    bool isBlocked(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
+                   float distance) const;
+
+    // The patch side that a ray from a side meets first, if any.
+    std::optional<uint32_t> firstHit(uint32_t side, const glm::vec3& point,
+                                     const glm::vec3& direction) const;
+
+    // Whether a ray meets nothing; for origins that lie on no surface, or at least `offset` off it.
+    bool isFree(const glm::vec3& origin, const glm::vec3& direction) const;
+
+    // Some tens of float rounding errors, metres.
+    float offset() const { return surfaceOffset; }
+
+  private:
+    struct Embree;
+    struct FromSide;
+    const Patches& patches;
+    float surfaceOffset;
+    std::unique_ptr<Embree> embree;
+};
+
+}  // namespace raybundle
