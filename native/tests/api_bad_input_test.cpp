@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What the C border refuses, by code and by a message that names the argument or the object.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "api_fixture.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+TEST(ApiNull, HandlesAreRefusedEverywhere) {
+    int32_t id = 77, values[4] = {};
+    float number = 77, rgb[3] = {};
+    size_t count = 0;
+    const char* text = nullptr;
+    rb_subdivision subdivision = nullptr;
+    const float matrix[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    expectInvalid(rb_new_scene(nullptr), "scene");
+    expectInvalid(rb_new_bake(nullptr), "bake");
+    expectInvalid(rb_add_image(nullptr, "", 1, 1, kOne, RB_IMAGE_REPEAT, &id), "scene");
+    expectInvalid(rb_add_material(nullptr, "", kGrey, kBlack, &id), "scene");
+    expectInvalid(rb_set_material_image(nullptr, 0, 0, kOne), "scene");
+    expectInvalid(rb_set_material_corner_colors(nullptr, 0, kOne), "scene");
+    expectInvalid(rb_add_mesh(nullptr, "", kVertices, 8, kCorners, 24, kFaces, 6, nullptr, &id),
+                  "scene");
+    expectInvalid(rb_set_mesh_corner_normals(nullptr, 0, kVertices, 8), "scene");
+    expectInvalid(rb_set_mesh_uvs(nullptr, 0, kVertices, 8), "scene");
+    expectInvalid(rb_set_mesh_corner_colors(nullptr, 0, kVertices, 8), "scene");
+    expectInvalid(rb_add_instance(nullptr, 0, "", kIdentity, RB_ROLE_BAKE, RB_SIDE_FRONT, &id),
+                  "scene");
+    expectInvalid(rb_add_point_light(nullptr, "", kOne, kOne, 0, RB_POINT_DISK, &id), "scene");
+    expectInvalid(rb_set_light_cone(nullptr, 0, matrix, 1, 0, false), "scene");
+    expectInvalid(rb_add_sun_light(nullptr, "", kOne, kOne, 0, &id), "scene");
+    expectInvalid(rb_add_area_light(nullptr, "", kOne, kOne, kOne, kOne, RB_AREA_ELLIPSE, &id),
+                  "scene");
+    expectInvalid(rb_set_world(nullptr, kOne), "scene");
+    expectInvalid(rb_set_bake_int(nullptr, "seed", 1), "bake");
+    expectInvalid(rb_set_bake_float(nullptr, "patch_size", 1), "bake");
+    expectInvalid(rb_set_bake_string(nullptr, "solver", "LINE_REUSE"), "bake");
+    expectInvalid(rb_get_bake_int(nullptr, "seed", &id), "bake");
+    expectInvalid(rb_get_bake_float(nullptr, "patch_size", &number), "bake");
+    expectInvalid(rb_get_bake_string(nullptr, "solver", &text), "bake");
+    expectInvalid(rb_set_bake_progress(nullptr, nullptr, nullptr), "bake");
+    expectInvalid(rb_execute_bake(nullptr, nullptr), "bake");
+    expectInvalid(rb_get_corner_light(nullptr, 0, RB_OUTPUT_COMBINED, rgb, 1), "bake");
+    expectInvalid(rb_get_vertex_light(nullptr, 0, RB_OUTPUT_COMBINED, rgb, 1), "bake");
+    expectInvalid(rb_get_report(nullptr, &text), "bake");
+    expectInvalid(rb_new_subdivision(kVertices, 8, kCorners, 24, kFaces, 6, 1, nullptr),
+                  "subdivision");
+    expectInvalid(rb_get_subdivision_size(nullptr, &count, &count), "subdivision");
+    expectInvalid(rb_get_subdivision(nullptr, rgb, 1, values, values, values, rgb, 1),
+                  "subdivision");
+    EXPECT_EQ(id, 77) << "outputs are untouched on failure";
+    EXPECT_EQ(number, 77);
+    EXPECT_EQ(subdivision, nullptr);
+    rb_release_scene(nullptr);
+    rb_release_bake(nullptr);
+    rb_release_subdivision(nullptr);
+}
+
+TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
+    int32_t id = 77;
+    expectInvalid(rb_add_image(scene, "", 1, 1, nullptr, RB_IMAGE_REPEAT, &id), "rgb");
+    expectInvalid(rb_add_image(scene, "", 1, 1, kOne, RB_IMAGE_REPEAT, nullptr), "image");
+    expectInvalid(rb_add_material(scene, "", nullptr, kBlack, &id), "reflectance");
+    expectInvalid(rb_add_material(scene, "", kGrey, nullptr, &id), "emission");
+    expectInvalid(rb_add_material(scene, "", kGrey, kBlack, nullptr), "material");
+    expectInvalid(rb_add_mesh(scene, "", nullptr, 8, kCorners, 24, kFaces, 6, nullptr, &id),
+                  "vertices");
+    expectInvalid(rb_add_mesh(scene, "", kVertices, 8, nullptr, 24, kFaces, 6, nullptr, &id),
+                  "corner_vertices");
+    expectInvalid(rb_add_mesh(scene, "", kVertices, 8, kCorners, 24, nullptr, 6, nullptr, &id),
+                  "face_offsets");
+    expectInvalid(rb_add_mesh(scene, "", kVertices, 8, kCorners, 24, kFaces, 6, nullptr, nullptr),
+                  "mesh");
+    expectInvalid(rb_add_point_light(scene, "", nullptr, kOne, 0, RB_POINT_DISK, &id), "position");
+    expectInvalid(rb_add_sun_light(scene, "", nullptr, kOne, 0, &id), "direction");
+    expectInvalid(rb_add_area_light(scene, "", kOne, nullptr, kOne, kOne, RB_AREA_ELLIPSE, &id),
+                  "axis_u");
+    expectInvalid(rb_set_world(scene, nullptr), "radiance");
+    expectInvalid(rb_get_bake_int(bake, "seed", nullptr), "value");
+    expectInvalid(rb_execute_bake(bake, nullptr), "scene");
+    expectInvalid(rb_set_bake_int(bake, nullptr, 1), "setting");
+    expectInvalid(rb_set_bake_string(bake, "solver", nullptr), "solver");
+    EXPECT_EQ(id, 77);
+    // A missing name is an empty one.
+    EXPECT_EQ(rb_add_material(scene, nullptr, kGrey, kBlack, &id), RB_ERROR_NONE);
+    EXPECT_EQ(id, 0);
+}
+
+TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
+    const int32_t material = addMaterial(), mesh = addCube(material);
+    int32_t id = 77;
+    const float matrix[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    for (int32_t bad : {-1, 1, 1000, std::numeric_limits<int32_t>::min()}) {
+        expectInvalid(rb_set_material_image(scene, bad, 0, kOne),
+                      "material " + std::to_string(bad));
+        expectInvalid(rb_set_material_image(scene, material, bad, kOne),
+                      "image " + std::to_string(bad));
+        expectInvalid(rb_set_material_corner_colors(scene, bad, kOne),
+                      "material " + std::to_string(bad));
+        expectInvalid(rb_set_mesh_uvs(scene, bad, kVertices, 24), "mesh " + std::to_string(bad));
+        expectInvalid(rb_set_light_cone(scene, bad, matrix, 1, 0, false),
+                      "light " + std::to_string(bad));
+        expectInvalid(rb_add_instance(scene, bad, "", kIdentity, RB_ROLE_BAKE, RB_SIDE_FRONT, &id),
+                      "mesh " + std::to_string(bad));
+    }
+    const std::vector<int32_t> materials(6, 5);
+    expectInvalid(
+        rb_add_mesh(scene, "", kVertices, 8, kCorners, 24, kFaces, 6, materials.data(), &id),
+        "material 5");
+    expectInvalid(rb_add_instance(scene, mesh, "", kIdentity, rb_role(5), RB_SIDE_FRONT, &id),
+                  "role 5");
+    expectInvalid(rb_add_instance(scene, mesh, "", kIdentity, RB_ROLE_BAKE, rb_side(5), &id),
+                  "side 5");
+    expectInvalid(rb_add_image(scene, "", 1, 1, kOne, rb_image_extension(5), &id), "extension 5");
+    expectInvalid(rb_add_point_light(scene, "", kOne, kOne, 0, rb_point_shape(5), &id), "shape 5");
+    expectInvalid(rb_add_area_light(scene, "", kOne, kOne, kOne, kOne, rb_area_shape(5), &id),
+                  "shape 5");
+    EXPECT_EQ(id, 77);
+}
+
+TEST_F(Api, MeshesThatDoNotAddUpAreRefusedByName) {
+    int32_t id = 77;
+    auto add = [&](const std::vector<int32_t>& corners, const std::vector<int32_t>& offsets) {
+        return rb_add_mesh(scene, "knot", kVertices, 8, corners.data(), corners.size(),
+                           offsets.data(), offsets.size() - 1, nullptr, &id);
+    };
+    expectInvalid(add({0, 1, 8}, {0, 3}), "knot");
+    expectInvalid(add({0, 1, -1}, {0, 3}), "knot");
+    expectInvalid(add({0, 1}, {0, 2}), "knot");
+    expectInvalid(add({0, 1, 2}, {0, 4}), "knot");
+    expectInvalid(add({0, 1, 2}, {1, 3}), "knot");
+    expectInvalid(add({0, 1, 2, 3, 4, 5}, {0, 5, 3, 6}), "knot");
+    expectInvalid(rb_add_mesh(scene, "knot", kVertices, 8, kCorners, 24, nullptr, 0, nullptr, &id),
+                  "knot");
+    std::array<float, 24> broken;
+    std::copy(std::begin(kVertices), std::end(kVertices), broken.begin());
+    broken[7] = NAN;
+    expectInvalid(
+        rb_add_mesh(scene, "knot", broken.data(), 8, kCorners, 24, kFaces, 6, nullptr, &id),
+        "knot");
+    broken[7] = INFINITY;
+    expectInvalid(
+        rb_add_mesh(scene, "knot", broken.data(), 8, kCorners, 24, kFaces, 6, nullptr, &id),
+        "knot");
+    EXPECT_EQ(id, 77);
+    EXPECT_EQ(rb_add_mesh(scene, "empty", nullptr, 0, nullptr, 0, nullptr, 0, nullptr, &id),
+              RB_ERROR_NONE)
+        << "an empty mesh is one";
+    addInstance(id);
+    EXPECT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+}
+
+TEST_F(Api, WrongCountsAreRefused) {
+    const int32_t mesh = addCube(addMaterial()), instance = addInstance(mesh);
+    const std::vector<float> values(100, 0.5f);
+    for (size_t wrong : {size_t(0), size_t(23), size_t(25)}) {
+        expectInvalid(rb_set_mesh_corner_normals(scene, mesh, values.data(), wrong), "24");
+        expectInvalid(rb_set_mesh_uvs(scene, mesh, values.data(), wrong), "24");
+        expectInvalid(rb_set_mesh_corner_colors(scene, mesh, values.data(), wrong), "24");
+    }
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    std::vector<float> rgb(75, -1);
+    expectInvalid(rb_get_corner_light(bake, instance, RB_OUTPUT_COMBINED, rgb.data(), 23), "24");
+    expectInvalid(rb_get_corner_light(bake, instance, RB_OUTPUT_COMBINED, nullptr, 24), "rgb");
+    expectInvalid(rb_get_vertex_light(bake, instance, RB_OUTPUT_COMBINED, rgb.data(), 24), "8");
+    expectInvalid(rb_get_corner_light(bake, 1, RB_OUTPUT_COMBINED, rgb.data(), 24), "instance 1");
+    expectInvalid(rb_get_corner_light(bake, instance, rb_output(9), rgb.data(), 24), "output 9");
+    for (float v : rgb) EXPECT_EQ(v, -1) << "outputs are untouched on failure";
+    EXPECT_EQ(rb_get_vertex_light(bake, instance, RB_OUTPUT_COMBINED, rgb.data(), 8),
+              RB_ERROR_NONE);
+    EXPECT_NEAR(rgb[23] * 3.14159265f, 2, 1e-3);
+    EXPECT_EQ(rgb[24], -1);
+}
+
+TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
+    int32_t id = 77;
+    const float bad[6] = {0.5f, NAN, 0.5f, 0.5f, 0.5f, 0.5f}, negative[6] = {0, 0, -1, 0, 0, 0};
+    expectInvalid(rb_add_material(scene, "fog", bad, kBlack, &id), "fog");
+    expectInvalid(rb_add_material(scene, "fog", kGrey, bad, &id), "fog");
+    expectInvalid(rb_add_material(scene, "fog", negative, kBlack, &id), "fog");
+    expectInvalid(rb_add_material(scene, "fog", kGrey, negative, &id), "fog");
+    const float infinite[3] = {0, INFINITY, 0}, zero[3] = {0, 0, 0};
+    expectInvalid(rb_add_point_light(scene, "bulb", infinite, kOne, 0, RB_POINT_DISK, &id), "bulb");
+    expectInvalid(rb_add_point_light(scene, "bulb", kOne, negative + 2, 0, RB_POINT_DISK, &id),
+                  "bulb");
+    expectInvalid(rb_add_point_light(scene, "bulb", kOne, kOne, -1, RB_POINT_DISK, &id), "bulb");
+    expectInvalid(rb_add_point_light(scene, "bulb", kOne, kOne, NAN, RB_POINT_DISK, &id), "bulb");
+    expectInvalid(rb_add_sun_light(scene, "sol", zero, kOne, 0, &id), "sol");
+    expectInvalid(rb_add_sun_light(scene, "sol", kOne, kOne, -0.1f, &id), "sol");
+    expectInvalid(
+        rb_add_area_light(scene, "panel", kOne, infinite, kOne, kOne, RB_AREA_RECTANGLE, &id),
+        "panel");
+    expectInvalid(rb_set_world(scene, infinite), "world");
+    float transform[12];
+    std::copy(std::begin(kIdentity), std::end(kIdentity), transform);
+    transform[5] = NAN;
+    const int32_t mesh = addCube(addMaterial());
+    expectInvalid(
+        rb_add_instance(scene, mesh, "chair", transform, RB_ROLE_BAKE, RB_SIDE_FRONT, &id),
+        "chair");
+    expectInvalid(rb_add_image(scene, "photo", 0, 5, kOne, RB_IMAGE_REPEAT, &id), "photo");
+    expectInvalid(rb_add_image(scene, "photo", 5, -1, kOne, RB_IMAGE_REPEAT, &id), "photo");
+    EXPECT_EQ(id, 77);
+    int32_t light = -1;
+    ASSERT_EQ(rb_add_point_light(scene, "spot", kOne, kOne, 0, RB_POINT_DISK, &light),
+              RB_ERROR_NONE);
+    const float matrix[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    for (float angle : {-1.0f, NAN, INFINITY})
+        expectInvalid(rb_set_light_cone(scene, light, matrix, angle, 0, false), "spot");
+    for (float blend : {-0.1f, 1.1f, NAN})
+        expectInvalid(rb_set_light_cone(scene, light, matrix, 1, blend, false), "spot");
+    int32_t sun = -1;
+    ASSERT_EQ(rb_add_sun_light(scene, "sol", kOne, kOne, 0, &sun), RB_ERROR_NONE);
+    expectInvalid(rb_set_light_cone(scene, sun, matrix, 1, 0, false), "sol");
+}
+
+TEST_F(Api, UnknownSettingsAndOtherTypesAreRefused) {
+    int32_t number = 77;
+    expectInvalid(rb_set_bake_int(bake, "colour", 1), "colour");
+    expectInvalid(rb_set_bake_int(bake, "target_error", 1), "target_error");
+    expectInvalid(rb_set_bake_float(bake, "seed", 1), "seed");
+    expectInvalid(rb_set_bake_float(bake, "solver", 1), "solver");
+    expectInvalid(rb_set_bake_string(bake, "seed", "1"), "seed");
+    expectInvalid(rb_set_bake_string(bake, "solver", "MAGIC"), "MAGIC");
+    expectInvalid(rb_set_bake_string(bake, "directions", "random"), "LOW_DISCREPANCY");
+    expectInvalid(rb_get_bake_int(bake, "", &number), "setting");
+    EXPECT_EQ(number, 77);
+}
+
+TEST_F(Api, SettingsOutOfRangeAreRefusedAndNotKept) {
+    for (const char* name :
+         {"max_patches", "min_bundles", "max_bundles", "lines_per_bundle", "seed", "threads"}) {
+        int32_t before = 0, after = -1;
+        EXPECT_EQ(rb_get_bake_int(bake, name, &before), RB_ERROR_NONE);
+        expectInvalid(rb_set_bake_int(bake, name, -1), name);
+        expectInvalid(rb_set_bake_int(bake, name, std::numeric_limits<int32_t>::min()), name);
+        EXPECT_EQ(rb_get_bake_int(bake, name, &after), RB_ERROR_NONE);
+        EXPECT_EQ(after, before);
+    }
+    for (const char* name : {"target_error", "patch_size", "memory_limit", "regularization"})
+        for (float bad : {-1.0f, NAN, INFINITY})
+            expectInvalid(rb_set_bake_float(bake, name, bad), name);
+    expectInvalid(rb_set_bake_float(bake, "target_error", 0), "target_error");
+    EXPECT_EQ(rb_set_bake_int(bake, "max_bundles", 2), RB_ERROR_NONE);
+}
+
+TEST(ApiSubdivision, RefusesWhatCannotBeCut) {
+    rb_subdivision subdivision = nullptr;
+    for (float edge : {0.0f, -1.0f, NAN})
+        expectInvalid(rb_new_subdivision(kVertices, 8, kCorners, 24, kFaces, 6, edge, &subdivision),
+                      "max_edge");
+    const int32_t bad[3] = {0, 1, 99}, offsets[2] = {0, 3};
+    expectInvalid(rb_new_subdivision(kVertices, 8, bad, 3, offsets, 1, 1, &subdivision),
+                  "vertex 99");
+    EXPECT_EQ(subdivision, nullptr);
+    ASSERT_EQ(rb_new_subdivision(nullptr, 0, nullptr, 0, nullptr, 0, 1, &subdivision),
+              RB_ERROR_NONE);
+    size_t vertices = 7, triangles = 7;
+    EXPECT_EQ(rb_get_subdivision_size(subdivision, &vertices, &triangles), RB_ERROR_NONE);
+    EXPECT_EQ(vertices + triangles, 0u);
+    rb_release_subdivision(subdivision);
+}
+
+}  // namespace
+}  // namespace raybundle

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The C border, through the shared library alone.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "api_fixture.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+TEST(ApiVersion, IsThatOfTheHeader) {
+    EXPECT_EQ(rb_get_abi_version(), RB_ABI_VERSION);
+    int major = -1, minor = -1, patch = -1;
+    EXPECT_EQ(std::sscanf(rb_get_version(), "%d.%d.%d", &major, &minor, &patch), 3)
+        << rb_get_version();
+}
+
+TEST_F(Api, SettingsHaveReadableDefaults) {
+    int32_t number = -1;
+    float real = -1;
+    const char* text = nullptr;
+    const std::vector<std::pair<const char*, int32_t>> integers = {
+        {"max_patches", 100000}, {"min_bundles", 64}, {"max_bundles", 4096},
+        {"lines_per_bundle", 0}, {"seed", 0},         {"threads", 0}};
+    for (const auto& [name, value] : integers) {
+        EXPECT_EQ(rb_get_bake_int(bake, name, &number), RB_ERROR_NONE) << name;
+        EXPECT_EQ(number, value) << name;
+    }
+    const std::vector<std::pair<const char*, float>> reals = {{"target_error", 0.02f},
+                                                              {"memory_limit", 4096},
+                                                              {"regularization", 0.02f},
+                                                              {"patch_size", 0.2f}};
+    for (const auto& [name, value] : reals) {
+        EXPECT_EQ(rb_get_bake_float(bake, name, &real), RB_ERROR_NONE) << name;
+        EXPECT_EQ(real, value) << name;
+    }
+    const std::vector<std::pair<const char*, const char*>> texts = {
+        {"solver", "LINE_REUSE"},
+        {"first_shot", "GATHER"},
+        {"directions", "LOW_DISCREPANCY"},
+        {"projector", "AUTO"},
+        {"small_patches", "CENTRE_SAMPLING"},
+        {"reconstruction", "LEAST_SQUARES"}};
+    for (const auto& [name, value] : texts) {
+        EXPECT_EQ(rb_get_bake_string(bake, name, &text), RB_ERROR_NONE) << name;
+        EXPECT_STREQ(text, value) << name;
+    }
+}
+
+TEST_F(Api, ThereIsNoResultBeforeABake) {
+    addFurnace();
+    std::vector<float> rgb(72, -1);
+    const char* json = "untouched";
+    expectFailure(rb_get_corner_light(bake, 0, RB_OUTPUT_COMBINED, rgb.data(), 24),
+                  RB_ERROR_INVALID_OPERATION, "bake");
+    expectFailure(rb_get_vertex_light(bake, 0, RB_OUTPUT_COMBINED, rgb.data(), 8),
+                  RB_ERROR_INVALID_OPERATION, "bake");
+    expectFailure(rb_get_report(bake, &json), RB_ERROR_INVALID_OPERATION, "bake");
+    EXPECT_STREQ(json, "untouched");
+}
+
+TEST_F(Api, AnOccluderHasNoResult) {
+    addInstance(addCube(addMaterial()), RB_ROLE_OCCLUDE);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    std::vector<float> rgb(72);
+    expectInvalid(rb_get_corner_light(bake, 0, RB_OUTPUT_COMBINED, rgb.data(), 24), "box");
+}
+
+TEST_F(Api, TheSceneMayGoBeforeItsResultIsFetched) {
+    const int32_t instance = addFurnace();
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    rb_release_scene(scene);
+    scene = nullptr;
+    expectFurnace(instance);
+}
+
+TEST_F(Api, TheBakeMayGoBeforeTheScene) {
+    const int32_t instance = addFurnace();
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    rb_release_bake(bake);
+    bake = nullptr;
+    ASSERT_EQ(rb_new_bake(&bake), RB_ERROR_NONE);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    expectFurnace(instance);
+}
+
+TEST_F(Api, OneBakeServesSeveralScenes) {
+    const int32_t instance = addFurnace();
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    rb_scene empty = nullptr;
+    ASSERT_EQ(rb_new_scene(&empty), RB_ERROR_NONE);
+    EXPECT_EQ(rb_execute_bake(bake, empty), RB_ERROR_NONE) << message();
+    rb_release_scene(empty);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    expectFurnace(instance);
+}
+
+TEST_F(Api, ReflectanceOfOneIsClampedAndTheMaterialNamed) {
+    const float mirror[6] = {1, 1.5f, 0.5f, 0, 0, 0};
+    addInstance(addCube(addMaterial(mirror, kGlow)));
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    const std::string warnings = report()["warnings"].dump();
+    EXPECT_NE(warnings.find("glow"), std::string::npos) << warnings;
+    EXPECT_NE(warnings.find("0.999"), std::string::npos) << warnings;
+    const std::vector<float> rgb = cornerLight(0);
+    // E / (1 - rho): a thousand times the emission at 0.999, and the third channel as it was.
+    for (size_t c = 0; c < 72; c += 3) {
+        EXPECT_NEAR(rgb[c] * 3.14159265f, 1000, 5);
+        EXPECT_NEAR(rgb[c + 1] * 3.14159265f, 1000, 5);
+        EXPECT_NEAR(rgb[c + 2] * 3.14159265f, 2, 1e-3);
+    }
+}
+
+TEST_F(Api, ImagesAndCornerColoursGiveReflectance) {
+    // Black base, half from an image of constant 0.6 and half from corner colours of 0.4: rho =
+    // 0.5.
+    const int32_t material = addMaterial(kBlack, kGlow), mesh = addCube(material);
+    const std::vector<float> pixels(4 * 2 * 3, 0.6f), uvs(48, 0.3f), colors(72, 0.4f);
+    const float half[3] = {0.5f, 0.5f, 0.5f};
+    int32_t image = -1;
+    ASSERT_EQ(rb_add_image(scene, "paint", 4, 2, pixels.data(), RB_IMAGE_REPEAT, &image),
+              RB_ERROR_NONE);
+    ASSERT_EQ(rb_set_material_image(scene, material, image, half), RB_ERROR_NONE);
+    ASSERT_EQ(rb_set_material_corner_colors(scene, material, half), RB_ERROR_NONE);
+    ASSERT_EQ(rb_set_mesh_uvs(scene, mesh, uvs.data(), 24), RB_ERROR_NONE);
+    ASSERT_EQ(rb_set_mesh_corner_colors(scene, mesh, colors.data(), 24), RB_ERROR_NONE);
+    const int32_t instance = addInstance(mesh);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    expectFurnace(instance);
+}
+
+TEST_F(Api, TheCallersMemoryIsNotKept) {
+    int32_t mesh = -1;
+    {
+        std::vector<float> vertices(std::begin(kVertices), std::end(kVertices));
+        std::vector<int32_t> corners(std::begin(kCorners), std::end(kCorners)),
+            faces(std::begin(kFaces), std::end(kFaces)), materials(6, addMaterial());
+        std::string name = "a name long enough to live on the heap, and gone before the bake";
+        ASSERT_EQ(rb_add_mesh(scene, name.c_str(), vertices.data(), 8, corners.data(), 24,
+                              faces.data(), 6, materials.data(), &mesh),
+                  RB_ERROR_NONE);
+        std::fill(vertices.begin(), vertices.end(), NAN);
+        std::fill(corners.begin(), corners.end(), -1);
+        name.assign(name.size(), 'x');
+    }
+    const int32_t instance = addInstance(mesh);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    expectFurnace(instance);
+}
+
+struct Progress {
+    double cancelAt;
+    double done = 0;  // of all stages, each counted as a fifth
+    bool cancelled = false;
+    std::thread::id thread;
+};
+
+bool follow(void* user, rb_stage stage, double fraction) {
+    Progress& progress = *static_cast<Progress*>(user);
+    EXPECT_EQ(std::this_thread::get_id(), progress.thread) << "called from the thread that bakes";
+    EXPECT_TRUE(fraction >= 0 && fraction <= 1);
+    progress.done = std::max(progress.done, (int(stage) + fraction) / 5);
+    progress.cancelled = progress.done >= progress.cancelAt;
+    return !progress.cancelled;
+}
+
+TEST_F(Api, ABakeCanBeCancelledAnywhereAndUsedAgain) {
+    const int32_t instance = addFurnace();
+    for (double at : {0.0, 0.1, 0.5, 1.0}) {
+        Progress progress{at, 0, false, std::this_thread::get_id()};
+        ASSERT_EQ(rb_set_bake_progress(bake, follow, &progress), RB_ERROR_NONE);
+        expectFailure(rb_execute_bake(bake, scene), RB_ERROR_CANCELLED, "cancelled");
+        EXPECT_TRUE(progress.cancelled) << at;
+        std::vector<float> rgb(72);
+        EXPECT_EQ(rb_get_corner_light(bake, instance, RB_OUTPUT_COMBINED, rgb.data(), 24),
+                  RB_ERROR_INVALID_OPERATION)
+            << "a cancelled bake has no result";
+    }
+    Progress progress{2, 0, false, std::this_thread::get_id()};
+    ASSERT_EQ(rb_set_bake_progress(bake, follow, &progress), RB_ERROR_NONE);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    EXPECT_EQ(progress.done, 1);
+    expectFurnace(instance);
+    // Without a function again; and the old result stays when a later run is cancelled.
+    ASSERT_EQ(rb_set_bake_progress(bake, nullptr, nullptr), RB_ERROR_NONE);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE);
+    Progress late{0.5, 0, false, std::this_thread::get_id()};
+    ASSERT_EQ(rb_set_bake_progress(bake, follow, &late), RB_ERROR_NONE);
+    EXPECT_EQ(rb_execute_bake(bake, scene), RB_ERROR_CANCELLED);
+    expectFurnace(instance);
+}
+
+TEST_F(Api, MessagesBelongToTheirThread) {
+    expectInvalid(rb_set_bake_int(bake, "here", 1), "here");
+    std::thread([] {
+        EXPECT_EQ(message(), "") << "nothing failed in this thread yet";
+        rb_set_bake_int(nullptr, "there", 1);
+        EXPECT_NE(message(), "");
+    }).join();
+    EXPECT_NE(message().find("here"), std::string::npos);
+    // A success does not clear it.
+    EXPECT_EQ(rb_set_bake_int(bake, "seed", 1), RB_ERROR_NONE);
+    EXPECT_NE(message().find("here"), std::string::npos);
+}
+
+TEST_F(Api, TwoBakesRunAtOnce) {
+    const int32_t instance = addFurnace();
+    rb_bake other = nullptr;
+    ASSERT_EQ(rb_new_bake(&other), RB_ERROR_NONE);
+    rb_error result = RB_ERROR_UNKNOWN;
+    rb_scene twin = nullptr;
+    std::swap(scene, twin);
+    ASSERT_EQ(rb_new_scene(&scene), RB_ERROR_NONE);
+    addFurnace();
+    std::thread thread([&] { result = rb_execute_bake(other, twin); });
+    EXPECT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    thread.join();
+    EXPECT_EQ(result, RB_ERROR_NONE);
+    expectFurnace(instance);
+    std::swap(bake, other);
+    expectFurnace(instance);
+    rb_release_bake(other);
+    rb_release_scene(twin);
+}
+
+TEST(ApiSubdivision, CutsAMeshForTheCaller) {
+    rb_subdivision subdivision = nullptr;
+    ASSERT_EQ(rb_new_subdivision(kVertices, 8, kCorners, 24, kFaces, 6, 0.3f, &subdivision),
+              RB_ERROR_NONE);
+    size_t vertices = 0, triangles = 0;
+    ASSERT_EQ(rb_get_subdivision_size(subdivision, &vertices, &triangles), RB_ERROR_NONE);
+    EXPECT_EQ(vertices, triangles / 2 + 2) << "Euler: a closed surface without holes";
+    std::vector<float> positions(3 * vertices), weights(9 * triangles);
+    std::vector<int32_t> corners(3 * triangles), faces(triangles), sources(9 * triangles);
+    expectInvalid(rb_get_subdivision(subdivision, positions.data(), vertices - 1, corners.data(),
+                                     faces.data(), sources.data(), weights.data(), triangles),
+                  "vertex_count");
+    expectInvalid(rb_get_subdivision(subdivision, positions.data(), vertices, corners.data(),
+                                     faces.data(), nullptr, weights.data(), triangles),
+                  "source_corners");
+    ASSERT_EQ(rb_get_subdivision(subdivision, positions.data(), vertices, corners.data(),
+                                 faces.data(), sources.data(), weights.data(), triangles),
+              RB_ERROR_NONE);
+    for (int32_t corner : corners) EXPECT_TRUE(corner >= 0 && size_t(corner) < vertices);
+    for (int32_t face : faces) EXPECT_TRUE(face >= 0 && face < 6);
+    for (int32_t source : sources) EXPECT_TRUE(source >= 0 && source < 24);
+    rb_release_subdivision(subdivision);
+}
+
+}  // namespace
+}  // namespace raybundle

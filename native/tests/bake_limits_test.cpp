@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Scenes that cannot be baked as they are, limits, roles and the report.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "bake/bake.h"
+#include "bake/error.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+TEST(BadScenes, WithoutLightTheResultIsBlackAndSaidSo) {
+    Bake bake;
+    bake.run(roomWithBoxes(0.5f));
+    const Json report = reportOf(bake);
+    EXPECT_TRUE(mentions(report["warnings"], "light")) << report["warnings"];
+    EXPECT_EQ(report["bundles"], 0) << "nothing to exchange";
+    for (const glm::vec3& v : everything(bake)) ASSERT_EQ(v, glm::vec3(0));
+}
+
+TEST(BadScenes, WithoutFacesThereIsAWarning) {
+    Scene nothing, empty, degenerate;
+    place(empty, polygons("hollow", {}, {}), grey("", 0.5f));
+    place(degenerate, polygons("thread", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}),
+          grey("", 0.5f, 1));
+    for (Scene* scene : {&nothing, &empty, &degenerate}) {
+        scene->addLight(pointLight({0, 0, 1}, glm::dvec3(1)));
+        scene->worldRadiance = glm::vec3(1);
+        Bake bake;
+        bake.run(*scene);
+        EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "no faces")) << reportOf(bake)["warnings"];
+    }
+    Bake bake;
+    bake.run(degenerate);
+    EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "thread"));
+    for (const glm::vec3& v : cornerLight(bake, 0, RB_OUTPUT_COMBINED)) EXPECT_EQ(v, glm::vec3(0));
+}
+
+TEST(BadScenes, AnObjectThatIsInsideOutIsNamed) {
+    Scene scene;
+    place(scene, box("shed", {-1, -1, -1}, {1, 1, 1}, false), grey("", 0.5f));
+    scene.addLight(pointLight({0, 0, 0}, glm::dvec3(1)));
+    Bake bake;
+    setQuick(bake);
+    bake.run(scene);
+    const Json report = reportOf(bake);
+    EXPECT_TRUE(mentions(report["warnings"], "shed")) << report["warnings"];
+    EXPECT_TRUE(mentions(report["objects"], "no light")) << report["objects"];
+}
+
+TEST(BadScenes, ADegenerateFaceSpoilsNothing) {
+    Scene scene;
+    Mesh mesh = box("cube", glm::vec3(0), glm::vec3(1), true);
+    for (int32_t v : {0, 1, 1, 0}) mesh.cornerVertices.push_back(v);
+    mesh.faceOffsets.push_back(int32_t(mesh.cornerVertices.size()));
+    place(scene, mesh, grey("", 0.5f, 1));
+    Bake bake;
+    setQuick(bake);
+    bake.run(scene);
+    EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "cube"));
+    const std::vector<glm::vec3> light = cornerLight(bake, 0, RB_OUTPUT_COMBINED);
+    for (size_t c = 0; c < 24; ++c) EXPECT_NEAR(light[c].x * kPi, 2, 1e-3);
+}
+
+TEST(Limits, MaxBundlesIsKeptAndSaidToBeTheReason) {
+    for (int most : {2, 10, 33, 200}) {
+        Bake bake;
+        bake.settings.patchSize = 0.25f;
+        bake.settings.targetError = 1e-5f;
+        bake.settings.maxBundles = most;
+        bake.run(litRoom());
+        const Json report = reportOf(bake);
+        EXPECT_LE(report["bundles"].get<int>(), most) << "also where it is below min_bundles";
+        EXPECT_TRUE(mentions(report["warnings"], "max_bundles")) << report["warnings"];
+    }
+}
+
+TEST(Limits, MinBundlesIsKept) {
+    for (int fewest : {2, 7, 300}) {
+        Bake bake;
+        bake.settings.patchSize = 0.25f;
+        bake.settings.targetError = 10;
+        bake.settings.minBundles = fewest;
+        bake.run(litRoom());
+        EXPECT_GE(reportOf(bake)["bundles"].get<int>(), fewest);
+        EXPECT_LE(reportOf(bake)["bundles"].get<int>(), fewest + 1);
+    }
+}
+
+TEST(Limits, MemoryLimitStopsAndSaysSo) {
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.settings.targetError = 1e-5f;
+    bake.settings.memoryLimit = 1;
+    bake.run(litRoom());
+    EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "memory_limit"));
+}
+
+TEST(Roles, AnOccluderBlocksAndHasNoResult) {
+    Scene scene;
+    place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0.5f));
+    place(scene, rectangle("screen", {-3, -3, 1}, {6, 0, 0}, {0, 6, 0}), grey("", 0), glm::dmat4(1),
+          RB_ROLE_OCCLUDE);
+    scene.addLight(pointLight({0, 0, 2}, glm::dvec3(1)));
+    Bake bake;
+    setQuick(bake);
+    bake.run(scene);
+    for (const glm::vec3& v : cornerLight(bake, 0, RB_OUTPUT_LIGHTING)) EXPECT_EQ(v, glm::vec3(0));
+    try {
+        cornerLight(bake, 1, RB_OUTPUT_LIGHTING);
+        ADD_FAILURE() << "an occluder has a result";
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("screen"), std::string::npos) << error.what();
+    }
+    EXPECT_EQ(reportOf(bake)["objects"][1]["status"], "occluder");
+}
+
+TEST(BakeReport, HasItsFixedKeys) {
+    Bake bake;
+    setQuick(bake);
+    bake.run(litRoom());
+    const Json report = reportOf(bake);
+    for (const char* key :
+         {"seconds", "patches", "bundles", "lines", "exchanges", "estimated_error", "energy",
+          "peak_memory_bytes", "objects", "warnings", "skipped"})
+        EXPECT_TRUE(report.contains(key)) << key;
+    for (const char* key : {"total", "patches", "first_shot", "bundles", "solve", "reconstruction"})
+        EXPECT_GE(report["seconds"][key].get<double>(), 0) << key;
+    for (const char* key : {"emitted", "absorbed", "escaped", "balance_error"})
+        EXPECT_TRUE(report["energy"].contains(key)) << key;
+    EXPECT_EQ(report["bundles"], 64);
+    EXPECT_EQ(report["objects"].size(), 3u);
+    EXPECT_EQ(report["objects"][2]["name"], "high box");
+    EXPECT_EQ(report["objects"][2]["corners"], 24);
+}
+
+}  // namespace
+}  // namespace raybundle

@@ -1,0 +1,388 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/first_shot.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "test_scenes.h"
+#include "transport/light_source.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+constexpr size_t kMany = 10000000;
+constexpr float kTarget = 0.002f;
+// At most 256 stratified samples per side and source leave about half a per cent of noise
+// (method.md 5.4: 0.0037 relative RMS); twice that is safe for one side.
+constexpr double kSampled = 0.01;
+// Closed forms in float, at sampled points of a patch that is small beside the light's distance.
+constexpr double kExact = 2e-4;
+
+struct Shot {
+    Patches patches;
+    FirstShot light;
+
+    // Front of the first patch of an instance.
+    float front(uint32_t instance = 0) const { return at(instance, 0); }
+    float back(uint32_t instance = 0) const { return at(instance, 1); }
+    float at(uint32_t instance, uint32_t side) const {
+        for (const Parent& parent : patches.parents)
+            if (parent.instance == instance)
+                return light.irradiance[2 * parent.firstPatch + side].x;
+        return NAN;
+    }
+};
+
+Shot shoot(const Scene& scene, float patchSize = 10) {
+    Shot shot{subdivide(scene, patchSize, kMany), {}};
+    shot.light =
+        gatherFirstShot(scene, shot.patches, Visibility(shot.patches), kTarget, 0, Progress());
+    return shot;
+}
+
+// A receiver of 2 mm at a point, facing up.
+void placeReceiver(Scene& scene, const glm::vec3& at = glm::vec3(0), const glm::vec3& u = {1, 0, 0},
+                   const glm::vec3& v = {0, 1, 0}) {
+    place(scene, rectangle("receiver", at - 0.001f * (u + v), 0.002f * u, 0.002f * v),
+          grey("", 0.5f));
+}
+
+// A black surface far below everything, to give a scene its size.
+void placeGround(Scene& scene) {
+    place(scene, rectangle("ground", {-20, -20, -5}, {40, 0, 0}, {0, 40, 0}), grey("", 0));
+}
+
+TEST(PointLight, FallsWithTheSquareOfTheDistanceAndTheCosine) {
+    Scene scene;
+    placeReceiver(scene, {0, 0, 0});
+    placeReceiver(scene, {3, 0, 0});
+    placeReceiver(scene, {0, 1, 0}, {0, 0, 1}, {1, 0, 0});  // upright, facing +y
+    scene.addLight(pointLight({0, 0, 2}, glm::dvec3(5)));
+    const Shot shot = shoot(scene);
+    EXPECT_NEAR(shot.front(0), 5.0 / 4, kExact * 5 / 4);
+    const double d2 = 13, exact = 5 * 2 / std::sqrt(d2) / d2;
+    EXPECT_NEAR(shot.front(1), exact, kExact * exact);
+    EXPECT_EQ(shot.back(0), 0);
+    EXPECT_EQ(shot.front(2), 0) << "the light is behind it";
+    const double side = 5 * 1 / std::sqrt(5.0) / 5;
+    EXPECT_NEAR(shot.back(2), side, kExact * side);
+}
+
+TEST(PointLight, APatchGetsTheMeanOverItsArea) {
+    Scene scene;
+    place(scene, rectangle("square", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0.5f));
+    scene.addLight(pointLight({0.2, 0.1, 1}, glm::dvec3(1)));
+    double mean = 0;
+    constexpr int kSteps = 400;
+    for (int i = 0; i < kSteps; ++i)
+        for (int j = 0; j < kSteps; ++j) {
+            const glm::dvec3 d(0.2 - (2 * (i + 0.5) / kSteps - 1),
+                               0.1 - (2 * (j + 0.5) / kSteps - 1), 1);
+            mean += 1 / std::pow(glm::dot(d, d), 1.5) / (kSteps * kSteps);
+        }
+    EXPECT_NEAR(shoot(scene).front(), mean, kSampled * mean);
+}
+
+TEST(PointLight, ASphereOutsideGivesWhatAPointGives) {
+    for (double radius : {0.1, 1.0, 1.9}) {
+        Scene scene;
+        placeReceiver(scene);
+        placeReceiver(scene, {0.5f, 0, -1});
+        Light light = pointLight({0, 0, 2}, glm::dvec3(3));
+        light.radius = radius;
+        light.pointShape = RB_POINT_SPHERE;
+        scene.addLight(light);
+        const Shot shot = shoot(scene);
+        EXPECT_NEAR(shot.front(0), 3.0 / 4, kSampled * 3 / 4) << "radius " << radius;
+        const double exact = 3 * 3 / std::pow(9.25, 1.5);
+        EXPECT_NEAR(shot.front(1), exact, kSampled * exact) << "radius " << radius;
+    }
+}
+
+TEST(PointLight, ADiskFacesItsReceiver) {
+    Scene scene;
+    placeReceiver(scene);
+    Light light = pointLight({0, 0, 2}, glm::dvec3(3));
+    light.radius = 1;
+    light.pointShape = RB_POINT_DISK;
+    scene.addLight(light);
+    // Radiance I / (pi r^2) over a coaxial disk: I / (r^2 + h^2).
+    EXPECT_NEAR(shoot(scene).front(), 3.0 / 5, kSampled * 3 / 5);
+}
+
+TEST(SpotLight, TheConeCutsAndBlends) {
+    Scene scene;
+    const double angle = 1.0, blend = 0.5, height = 2;
+    const double edge = std::cos(0.5 * angle), soft = (1 - edge) * blend;
+    const double cosines[] = {0.9999, edge + 0.75 * soft, edge + 0.5 * soft, edge + 0.1 * soft,
+                              edge - 0.01};
+    for (double c : cosines) placeReceiver(scene, {float(height * std::tan(std::acos(c))), 0, 0});
+    Light light = pointLight({0, 0, height}, glm::dvec3(1));
+    light.hasCone = true;
+    light.coneAngle = angle;
+    light.coneBlend = blend;
+    scene.addLight(light);
+    const Shot shot = shoot(scene);
+    for (uint32_t k = 0; k < 5; ++k) {
+        const double t = std::clamp((cosines[k] - edge) / soft, 0.0, 1.0);
+        const double exact = t * t * (3 - 2 * t) * std::pow(cosines[k], 3) / (height * height);
+        // Across 2 mm the smoothstep changes by up to 0.0006 of the full light.
+        EXPECT_NEAR(shot.front(k), exact, kSampled * exact + 2e-4) << "receiver " << k;
+    }
+    EXPECT_EQ(shot.front(4), 0);
+}
+
+TEST(SpotLight, DimsWithTheCosineWhereItIsAskedTo) {
+    Scene scene;
+    placeReceiver(scene, {2, 0, 0});
+    Light light = pointLight({0, 0, 2}, glm::dvec3(1));
+    light.hasCone = true;
+    light.coneAngle = 3;
+    light.coneDims = true;
+    scene.addLight(light);
+    const double exact = std::pow(std::cos(0.25 * kPi), 4) / 4;
+    EXPECT_NEAR(shoot(scene).front(), exact, kSampled * exact);
+}
+
+TEST(SunLight, GivesItsIrradianceTimesTheCosine) {
+    for (double angle : {0.0, 0.1}) {
+        Scene scene;
+        placeReceiver(scene);
+        place(scene, rectangle("slope", {5, 0, 0}, {1, 0, 1}, {0, 1, 0}), grey("", 0.5f));
+        scene.addLight(sunLight({0.3, 0.4, 2}, {2, 3, 4}, angle));
+        const Shot shot = shoot(scene);
+        const glm::dvec3 d = glm::normalize(glm::dvec3(0.3, 0.4, 2));
+        const double slope = glm::dot(d, glm::normalize(glm::dvec3(-1, 0, 1)));
+        EXPECT_NEAR(shot.front(0), 2 * d.z, 1e-5);
+        EXPECT_NEAR(shot.front(1), 2 * slope, 1e-5);
+        EXPECT_NEAR(shot.light.irradiance[0].z, 4 * d.z, 1e-5);
+        EXPECT_EQ(shot.back(0), 0);
+    }
+}
+
+TEST(SunLight, AWideSunOnTheHorizonIsHalfSeen) {
+    Scene scene;
+    placeReceiver(scene);
+    const double half = 0.3;
+    scene.addLight(sunLight({1, 0, 0}, glm::dvec3(1), 2 * half));
+    // Radiance 1 / (pi sin^2 half); the integral of sin^2(theta) sin(phi) over the upper half of
+    // the disk.
+    const double exact =
+        (half - 0.5 * std::sin(2 * half)) / (kPi * std::sin(half) * std::sin(half));
+    const Shot shot = shoot(scene);
+    EXPECT_NEAR(shot.front(), exact, 2 * kSampled * exact) << "half of the samples see nothing";
+    EXPECT_NEAR(shot.back(), exact, 2 * kSampled * exact);
+}
+
+TEST(AreaLight, ARectangleHasLambertsClosedForm) {
+    Scene scene;
+    placeReceiver(scene);
+    placeReceiver(scene, {1.5f, 0.7f, 0});
+    placeReceiver(scene, {1.5f, 0, 1}, {0, 0, 1}, {0, 1, 0});  // upright, facing the light in part
+    scene.addLight(areaLight({0, 0, 1.2}, {0.5, 0, 0}, {0, -0.8, 0}, glm::dvec3(7)));
+    const Shot shot = shoot(scene);
+    const glm::dvec3 lamp[4] = {
+        {-0.5, 0.8, 1.2}, {0.5, 0.8, 1.2}, {0.5, -0.8, 1.2}, {-0.5, -0.8, 1.2}};
+    const double below = 7 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4);
+    const double beside = 7 * polygonIrradiance({1.5, 0.7, 0}, {0, 0, 1}, lamp, 4);
+    const double upright = 7 * polygonIrradiance({1.5, 0, 1}, {-1, 0, 0}, lamp, 4);
+    EXPECT_NEAR(shot.front(0), below, kExact * below);
+    EXPECT_NEAR(shot.front(1), beside, kExact * beside);
+    // At 0.2 m below the lamp's plane 2 mm matter more.
+    EXPECT_NEAR(shot.front(2), upright, 10 * kExact * upright);
+}
+
+TEST(AreaLight, AnEllipseUnderItsCentreHasAClosedForm) {
+    Scene scene;
+    placeReceiver(scene);
+    const double r = 0.6, h = 1.1;
+    scene.addLight(areaLight({0, 0, h}, {0, r, 0}, {r, 0, 0}, glm::dvec3(7), RB_AREA_ELLIPSE));
+    const double exact = 7 * kPi * r * r / (r * r + h * h);
+    EXPECT_NEAR(shoot(scene).front(), exact, kSampled * exact);
+}
+
+TEST(AreaLight, ShinesToItsFrontOnly) {
+    for (rb_area_shape shape : {RB_AREA_RECTANGLE, RB_AREA_ELLIPSE}) {
+        Scene scene;
+        placeReceiver(scene);
+        scene.addLight(areaLight({0, 0, 1}, {1, 0, 0}, {0, 1, 0}, glm::dvec3(7), shape));
+        EXPECT_EQ(shoot(scene).front(), 0);
+    }
+}
+
+TEST(Shadows, UmbraIsBlackAndFullLightIsExact) {
+    // Lamp of 0.4 m at 2 m, blocker of 1 m at 1 m: on the floor the umbra is 1.6 m wide and the
+    // penumbra ends at 1.2 m from the centre.
+    Scene scene, open;
+    for (Scene* s : {&scene, &open}) {
+        place(*s, rectangle("floor", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}), grey("", 0.5f));
+        s->addLight(areaLight({0, 0, 2}, {0.2, 0, 0}, {0, -0.2, 0}, glm::dvec3(10)));
+    }
+    place(scene, rectangle("blocker", {-0.5f, -0.5f, 1}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
+    const Shot shadowed = shoot(scene, 0.1f), lit = shoot(open, 0.1f);
+    int dark = 0, full = 0, half = 0;
+    for (uint32_t p = 0; p < lit.patches.count(); ++p) {
+        const glm::dvec3 at = lit.patches.centre + glm::dvec3(lit.patches.point(p, {0.5f, 0.5f}));
+        const double reach = std::max(std::abs(at.x), std::abs(at.y));
+        const float found = shadowed.light.irradiance[2 * p].x,
+                    free = lit.light.irradiance[2 * p].x;
+        if (reach < 0.75) {
+            EXPECT_EQ(found, 0) << "umbra at " << at.x << ", " << at.y;
+            ++dark;
+        } else if (reach > 1.25) {
+            // Means of the closed form at the same points of the patch up to the points' rounding.
+            EXPECT_NEAR(found, free, 1e-3f * free) << "full light at " << at.x << ", " << at.y;
+            ++full;
+        } else {
+            EXPECT_LE(found, 1.01f * free);
+            half += found > 0 && found < 0.99f * free;
+        }
+    }
+    EXPECT_GT(dark, 100);
+    EXPECT_GT(full, 100);
+    EXPECT_GT(half, 50);
+}
+
+TEST(Shadows, SurfacesBlockFromBothSides) {
+    for (bool turned : {false, true}) {
+        Scene scene;
+        placeReceiver(scene);
+        const glm::vec3 u(2, 0, 0), v(0, 2, 0);
+        place(scene, rectangle("blocker", {-1, -1, 1}, turned ? v : u, turned ? u : v),
+              grey("", 0.5f));
+        scene.addLight(pointLight({0.01, 0.02, 3}, glm::dvec3(10)));
+        EXPECT_EQ(shoot(scene).front(), 0);
+    }
+}
+
+TEST(EmissiveMesh, ShinesFromTheSidesThatEmit) {
+    for (float backEmission : {0.0f, 300.0f}) {
+        Scene scene;
+        placeReceiver(scene, {0, 0, 0});
+        placeReceiver(scene, {0, 0, 2}, {0, 1, 0}, {1, 0, 0});  // above, facing down
+        place(scene,
+              rectangle("lamp", {-0.1f, -0.1f, 1}, {0, 0.2f, 0}, {0.2f, 0, 0}),  // front looks down
+              grey("lamp", 0, 600, backEmission));
+        placeGround(scene);
+        const Shot shot = shoot(scene);
+        const glm::dvec3 lamp[4] = {{-0.1, -0.1, 1}, {0.1, -0.1, 1}, {0.1, 0.1, 1}, {-0.1, 0.1, 1}};
+        const double below = polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
+        // Rays start 4e-6 of the ground's 28 m above the receiver, 0.1 mm of a metre: 2e-4 more
+        // light.
+        EXPECT_NEAR(shot.front(0), 600 * below, 5e-4 * 600 * below);
+        EXPECT_NEAR(shot.front(1), backEmission * below, 5e-4 * backEmission * below);
+        const double power = 0.04 * (600.0 + backEmission);
+        EXPECT_NEAR(shot.light.emitted.x, power, 1e-5 * power);
+    }
+}
+
+TEST(EmissiveMesh, PowerToASquareFollowsTheFormFactor) {
+    Scene scene;
+    place(scene, rectangle("floor", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
+    place(scene, rectangle("lamp", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}), grey("lamp", 0, 50));
+    placeGround(scene);
+    const Shot shot = shoot(scene, 0.1f);
+    double power = 0;
+    for (uint32_t p = 0; p < shot.patches.count(); ++p)
+        if (shot.patches.parents[shot.patches.parentOf[p]].instance == 0)
+            power += double(shot.patches.area[p]) * shot.light.irradiance[2 * p].x;
+    const double exact = 50 * parallelRectangles(1, 1, 1);
+    // The floor's hundred patches are wholly lit: closed forms at stratified points.
+    EXPECT_NEAR(power, exact, 1e-3 * exact);
+}
+
+TEST(EmissiveMesh, ManyFacesWithoutAClosedFormGiveTheSame) {
+    Scene scene;
+    place(scene, rectangle("floor", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
+    place(scene, grid("lamp", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}, 6, 6), grey("lamp", 0, 50));
+    placeGround(scene);
+    const Shot shot = shoot(scene);
+    const double exact = 50 * parallelRectangles(1, 1, 1);
+    EXPECT_NEAR(shot.front(), exact, kSampled * exact);
+}
+
+TEST(EmissiveMesh, TrianglesEmitUniformly) {
+    // Two triangles that fill a square, too many to have a closed form, over a receiver off the
+    // middle.
+    Scene scene;
+    placeReceiver(scene, {0.9f, 0.1f, 0});
+    std::vector<glm::vec3> v;
+    std::vector<std::vector<int32_t>> faces;
+    for (int k = 0; k < 18; ++k) {
+        const int32_t first = int32_t(v.size());
+        const float y = float(k) / 18, h = 1.0f / 18;
+        v.insert(v.end(), {{0, y, 1}, {0, y + h, 1}, {1, y, 1}, {1, y + h, 1}});
+        faces.insert(faces.end(),
+                     {{first, first + 1, first + 2}, {first + 1, first + 3, first + 2}});
+    }
+    place(scene, polygons("lamp", v, faces), grey("lamp", 0, 50));
+    placeGround(scene);
+    const glm::dvec3 lamp[4] = {{0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    const double exact = 50 / kPi * polygonIrradiance({0.9, 0.1, 0}, {0, 0, 1}, lamp, 4);
+    EXPECT_NEAR(shoot(scene).front(), exact, kSampled * exact);
+}
+
+TEST(FirstShot, LeavesDimEmissionToTheBundles) {
+    const Shot shot = shoot(closedCube(0.5f, 1), 0.25f);
+    EXPECT_EQ(shot.light.emitted, glm::dvec3(0));
+    for (size_t side = 0; side < shot.patches.sideCount(); ++side) {
+        EXPECT_EQ(shot.light.emission[side], shot.patches.emission[side]);
+        EXPECT_EQ(shot.light.irradiance[side], glm::vec3(0));
+    }
+}
+
+TEST(FirstShot, PowerIsConservedInAClosedRoom) {
+    for (bool isArea : {false, true}) {
+        Scene scene = roomWithBoxes(0.5f);
+        const Light light = isArea ? areaLight({2, 1.6, 2.79}, {0.4, 0, 0}, {0, -0.4, 0}, {1, 2, 3})
+                                   : pointLight({2.2, 1.7, 2}, {1, 2, 3});
+        scene.addLight(light);
+        const Shot shot = shoot(scene, 0.1f);
+        glm::dvec3 gathered(0.0);
+        for (uint32_t side = 0; side < shot.patches.sideCount(); ++side)
+            gathered +=
+                double(shot.patches.area[side / 2]) * glm::dvec3(shot.light.irradiance[side]);
+        const double exact = isArea ? kPi * 0.64 : 4 * kPi;
+        EXPECT_NEAR(shot.light.emitted.x, exact, 1e-5 * exact);
+        // Some thousand patches whose errors of 1 % at most are independent.
+        EXPECT_NEAR(gathered.x, exact, 2e-3 * exact);
+        EXPECT_NEAR(gathered.y, 2 * exact, 4e-3 * exact);
+        EXPECT_NEAR(gathered.z, 3 * exact, 6e-3 * exact);
+        EXPECT_NEAR(shot.light.escaped.x, 0, 1e-3 * exact);
+    }
+}
+
+TEST(FirstShot, AClosedRoomKeepsTheSunOut) {
+    Scene scene = roomWithBoxes(0.5f);
+    scene.addLight(sunLight({0.3, 0.4, 1}, glm::dvec3(1), 0.05));
+    const Shot shot = shoot(scene, 0.1f);
+    for (uint32_t side = 0; side < shot.patches.sideCount(); side += 2)
+        ASSERT_EQ(shot.light.irradiance[side], glm::vec3(0)) << "light leaks through an edge";
+}
+
+TEST(FirstShot, LightsWithoutStrengthOrSizeDoNoHarm) {
+    Scene scene;
+    placeReceiver(scene);
+    scene.addLight(pointLight({0, 0, 1}, glm::dvec3(0)));
+    scene.addLight(areaLight({0, 0, 1}, {1, 0, 0}, {2, 0, 0}, glm::dvec3(1)));
+    scene.addLight(pointLight({0, 0, 0}, glm::dvec3(1)));  // on the receiver itself
+    const Shot shot = shoot(scene);
+    EXPECT_TRUE(std::isfinite(shot.front()) && std::isfinite(shot.back()));
+}
+
+TEST(FirstShot, TheSameSeedGivesTheSameLight) {
+    Scene scene = roomWithBoxes(0.5f);
+    scene.addLight(areaLight({2, 1.6, 2.5}, {0.4, 0, 0}, {0, -0.4, 0}, glm::dvec3(1)));
+    const Shot one = shoot(scene, 0.3f), two = shoot(scene, 0.3f);
+    for (size_t side = 0; side < one.patches.sideCount(); ++side)
+        ASSERT_EQ(one.light.irradiance[side], two.light.irradiance[side]);
+}
+
+}  // namespace
+}  // namespace raybundle

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/patches.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "bake/error.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+constexpr size_t kMany = 10000000;
+// Points inside a patch, away from its edges, where rounding decides.
+const glm::vec2 kInside[] = {
+    {0.33f, 0.33f}, {0.1f, 0.1f}, {0.8f, 0.1f}, {0.1f, 0.8f}, {0.8f, 0.8f}};
+
+Patches subdivided(Mesh mesh, float size, const glm::dmat4& transform = glm::dmat4(1)) {
+    Scene scene;
+    place(scene, std::move(mesh), grey("grey", 0.5f), transform);
+    return subdivide(scene, size, kMany);
+}
+
+double patchArea(const Patches& patches) {
+    double sum = 0;
+    for (float area : patches.area) sum += area;
+    return sum;
+}
+
+Parent parentWithGrid(bool isTriangle, int countA, int countB) {
+    Parent parent;
+    parent.origin = {0.1f, -0.2f, 0.3f};
+    parent.a = {1.7f, 0.2f, 0.1f};
+    parent.b = {0.3f, 1.1f, -0.4f};
+    parent.isTriangle = isTriangle;
+    parent.countA = uint16_t(countA);
+    parent.countB = uint16_t(countB);
+    return parent;
+}
+
+TEST(Patches, AreasOfQuadsTrianglesAndConcaveFacesAreConserved) {
+    const Mesh mesh = polygons("shapes",
+                               {{0, 0, 0},
+                                {2, 0, 0},
+                                {2, 3, 0},
+                                {0, 3, 0},  // rectangle
+                                {5, 0, 0},
+                                {6, 0, 0},
+                                {5, 2, 0},  // triangle
+                                {0, 0, 1},
+                                {3, 0, 1},
+                                {3, 1, 1},
+                                {1, 1, 1},
+                                {1, 2, 1},
+                                {0, 2, 1},  // L
+                                {0, 0, 2},
+                                {3, 0, 2},
+                                {1, 1, 2},
+                                {0, 3, 2}},  // arrow
+                               {{0, 1, 2, 3}, {4, 5, 6}, {7, 8, 9, 10, 11, 12}, {13, 14, 15, 16}});
+    const double exact = 6 + 1 + 4 + 3;
+    for (float size : {10.0f, 0.5f, 0.07f}) {
+        const Patches patches = subdivided(mesh, size);
+        EXPECT_NEAR(patchArea(patches), exact, 1e-5 * exact) << "patch size " << size;
+        EXPECT_NEAR(patches.totalArea, exact, 1e-5 * exact) << "patch size " << size;
+    }
+}
+
+TEST(Patches, ANonPlanarQuadHasTheAreaOfItsTwoTriangles) {
+    const std::vector<glm::vec3> v = {{0, 0, 0}, {1, 0, 0.3f}, {1, 1, 0}, {0, 1, 0.2f}};
+    auto area = [&](int a, int b, int c) {
+        return 0.5 * double(glm::length(
+                         glm::cross(v[size_t(b)] - v[size_t(a)], v[size_t(c)] - v[size_t(a)])));
+    };
+    const double one = area(0, 1, 2) + area(0, 2, 3), other = area(0, 1, 3) + area(1, 2, 3);
+    const double found = patchArea(subdivided(polygons("bent", v, {{0, 1, 2, 3}}), 0.1f));
+    EXPECT_LT(std::min(std::abs(found - one), std::abs(found - other)), 1e-5);
+}
+
+TEST(Patches, ScaledAndMirroredInstancesKeepAreaAndFronts) {
+    for (double mirror : {1.0, -1.0}) {
+        const glm::dmat4 transform = glm::scale(
+            glm::rotate(glm::dmat4(1), 0.7, glm::dvec3(1, 2, 3)), glm::dvec3(2 * mirror, 3, 0.5));
+        const Patches patches =
+            subdivided(box("box", {-1, -1, -1}, {1, 1, 1}, true), 0.3f, transform);
+        const double exact = 2 * (4.0 * 6 + 4.0 * 1 + 6.0 * 1);
+        EXPECT_NEAR(patchArea(patches), exact, 1e-5 * exact);
+        for (uint32_t p = 0; p < patches.count(); ++p)
+            ASSERT_LT(glm::dot(patches.normal(2 * p), patches.point(p, {0.3f, 0.3f})), 0)
+                << "the front of an inward box looks to its centre, mirror " << mirror;
+    }
+}
+
+TEST(Patches, PatchAtFindsThePatchOfEveryPoint) {
+    for (bool isTriangle : {true, false})
+        for (int countA : {1, 2, 3, 5, 7, 10, 31, 64, 100, 333, 1021, 4095, 4096}) {
+            const int countB = isTriangle ? countA : 1 + countA / 3;
+            const Parent parent = parentWithGrid(isTriangle, countA, countB);
+            const uint32_t step = 1 + parent.patchCount() / 100000;
+            for (uint32_t k = 0; k < parent.patchCount(); k += step)
+                for (glm::vec2 uv : kInside) {
+                    const glm::vec2 st = parent.pointOn(k, uv);
+                    ASSERT_EQ(parent.patchAt(st.x, st.y), k) << countA << " x " << countB;
+                }
+        }
+}
+
+TEST(Patches, PatchAtClampsToTheParent) {
+    for (bool isTriangle : {true, false}) {
+        const Parent parent = parentWithGrid(isTriangle, 10, 10);
+        for (float s : {-1e-6f, -3.0f, 0.0f, 0.5f, 1.0f, 1.000001f, 4.0f})
+            for (float t : {-1e-6f, -3.0f, 0.0f, 0.5f, 1.0f, 1.000001f, 4.0f})
+                EXPECT_LT(parent.patchAt(s, t), parent.patchCount());
+    }
+}
+
+TEST(Patches, PatchAtFindsThePatchOfAPointInTheWorld) {
+    // A skewed sliver, a long strip and a plain triangle: parents whose float coordinates are hard.
+    const Mesh mesh = polygons("hard",
+                               {{0, 0, 0},
+                                {1, 0, 0},
+                                {1.9f, 0.2f, 0},
+                                {0.9f, 0.2f, 0},
+                                {0, 0, 1},
+                                {300, 0, 1},
+                                {300, 0.7f, 1},
+                                {0, 0.7f, 1},
+                                {0, 0, 2},
+                                {7, 1, 2},
+                                {2, 5, 3}},
+                               {{0, 1, 2, 3}, {4, 5, 6, 7}, {8, 9, 10}});
+    const Patches patches = subdivided(mesh, 0.11f);
+    for (uint32_t p = 0; p < patches.count(); ++p)
+        for (glm::vec2 uv : kInside)
+            ASSERT_EQ(patches.patchAt(patches.parentOf[p], patches.point(p, uv)), p);
+}
+
+TEST(Patches, PatchesOfAParentHaveEqualArea) {
+    for (bool isTriangle : {true, false})
+        for (int count : {1, 3, 10, 100}) {
+            const Parent parent = parentWithGrid(isTriangle, count, count);
+            const double wanted = double(parent.area()) / parent.patchCount();
+            for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+                const glm::vec3 p = parent.position(parent.pointOn(k, {0, 0}));
+                const glm::vec3 q = parent.position(parent.pointOn(k, {1, 0}));
+                const glm::vec3 r = parent.position(parent.pointOn(k, {0, 1}));
+                const double area =
+                    glm::length(glm::cross(q - p, r - p)) * (isTriangle ? 0.5 : 1.0);
+                ASSERT_NEAR(area, wanted, 1e-3 * wanted);
+            }
+        }
+}
+
+TEST(Patches, MaxPatchesIsAnUpperBound) {
+    Scene scene = roomWithBoxes(0.5f);
+    const double exact = subdivide(scene, 10, kMany).totalArea;
+    for (size_t most : {size_t(100), size_t(1000), size_t(20000)}) {
+        const Patches patches = subdivide(scene, 0.01f, most);
+        EXPECT_LE(patches.count(), most);
+        EXPECT_GT(patches.count(), most / 3) << "coarser than it needs to be";
+        EXPECT_NEAR(patchArea(patches), exact, 1e-5 * exact);
+    }
+    const Patches fewest = subdivide(scene, 0.01f, 1);
+    EXPECT_EQ(fewest.count(), fewest.parents.size()) << "a parent keeps one patch";
+}
+
+TEST(Patches, ElongatedTrianglesAreBisected) {
+    const float size = 0.5f;
+    const Patches patches =
+        subdivided(polygons("sliver", {{0, 0, 0}, {100, 0, 0}, {50, 1, 0}}, {{0, 1, 2}}), size);
+    EXPECT_NEAR(patchArea(patches), 50, 1e-4 * 50);
+    EXPECT_LT(patches.count(), 2000u) << "a grid of slivers would have 10000";
+    for (const Parent& parent : patches.parents) {
+        const float longest = std::max(
+            {glm::length(parent.a), glm::length(parent.b), glm::length(parent.b - parent.a)});
+        const float height = 2 * parent.area() / longest;
+        EXPECT_TRUE(longest <= 4.01f * height || longest <= 2.01f * size);
+    }
+}
+
+TEST(Patches, DegenerateFacesAreLeftOutAndTheirObjectIsNamed) {
+    const Mesh mesh =
+        polygons("broken", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 0, 0}, {3, 0, 0}, {1, 0, 0}},
+                 {{0, 1, 2}, {0, 1, 3}, {0, 3, 4, 1}, {1, 5, 2}});
+    const Patches patches = subdivided(mesh, 0.3f);
+    EXPECT_EQ(patches.degenerateFaces, 3u);
+    EXPECT_NEAR(patchArea(patches), 0.5, 1e-6);
+    ASSERT_EQ(patches.warnings.size(), 1u);
+    EXPECT_NE(patches.warnings[0].find("broken"), std::string::npos) << patches.warnings[0];
+    EXPECT_NE(patches.warnings[0].find('3'), std::string::npos) << patches.warnings[0];
+}
+
+TEST(Patches, CoordinatesThatAreNotFiniteAreRejectedByName) {
+    for (float bad : {NAN, INFINITY, -INFINITY}) {
+        Scene scene;
+        Mesh mesh = rectangle("crooked", {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+        mesh.vertices[2].y = bad;
+        try {
+            scene.addMesh(std::move(mesh));
+            ADD_FAILURE() << "accepted " << bad;
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code, RB_ERROR_INVALID_ARGUMENT);
+            EXPECT_NE(std::string(error.what()).find("crooked"), std::string::npos) << error.what();
+        }
+        EXPECT_TRUE(scene.meshes.empty());
+    }
+}
+
+TEST(Patches, AScenesDistanceFromTheOriginDoesNotMatter) {
+    const Mesh mesh = box("far", {0, 0, 0}, {1, 1, 1}, true);
+    const Patches near = subdivided(mesh, 0.1f);
+    const Patches far =
+        subdivided(mesh, 0.1f, glm::translate(glm::dmat4(1), glm::dvec3(1e5, -1e5, 2e5 + 0.3)));
+    ASSERT_EQ(near.count(), far.count());
+    for (uint32_t p = 0; p < near.count(); ++p) {
+        ASSERT_NEAR(far.area[p], near.area[p], 1e-6f * near.area[p]);
+        ASSERT_LT(glm::distance(far.point(p, {0.5f, 0.5f}), near.point(p, {0.5f, 0.5f})), 1e-5f);
+    }
+}
+
+TEST(Reflectance, AnImageOfACheckerAveragesExactly) {
+    constexpr int kPixels = 8;
+    Image image{"checker", kPixels, kPixels, RB_IMAGE_REPEAT, {}};
+    for (int y = 0; y < kPixels; ++y)
+        for (int x = 0; x < kPixels; ++x) image.pixels.emplace_back((x + y) % 2 ? 0.8f : 0.2f);
+    for (float size : {1.0f, 0.5f}) {
+        Scene scene;
+        Material material = grey("checker", 0.0f);
+        material.reflectance[1] = glm::vec3(0.1f);
+        material.image = scene.addImage(image);
+        material.imageWeight = {1, 0.5f, 0};
+        Mesh mesh = rectangle("plane", {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+        mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        place(scene, mesh, material);
+        const Patches patches = subdivide(scene, size, kMany);
+        for (uint32_t p = 0; p < patches.count(); ++p) {
+            EXPECT_LT(glm::distance(patches.reflectance[2 * p], {0.5f, 0.25f, 0}), 1e-5f);
+            EXPECT_LT(glm::distance(patches.reflectance[2 * p + 1], {0.6f, 0.35f, 0.1f}), 1e-5f);
+        }
+    }
+}
+
+TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnQuads) {
+    Scene scene;
+    Material material = grey("ramp", 0.0f);
+    material.usesCornerColors = true;
+    material.cornerColorWeight = glm::vec3(1);
+    Mesh mesh = rectangle("plane", {0, 0, 0}, {2, 0, 0}, {0, 1, 0});
+    for (int32_t v : mesh.cornerVertices)
+        mesh.cornerColors.push_back(0.1f + 0.3f * mesh.vertices[size_t(v)] + glm::vec3(0, 0, 0.2f));
+    place(scene, mesh, material);
+    const Patches patches = subdivide(scene, 0.13f, kMany);
+    for (uint32_t p = 0; p < patches.count(); ++p) {
+        const glm::vec3 at = patches.point(p, {0.5f, 0.5f}) + glm::vec3(patches.centre);
+        ASSERT_LT(
+            glm::distance(patches.reflectance[2 * p], 0.1f + 0.3f * at + glm::vec3(0, 0, 0.2f)),
+            1e-5f);
+    }
+}
+
+TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnTriangles) {
+    Scene scene;
+    Material material = grey("ramp", 0.0f);
+    material.usesCornerColors = true;
+    material.cornerColorWeight = glm::vec3(1);
+    Mesh mesh = polygons("triangle", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
+    mesh.cornerColors = {{0, 0, 0.9f}, {0.9f, 0, 0}, {0, 0.9f, 0}};
+    place(scene, mesh, material);
+    const Patches patches = subdivide(scene, 10, kMany);
+    ASSERT_EQ(patches.count(), 1u);
+    EXPECT_LT(glm::distance(patches.reflectance[0], glm::vec3(0.3f)), 1e-5f)
+        << "the mean of a linear colour is that at the centroid";
+}
+
+}  // namespace
+}  // namespace raybundle

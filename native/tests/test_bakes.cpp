@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "test_bakes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "test_scenes.h"
+
+namespace raybundle::test {
+
+Json reportOf(const Bake& bake) { return Json::parse(bake.reportJson()); }
+
+bool mentions(const Json& part, const std::string& text) {
+    return part.dump().find(text) != std::string::npos;
+}
+
+std::vector<glm::vec3> cornerLight(const Bake& bake, int32_t instance, rb_output output) {
+    return bake.instanceLight(instance).perCorner(output);
+}
+
+std::vector<glm::vec3> everything(const Bake& bake) {
+    std::vector<glm::vec3> all;
+    for (int32_t i = 0; i < 3; ++i)
+        for (rb_output output :
+             {RB_OUTPUT_COMBINED, RB_OUTPUT_LIGHTING, RB_OUTPUT_DIRECT, RB_OUTPUT_INDIRECT})
+            for (const glm::vec3& v : cornerLight(bake, i, output)) all.push_back(v);
+    return all;
+}
+
+double difference(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
+    if (a.size() != b.size()) return INFINITY;
+    double most = 0, value = 0;
+    for (size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+        for (int c = 0; c < 3; ++c) {
+            most = std::max(most, std::abs(double(a[i][c]) - double(b[i][c])));
+            value = std::max(value, std::abs(double(a[i][c])));
+        }
+    return most / value;  // not a number if all is black: no test accepts that
+}
+
+double noise(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
+    double squares = 0, signal = 0;
+    for (size_t i = 0; i < a.size(); ++i) {
+        squares += double(glm::dot(a[i] - b[i], a[i] - b[i]));
+        signal += double(glm::dot(a[i], a[i]));
+    }
+    return std::sqrt(squares / signal);
+}
+
+Scene litRoom(float reflectance) {
+    Scene scene = roomWithBoxes(reflectance);
+    scene.addLight(areaLight({2, 1.6, 2.6}, {0.3, 0, 0}, {0, -0.3, 0}, {5, 4, 3}));
+    return scene;
+}
+
+void setQuick(Bake& bake, int bundleCount) {
+    bake.settings.patchSize = 0.25f;
+    bake.settings.minBundles = bake.settings.maxBundles = bundleCount;
+}
+
+std::vector<glm::vec3> bakeQuick(const Scene& scene, int seed, int threads) {
+    Bake bake;
+    setQuick(bake);
+    bake.settings.seed = seed;
+    bake.settings.threads = threads;
+    bake.run(scene);
+    return everything(bake);
+}
+
+}  // namespace raybundle::test

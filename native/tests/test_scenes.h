@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Small scenes and closed forms that several tests share.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "bundles/line_counts.h"
+#include "patches/patches.h"
+#include "scene/scene.h"
+
+namespace raybundle::test {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Meshes. All faces are wound counter-clockwise seen from their front.
+Mesh polygons(const std::string& name, std::vector<glm::vec3> vertices,
+              const std::vector<std::vector<int32_t>>& faces);
+// na x nb parallelograms over origin + [0, 1] a + [0, 1] b with common vertices.
+Mesh grid(const std::string& name, const glm::vec3& origin, const glm::vec3& a, const glm::vec3& b,
+          int na, int nb);
+inline Mesh rectangle(const std::string& name, const glm::vec3& origin, const glm::vec3& a,
+                      const glm::vec3& b) {
+    return grid(name, origin, a, b, 1, 1);
+}
+// Six quads, with their fronts inside or outside.
+Mesh box(const std::string& name, const glm::vec3& low, const glm::vec3& high, bool inward);
+// An icosahedron whose faces are cut in four `levels` times and blown up to a sphere around the
+// origin.
+Mesh icosphere(const std::string& name, float radius, int levels, bool inward);
+
+// Materials: grey, emission on the front side only unless said otherwise.
+Material grey(const std::string& name, float reflectance, float emission = 0,
+              float backEmission = 0);
+
+// Adds the mesh with one material on all its faces, and an instance of it. Returns the instance.
+int32_t place(Scene& scene, Mesh mesh, const Material& material,
+              const glm::dmat4& transform = glm::dmat4(1), rb_role role = RB_ROLE_BAKE,
+              rb_side side = RB_SIDE_FRONT);
+
+// A closed unit cube seen from inside.
+Scene closedCube(float reflectance, float emission = 0);
+// A closed room of 4 x 3.2 x 2.8 m with two boxes in it, one of them turned, both `gap` above the
+// floor.
+Scene roomWithBoxes(float reflectance, float emission = 0, float gap = 0.1f);
+
+Light pointLight(const glm::dvec3& position, const glm::dvec3& intensity);
+Light areaLight(const glm::dvec3& centre, const glm::dvec3& axisU, const glm::dvec3& axisV,
+                const glm::dvec3& radiance, rb_area_shape shape = RB_AREA_RECTANGLE);
+Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double angle = 0);
+
+// Lines of the first `count` bundles of a sequence through the patches.
+LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed = 1,
+                      DirectionKind kind = DirectionKind::LOW_DISCREPANCY,
+                      float touchDistance = 1e-5f);
+
+// m_i of both halves together.
+double linesOf(const LineCounts& counts, uint32_t side);
+// c_ij of both halves together.
+double linesBetween(const LineCounts& counts, uint32_t i, uint32_t j);
+// Form factor from all fronts of an instance to all fronts of another, by the counts.
+double formFactor(const Patches& patches, const LineCounts& counts, uint32_t from, uint32_t to);
+
+// Closed forms of method.md 2.1. Aligned parallel rectangles a x b at distance c.
+double parallelRectangles(double a, double b, double c);
+// Perpendicular rectangles with a common edge l; w is the width of the first, h that of the second.
+double perpendicularRectangles(double w, double h, double l);
+// Parallel rectangles [x0, x1] x [y0, y1] and [u0, u1] x [v0, v1] at distance z.
+double offsetRectangles(const double (&x)[2], const double (&y)[2], const double (&u)[2],
+                        const double (&v)[2], double z);
+// Coaxial disks of radii r1 and r2 at distance h.
+double coaxialDisks(double r1, double r2, double h);
+
+}  // namespace raybundle::test
