@@ -1,0 +1,161 @@
+"""Cycles' own light at the corners of the meshes, as a reference.
+
+    blender -b FILE.blend -P blend_tests/cycles_reference.py -- \\
+        --samples 8192 --seed 0 --out FILE.npz [--objects NAME ...]
+
+The values are those of Cycles' Diffuse bake with Direct and Indirect but without Color:
+irradiance / pi, scene-linear, sampled exactly at the corner's place. A surface that reflects
+nothing (pure emission, black) has no diffuse light in Cycles: its values are 0 whatever arrives.
+The .blend file is never saved.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Sequence
+
+import bpy
+import numpy as np
+
+ATTRIBUTE = "Cycles"
+BOUNCES = 128
+
+
+def bakeable_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The mesh objects of the view layer that are rendered and have faces of their own."""
+    return [item for item in context.view_layer.objects
+            if item.type == "MESH" and len(item.data.polygons) > 0
+            and not item.hide_render and item.visible_get()]
+
+
+def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int) -> None:
+    """Sets Cycles to an unbiased bake: every bounce, nothing clamped, denoised or adapted."""
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.samples, cycles.seed = samples, seed
+    cycles.time_limit = 0.0
+    cycles.use_animated_seed = False
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising = False
+    cycles.use_fast_gi = False
+    cycles.use_guiding = False
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = BOUNCES
+    cycles.transmission_bounces = cycles.transparent_max_bounces = BOUNCES
+    cycles.min_light_bounces = cycles.min_transparent_bounces = 0
+    cycles.light_sampling_threshold = 0.0
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles.blur_glossy = 0.0
+    scene.render.use_simplify = False
+
+
+def target_attribute(mesh: bpy.types.Mesh) -> bpy.types.Attribute:
+    """The mesh's attribute that the bake writes, made if it is missing, and active."""
+    attributes = mesh.color_attributes
+    existing = attributes.get(ATTRIBUTE)
+    if existing is not None and (existing.data_type, existing.domain) != ("FLOAT_COLOR", "CORNER"):
+        attributes.remove(existing)
+        existing = None
+    if existing is None:
+        attributes.new(name=ATTRIBUTE, type="FLOAT_COLOR", domain="CORNER")
+    attributes.active_color_index = attributes.find(ATTRIBUTE)
+    return attributes[ATTRIBUTE]
+
+
+def corner_values(mesh: bpy.types.Mesh) -> np.ndarray:
+    """The baked values, one RGB row per corner."""
+    attribute = mesh.color_attributes[ATTRIBUTE]
+    values = np.empty(4 * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("color", values)
+    return values.reshape(-1, 4)[:, :3].copy()
+
+
+def rounds_of_distinct_meshes(objects: Sequence[bpy.types.Object]
+                              ) -> list[list[bpy.types.Object]]:
+    """Splits the objects so that no round has two that share a mesh: a bake overwrites it."""
+    rounds: list[dict[bpy.types.Mesh, bpy.types.Object]] = []
+    for item in objects:
+        free = next((entry for entry in rounds if item.data not in entry), None)
+        if free is None:
+            free = {}
+            rounds.append(free)
+        free[item.data] = item
+    return [list(entry.values()) for entry in rounds]
+
+
+def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int
+                 ) -> dict[str, np.ndarray]:
+    """Bakes irradiance / pi of the objects; RGB by corner, keyed by the object's name.
+
+    The scene's render settings, the selection and the meshes' active colour attribute change.
+    """
+    context = bpy.context
+    prepare_scene(context.scene, samples, seed)
+    result: dict[str, np.ndarray] = {}
+    for group in rounds_of_distinct_meshes(objects):
+        for item in context.view_layer.objects:
+            item.select_set(False)
+        for item in group:
+            target_attribute(item.data)
+            item.select_set(True)
+        context.view_layer.objects.active = group[0]
+        bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"},
+                            target="VERTEX_COLORS", use_selected_to_active=False,
+                            use_clear=True)
+        result.update((item.name, corner_values(item.data)) for item in group)
+    return result
+
+
+def save(path: Path, values: dict[str, np.ndarray], samples: int, seed: int, seconds: float
+         ) -> None:
+    """Writes the values, and how they came about, to a compressed .npz file.
+
+    The objects' arrays have the key ``object:NAME``.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(path, samples=samples, seed=seed, seconds=round(seconds, 1),
+                        blender_version=bpy.app.version_string,
+                        **{f"object:{name}": array for name, array in values.items()})
+
+
+def load(path: Path) -> dict[str, np.ndarray]:
+    """The values of a file that `save` wrote, by object name."""
+    with np.load(path) as stored:
+        return {key.partition(":")[2]: stored[key] for key in stored.files
+                if key.startswith("object:")}
+
+
+def main(argv: Sequence[str]) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="cycles_reference.py", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--samples", type=int, default=8192)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--objects", nargs="*", metavar="NAME",
+                        help="bake these only (default: every mesh object that is rendered)")
+    options = parser.parse_args(argv)
+
+    objects = bakeable_objects(bpy.context)
+    if options.objects:
+        missing = sorted(set(options.objects) - {item.name for item in objects})
+        if missing:
+            sys.exit(f"not a rendered mesh object of this scene: {', '.join(missing)}")
+        objects = [item for item in objects if item.name in options.objects]
+    if not objects:
+        sys.exit("nothing to bake: the scene has no rendered mesh object with faces")
+
+    start = time.perf_counter()
+    values = bake_objects(objects, options.samples, options.seed)
+    seconds = time.perf_counter() - start
+    save(options.out, values, options.samples, options.seed, seconds)
+    for name, array in values.items():
+        print(f"{name}: {len(array)} corners, mean {array.mean(axis=0).round(4).tolist()}")
+    print(f"{options.out}: {options.samples} samples in {seconds:.1f} s")
+
+
+if __name__ == "__main__":
+    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])

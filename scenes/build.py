@@ -1,0 +1,60 @@
+"""Builds the scenes: ``blender -b --factory-startup -P scenes/build.py -- [NAME ...]``.
+
+Without names all scenes are built. Each is saved beside this file as NAME.blend.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+if str(FOLDER) not in sys.path:
+    sys.path.insert(0, str(FOLDER))
+
+construction = importlib.import_module("build.construction")
+
+SCENES = ("cornell_box", "furnace", "facing_squares", "sphere_interior", "big_room", "office",
+          "two_rooms", "open_court", "thin_wall", "instances")
+
+
+def build_scene(name: str) -> Path:
+    """Builds one scene in an empty file and saves it."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    context = bpy.context
+    context.scene.name = name
+    construction.set_render_settings(context.scene)
+    construction.show_vertex_colours(bpy.data.screens)
+    importlib.import_module(f"build.{name}").build(context)
+    path = FOLDER / f"{name}.blend"
+    bpy.context.preferences.filepaths.save_version = 0
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
+    return path
+
+
+def summary(path: Path) -> str:
+    """One line about the scene that is open: objects and faces that a render shows."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    own = [item for item in bpy.context.view_layer.objects
+           if item.type == "MESH" and not item.hide_render]
+    shown = [instance.object for instance in graph.object_instances
+             if instance.object.type == "MESH"]
+    return (f"{path.name}: {len(own)} mesh objects with "
+            f"{sum(len(item.data.polygons) for item in own)} faces; shown: {len(shown)} with "
+            f"{sum(len(item.data.polygons) for item in shown)}; {path.stat().st_size} bytes")
+
+
+def main(names: list[str]) -> None:
+    """Builds the named scenes, or all."""
+    unknown = sorted(set(names) - set(SCENES))
+    if unknown:
+        sys.exit(f"unknown scene: {', '.join(unknown)}; known: {', '.join(SCENES)}")
+    for name in names or SCENES:
+        print(summary(build_scene(name)))
+
+
+if __name__ == "__main__":
+    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])

@@ -1,0 +1,1 @@
+"""One module per scene, each with a function ``build(context)`` that fills an empty file."""
