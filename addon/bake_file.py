@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+r"""Bakes a .blend file in the background; the script behind the ./bake command.
+
+    blender -b --factory-startup FILE.blend --python-exit-code 1 -P addon/bake_file.py -- \
+        [--out DIR] [--set name=value ...]
+
+Writes DIR/NAME.baked.blend, DIR/NAME.json (the report) and DIR/NAME.png (a picture of the vertex
+colours). Leaves with exit code 1 and one line on an error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import attribute_picture  # noqa: E402
+import raybundle  # noqa: E402
+from raybundle.properties import checked_value  # noqa: E402
+
+# Between two lines of progress within a stage.
+PROGRESS_SECONDS = 1.0
+
+
+def main(arguments: list[str]) -> None:
+    options = _parse(arguments)
+    if not bpy.data.filepath:
+        raise raybundle.BakeError("There is no file to bake: name a .blend before -P")
+    raybundle.register()
+    name = Path(bpy.data.filepath).stem
+    out = options.out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    scene = bpy.context.scene
+    for assignment in options.set:
+        _apply(scene, assignment)
+
+    report = raybundle.bake(bpy.context, ProgressLines())
+    (out / f"{name}.json").write_text(report.to_json(indent=2) + "\n")
+    # Textures and libraries beside the original must still be found from the new place.
+    bpy.ops.wm.save_as_mainfile(filepath=str(out / f"{name}.baked.blend"), relative_remap=True,
+                                compress=True, copy=True)
+    # From here on the open file is changed for the picture; it is not saved again.
+    baked = {item.name for item in report.objects if item.status.startswith('baked')}
+    attribute_picture.render(bpy.context, baked, scene.raybundle.attribute, out / f"{name}.png")
+    _print_summary(report, out, name)
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="bake", description="Bake a .blend file")
+    parser.add_argument("--out", type=Path, default=Path("out"), metavar="DIR",
+                        help="folder of the results (out)")
+    parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="name=value",
+                        help="settings of scene.raybundle, such as target_error=0.01")
+    return parser.parse_args(arguments)
+
+
+def _apply(scene: bpy.types.Scene, assignment: str) -> None:
+    name, equals, value = assignment.partition("=")
+    if not equals:
+        raise raybundle.BakeError(f'--set "{assignment}": expected name=value')
+    if name.startswith("skip."):
+        raise raybundle.BakeError(f'--set "{name}": skips cannot be switched in this version')
+    definition = type(scene.raybundle).bl_rna.properties.get(name)
+    if definition is None or name in ('rna_type', 'name', 'report'):
+        names = [item.identifier for item in type(scene.raybundle).bl_rna.properties
+                 if item.identifier not in ('rna_type', 'name', 'report')]
+        raise raybundle.BakeError(f'--set "{name}": there is no such setting; there are: '
+                                  f'{", ".join(names)}')
+    setattr(scene.raybundle, name, checked_value(name, value))
+
+
+class ProgressLines:
+    """A line when a stage begins, and after each second in it."""
+
+    def __init__(self) -> None:
+        self._stage = ""
+        self._printed = 0.0
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        now = time.monotonic()
+        if stage == self._stage and now < self._printed + PROGRESS_SECONDS:
+            return
+        self._stage, self._printed = stage, now
+        print(f"{stage:<14} {100.0 * fraction:3.0f} %", flush=True)
+
+
+def _print_summary(report: raybundle.BakeReport, out: Path, name: str) -> None:
+    print(report.summary())
+    stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
+                       if stage != 'total')
+    print(f"  seconds: {stages}")
+    print(f"  energy balance error: {report.energy['balance_error']:.1e}")
+    for item in report.objects:
+        if item.status != 'baked':
+            print(f"  {item.name}: {item.status}")
+    for warning in report.warnings:
+        print(f"  warning: {warning}")
+    for suffix in ("baked.blend", "png", "json"):
+        print(f"  wrote {out / f'{name}.{suffix}'}")
+
+
+if __name__ == "__main__":
+    given = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
+    try:
+        main(given)
+    except (raybundle.BakeError, raybundle.RaybundleError, ValueError, OSError) as error:
+        print(f"bake: {error}", file=sys.stderr, flush=True)
+        # Blender itself would print a traceback and go on.
+        os._exit(1)

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bake, stage by stage: check, export, native scene, execute, read results, write, report.
+
+Nothing of the user's data changes before the whole solve has succeeded.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from . import bake_cache, native
+from .bake_report import BakeError, BakeReport, ObjectReport
+from .color_attribute import name_is_free, write_light
+from .corner_map import CornerMap, grouped_mean
+from .mesh_export import read
+from .native import ErrorCode, Progress, RaybundleError
+from .native_scene import build_native_scene
+from .properties import BakeSettings, read_settings
+from .scene_export import BakeTarget, SceneExport, export_scene
+from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
+                              subdivide)
+
+
+@dataclass(frozen=True)
+class TargetLight:
+    """What is to be written to an object."""
+
+    target: BakeTarget
+    light: np.ndarray  # (corners or vertices, 3), by settings.domain
+    subdivided: SubdividedMesh | None
+
+
+def bake(context: bpy.types.Context, progress: Progress | None = None,
+         **overrides: object) -> BakeReport:
+    """Bake the context's scene with its settings, some perhaps overridden (seed=1, ...).
+
+    progress(stage, fraction) may return False to cancel. Raises BakeError for what the user can put
+    right, RaybundleError for what the native library refuses, with code CANCELLED after a cancel.
+    """
+    started = time.perf_counter()
+    scene = context.scene
+    try:
+        settings = read_settings(scene, overrides)
+    except ValueError as error:
+        raise BakeError(str(error)) from error
+    report_progress = _checked_progress(progress)
+    native.load()
+
+    with _object_mode(context):
+        _check(scene, settings)
+        report_progress('export', 0.0)
+        export, subdivided = _export(context, settings)
+        with build_native_scene(export.scene) as native_scene:
+            export_seconds = time.perf_counter() - started
+            native_bake = bake_cache.get_or_create(scene)
+            _apply_settings(native_bake, settings)
+            native_bake.execute(native_scene, report_progress)
+
+        report_progress('write_back', 0.0)
+        write_started = time.perf_counter()
+        lights = _read_results(native_bake, export, subdivided, settings)
+        native_report = native_bake.report()
+        objects = _write(context, lights, settings, export, native_report)
+        report = BakeReport.from_native(native_report)
+        report.objects = objects + [ObjectReport(name, 0, status)
+                                    for name, status in export.statuses.items()]
+        report.warnings = list(dict.fromkeys([*export.warnings, *report.warnings]))
+        finished = time.perf_counter()
+        report.seconds.update(export=export_seconds, write_back=finished - write_started,
+                              total=finished - started)
+        scene.raybundle.report = report.to_json()
+    return report
+
+
+def _checked_progress(progress: Progress | None) -> Progress:
+    def report(stage: str, fraction: float) -> None:
+        if progress is not None and progress(stage, fraction) is False:
+            raise RaybundleError(ErrorCode.CANCELLED, "The bake was cancelled")
+    return report
+
+
+# --------------------------------------------------------------------------------------------------
+# Check
+# --------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _object_mode(context: bpy.types.Context) -> Iterator[None]:
+    """Out of Edit Mode, in which meshes can be neither evaluated nor written, and back again."""
+    was_editing = context.mode.startswith('EDIT')
+    if was_editing and bpy.ops.object.mode_set.poll():
+        bpy.ops.object.mode_set(mode='OBJECT')
+    try:
+        yield
+    finally:
+        if was_editing and context.mode == 'OBJECT' and bpy.ops.object.mode_set.poll():
+            bpy.ops.object.mode_set(mode='EDIT')
+
+
+def _check(scene: bpy.types.Scene, settings: BakeSettings) -> None:
+    if not settings.attribute:
+        raise BakeError("The attribute needs a name")
+    for item in scene.objects:
+        if item.type != 'MESH' or item.raybundle.role != 'BAKE':
+            continue
+        if item.data.is_editmode:
+            raise BakeError(f'"{item.name}" is in Edit Mode: leave it before baking')
+        if not name_is_free(item.data, settings.attribute):
+            raise BakeError(f'"{item.name}" has another attribute of the name '
+                            f'"{settings.attribute}", which is no colour: choose another name')
+
+
+# --------------------------------------------------------------------------------------------------
+# Export
+# --------------------------------------------------------------------------------------------------
+
+
+def _export(context: bpy.types.Context, settings: BakeSettings
+            ) -> tuple[SceneExport, dict[int, SubdividedMesh]]:
+    """The exported scene and, for topology 'SUBDIVIDE', the finer mesh by target's instance."""
+    refine = settings.topology == 'SUBDIVIDE'
+    selected = None
+    if settings.scope == 'SELECTED':
+        selected = {item for item in context.scene.objects if item.select_get()}
+        if refine:
+            # Whoever selects a copy means its original.
+            selected |= {original for original, copy in find_copies(context.scene).items()
+                         if copy in selected}
+    with originals_shown(context.scene) if refine else nullcontext():
+        export = export_scene(context, selected)
+    _leave_out_unwritable(export, settings)
+    if not export.targets:
+        reasons = "; ".join(f'"{name}" {status}' for name, status in export.statuses.items())
+        what = "selected mesh object" if settings.scope == 'SELECTED' else "visible mesh object"
+        raise BakeError(f"Nothing to bake: no {what} with faces and the role Bake"
+                        + (f" ({reasons})" if reasons else ""))
+    return export, _refine(export, settings) if refine else {}
+
+
+def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
+    """Targets whose data belongs to another file keep taking part in the light."""
+    writable = []
+    for target in export.targets:
+        # A copy needs a place beside its original, but has a mesh of its own.
+        owner = target.object if settings.topology == 'SUBDIVIDE' else target.object.data
+        if owner.library is None and owner.override_library is None:
+            writable.append(target)
+            continue
+        status = (f"linked from {owner.library.filepath}: cannot be written" if owner.library
+                  else "overrides linked data: cannot be written")
+        export.statuses[target.object.name] = status
+        export.warnings.add(f'"{target.object.name}" is {status}')
+        instances = export.scene.instances
+        instances[target.instance] = replace(instances[target.instance], role='OCCLUDE')
+    export.targets[:] = writable
+
+
+def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, SubdividedMesh]:
+    scene = export.scene
+    patch_size = settings.patch_size or scene.diagonal() / 64.0
+    result = {}
+    for target in export.targets:
+        instance = scene.instances[target.instance]
+        mesh = subdivide(scene.meshes[instance.mesh], instance.transform, 2.0 * patch_size)
+        scene.meshes.append(mesh.data)
+        scene.instances[target.instance] = replace(instance, mesh=len(scene.meshes) - 1)
+        result[target.instance] = mesh
+    return result
+
+
+def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
+    for name in native.SETTINGS:
+        if hasattr(settings, name):
+            native_bake.set(name, getattr(settings, name))
+
+
+# --------------------------------------------------------------------------------------------------
+# Results
+# --------------------------------------------------------------------------------------------------
+
+
+def _read_results(native_bake: native.Bake, export: SceneExport,
+                  subdivided: dict[int, SubdividedMesh], settings: BakeSettings
+                  ) -> list[TargetLight]:
+    results = []
+    for target in export.targets:
+        mesh = export.scene.meshes[export.scene.instances[target.instance].mesh]
+        finer = subdivided.get(target.instance)
+        corner_map = target.corner_map if finer is None else CornerMap(mesh.corner_count)
+        if settings.domain == 'POINT' and corner_map.is_identity:
+            light = native_bake.vertex_light(target.instance, settings.output, len(mesh.vertices))
+        else:
+            light = corner_map.to_original(native_bake.corner_light(
+                target.instance, settings.output, mesh.corner_count))
+            if settings.domain == 'POINT':
+                original = target.object.data
+                light = grouped_mean(light, read(original.loops, 'vertex_index', np.int32),
+                                     len(original.vertices))
+        results.append(TargetLight(target, light, finer))
+    return results
+
+
+# --------------------------------------------------------------------------------------------------
+# Write
+# --------------------------------------------------------------------------------------------------
+
+
+def _write(context: bpy.types.Context, lights: list[TargetLight], settings: BakeSettings,
+           export: SceneExport, native_report: dict) -> list[ObjectReport]:
+    copies: dict[bpy.types.Object, bpy.types.Object] = {}
+    if settings.topology == 'SUBDIVIDE':
+        copies = create_copies(context, {item.target.object: item.subdivided for item in lights})
+    else:
+        lights = _resolve_shared_meshes(lights, settings, export)
+    reports = []
+    for item in lights:
+        receiver = copies.get(item.target.object, item.target.object)
+        write_light(receiver.data, settings.attribute, settings.data_type, settings.domain,
+                    item.light)
+        # The native library lists its objects by instance.
+        status = native_report['objects'][item.target.instance]['status']
+        reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status))
+    _warn_of_clipping(lights, settings, export)
+    return reports
+
+
+def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
+                           export: SceneExport) -> list[TargetLight]:
+    """One mesh has one set of colours: copy the mesh, or average the light."""
+    groups: dict[bpy.types.Mesh, list[TargetLight]] = {}
+    for item in lights:
+        groups.setdefault(item.target.object.data, []).append(item)
+    resolved = []
+    for mesh, group in groups.items():
+        if len(group) > 1 and settings.shared_meshes == 'AVERAGE':
+            mean = np.mean([item.light for item in group], axis=0)
+            group = [replace(item, light=mean) for item in group]
+            export.warnings.add(f'mesh "{mesh.name}" shows the mean light of its '
+                                f'{len(group)} objects')
+        elif len(group) > 1:
+            for item in group[1:]:
+                item.target.object.data = mesh.copy()
+            export.warnings.add(
+                f'mesh "{mesh.name}" was shared by {len(group)} baked objects: '
+                f'{len(group) - 1} of them have copies of it now, each with its own light')
+        resolved += group
+    return resolved
+
+
+def _warn_of_clipping(lights: list[TargetLight], settings: BakeSettings, export: SceneExport
+                      ) -> None:
+    if settings.data_type != 'BYTE_COLOR':
+        return
+    count = sum(len(item.light) for item in lights)
+    clipped = sum(int(np.count_nonzero((item.light > 1.0).any(axis=1))) for item in lights)
+    if clipped:
+        export.warnings.add(f"{clipped} of {count} values are brighter than 1 and cut off: choose "
+                            f"the data type Color to keep them")

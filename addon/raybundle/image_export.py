@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender images -> linear RGB pixels, and their means."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+# Larger images are averaged down: patches see nothing finer, and the native library copies them.
+MAX_SIZE = 2048
+
+
+class ImagePixels:
+    """Reads each image once."""
+
+    def __init__(self) -> None:
+        self._pixels: dict[str, np.ndarray | None] = {}
+
+    def read(self, image: bpy.types.Image) -> np.ndarray | None:
+        """(height, width, 3) float32, linear RGB, bottom row first; None without pixel data."""
+        if image.name_full not in self._pixels:
+            self._pixels[image.name_full] = _read(image)
+        return self._pixels[image.name_full]
+
+
+def srgb_to_linear(values: np.ndarray) -> np.ndarray:
+    """IEC 61966-2-1, any shape."""
+    return np.where(values <= 0.04045, values / 12.92,
+                    ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def sphere_mean(pixels: np.ndarray) -> np.ndarray:
+    """(3,), the mean of an equirectangular image over the sphere; rows near the poles are small."""
+    height = len(pixels)
+    weights = np.sin((np.arange(height) + 0.5) * np.pi / height)
+    return np.average(pixels.mean(axis=1), axis=0, weights=weights)
+
+
+def _read(image: bpy.types.Image) -> np.ndarray | None:
+    width, height = image.size
+    channels = image.channels
+    # Both are 0 when the file is missing.
+    if width == 0 or height == 0 or channels == 0 or not image.has_data and not len(image.pixels):
+        return None
+    values = np.empty(width * height * channels, np.float32)
+    image.pixels.foreach_get(values)
+    pixels = values.reshape(height, width, channels)
+    pixels = pixels[:, :, :3] if channels >= 3 else np.repeat(pixels[:, :, :1], 3, axis=2)
+    # The pixels of byte images are as stored; Blender has made those of float images linear.
+    if not image.is_float and 'sRGB' in image.colorspace_settings.name:
+        pixels = srgb_to_linear(pixels)
+    return np.ascontiguousarray(_reduced(pixels))
+
+
+def _reduced(pixels: np.ndarray) -> np.ndarray:
+    factor = -(-max(pixels.shape[:2]) // MAX_SIZE)
+    if factor <= 1:
+        return pixels
+    height, width = (max(size // factor, 1) for size in pixels.shape[:2])
+    rows, columns = min(factor, pixels.shape[0]), min(factor, pixels.shape[1])
+    cropped = pixels[:height * rows, :width * columns]
+    return cropped.reshape(height, rows, width, columns, 3).mean(axis=(1, 3))

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights and world in the units of Cycles, whose formulas changed between Blender versions."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from .image_export import ImagePixels
+from .node_reader import NodeReader, output_node
+from .scene_data import AreaLightData, LightData, PointLightData, SunLightData, Warnings
+
+
+def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: ImagePixels,
+                 warnings: Warnings) -> LightData | None:
+    """None if the light gives no light."""
+    light = light_object.data
+    name = light_object.name
+    strength = _strength(light, name, images, warnings)
+    if not np.any(strength > 0.0):
+        return None
+    _warn_of_unread_options(light, name, warnings)
+    if light.type in ('POINT', 'SPOT'):
+        return _point_light(light, name, matrix_world, strength)
+    if light.type == 'SUN':
+        direction = np.array(matrix_world.col[2][:3])
+        return SunLightData(name, direction / max(np.linalg.norm(direction), 1e-30),
+                            strength * sun_irradiance_factor(light.angle), light.angle)
+    return _area_light(light, name, matrix_world, strength)
+
+
+def export_world(world: bpy.types.World | None, images: ImagePixels, warnings: Warnings
+                 ) -> np.ndarray:
+    """(3,) W/(m^2 sr), the mean radiance of the world."""
+    if world is None:
+        return np.zeros(3)
+    # From 5.0 on every world has nodes and use_nodes only warns.
+    if bpy.app.version < (5, 0, 0) and not world.use_nodes or world.node_tree is None:
+        return np.array(world.color)
+    output = output_node(world.node_tree)
+    if output is None:
+        return np.zeros(3)
+    reader = NodeReader(f'world "{world.name}"', images, warnings)
+    return np.maximum(reader.surface(output.inputs['Surface']).emission, 0.0)
+
+
+def area_light_radiance(power: np.ndarray, area: float, normalize: bool = True,
+                        version: tuple[int, int, int] = bpy.app.version) -> np.ndarray:
+    """(3,) W/(m^2 sr) of an area light of this power (3,) in W and area in m^2.
+
+    4.0 corrected the factor 1/4 to 1/pi; 4.5 can leave the area out.
+    """
+    radiance = power / (area * (4.0 if version < (4, 0, 0) else math.pi))
+    return radiance if normalize else radiance * area
+
+
+def sun_irradiance_factor(angle: float, version: tuple[int, int, int] = bpy.app.version
+                          ) -> float:
+    """Irradiance at normal incidence per strength of a sun of this angular diameter (radians).
+
+    Before 4.0 the strength counts on a flat disk in the sky: the mean cosine over it remains.
+    """
+    if version >= (4, 0, 0) or angle <= 0.0:
+        return 1.0
+    radius = math.tan(min(angle, math.pi - 1e-3) / 2.0)
+    # 2 (sqrt(1 + r^2) - 1) / r^2, without the cancellation for small r.
+    return 2.0 / (math.sqrt(1.0 + radius * radius) + 1.0)
+
+
+def _strength(light: bpy.types.Light, name: str, images: ImagePixels, warnings: Warnings
+              ) -> np.ndarray:
+    """(3,) W, or W/m^2 of a sun."""
+    strength = np.array(light.color) * light.energy
+    # From 4.5 on.
+    strength = strength * 2.0 ** getattr(light, 'exposure', 0.0)
+    if getattr(light, 'use_temperature', False):
+        strength = strength * np.array(light.temperature_color)
+    if light.use_nodes and light.node_tree:
+        output = output_node(light.node_tree)
+        if output is None:
+            return np.zeros(3)
+        reader = NodeReader(f'light "{name}"', images, warnings)
+        strength = strength * reader.surface(output.inputs['Surface']).emission
+    return strength
+
+
+def _warn_of_unread_options(light: bpy.types.Light, name: str, warnings: Warnings) -> None:
+    cycles = getattr(light, 'cycles', None)
+    # Newer versions have the first, older ones the second.
+    if not getattr(light, 'use_shadow', True) or not getattr(cycles, 'cast_shadow', True):
+        warnings.add(f'light "{name}": it casts shadows, although they are switched off')
+    if light.type == 'AREA' and light.spread < math.pi - 1e-4:
+        warnings.add(f'light "{name}": its spread is not read, it shines with 180 degrees')
+
+
+def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray
+                 ) -> PointLightData:
+    # Before 4.0 a disk that faces the receiver, in 4.0 a sphere, since 4.1 as the light says.
+    if bpy.app.version < (4, 0, 0):
+        soft = True
+    elif bpy.app.version < (4, 1, 0):
+        soft = False
+    else:
+        soft = light.use_soft_falloff
+    intensity = strength / (4.0 * math.pi)
+    position = np.array(matrix_world.translation)
+    shape = 'DISK' if soft else 'SPHERE'
+    if light.type == 'POINT':
+        return PointLightData(name, position, intensity, light.shadow_soft_size, shape)
+    if bpy.app.version < (3, 5, 0):
+        # The scale is not looked at, and the cosine to the axis dims the light.
+        world_to_light = np.array(matrix_world.to_quaternion().to_matrix().inverted())
+    else:
+        # The object's scale deforms the cone; the power is not renormalised for it.
+        world_to_light = np.array(matrix_world.to_3x3().inverted_safe())
+    return PointLightData(name, position, intensity, light.shadow_soft_size, shape,
+                          world_to_light, light.spot_size, light.spot_blend,
+                          cone_dims=bpy.app.version < (3, 5, 0))
+
+
+def _area_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray
+                ) -> AreaLightData | None:
+    size_u = light.size
+    size_v = light.size_y if light.shape in ('RECTANGLE', 'ELLIPSE') else light.size
+    matrix = np.array(matrix_world)[:3, :3]
+    axis_u, axis_v = matrix[:, 0] * size_u / 2.0, matrix[:, 1] * size_v / 2.0
+    # The light shines along -Z, also where the object is mirrored.
+    if np.cross(axis_u, axis_v) @ matrix[:, 2] > 0.0:
+        axis_v = -axis_v
+    area = 4.0 * np.linalg.norm(axis_u) * np.linalg.norm(axis_v)
+    ellipse = light.shape in ('DISK', 'ELLIPSE')
+    if ellipse:
+        area *= math.pi / 4.0
+    if area <= 0.0:
+        return None
+    radiance = area_light_radiance(strength, area, getattr(light, 'normalize', True))
+    return AreaLightData(name, np.array(matrix_world.translation), axis_u, axis_v, radiance,
+                         'ELLIPSE' if ellipse else 'RECTANGLE')

@@ -1,0 +1,536 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The native library: the only module that knows ctypes.
+
+The library is loaded on first use, not at registration, so that enabling the add-on never fails and
+a missing or incompatible library gives a readable message. Arrays go in and out as numpy arrays
+whose shape and type are checked here; handles are wrapped in classes with close() that also work as
+context managers. The interface itself is described in native/include/raybundle/raybundle.h.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import enum
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+ABI_VERSION = 1
+
+
+class ErrorCode(enum.IntEnum):
+    NONE = 0
+    UNKNOWN = 1
+    INVALID_ARGUMENT = 2
+    INVALID_OPERATION = 3
+    OUT_OF_MEMORY = 4
+    UNSUPPORTED_HARDWARE = 5
+    CANCELLED = 6
+
+
+class RaybundleError(RuntimeError):
+    """A failed call of the native library, or a library that cannot be used."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+
+
+# Names of the stages in the order of rb_stage; the keys of the report's seconds.
+STAGES = ('patches', 'first_shot', 'bundles', 'solve', 'reconstruction')
+
+IMAGE_EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2}
+ROLES = {'BAKE': 0, 'OCCLUDE': 1}
+SIDES = {'FRONT': 0, 'BACK': 1}
+POINT_SHAPES = {'DISK': 0, 'SPHERE': 1}
+AREA_SHAPES = {'RECTANGLE': 0, 'ELLIPSE': 1}
+OUTPUTS = {'COMBINED': 0, 'LIGHTING': 1, 'DIRECT': 2, 'INDIRECT': 3}
+
+# Settings of a bake and their types.
+SETTINGS: dict[str, type] = {
+    'target_error': float,
+    'patch_size': float,
+    'max_patches': int,
+    'min_bundles': int,
+    'max_bundles': int,
+    'lines_per_bundle': int,
+    'memory_limit': float,
+    'seed': int,
+    'threads': int,
+    'regularization': float,
+    'solver': str,
+    'first_shot': str,
+    'directions': str,
+    'projector': str,
+    'small_patches': str,
+    'reconstruction': str,
+}
+
+# Called with the stage and the share of it that is done (0 to 1); returning False cancels.
+Progress = Callable[[str, float], object]
+
+_ProgressFunction = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_double)
+
+_handle = ctypes.c_void_p
+_int = ctypes.c_int32
+_size = ctypes.c_size_t
+_float = ctypes.c_float
+_enum = ctypes.c_int
+_text = ctypes.c_char_p
+_floats = ctypes.POINTER(ctypes.c_float)
+_ints = ctypes.POINTER(ctypes.c_int32)
+_out = ctypes.POINTER
+
+# Argument types of every function that returns an rb_error.
+_FALLIBLE: dict[str, Sequence[object]] = {
+    'rb_new_scene': (_out(_handle),),
+    'rb_add_image': (_handle, _text, _int, _int, _floats, _enum, _out(_int)),
+    'rb_add_material': (_handle, _text, _floats, _floats, _out(_int)),
+    'rb_set_material_image': (_handle, _int, _int, _floats),
+    'rb_set_material_corner_colors': (_handle, _int, _floats),
+    'rb_add_mesh': (_handle, _text, _floats, _size, _ints, _size, _ints, _size, _ints, _out(_int)),
+    'rb_set_mesh_corner_normals': (_handle, _int, _floats, _size),
+    'rb_set_mesh_sharp_edges': (_handle, _int, _ints, _size),
+    'rb_set_mesh_uvs': (_handle, _int, _floats, _size),
+    'rb_set_mesh_corner_colors': (_handle, _int, _floats, _size),
+    'rb_add_instance': (_handle, _int, _text, _floats, _enum, _enum, _out(_int)),
+    'rb_add_point_light': (_handle, _text, _floats, _floats, _float, _enum, _out(_int)),
+    'rb_set_light_cone': (_handle, _int, _floats, _float, _float, ctypes.c_bool),
+    'rb_add_sun_light': (_handle, _text, _floats, _floats, _float, _out(_int)),
+    'rb_add_area_light': (_handle, _text, _floats, _floats, _floats, _floats, _enum, _out(_int)),
+    'rb_set_world': (_handle, _floats),
+    'rb_new_bake': (_out(_handle),),
+    'rb_set_bake_int': (_handle, _text, _int),
+    'rb_set_bake_float': (_handle, _text, _float),
+    'rb_set_bake_string': (_handle, _text, _text),
+    'rb_get_bake_int': (_handle, _text, _out(_int)),
+    'rb_get_bake_float': (_handle, _text, _out(_float)),
+    'rb_get_bake_string': (_handle, _text, _out(_text)),
+    'rb_set_bake_progress': (_handle, _ProgressFunction, ctypes.c_void_p),
+    'rb_execute_bake': (_handle, _handle),
+    'rb_get_corner_light': (_handle, _int, _enum, _floats, _size),
+    'rb_get_vertex_light': (_handle, _int, _enum, _floats, _size),
+    'rb_get_report': (_handle, _out(_text)),
+    'rb_new_subdivision': (_floats, _size, _ints, _size, _ints, _size, _float, _out(_handle)),
+    'rb_get_subdivision_size': (_handle, _out(_size), _out(_size)),
+    'rb_get_subdivision': (_handle, _floats, _size, _ints, _ints, _ints, _floats, _size),
+}
+
+# Result type and argument types of the functions that cannot fail.
+_INFALLIBLE: dict[str, tuple[object, Sequence[object]]] = {
+    'rb_get_abi_version': (_int, ()),
+    'rb_get_version': (_text, ()),
+    'rb_get_error_message': (_text, ()),
+    'rb_release_scene': (None, (_handle,)),
+    'rb_release_bake': (None, (_handle,)),
+    'rb_release_subdivision': (None, (_handle,)),
+}
+
+_library: ctypes.CDLL | None = None
+
+
+# --------------------------------------------------------------------------------------------------
+# Library
+# --------------------------------------------------------------------------------------------------
+
+
+def library_path() -> Path:
+    """Where the build puts the shared library."""
+    name = {'win32': "raybundle.dll", 'darwin': "libraybundle.dylib"}.get(
+        sys.platform, "libraybundle.so")
+    return Path(__file__).parent / "lib" / name
+
+
+def load() -> ctypes.CDLL:
+    """Load the library on first use and check that it speaks this module's version."""
+    global _library
+    if _library is not None:
+        return _library
+    path = library_path()
+    if not path.is_file():
+        raise RaybundleError(
+            ErrorCode.INVALID_OPERATION,
+            f"The native library is missing: {path}. Build it with "
+            f"'cmake --preset release && cmake --build --preset release', or install the add-on "
+            f"from a release for this platform")
+    try:
+        library = ctypes.CDLL(str(path))
+        library.rb_get_abi_version.restype = _int
+        version = library.rb_get_abi_version()
+    except (OSError, AttributeError) as error:
+        raise RaybundleError(
+            ErrorCode.INVALID_OPERATION,
+            f"The native library cannot be loaded: {path} ({error})") from error
+    if version != ABI_VERSION:
+        raise RaybundleError(
+            ErrorCode.INVALID_OPERATION,
+            f"The native library {path} has interface version {version}, this add-on needs "
+            f"{ABI_VERSION}: build or install both from the same release")
+    try:
+        _declare(library)
+    except AttributeError as error:
+        raise RaybundleError(
+            ErrorCode.INVALID_OPERATION,
+            f"The native library {path} lacks a function of interface version {ABI_VERSION} "
+            f"({error}): build or install both from the same release") from error
+    _library = library
+    return library
+
+
+def version() -> str:
+    """Release of the native library, "major.minor.patch"."""
+    return load().rb_get_version().decode()
+
+
+def _declare(library: ctypes.CDLL) -> None:
+    for name, (result, arguments) in _INFALLIBLE.items():
+        function = getattr(library, name)
+        function.restype = result
+        function.argtypes = arguments
+
+    def raise_on_error(code: int, function: object, arguments: tuple) -> int:
+        if code != ErrorCode.NONE:
+            message = library.rb_get_error_message().decode(errors='replace')
+            raise RaybundleError(code, message)
+        return code
+
+    for name, arguments in _FALLIBLE.items():
+        function = getattr(library, name)
+        function.restype = _enum
+        function.argtypes = arguments
+        function.errcheck = raise_on_error
+
+
+# --------------------------------------------------------------------------------------------------
+# Arrays
+# --------------------------------------------------------------------------------------------------
+
+
+def _array(values: object, dtype: type, shape: tuple[int | None, ...], name: str) -> np.ndarray:
+    """A C-contiguous array of this type; None in shape stands for any length.
+
+    Floats may change precision and integers size, but floats never silently become integers.
+    """
+    array = np.asarray(values)
+    if array.size and not np.can_cast(array.dtype, dtype, casting='same_kind'):
+        raise TypeError(f"{name}: expected {np.dtype(dtype).name}, got {array.dtype.name}")
+    if array.ndim != len(shape) or any(
+            expected is not None and expected != given
+            for expected, given in zip(shape, array.shape)):
+        raise ValueError(f"{name}: expected shape {shape}, got {array.shape}")
+    return np.ascontiguousarray(array, dtype=dtype)
+
+
+def _float_array(values: object, shape: tuple[int | None, ...], name: str) -> np.ndarray:
+    return _array(values, np.float32, shape, name)
+
+
+def _int_array(values: object, shape: tuple[int | None, ...], name: str) -> np.ndarray:
+    return _array(values, np.int32, shape, name)
+
+
+def _as_floats(array: np.ndarray) -> object:
+    return array.ctypes.data_as(_floats)
+
+
+def _as_ints(array: np.ndarray) -> object:
+    return array.ctypes.data_as(_ints)
+
+
+class _Handle:
+    """Owner of a native object: close() or a with block releases it."""
+
+    _release = ""
+
+    def __init__(self) -> None:
+        self._library = load()
+        self._pointer = _handle()
+
+    def close(self) -> None:
+        if self._pointer:
+            getattr(self._library, self._release)(self._pointer)
+            self._pointer = _handle()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        # A failed load leaves an object without a pointer.
+        if getattr(self, '_pointer', None):
+            self.close()
+
+
+# --------------------------------------------------------------------------------------------------
+# Scene
+# --------------------------------------------------------------------------------------------------
+
+
+class Scene(_Handle):
+    """The scene as the native library sees it: images, materials, meshes, instances, lights."""
+
+    _release = 'rb_release_scene'
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._library.rb_new_scene(ctypes.byref(self._pointer))
+
+    def add_image(self, name: str, pixels: np.ndarray, extension: str) -> int:
+        """pixels: (height, width, 3), linear RGB, bottom row first."""
+        pixels = _float_array(pixels, (None, None, 3), "pixels")
+        identifier = _int()
+        self._library.rb_add_image(
+            self._pointer, name.encode(), pixels.shape[1], pixels.shape[0], _as_floats(pixels),
+            IMAGE_EXTENSIONS[extension], ctypes.byref(identifier))
+        return identifier.value
+
+    def add_material(self, name: str, reflectance: np.ndarray, emission: np.ndarray) -> int:
+        """reflectance, emission (W/m^2): (2, 3), RGB of the front side and of the back side."""
+        reflectance = _float_array(reflectance, (2, 3), "reflectance")
+        emission = _float_array(emission, (2, 3), "emission")
+        identifier = _int()
+        self._library.rb_add_material(
+            self._pointer, name.encode(), _as_floats(reflectance), _as_floats(emission),
+            ctypes.byref(identifier))
+        return identifier.value
+
+    def set_material_image(self, material: int, image: int, weight: np.ndarray) -> None:
+        """weight: (3,), what the image is multiplied with before it joins the reflectance."""
+        weight = _float_array(weight, (3,), "weight")
+        self._library.rb_set_material_image(self._pointer, material, image, _as_floats(weight))
+
+    def set_material_corner_colors(self, material: int, weight: np.ndarray) -> None:
+        """weight: (3,), likewise for the mesh's corner colours."""
+        weight = _float_array(weight, (3,), "weight")
+        self._library.rb_set_material_corner_colors(self._pointer, material, _as_floats(weight))
+
+    def add_mesh(self, name: str, vertices: np.ndarray, corner_vertices: np.ndarray,
+                 face_offsets: np.ndarray, face_materials: np.ndarray | None) -> int:
+        """vertices: (n, 3) m; corner_vertices: (c,); face_offsets: (f + 1,); materials: (f,)."""
+        vertices = _float_array(vertices, (None, 3), "vertices")
+        corner_vertices = _int_array(corner_vertices, (None,), "corner_vertices")
+        face_offsets = _int_array(face_offsets, (None,), "face_offsets")
+        face_count = len(face_offsets) - 1
+        materials = None
+        if face_materials is not None:
+            face_materials = _int_array(face_materials, (face_count,), "face_materials")
+            materials = _as_ints(face_materials)
+        identifier = _int()
+        self._library.rb_add_mesh(
+            self._pointer, name.encode(), _as_floats(vertices), len(vertices),
+            _as_ints(corner_vertices), len(corner_vertices), _as_ints(face_offsets), face_count,
+            materials, ctypes.byref(identifier))
+        return identifier.value
+
+    def set_mesh_corner_normals(self, mesh: int, normals: np.ndarray) -> None:
+        """normals: (c, 3), unit length."""
+        normals = _float_array(normals, (None, 3), "normals")
+        self._library.rb_set_mesh_corner_normals(
+            self._pointer, mesh, _as_floats(normals), len(normals))
+
+    def set_mesh_sharp_edges(self, mesh: int, edges: np.ndarray) -> None:
+        """edges: (e, 2), vertex indices."""
+        edges = _int_array(edges, (None, 2), "edges")
+        self._library.rb_set_mesh_sharp_edges(self._pointer, mesh, _as_ints(edges), len(edges))
+
+    def set_mesh_uvs(self, mesh: int, uvs: np.ndarray) -> None:
+        """uvs: (c, 2)."""
+        uvs = _float_array(uvs, (None, 2), "uvs")
+        self._library.rb_set_mesh_uvs(self._pointer, mesh, _as_floats(uvs), len(uvs))
+
+    def set_mesh_corner_colors(self, mesh: int, colors: np.ndarray) -> None:
+        """colors: (c, 3), linear RGB."""
+        colors = _float_array(colors, (None, 3), "colors")
+        self._library.rb_set_mesh_corner_colors(
+            self._pointer, mesh, _as_floats(colors), len(colors))
+
+    def add_instance(self, mesh: int, name: str, transform: np.ndarray, role: str,
+                     side: str) -> int:
+        """transform: (3, 4), object to world."""
+        transform = _float_array(transform, (3, 4), "transform")
+        identifier = _int()
+        self._library.rb_add_instance(
+            self._pointer, mesh, name.encode(), _as_floats(transform), ROLES[role], SIDES[side],
+            ctypes.byref(identifier))
+        return identifier.value
+
+    def add_point_light(self, name: str, position: np.ndarray, intensity: np.ndarray,
+                        radius: float, shape: str) -> int:
+        """position: (3,) m; intensity: (3,) W/sr; radius: m."""
+        position = _float_array(position, (3,), "position")
+        intensity = _float_array(intensity, (3,), "intensity")
+        identifier = _int()
+        self._library.rb_add_point_light(
+            self._pointer, name.encode(), _as_floats(position), _as_floats(intensity), radius,
+            POINT_SHAPES[shape], ctypes.byref(identifier))
+        return identifier.value
+
+    def set_light_cone(self, light: int, world_to_light: np.ndarray, angle: float,
+                       blend: float, dims_by_cosine: bool) -> None:
+        """world_to_light: (3, 3); angle: full opening in radians; blend: 0 to 1."""
+        world_to_light = _float_array(world_to_light, (3, 3), "world_to_light")
+        self._library.rb_set_light_cone(
+            self._pointer, light, _as_floats(world_to_light), angle, blend, dims_by_cosine)
+
+    def add_sun_light(self, name: str, direction: np.ndarray, irradiance: np.ndarray,
+                      angle: float) -> int:
+        """direction: (3,) towards the sun; irradiance: (3,) W/m^2; angle: diameter in radians."""
+        direction = _float_array(direction, (3,), "direction")
+        irradiance = _float_array(irradiance, (3,), "irradiance")
+        identifier = _int()
+        self._library.rb_add_sun_light(
+            self._pointer, name.encode(), _as_floats(direction), _as_floats(irradiance), angle,
+            ctypes.byref(identifier))
+        return identifier.value
+
+    def add_area_light(self, name: str, centre: np.ndarray, axis_u: np.ndarray,
+                       axis_v: np.ndarray, radiance: np.ndarray, shape: str) -> int:
+        """centre, axis_u, axis_v: (3,) m, half axes; radiance: (3,) W/(m^2 sr)."""
+        centre = _float_array(centre, (3,), "centre")
+        axis_u = _float_array(axis_u, (3,), "axis_u")
+        axis_v = _float_array(axis_v, (3,), "axis_v")
+        radiance = _float_array(radiance, (3,), "radiance")
+        identifier = _int()
+        self._library.rb_add_area_light(
+            self._pointer, name.encode(), _as_floats(centre), _as_floats(axis_u),
+            _as_floats(axis_v), _as_floats(radiance), AREA_SHAPES[shape],
+            ctypes.byref(identifier))
+        return identifier.value
+
+    def set_world(self, radiance: np.ndarray) -> None:
+        """radiance: (3,) W/(m^2 sr)."""
+        radiance = _float_array(radiance, (3,), "radiance")
+        self._library.rb_set_world(self._pointer, _as_floats(radiance))
+
+
+# --------------------------------------------------------------------------------------------------
+# Bake
+# --------------------------------------------------------------------------------------------------
+
+
+class Bake(_Handle):
+    """A bake: settings, execution, results. It keeps patches and lines for the next execution."""
+
+    _release = 'rb_release_bake'
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._library.rb_new_bake(ctypes.byref(self._pointer))
+
+    def set(self, name: str, value: int | float | str) -> None:
+        kind = SETTINGS.get(name)
+        if kind is str:
+            self._library.rb_set_bake_string(self._pointer, name.encode(), str(value).encode())
+        elif kind is int:
+            self._library.rb_set_bake_int(self._pointer, name.encode(), int(value))
+        else:
+            # The library itself refuses unknown names.
+            self._library.rb_set_bake_float(self._pointer, name.encode(), float(value))
+
+    def get(self, name: str) -> int | float | str:
+        kind = SETTINGS.get(name)
+        if kind is str:
+            text = _text()
+            self._library.rb_get_bake_string(self._pointer, name.encode(), ctypes.byref(text))
+            return text.value.decode()
+        if kind is int:
+            integer = _int()
+            self._library.rb_get_bake_int(self._pointer, name.encode(), ctypes.byref(integer))
+            return integer.value
+        real = _float()
+        self._library.rb_get_bake_float(self._pointer, name.encode(), ctypes.byref(real))
+        return real.value
+
+    def execute(self, scene: Scene, progress: Progress | None = None) -> None:
+        """Bake the scene. Raises RaybundleError, with code CANCELLED if progress returned False;
+        an exception inside progress cancels and is raised again here."""
+        raised: list[BaseException] = []
+
+        def report(_user: object, stage: int, fraction: float) -> bool:
+            try:
+                return progress(STAGES[stage], fraction) is not False
+            except BaseException as exception:
+                # It must not cross the C frames between here and the caller of execute.
+                raised.append(exception)
+                return False
+
+        # The function object lives in this frame as long as the library may call it.
+        function = _ProgressFunction(report) if progress else _ProgressFunction()
+        self._library.rb_set_bake_progress(self._pointer, function, None)
+        try:
+            self._library.rb_execute_bake(self._pointer, scene._pointer)
+        except RaybundleError:
+            if raised:
+                raise raised[0]
+            raise
+        finally:
+            self._library.rb_set_bake_progress(self._pointer, _ProgressFunction(), None)
+        if raised:
+            raise raised[0]
+
+    def corner_light(self, instance: int, output: str, count: int) -> np.ndarray:
+        """(count, 3) float32, in the order of the mesh's corners."""
+        light = np.empty((count, 3), np.float32)
+        self._library.rb_get_corner_light(
+            self._pointer, instance, OUTPUTS[output], _as_floats(light), count)
+        return light
+
+    def vertex_light(self, instance: int, output: str, count: int) -> np.ndarray:
+        """(count, 3) float32, in the order of the mesh's vertices."""
+        light = np.empty((count, 3), np.float32)
+        self._library.rb_get_vertex_light(
+            self._pointer, instance, OUTPUTS[output], _as_floats(light), count)
+        return light
+
+    def report(self) -> dict:
+        """The native part of the report of the last successful execution."""
+        text = _text()
+        self._library.rb_get_report(self._pointer, ctypes.byref(text))
+        return json.loads(text.value.decode())
+
+
+# --------------------------------------------------------------------------------------------------
+# Subdivision
+# --------------------------------------------------------------------------------------------------
+
+
+class Subdivision(_Handle):
+    """A conforming triangle mesh whose edges are no longer than max_edge metres.
+
+    vertices        (n, 3) float32, m
+    triangles       (t, 3) int32, vertex indices
+    source_faces    (t,) int32, the face of the source mesh that a triangle lies in
+    source_corners  (t, 3, 3) int32, per new corner the three source corners it lies between
+    source_weights  (t, 3, 3) float32, their weights, which sum to 1
+    """
+
+    _release = 'rb_release_subdivision'
+
+    def __init__(self, vertices: np.ndarray, corner_vertices: np.ndarray,
+                 face_offsets: np.ndarray, max_edge: float) -> None:
+        super().__init__()
+        vertices = _float_array(vertices, (None, 3), "vertices")
+        corner_vertices = _int_array(corner_vertices, (None,), "corner_vertices")
+        face_offsets = _int_array(face_offsets, (None,), "face_offsets")
+        self._library.rb_new_subdivision(
+            _as_floats(vertices), len(vertices), _as_ints(corner_vertices), len(corner_vertices),
+            _as_ints(face_offsets), len(face_offsets) - 1, max_edge, ctypes.byref(self._pointer))
+        vertex_count, triangle_count = _size(), _size()
+        self._library.rb_get_subdivision_size(
+            self._pointer, ctypes.byref(vertex_count), ctypes.byref(triangle_count))
+        count = triangle_count.value
+        self.vertices = np.empty((vertex_count.value, 3), np.float32)
+        self.triangles = np.empty((count, 3), np.int32)
+        self.source_faces = np.empty(count, np.int32)
+        self.source_corners = np.empty((count, 3, 3), np.int32)
+        self.source_weights = np.empty((count, 3, 3), np.float32)
+        self._library.rb_get_subdivision(
+            self._pointer, _as_floats(self.vertices), len(self.vertices),
+            _as_ints(self.triangles), _as_ints(self.source_faces), _as_ints(self.source_corners),
+            _as_floats(self.source_weights), count)

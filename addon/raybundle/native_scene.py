@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""SceneData -> the native library's scene."""
+
+from __future__ import annotations
+
+from . import native
+from .scene_data import AreaLightData, LightData, MeshData, PointLightData, SceneData
+
+
+def build_native_scene(data: SceneData) -> native.Scene:
+    """Instance ids are positions in data.instances. The caller closes the scene."""
+    scene = native.Scene()
+    images = [scene.add_image(image.name, image.pixels, image.extension) for image in data.images]
+    materials = []
+    for material in data.materials:
+        identifier = scene.add_material(material.name, material.reflectance, material.emission)
+        if material.image is not None:
+            scene.set_material_image(identifier, images[material.image], material.image_weight)
+        if material.color_weight is not None:
+            scene.set_material_corner_colors(identifier, material.color_weight)
+        materials.append(identifier)
+    meshes = [_add_mesh(scene, mesh) for mesh in data.meshes]
+    for instance in data.instances:
+        scene.add_instance(meshes[instance.mesh], instance.name, instance.transform,
+                           instance.role, instance.side)
+    for light in data.lights:
+        _add_light(scene, light)
+    scene.set_world(data.world)
+    return scene
+
+
+def _add_mesh(scene: native.Scene, mesh: MeshData) -> int:
+    identifier = scene.add_mesh(mesh.name, mesh.vertices, mesh.corner_vertices, mesh.face_offsets,
+                                mesh.face_materials)
+    scene.set_mesh_corner_normals(identifier, mesh.corner_normals)
+    scene.set_mesh_sharp_edges(identifier, mesh.sharp_edges)
+    if mesh.uvs is not None:
+        scene.set_mesh_uvs(identifier, mesh.uvs)
+    if mesh.corner_colors is not None:
+        scene.set_mesh_corner_colors(identifier, mesh.corner_colors)
+    return identifier
+
+
+def _add_light(scene: native.Scene, light: LightData) -> None:
+    if isinstance(light, PointLightData):
+        identifier = scene.add_point_light(light.name, light.position, light.intensity,
+                                           light.radius, light.shape)
+        if light.world_to_light is not None:
+            scene.set_light_cone(identifier, light.world_to_light, light.cone_angle,
+                                 light.cone_blend, light.cone_dims)
+    elif isinstance(light, AreaLightData):
+        scene.add_area_light(light.name, light.centre, light.axis_u, light.axis_v, light.radiance,
+                             light.shape)
+    else:
+        scene.add_sun_light(light.name, light.direction, light.irradiance, light.angle)

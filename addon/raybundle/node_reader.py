@@ -1,0 +1,385 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Node trees of materials, lights and the world -> colours and shaders of the simple kind that
+radiosity needs: diffuse reflectance and emission.
+
+A tree is read from its output towards its inputs. What cannot be read takes the value of the socket
+(or the mean of the image) and is named in the warnings.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix
+
+from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
+from .image_export import ImagePixels, sphere_mean
+from .scene_data import Warnings
+
+# Values of the Light Path node as diffuse light sees a surface.
+_LIGHT_PATH = {'Is Diffuse Ray': 1.0, 'Is Reflection Ray': 1.0, 'Ray Depth': 1.0,
+               'Diffuse Depth': 1.0}
+
+# Nodes that change a colour in a way that is not linear: exact for constants is not attempted.
+_COLOR_FILTERS = ('GAMMA', 'HUE_SAT', 'BRIGHTCONTRAST', 'INVERT', 'CURVE_RGB', 'VALTORGB',
+                  'RGBTOBW', 'CLAMP')
+
+_MATH: dict[str, Callable[[float, float], float]] = {
+    'ADD': lambda a, b: a + b,
+    'SUBTRACT': lambda a, b: a - b,
+    'MULTIPLY': lambda a, b: a * b,
+    'DIVIDE': lambda a, b: a / b if b else 0.0,
+    'MINIMUM': min,
+    'MAXIMUM': max,
+    'GREATER_THAN': lambda a, b: float(a > b),
+    'LESS_THAN': lambda a, b: float(a < b),
+    'POWER': lambda a, b: a ** b if a > 0.0 else 0.0,
+    'ABSOLUTE': lambda a, b: abs(a),
+    'SQRT': lambda a, b: math.sqrt(max(a, 0.0)),
+}
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What a shader is to diffuse light, seen from one side."""
+
+    reflectance: ColorExpression = field(default_factory=ColorExpression)
+    emission: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) radiance
+
+    def scaled(self, factor: float) -> Surface:
+        return Surface(self.reflectance.scaled(factor), self.emission * factor)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """Where a socket's value comes from: an output of a node, or (node None) the socket itself."""
+
+    socket: bpy.types.NodeSocket
+    path: tuple[bpy.types.Node, ...]
+    node: bpy.types.Node | None = None
+    output: bpy.types.NodeSocket | None = None
+
+
+class NodeReader:
+    """Reads one tree for one side of the surface (backfacing)."""
+
+    def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
+                 backfacing: bool = False) -> None:
+        self.owner = owner  # what warnings name, such as 'material "Wall"'
+        self.images = images
+        self.warnings = warnings
+        self.backfacing = backfacing
+
+    # ----------------------------------------------------------------------------------------------
+    # Shaders
+    # ----------------------------------------------------------------------------------------------
+
+    def surface(self, socket: bpy.types.NodeSocket,
+                path: tuple[bpy.types.Node, ...] = ()) -> Surface:
+        """The shader linked to a socket; nothing linked is black, as in Cycles."""
+        source = _follow(socket, path)
+        node, path = source.node, source.path
+        if node is None:
+            return Surface()
+        if node.type == 'BSDF_DIFFUSE':
+            return Surface(self.color(node.inputs['Color'], path))
+        if node.type == 'BSDF_PRINCIPLED':
+            return self._principled(node, path)
+        if node.type in ('EMISSION', 'BACKGROUND'):
+            color = self._constant_color(node.inputs['Color'], path)
+            return Surface(emission=color * self.value(node.inputs['Strength'], path))
+        if node.type == 'MIX_SHADER':
+            factor = float(np.clip(self.value(node.inputs[0], path), 0.0, 1.0))
+            # A branch that is not seen at all raises no warnings.
+            parts = [self.surface(node.inputs[index], path).scaled(share)
+                     for index, share in ((1, 1.0 - factor), (2, factor)) if share > 0.0]
+            return self._sum(parts, node)
+        if node.type == 'ADD_SHADER':
+            return self._sum([self.surface(socket, path) for socket in node.inputs], node)
+        if node.type == 'SUBSURFACE_SCATTERING':
+            self._warn(node, "is read as a diffuse surface")
+            return Surface(self.color(node.inputs['Color'], path))
+        self._warn(node, "is not diffuse: it reflects nothing and stops the light")
+        return Surface()
+
+    def _principled(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
+        # Sockets were renamed in 4.0.
+        transmission = _input(node, 'Transmission Weight', 'Transmission')
+        emission = _input(node, 'Emission Color', 'Emission')
+        diffuse = 1.0
+        for socket in (node.inputs['Metallic'], transmission):
+            diffuse *= 1.0 - float(np.clip(self.value(socket, path), 0.0, 1.0))
+        alpha = float(np.clip(self.value(node.inputs['Alpha'], path), 0.0, 1.0))
+        if alpha < 1.0:
+            self._warn(node, f"lets light through (alpha {alpha:.3g}): it stops it here")
+        strength = self.value(node.inputs['Emission Strength'], path)
+        radiance = np.zeros(3)
+        if strength:
+            radiance = self._constant_color(emission, path) * strength
+        reflectance = self.color(node.inputs['Base Color'], path).scaled(diffuse * alpha)
+        return Surface(reflectance, radiance * alpha)
+
+    def _sum(self, parts: list[Surface], node: bpy.types.Node) -> Surface:
+        total = Surface()
+        for part in parts:
+            total = Surface(self._plus(total.reflectance, part.reflectance, node),
+                            total.emission + part.emission)
+        return total
+
+    # ----------------------------------------------------------------------------------------------
+    # Colours
+    # ----------------------------------------------------------------------------------------------
+
+    def color(self, socket: bpy.types.NodeSocket,
+              path: tuple[bpy.types.Node, ...] = ()) -> ColorExpression:
+        source = _follow(socket, path)
+        node, path = source.node, source.path
+        if node is None:
+            return ColorExpression(_default_color(source.socket))
+        if node.type == 'RGB':
+            return ColorExpression(_default_color(node.outputs[0]))
+        if node.type == 'TEX_IMAGE':
+            return self._image(node, source.output, path)
+        if node.type == 'TEX_ENVIRONMENT':
+            return self._environment(node)
+        if node.type in ('ATTRIBUTE', 'VERTEX_COLOR') and source.output.name == 'Color':
+            return self._attribute(node)
+        if node.type in ('MIX', 'MIX_RGB'):
+            return self._mix(node, path)
+        if node.type in _COLOR_FILTERS:
+            return self._filter(node, path)
+        if node.type in _VALUE_NODES:
+            return ColorExpression(WHITE * self._node_value(source))
+        self._warn(node, "cannot be read: the colour of the socket it is linked to is used")
+        return ColorExpression(_default_color(source.socket))
+
+    def _constant_color(self, socket: bpy.types.NodeSocket,
+                        path: tuple[bpy.types.Node, ...]) -> np.ndarray:
+        """(3,); where only constants are possible (emission), the mean of what varies."""
+        color = self.color(socket, path)
+        if not color.is_constant:
+            self._warn(socket.node, f"has a varying {socket.name}: its mean is used")
+        return color.mean()
+
+    def _image(self, node: bpy.types.Node, output: bpy.types.NodeSocket,
+               path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        pixels = self.images.read(node.image) if node.image else None
+        if pixels is None:
+            self._warn(node, "has no image data: black is used")
+            return ColorExpression()
+        mean = pixels.mean(axis=(0, 1), dtype=np.float64)
+        if output.name != 'Color':
+            self._warn(node, f"is used by its {output.name}: 1 is used")
+            return ColorExpression(WHITE)
+        if node.projection != 'FLAT':
+            self._warn(node, f"is projected as {node.projection}: the image's mean is used")
+            return ColorExpression(mean)
+        coordinates = self._coordinates(node.inputs['Vector'], path)
+        if coordinates is None:
+            self._warn(node, "has coordinates that are not a UV map: the image's mean is used")
+            return ColorExpression(mean)
+        extension = node.extension
+        if extension not in ('REPEAT', 'EXTEND', 'CLIP'):
+            self._warn(node, f"has extension {extension}: REPEAT is used")
+            extension = 'REPEAT'
+        layer, matrix = coordinates
+        return ColorExpression(texture=Texture(node.image, extension, mean, layer, matrix),
+                               texture_weight=WHITE)
+
+    def _coordinates(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
+                     ) -> tuple[str, np.ndarray] | None:
+        """Name of the UV map ("" for the active one) and affine map (2, 3) of an image's vector."""
+        source = _follow(socket, path)
+        node, path = source.node, source.path
+        if node is None:
+            return "", IDENTITY_UV
+        if node.type == 'UVMAP':
+            return node.uv_map, IDENTITY_UV
+        if node.type == 'TEX_COORD' and source.output.name == 'UV':
+            return "", IDENTITY_UV
+        if node.type == 'ATTRIBUTE' and source.output.name == 'Vector':
+            return node.attribute_name, IDENTITY_UV
+        if node.type == 'MAPPING' and node.vector_type in ('POINT', 'TEXTURE'):
+            sockets = [node.inputs.get(name) for name in ('Location', 'Rotation', 'Scale')]
+            inner = self._coordinates(node.inputs['Vector'], path)
+            if inner is None or any(item.is_linked for item in sockets):
+                return None
+            location, rotation, scale = (item.default_value for item in sockets)
+            matrix = Matrix.LocRotScale(location, Euler(rotation), scale)
+            if node.vector_type == 'TEXTURE':
+                matrix = matrix.inverted_safe()
+            layer, first = inner
+            square = np.vstack([first, [0.0, 0.0, 1.0]])
+            second = np.array(matrix)[:2][:, [0, 1, 3]]
+            return layer, second @ square
+        return None
+
+    def _environment(self, node: bpy.types.Node) -> ColorExpression:
+        pixels = self.images.read(node.image) if node.image else None
+        if pixels is None:
+            self._warn(node, "has no image data: black is used")
+            return ColorExpression()
+        self._warn(node, "varies with the direction: its mean over the sphere is used")
+        if node.projection == 'MIRROR_BALL':
+            return ColorExpression(pixels.mean(axis=(0, 1), dtype=np.float64))
+        return ColorExpression(sphere_mean(pixels))
+
+    def _attribute(self, node: bpy.types.Node) -> ColorExpression:
+        if node.type == 'ATTRIBUTE' and node.attribute_type != 'GEOMETRY':
+            self._warn(node, "reads a property of the object: grey is used")
+            return ColorExpression(WHITE * 0.5)
+        name = node.layer_name if node.type == 'VERTEX_COLOR' else node.attribute_name
+        return ColorExpression(attribute=name, attribute_weight=WHITE)
+
+    def _mix(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        if node.type == 'MIX_RGB':
+            factor, first, second = node.inputs[:3]
+        elif node.data_type == 'RGBA':
+            # One node has a set of sockets per data type, told apart by identifier.
+            sockets = {socket.identifier: socket for socket in node.inputs}
+            factor, first, second = (
+                sockets[name] for name in ('Factor_Float', 'A_Color', 'B_Color'))
+        elif node.data_type == 'FLOAT':
+            sockets = {socket.identifier: socket for socket in node.inputs}
+            share = self.value(sockets['Factor_Float'], path)
+            a, b = (self.value(sockets[name], path) for name in ('A_Float', 'B_Float'))
+            return ColorExpression(WHITE * (a + (b - a) * share))
+        else:
+            self._warn(node, f"mixes {node.data_type}: grey is used")
+            return ColorExpression(WHITE * 0.5)
+        share = float(np.clip(self.value(factor, path), 0.0, 1.0))
+        a, b = self.color(first, path), self.color(second, path)
+        if node.blend_type == 'MIX':
+            return self._plus(a.scaled(1.0 - share), b.scaled(share), node)
+        if node.blend_type == 'ADD':
+            return self._plus(a, b.scaled(share), node)
+        if node.blend_type == 'SUBTRACT':
+            return self._plus(a, b.scaled(-share), node)
+        if node.blend_type == 'MULTIPLY':
+            return self._plus(a.scaled(1.0 - share), self._times(a, b, node).scaled(share), node)
+        self._warn(node, f"blends by {node.blend_type}: its first colour is used")
+        return a
+
+    def _filter(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        name = {'VALTORGB': 'Fac', 'CLAMP': 'Value'}.get(node.type, 'Color')
+        color = self.color(_input(node, name, 'Factor'), path)
+        if node.type == 'VALTORGB' and color.is_constant:
+            return ColorExpression(np.array(node.color_ramp.evaluate(color.constant.mean())[:3]))
+        if node.type == 'VALTORGB':
+            self._warn(node, "maps a varying colour: its value for the mean is used")
+            return ColorExpression(np.array(node.color_ramp.evaluate(color.mean().mean())[:3]))
+        if node.type == 'RGBTOBW' and color.is_constant:
+            return ColorExpression(WHITE * (color.constant @ [0.2126, 0.7152, 0.0722]))
+        self._warn(node, "is left out: the colour that goes into it is used")
+        return color
+
+    def _plus(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
+              ) -> ColorExpression:
+        if not a.can_add(b):
+            self._warn(node, "joins two images or attributes: the mean of the second is used")
+        return a.plus(b).simplified()
+
+    def _times(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
+               ) -> ColorExpression:
+        if a.is_constant:
+            return b.scaled(a.constant)
+        if not b.is_constant:
+            self._warn(node, "multiplies two images or attributes: the mean of the second is used")
+        return a.scaled(b.mean())
+
+    # ----------------------------------------------------------------------------------------------
+    # Values
+    # ----------------------------------------------------------------------------------------------
+
+    def value(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...] = ()) -> float:
+        source = _follow(socket, path)
+        if source.node is None:
+            return _default_value(source.socket)
+        return self._node_value(source)
+
+    def _node_value(self, source: _Source) -> float:
+        node, path = source.node, source.path
+        if node.type == 'VALUE':
+            return node.outputs[0].default_value
+        if node.type == 'NEW_GEOMETRY' and source.output.name == 'Backfacing':
+            return float(self.backfacing)
+        if node.type == 'LIGHT_PATH':
+            return _LIGHT_PATH.get(source.output.name, 0.0)
+        if node.type == 'MATH' and node.operation in _MATH:
+            a, b = (self.value(socket, path) for socket in node.inputs[:2])
+            result = _MATH[node.operation](a, b)
+            return min(max(result, 0.0), 1.0) if node.use_clamp else result
+        if node.type in ('RGB', 'MIX', 'MIX_RGB', 'CLAMP'):
+            color = self.color(source.socket, path)
+            if color.is_constant:
+                return float(color.constant @ [0.2126, 0.7152, 0.0722])
+        self._warn(node, f"is no constant: the value of the socket {source.socket.name} is used")
+        return _default_value(source.socket)
+
+    def _warn(self, node: bpy.types.Node, what: str) -> None:
+        self.warnings.add(f'{self.owner}: node "{node.name}" ({node.bl_label}) {what}')
+
+
+_VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'MATH')
+
+
+def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """The active output that Cycles uses."""
+    return tree.get_output_node('CYCLES') or tree.get_output_node('ALL')
+
+
+def _follow(socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> _Source:
+    """Go upstream through reroutes, muted nodes and groups. path: the group nodes we are inside."""
+    while socket.is_linked:
+        link = socket.links[0]
+        if link.is_muted:
+            break
+        node, output = link.from_node, link.from_socket
+        if node.mute:
+            passed = [item.from_socket for item in node.internal_links
+                      if item.to_socket == output]
+            if not passed:
+                break
+            socket = passed[0]
+        elif node.type == 'REROUTE':
+            socket = node.inputs[0]
+        elif node.type == 'GROUP' and node.node_tree:
+            inner = _group_output(node.node_tree, output.identifier)
+            if inner is None:
+                break
+            socket, path = inner, path + (node,)
+        elif node.type == 'GROUP_INPUT' and path:
+            group = path[-1]
+            socket = next(item for item in group.inputs if item.identifier == output.identifier)
+            path = path[:-1]
+        else:
+            return _Source(socket, path, node, output)
+    return _Source(socket, path)
+
+
+def _group_output(tree: bpy.types.NodeTree, identifier: str) -> bpy.types.NodeSocket | None:
+    for node in tree.nodes:
+        if node.type == 'GROUP_OUTPUT' and node.is_active_output:
+            return next((item for item in node.inputs if item.identifier == identifier), None)
+    return None
+
+
+def _input(node: bpy.types.Node, *names: str) -> bpy.types.NodeSocket:
+    return next(node.inputs[name] for name in names if name in node.inputs)
+
+
+def _default_color(socket: bpy.types.NodeSocket) -> np.ndarray:
+    value = getattr(socket, 'default_value', 0.0)
+    # A colour or a vector has components, a plain value is grey.
+    return np.array(value[:3]) if hasattr(value, '__len__') else WHITE * float(value)
+
+
+def _default_value(socket: bpy.types.NodeSocket) -> float:
+    value = getattr(socket, 'default_value', 0.0)
+    if hasattr(value, '__len__'):
+        return float(np.array(value[:3]) @ [0.2126, 0.7152, 0.0722])
+    return float(value)

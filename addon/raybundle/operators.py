@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: each asks whether it may run, calls one function and reports."""
+
+import bpy
+
+from . import bake_cache, color_attribute, viewport_preview
+from .bake import bake
+from .bake_report import BakeError
+from .native import ErrorCode, RaybundleError
+from .subdivided_copy import remove_copies
+
+# Share of the progress bar at the start of each stage; most of the time goes into bundles.
+_STAGE_STARTS = {'export': 0.0, 'patches': 0.05, 'first_shot': 0.1, 'bundles': 0.3, 'solve': 0.85,
+                 'reconstruction': 0.9, 'write_back': 0.97, 'done': 1.0}
+
+
+def _overall_fraction(stage: str, fraction: float) -> float:
+    starts = list(_STAGE_STARTS.values())
+    index = list(_STAGE_STARTS).index(stage)
+    return starts[index] + fraction * (starts[index + 1] - starts[index])
+
+
+def _run_bake(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+    window_manager = context.window_manager
+
+    def show_progress(stage: str, fraction: float) -> None:
+        window_manager.progress_update(1000.0 * _overall_fraction(stage, fraction))
+
+    window_manager.progress_begin(0.0, 1000.0)
+    try:
+        report = bake(context, show_progress)
+    except (BakeError, RaybundleError) as error:
+        cancelled = isinstance(error, RaybundleError) and error.code == ErrorCode.CANCELLED
+        operator.report({'WARNING' if cancelled else 'ERROR'}, str(error))
+        return {'CANCELLED'}
+    finally:
+        window_manager.progress_end()
+    for warning in report.warnings:
+        operator.report({'WARNING'}, warning)
+    operator.report({'INFO'}, report.summary())
+    return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_bake(bpy.types.Operator):
+    """Write direct and indirect light into the colour attributes of the scene's meshes"""
+    bl_idname = "raybundle.bake"
+    bl_label = "Bake Radiosity"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+    def execute(self, context):
+        return _run_bake(self, context)
+
+
+class RAYBUNDLE_OT_relight(bpy.types.Operator):
+    """Bake again after a change of lights or colours; the lines of unchanged geometry are reused"""
+    bl_idname = "raybundle.relight"
+    bl_label = "Relight"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+    def execute(self, context):
+        if not bake_cache.has_result(context.scene):
+            self.report({'ERROR'}, "There is nothing to relight: bake first; lines are kept until "
+                                   "the file is closed")
+            return {'CANCELLED'}
+        return _run_bake(self, context)
+
+
+class RAYBUNDLE_OT_clear(bpy.types.Operator):
+    """Remove the baked attribute and the subdivided copies, and free the kept lines"""
+    bl_idname = "raybundle.clear"
+    bl_label = "Clear Bake"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None and context.mode == 'OBJECT'
+
+    def execute(self, context):
+        scene = context.scene
+        copies = remove_copies(scene)
+        meshes = {item.data for item in scene.objects
+                  if item.type == 'MESH' and item.data.library is None}
+        cleared = sum(color_attribute.clear(mesh, scene.raybundle.attribute) for mesh in meshes)
+        scene.raybundle.report = ""
+        bake_cache.discard(scene)
+        self.report({'INFO'}, f'Attribute "{scene.raybundle.attribute}" removed from {cleared} '
+                              f'meshes, {copies} subdivided copies removed')
+        return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_preview(bpy.types.Operator):
+    """Show the baked attribute in the 3D views' solid shading, or the earlier shading again"""
+    bl_idname = "raybundle.preview"
+    bl_label = "Preview"
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+    def execute(self, context):
+        for item in context.scene.objects:
+            if item.type == 'MESH' and item.data.library is None:
+                color_attribute.activate(item.data, context.scene.raybundle.attribute)
+        # In the background there are no views.
+        if not bpy.app.background:
+            viewport_preview.toggle(context.window_manager)
+        return {'FINISHED'}
+
+
+classes = (
+    RAYBUNDLE_OT_bake,
+    RAYBUNDLE_OT_relight,
+    RAYBUNDLE_OT_clear,
+    RAYBUNDLE_OT_preview,
+)
+
+
+def register() -> None:
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels: Render properties, Object properties, and the sidebar of the 3D view."""
+
+import json
+
+import bpy
+
+
+class RaybundleRenderPanel:
+    """In the Render properties, whatever the engine: the bake depends on none."""
+    bl_space_type = 'PROPERTIES'
+    bl_region_type = 'WINDOW'
+    bl_context = "render"
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+
+class RAYBUNDLE_PT_render(RaybundleRenderPanel, bpy.types.Panel):
+    bl_label = "Raybundle"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.raybundle
+        row = layout.row(align=True)
+        row.operator("raybundle.bake", text="Bake", icon='LIGHT')
+        row.operator("raybundle.relight")
+        row.operator("raybundle.clear", text="", icon='TRASH')
+        layout.prop(settings, "scope")
+
+
+class RAYBUNDLE_PT_last_bake(RaybundleRenderPanel, bpy.types.Panel):
+    bl_label = "Last Bake"
+    bl_parent_id = "RAYBUNDLE_PT_render"
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None and context.scene.raybundle.report != ""
+
+    def draw(self, context):
+        layout = self.layout
+        report = json.loads(context.scene.raybundle.report)
+        column = layout.column(align=True)
+        column.label(text=f"Noise: {100.0 * report['estimated_error']:.2g} %")
+        column.label(text=f"Time: {report['seconds']['total']:.2f} s")
+        column.label(text=f"Patches: {report['patches']:,}")
+        column.label(text=f"Bundles: {report['bundles']:,}")
+        for warning in report['warnings']:
+            layout.label(text=warning, icon='ERROR')
+
+
+class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
+    bl_label = "Quality"
+    bl_parent_id = "RAYBUNDLE_PT_render"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.raybundle
+        layout.prop(settings, "target_error")
+        layout.prop(settings, "topology")
+        layout.prop(settings, "patch_size")
+
+
+class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
+    bl_label = "Limits"
+    bl_parent_id = "RAYBUNDLE_PT_quality"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.raybundle
+        # Short, since the editor is narrow.
+        layout.prop(settings, "max_patches", text="Patches")
+        layout.prop(settings, "max_bundles", text="Bundles")
+        layout.prop(settings, "lines_per_bundle", text="Lines")
+        layout.prop(settings, "memory_limit", text="MB")
+
+
+class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):
+    bl_label = "Method"
+    bl_parent_id = "RAYBUNDLE_PT_render"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.raybundle
+        layout.prop(settings, "solver")
+        layout.prop(settings, "first_shot")
+        layout.prop(settings, "directions")
+        layout.prop(settings, "projector")
+        layout.prop(settings, "small_patches")
+        layout.prop(settings, "reconstruction")
+        layout.prop(settings, "seed")
+        layout.prop(settings, "threads")
+
+
+class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
+    bl_label = "Output"
+    bl_parent_id = "RAYBUNDLE_PT_render"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.raybundle
+        layout.prop(settings, "output")
+        layout.prop(settings, "attribute")
+        layout.prop(settings, "domain")
+        layout.prop(settings, "data_type")
+        column = layout.column()
+        # A subdivided copy has a mesh of its own anyway.
+        column.active = settings.topology == 'KEEP'
+        column.prop(settings, "shared_meshes")
+
+
+class RAYBUNDLE_PT_object(bpy.types.Panel):
+    bl_label = "Raybundle"
+    bl_space_type = 'PROPERTIES'
+    bl_region_type = 'WINDOW'
+    bl_context = "object"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.object is not None and context.object.type in {
+            'MESH', 'CURVE', 'SURFACE', 'META', 'FONT'}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.object.raybundle
+        layout.prop(settings, "role")
+        column = layout.column()
+        column.active = settings.role == 'BAKE'
+        column.prop(settings, "side")
+
+
+class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
+    bl_label = "Raybundle"
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "Raybundle"
+
+    def draw(self, context):
+        layout = self.layout
+        column = layout.column(align=True)
+        column.operator("raybundle.bake", text="Bake", icon='LIGHT')
+        column.operator("raybundle.relight")
+        column.operator("raybundle.clear", text="Clear")
+        layout.operator("raybundle.preview")
+
+
+classes = (
+    RAYBUNDLE_PT_render,
+    RAYBUNDLE_PT_last_bake,
+    RAYBUNDLE_PT_quality,
+    RAYBUNDLE_PT_limits,
+    RAYBUNDLE_PT_method,
+    RAYBUNDLE_PT_output,
+    RAYBUNDLE_PT_object,
+    RAYBUNDLE_PT_sidebar,
+)
+
+
+def register() -> None:
+    for cls in classes:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

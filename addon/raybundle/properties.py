@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of the scene (scene.raybundle) and of objects (object.raybundle).
+
+The defaults of what the native library knows are its own; a test compares them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import bpy
+from bpy.props import (EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty)
+
+enum_scope = (
+    ('VISIBLE', "Visible", "Bake all objects that are visible in the viewport and in renders"),
+    ('SELECTED', "Selected",
+     "Bake the selected objects; the other visible ones still reflect and block light"),
+)
+
+enum_output = (
+    ('LIGHTING', "Lighting",
+     "Light on a white surface: irradiance / pi, as Cycles' Diffuse bake without Color. Multiply "
+     "it by the material's colour"),
+    ('COMBINED', "Combined",
+     "Radiance that leaves the surface: emission and reflected light with the material's colour"),
+    ('DIRECT', "Direct",
+     "The part of Lighting that comes straight from lights, emission and world"),
+    ('INDIRECT', "Indirect", "The part of Lighting that other surfaces have reflected"),
+)
+
+enum_domain = (
+    ('CORNER', "Face Corner", "A value per corner of each face: edges between smooth regions "
+     "stay sharp"),
+    ('POINT', "Vertex", "A value per vertex: the mean of its corners"),
+)
+
+enum_data_type = (
+    ('FLOAT_COLOR', "Color", "Scene-linear floats without an upper limit"),
+    ('BYTE_COLOR', "Byte Color", "8 bits per channel, sRGB; light above 1 is cut off"),
+)
+
+enum_topology = (
+    ('KEEP', "Keep", "Write to the vertices that the meshes have"),
+    ('SUBDIVIDE', "Subdivide",
+     "Write to a finer copy of each object; the original is hidden, and Clear shows it again"),
+)
+
+enum_shared_meshes = (
+    ('SINGLE_USER', "Copies",
+     "Objects that share a mesh get a copy each, so that each has its own light"),
+    ('AVERAGE', "Average", "Objects that share a mesh keep sharing it and show their mean light"),
+)
+
+enum_solver = (
+    ('LINE_REUSE', "Line Reuse",
+     "Keep all lines as a sparse matrix and solve on it to convergence"),
+)
+
+enum_first_shot = (
+    ('GATHER', "Gather", "Shadow rays from the receivers to the lights"),
+)
+
+enum_directions = (
+    ('LOW_DISCREPANCY', "Low Discrepancy", "Directions spread evenly: the least noise"),
+    ('RANDOM', "Random", "Independent uniform directions"),
+)
+
+enum_projector = (
+    ('AUTO', "Automatic", "The fastest exact projector"),
+    ('FRAGMENT_LISTS', "Fragment Lists", "Exact lists of fragments per pixel, ordered by depth"),
+)
+
+enum_small_patches = (
+    ('CENTRE_SAMPLING', "Centre Sampling",
+     "A line meets what covers the pixel's centre: unbiased for patches of any size"),
+)
+
+enum_reconstruction = (
+    ('LEAST_SQUARES', "Least Squares",
+     "Vertex values whose interpolation over the faces is nearest to the light on the surface"),
+)
+
+enum_role = (
+    ('BAKE', "Bake", "Takes part in the light and gets colours"),
+    ('OCCLUDE', "Occlude", "Reflects and blocks light, but gets no colours"),
+    ('IGNORE', "Ignore", "Left out"),
+)
+
+enum_side = (
+    ('FRONT', "Front", "Bake the light on the side that the normals point to"),
+    ('BACK', "Back", "Bake the light on the other side, as for a room modelled as a box with "
+     "outward normals"),
+)
+
+
+def _is_mesh_object(_self: bpy.types.PropertyGroup, item: bpy.types.Object) -> bool:
+    return item.type == 'MESH'
+
+
+class RaybundleSceneSettings(bpy.types.PropertyGroup):
+    scope: EnumProperty(
+        name="Scope", description="Which objects get colours", items=enum_scope,
+        default='VISIBLE')
+    target_error: FloatProperty(
+        name="Noise", description="Relative noise of the light at which the bake stops",
+        default=0.02, min=0.0005, max=1.0, soft_max=0.2, precision=4, step=0.1)
+    output: EnumProperty(
+        name="Output", description="Which quantity is written", items=enum_output,
+        default='LIGHTING')
+    attribute: StringProperty(
+        name="Attribute", description="Name of the colour attribute that is written",
+        default="Radiosity")
+    domain: EnumProperty(
+        name="Domain", description="Which elements have a value", items=enum_domain,
+        default='CORNER')
+    data_type: EnumProperty(
+        name="Data Type", description="How values are stored", items=enum_data_type,
+        default='FLOAT_COLOR')
+    topology: EnumProperty(
+        name="Topology", description="Whether meshes may be refined for their light",
+        items=enum_topology, default='KEEP')
+    shared_meshes: EnumProperty(
+        name="Shared", description="What baked objects with a common mesh get",
+        items=enum_shared_meshes, default='SINGLE_USER')
+    patch_size: FloatProperty(
+        name="Patch Size",
+        description="Edge of the patches that the light is computed on; 0 is automatic",
+        default=0.0, min=0.0, max=1e9, soft_max=10.0, precision=3, step=1, subtype='DISTANCE',
+        unit='LENGTH')
+    max_patches: IntProperty(
+        name="Maximum Patches",
+        description="Most patches that subdivision may make; patches grow to stay below it",
+        default=100_000, min=1, max=2 ** 28, soft_min=1_000, soft_max=10_000_000)
+    solver: EnumProperty(
+        name="Solver", description="How light is passed on between surfaces", items=enum_solver,
+        default='LINE_REUSE')
+    first_shot: EnumProperty(
+        name="First Shot", description="How the light of lamps and world is distributed",
+        items=enum_first_shot, default='GATHER')
+    directions: EnumProperty(
+        name="Directions", description="How the directions of the bundles are chosen",
+        items=enum_directions, default='LOW_DISCREPANCY')
+    projector: EnumProperty(
+        name="Projector", description="How a bundle's lines find the surfaces they meet",
+        items=enum_projector, default='AUTO')
+    small_patches: EnumProperty(
+        name="Small Patches", description="How patches smaller than a pixel are met",
+        items=enum_small_patches, default='CENTRE_SAMPLING')
+    reconstruction: EnumProperty(
+        name="Reconstruction", description="How patches become values at vertices",
+        items=enum_reconstruction, default='LEAST_SQUARES')
+    max_bundles: IntProperty(
+        name="Maximum Bundles",
+        description="Most directions that are traced, even if there is still more noise than "
+                    "wanted",
+        default=4096, min=2, max=2 ** 24, soft_max=65_536)
+    lines_per_bundle: IntProperty(
+        name="Lines per Bundle",
+        description="Lines in each direction; 0 is automatic: two per patch",
+        default=0, min=0, max=2 ** 26, soft_max=10_000_000)
+    memory_limit: FloatProperty(
+        name="Memory Limit", description="Most memory for the exchanges between patches, in MB",
+        default=4096.0, min=1.0, max=1e9, soft_min=64.0, soft_max=262_144.0, precision=0,
+        step=6400)
+    seed: IntProperty(
+        name="Seed", description="The same seed gives the same noise", default=0, min=0)
+    threads: IntProperty(
+        name="Threads", description="Processor threads to use; 0 is all", default=0, min=0,
+        soft_max=64, max=1024)
+    report: StringProperty(
+        name="Report", description="The report of the last bake, as JSON")
+
+
+class RaybundleObjectSettings(bpy.types.PropertyGroup):
+    role: EnumProperty(
+        name="Role", description="What the object is to the bake", items=enum_role,
+        default='BAKE')
+    side: EnumProperty(
+        name="Side", description="The side of the faces whose light is baked", items=enum_side,
+        default='FRONT')
+    source: PointerProperty(
+        name="Source", description="The object that this one is the subdivided copy of",
+        type=bpy.types.Object, poll=_is_mesh_object)
+
+
+@dataclass(frozen=True)
+class BakeSettings:
+    """The settings of one bake: those of the scene, some perhaps overridden."""
+
+    scope: str
+    target_error: float
+    output: str
+    attribute: str
+    domain: str
+    data_type: str
+    topology: str
+    shared_meshes: str
+    patch_size: float
+    max_patches: int
+    solver: str
+    first_shot: str
+    directions: str
+    projector: str
+    small_patches: str
+    reconstruction: str
+    max_bundles: int
+    lines_per_bundle: int
+    memory_limit: float
+    seed: int
+    threads: int
+
+
+def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
+    """Raises ValueError for an override that is unknown or not one of the property's values."""
+    names = [item.name for item in fields(BakeSettings)]
+    values = {name: getattr(scene.raybundle, name) for name in names}
+    for name, value in overrides.items():
+        if name not in values:
+            raise ValueError(f'there is no setting "{name}"; there are: {", ".join(names)}')
+        values[name] = checked_value(name, value)
+    return BakeSettings(**values)
+
+
+def checked_value(name: str, value: object) -> object:
+    """The value in the type of the scene setting of this name; text is converted."""
+    definition = RaybundleSceneSettings.bl_rna.properties[name]
+    if definition.type == 'ENUM':
+        choices = [item.identifier for item in definition.enum_items]
+        if value not in choices:
+            raise ValueError(f'{name}: "{value}" is none of {", ".join(choices)}')
+        return value
+    if definition.type == 'STRING':
+        return str(value)
+    try:
+        number = int(value) if definition.type == 'INT' else float(value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{name}: "{value}" is not a number') from error
+    if not definition.hard_min <= number <= definition.hard_max:
+        raise ValueError(f"{name}: {number} is not between {definition.hard_min:g} and "
+                         f"{definition.hard_max:g}")
+    return number
+
+
+classes = (
+    RaybundleSceneSettings,
+    RaybundleObjectSettings,
+)
+
+
+def register() -> None:
+    for cls in classes:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.raybundle = PointerProperty(
+        name="Raybundle", description="Settings of Raybundle", type=RaybundleSceneSettings)
+    bpy.types.Object.raybundle = PointerProperty(
+        name="Raybundle", description="Settings of Raybundle", type=RaybundleObjectSettings)
+
+
+def unregister() -> None:
+    del bpy.types.Object.raybundle
+    del bpy.types.Scene.raybundle
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)

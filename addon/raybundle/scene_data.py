@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The exported scene: plain arrays between Blender and the native library, without bpy.
+
+Indices (mesh, material, image) are positions in the lists of SceneData.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ImageData:
+    name: str
+    pixels: np.ndarray  # (height, width, 3) float32, linear RGB, bottom row first
+    extension: str  # 'REPEAT', 'EXTEND' or 'CLIP'
+
+
+@dataclass(frozen=True)
+class MaterialData:
+    """Diffuse reflectance and emission of the front side (row 0) and the back side (row 1)."""
+
+    name: str
+    reflectance: np.ndarray  # (2, 3)
+    emission: np.ndarray  # (2, 3), W/m^2
+    image: int | None = None
+    image_weight: np.ndarray | None = None  # (3,)
+    color_weight: np.ndarray | None = None  # (3,), of the mesh's corner colours
+
+
+@dataclass(frozen=True)
+class MeshData:
+    name: str
+    vertices: np.ndarray  # (n, 3) float32, m
+    corner_vertices: np.ndarray  # (c,) int32
+    face_offsets: np.ndarray  # (f + 1,) int32
+    face_materials: np.ndarray  # (f,) int32
+    corner_normals: np.ndarray  # (c, 3) float32, unit length
+    sharp_edges: np.ndarray  # (e, 2) int32, vertices
+    face_smooth: np.ndarray  # (f,) bool
+    uvs: np.ndarray | None = None  # (c, 2) float32
+    corner_colors: np.ndarray | None = None  # (c, 3) float32, linear RGB
+
+    @property
+    def corner_count(self) -> int:
+        return len(self.corner_vertices)
+
+    @property
+    def face_count(self) -> int:
+        return len(self.face_offsets) - 1
+
+    def corner_faces(self) -> np.ndarray:
+        """(c,) the face of each corner."""
+        return np.repeat(np.arange(self.face_count), np.diff(self.face_offsets))
+
+    def digest(self) -> bytes:
+        """The same for meshes with the same content, whatever their name."""
+        content = hashlib.blake2b(digest_size=16)
+        for array in (self.vertices, self.corner_vertices, self.face_offsets, self.face_materials,
+                      self.corner_normals, self.sharp_edges, self.uvs, self.corner_colors):
+            # The length keeps two neighbouring arrays from changing places.
+            content.update(str(None if array is None else array.shape).encode())
+            if array is not None:
+                content.update(np.ascontiguousarray(array).data)
+        return content.digest()
+
+
+@dataclass(frozen=True)
+class InstanceData:
+    mesh: int
+    name: str
+    transform: np.ndarray  # (3, 4) float64, object to world
+    role: str  # 'BAKE' or 'OCCLUDE'
+    side: str  # 'FRONT' or 'BACK'
+
+
+@dataclass(frozen=True)
+class PointLightData:
+    name: str
+    position: np.ndarray  # (3,) m
+    intensity: np.ndarray  # (3,) W/sr
+    radius: float  # m
+    shape: str  # 'DISK' or 'SPHERE'
+    world_to_light: np.ndarray | None = None  # (3, 3), of a spot light
+    cone_angle: float = 0.0  # radians, full opening
+    cone_blend: float = 0.0  # 0 to 1
+    cone_dims: bool = False  # the intensity falls with the cosine to the axis
+
+
+@dataclass(frozen=True)
+class SunLightData:
+    name: str
+    direction: np.ndarray  # (3,) towards the sun
+    irradiance: np.ndarray  # (3,) W/m^2 at normal incidence
+    angle: float  # radians, full diameter
+
+
+@dataclass(frozen=True)
+class AreaLightData:
+    name: str
+    centre: np.ndarray  # (3,) m
+    axis_u: np.ndarray  # (3,) m, half axis
+    axis_v: np.ndarray  # (3,) m, half axis
+    radiance: np.ndarray  # (3,) W/(m^2 sr)
+    shape: str  # 'RECTANGLE' or 'ELLIPSE'
+
+
+LightData = PointLightData | SunLightData | AreaLightData
+
+
+@dataclass
+class SceneData:
+    images: list[ImageData] = field(default_factory=list)
+    materials: list[MaterialData] = field(default_factory=list)
+    meshes: list[MeshData] = field(default_factory=list)
+    instances: list[InstanceData] = field(default_factory=list)
+    lights: list[LightData] = field(default_factory=list)
+    world: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr)
+
+    def diagonal(self) -> float:
+        """Of the bounding box of all instances in the world, m."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for instance in self.instances:
+            vertices = self.meshes[instance.mesh].vertices
+            corners = box_corners(vertices.min(axis=0), vertices.max(axis=0))
+            placed = corners @ instance.transform[:, :3].T + instance.transform[:, 3]
+            low, high = np.minimum(low, placed.min(axis=0)), np.maximum(high, placed.max(axis=0))
+        return float(np.linalg.norm(high - low)) if self.instances else 0.0
+
+
+def box_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(8, 3), the corners of an axis-aligned box."""
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
+                     for z in (low[2], high[2])])
+
+
+class Warnings(list):
+    """Messages for the report, each kept once."""
+
+    def add(self, message: str) -> None:
+        if message not in self:
+            self.append(message)

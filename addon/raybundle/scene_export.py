@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The evaluated scene -> SceneData, and what belongs to each object that gets light.
+
+The viewport's evaluation is used (Python has no other), filtered by what renders.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
+from .light_export import export_light, export_world
+from .material_export import MaterialExporter
+from .mesh_export import MeshError, export_mesh
+from .scene_data import InstanceData, MeshData, SceneData, Warnings
+
+# Object types whose evaluated geometry is a mesh.
+GEOMETRY_TYPES = ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT')
+_UNREAD_TYPES = ('CURVES', 'POINTCLOUD', 'VOLUME')
+
+
+@dataclass(frozen=True)
+class BakeTarget:
+    """An object that gets light."""
+
+    object: bpy.types.Object  # original
+    instance: int  # position in SceneData.instances
+    corner_map: CornerMap
+
+
+@dataclass
+class SceneExport:
+    scene: SceneData = field(default_factory=SceneData)
+    targets: list[BakeTarget] = field(default_factory=list)
+    statuses: dict[str, str] = field(default_factory=dict)  # of objects that get no light
+    warnings: Warnings = field(default_factory=Warnings)
+
+
+def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None
+                 ) -> SceneExport:
+    """selected: the objects to bake, None for all. The original data is as before on return."""
+    changed = _meshes_with_changed_topology(context, selected)
+    try:
+        with ElementCodes(changed):
+            return _Exporter(context, selected).export()
+    finally:
+        if changed:
+            # Evaluate once more, so that nothing that is evaluated still has the codes.
+            context.view_layer.update()
+
+
+def renderable_instances(context: bpy.types.Context) -> Iterator[bpy.types.DepsgraphObjectInstance]:
+    """What is both visible in the viewport and enabled for rendering."""
+    depsgraph = context.evaluated_depsgraph_get()
+    renderable = _objects_in_rendered_collections(context.view_layer)
+    for instance in depsgraph.object_instances:
+        item = instance.object
+        if item.hide_render:
+            continue
+        if instance.is_instance:
+            if instance.parent is not None and instance.parent.hide_render:
+                continue
+        elif item.original not in renderable:
+            continue
+        elif item.is_instancer and not item.show_instancer_for_render:
+            continue
+        yield instance
+
+
+def _objects_in_rendered_collections(view_layer: bpy.types.ViewLayer) -> set[bpy.types.Object]:
+    objects: set[bpy.types.Object] = set()
+    pending = [view_layer.layer_collection]
+    while pending:
+        layer_collection = pending.pop()
+        collection = layer_collection.collection
+        if collection.hide_render:
+            continue
+        # An excluded collection may have children that are not.
+        if not layer_collection.exclude:
+            objects.update(collection.objects)
+        pending.extend(layer_collection.children)
+    return objects
+
+
+def _role(item: bpy.types.Object, selected: Collection[bpy.types.Object] | None) -> str:
+    role = item.raybundle.role
+    if role == 'BAKE' and selected is not None and item not in selected:
+        return 'OCCLUDE'
+    return role
+
+
+def _meshes_with_changed_topology(context: bpy.types.Context,
+                                  selected: Collection[bpy.types.Object] | None
+                                  ) -> list[bpy.types.Mesh]:
+    """Original meshes of baked objects whose modifiers make other corners."""
+    meshes = []
+    for instance in renderable_instances(context):
+        item = instance.object.original
+        if (instance.is_instance or item.type != 'MESH' or instance.object.type != 'MESH'
+                or not item.modifiers
+                or _role(item, selected) != 'BAKE' or item.data.library is not None):
+            continue
+        if not same_topology(item.data, instance.object.data):
+            meshes.append(item.data)
+    return meshes
+
+
+class _Exporter:
+    """One walk over the evaluated scene."""
+
+    def __init__(self, context: bpy.types.Context,
+                 selected: Collection[bpy.types.Object] | None) -> None:
+        self.context = context
+        self.selected = selected
+        self.result = SceneExport()
+        self.materials = MaterialExporter(self.result.scene, self.result.warnings)
+        self._meshes: dict[tuple, int | MeshError] = {}
+        self._mesh_digests: dict[bytes, int] = {}
+        self._instance_counts: Counter[tuple[str, str]] = Counter()
+        self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
+        self._placed: set[tuple[str, int, bytes]] = set()
+
+    def export(self) -> SceneExport:
+        for instance in renderable_instances(self.context):
+            item = instance.object
+            if item.type == 'LIGHT':
+                self._add_light(instance)
+            elif item.type in GEOMETRY_TYPES:
+                self._add_geometry(instance)
+            elif item.type in _UNREAD_TYPES:
+                self._refuse(item.name, f"{item.type} geometry is not read")
+        scene = self.result.scene
+        scene.world = export_world(self.context.scene.world, self.materials.images,
+                                   self.result.warnings)
+        for (parent, name), count in self._instance_counts.items():
+            label = name if parent == name else f"{parent} / {name}"
+            plural = "s" if count > 1 else ""
+            self.result.statuses[label] = (
+                f"{count} instance{plural} without own data: only reflects and blocks light")
+        return self.result
+
+    def _add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        item = instance.object
+        portal = getattr(getattr(item.data, 'cycles', None), 'is_portal', False)
+        # Both are ways to say that diffuse surfaces do not see the light.
+        if portal or not item.visible_diffuse:
+            return
+        light = export_light(item, instance.matrix_world, self.materials.images,
+                             self.result.warnings)
+        if light is not None:
+            self.result.scene.lights.append(light)
+
+    def _add_geometry(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        item = instance.object
+        original = item.original
+        role = _role(original, self.selected)
+        if role == 'IGNORE':
+            return
+        transform = np.array(instance.matrix_world)[:3]
+        if not np.isfinite(transform).all():
+            self._refuse(item.name, "its transform is not finite")
+            return
+        mesh = self._mesh(item, wants_map=role == 'BAKE' and not instance.is_instance)
+        if isinstance(mesh, MeshError):
+            # A curve without a surface, an empty font: not worth a word unless it is a mesh.
+            if original.type == 'MESH':
+                self._refuse(item.name, str(mesh))
+            return
+        if original.type != 'MESH':
+            # Blender lists a curve both as itself and as the mesh that it evaluates to.
+            place = (original.name_full, mesh, transform.tobytes())
+            if place in self._placed:
+                return
+            self._placed.add(place)
+            if role == 'BAKE':
+                self.result.statuses[item.name] = (
+                    f"{original.type} objects take part in the light, but have no attribute")
+            role = 'OCCLUDE'
+        elif instance.is_instance:
+            parent = instance.parent.name if instance.parent else item.name
+            self._instance_counts[parent, item.name] += 1
+            role = 'OCCLUDE'
+        self.result.scene.instances.append(
+            InstanceData(mesh, item.name, transform, role, original.raybundle.side))
+        if role == 'BAKE':
+            index = len(self.result.scene.instances) - 1
+            self.result.targets.append(
+                BakeTarget(original, index, self._corner_maps[original]))
+
+    def _refuse(self, name: str, reason: str) -> None:
+        self.result.statuses[name] = reason
+        self.result.warnings.add(f'"{name}" is left out: {reason}')
+
+    def _mesh(self, item: bpy.types.Object, wants_map: bool) -> int | MeshError:
+        """Index of the object's mesh in the scene; objects that share it export it once."""
+        # Materials may sit on the object, and then differ between objects with the same mesh.
+        slots = tuple(slot.material.original if slot.material else None
+                      for slot in item.material_slots)
+        key = (item.data.as_pointer(), item.type, slots)
+        original = item.original
+        needs_map = wants_map and original.type == 'MESH' and original not in self._corner_maps
+        if key not in self._meshes or needs_map:
+            mesh = item.to_mesh()
+            try:
+                if key not in self._meshes:
+                    self._meshes[key] = self._exported(item, mesh)
+                if needs_map and not isinstance(self._meshes[key], MeshError):
+                    self._corner_maps[original] = self._corner_map(original, mesh)
+            finally:
+                item.to_mesh_clear()
+        return self._meshes[key]
+
+    def _exported(self, item: bpy.types.Object, mesh: bpy.types.Mesh) -> int | MeshError:
+        materials = [self.materials.export(slot.material) for slot in item.material_slots]
+        try:
+            default = None if materials else self.materials.export(None)
+            data = export_mesh(mesh, item.data.name, materials, default)
+        except MeshError as error:
+            return error
+        return self._unique(data)
+
+    def _unique(self, data: MeshData) -> int:
+        """Copies of a mesh count as the same one, such as those that an earlier bake made."""
+        digest = data.digest()
+        if digest not in self._mesh_digests:
+            self._mesh_digests[digest] = len(self.result.scene.meshes)
+            self.result.scene.meshes.append(data)
+        return self._mesh_digests[digest]
+
+    def _corner_map(self, original: bpy.types.Object, evaluated: bpy.types.Mesh) -> CornerMap:
+        corner_map = build_corner_map(original.data, evaluated)
+        if corner_map.filled:
+            self.result.warnings.add(
+                f'"{original.name}": its modifiers keep no trace of {corner_map.filled} of its '
+                f'{corner_map.original_count} corners: they have the light of their neighbours')
+        return corner_map

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finer copies of objects, for meshes too coarse for their light (topology 'SUBDIVIDE').
+
+A copy "<name> (Radiosity)" stands in for its original, which is hidden. The copy remembers the
+original in raybundle.source, so that the next bake replaces it and Clear undoes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from .mesh_export import read
+from .native import Subdivision
+from .scene_data import MeshData
+
+NAME_SUFFIX = " (Radiosity)"
+
+
+@dataclass(frozen=True)
+class SubdividedMesh:
+    """The finer mesh, and where its corners lie on the mesh it was made of."""
+
+    data: MeshData
+    source_faces: np.ndarray  # (t,) int32
+    source_corners: np.ndarray  # (3 t, 3) int32
+    source_weights: np.ndarray  # (3 t, 3) float32, rows sum to 1
+
+    def interpolated(self, values: np.ndarray) -> np.ndarray:
+        """values: (source corners, n) -> (corners, n)."""
+        return np.einsum('cj,cjn->cn', self.source_weights, values[self.source_corners])
+
+
+def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> SubdividedMesh:
+    """No edge of the result is longer than max_edge (m) in the world; transform: (3, 4)."""
+    world = mesh.vertices @ transform[:, :3].T + transform[:, 3]
+    with Subdivision(world, mesh.corner_vertices, mesh.face_offsets, max_edge) as subdivision:
+        corner_vertices = subdivision.triangles.reshape(-1)
+        result = SubdividedMesh(mesh, subdivision.source_faces,
+                                subdivision.source_corners.reshape(-1, 3),
+                                subdivision.source_weights.reshape(-1, 3))
+        vertex_count = len(subdivision.vertices)
+    # Interpolate in object space, rather than invert a transform that may be flat.
+    vertices = np.zeros((vertex_count, 3), np.float32)
+    vertices[corner_vertices] = result.interpolated(mesh.vertices[mesh.corner_vertices])
+    normals = result.interpolated(mesh.corner_normals)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+    return replace(result, data=replace(
+        mesh,
+        vertices=vertices,
+        corner_vertices=corner_vertices,
+        face_offsets=np.arange(0, len(corner_vertices) + 1, 3, dtype=np.int32),
+        face_materials=mesh.face_materials[result.source_faces],
+        corner_normals=normals.astype(np.float32),
+        # The edges of the source are gone; its normals still part what is sharp and not flat.
+        sharp_edges=np.empty((0, 2), np.int32),
+        face_smooth=mesh.face_smooth[result.source_faces],
+        uvs=None if mesh.uvs is None else result.interpolated(mesh.uvs),
+        corner_colors=(None if mesh.corner_colors is None
+                       else result.interpolated(mesh.corner_colors))))
+
+
+def find_copies(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.Object]:
+    """The copy of each original of the scene."""
+    return {item.raybundle.source: item for item in scene.objects if item.raybundle.source}
+
+
+@contextmanager
+def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
+    """Originals in place of their copies, until the end of the with block."""
+    copies = find_copies(scene)
+    states = [(item, item.hide_viewport, item.hide_render)
+              for pair in copies.items() for item in pair]
+    try:
+        for original, copy in copies.items():
+            _set_hidden(original, False)
+            _set_hidden(copy, True)
+        yield
+    finally:
+        for item, hide_viewport, hide_render in states:
+            item.hide_viewport, item.hide_render = hide_viewport, hide_render
+
+
+def create_copies(context: bpy.types.Context,
+                  meshes: dict[bpy.types.Object, SubdividedMesh]
+                  ) -> dict[bpy.types.Object, bpy.types.Object]:
+    """Put a copy in the place of each original; earlier copies are removed."""
+    # A hidden original is not evaluated: show all of them for one evaluation.
+    with originals_shown(context.scene):
+        depsgraph = context.evaluated_depsgraph_get()
+        built = {original: _evaluated_copy(original.evaluated_get(depsgraph), subdivided)
+                 for original, subdivided in meshes.items()}
+    earlier = find_copies(context.scene)
+    copies = {}
+    for original, mesh in built.items():
+        if original in earlier:
+            _remove_copy(earlier[original])
+        copies[original] = _place_copy(context, original, mesh)
+        _set_hidden(original, True)
+    return copies
+
+
+def _evaluated_copy(evaluated: bpy.types.Object, subdivided: SubdividedMesh) -> bpy.types.Mesh:
+    source = evaluated.to_mesh()
+    try:
+        mesh = _build_mesh(evaluated.name + NAME_SUFFIX, source, subdivided)
+    finally:
+        evaluated.to_mesh_clear()
+    for slot in evaluated.original.material_slots:
+        mesh.materials.append(slot.material)
+    return mesh
+
+
+def _place_copy(context: bpy.types.Context, original: bpy.types.Object, mesh: bpy.types.Mesh
+                ) -> bpy.types.Object:
+    copy = bpy.data.objects.new(original.name + NAME_SUFFIX, mesh)
+    # A collection of another file cannot take new objects.
+    collections = [item for item in original.users_collection if item.library is None]
+    for collection in collections or [context.scene.collection]:
+        collection.objects.link(copy)
+    copy.parent = original.parent
+    copy.parent_type = original.parent_type
+    copy.parent_bone = original.parent_bone
+    copy.matrix_parent_inverse = original.matrix_parent_inverse
+    copy.rotation_mode = original.rotation_mode
+    copy.matrix_world = original.matrix_world
+    copy.raybundle.role = original.raybundle.role
+    copy.raybundle.side = original.raybundle.side
+    copy.raybundle.source = original
+    return copy
+
+
+def remove_copies(scene: bpy.types.Scene) -> int:
+    """Remove all copies and show their originals again; returns how many there were."""
+    copies = find_copies(scene)
+    for original, copy in copies.items():
+        _set_hidden(original, False)
+        _remove_copy(copy)
+    return len(copies)
+
+
+def _set_hidden(item: bpy.types.Object, hidden: bool) -> None:
+    item.hide_viewport = hidden
+    item.hide_render = hidden
+
+
+def _remove_copy(copy: bpy.types.Object) -> None:
+    mesh = copy.data
+    bpy.data.objects.remove(copy)
+    if mesh.users == 0:
+        bpy.data.meshes.remove(mesh)
+
+
+def _build_mesh(name: str, source: bpy.types.Mesh, subdivided: SubdividedMesh) -> bpy.types.Mesh:
+    data = subdivided.data
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(data.vertices))
+    mesh.vertices.foreach_set('co', data.vertices.ravel())
+    mesh.loops.add(data.corner_count)
+    mesh.loops.foreach_set('vertex_index', data.corner_vertices)
+    mesh.polygons.add(data.face_count)
+    mesh.polygons.foreach_set('loop_start', data.face_offsets[:-1])
+    if bpy.app.version < (4, 1, 0):
+        # Later versions derive it from the starts and refuse to set it.
+        mesh.polygons.foreach_set('loop_total', np.diff(data.face_offsets))
+    slots = read(source.polygons, 'material_index', np.int32)
+    mesh.polygons.foreach_set('material_index', slots[subdivided.source_faces])
+    mesh.polygons.foreach_set('use_smooth', data.face_smooth)
+    mesh.update(calc_edges=True)
+    _carry_uv_layers(source, mesh, subdivided)
+    _carry_color_attributes(source, mesh, subdivided)
+    if data.face_smooth.any():
+        # Set as custom normals, the shading stays that of the source, sharp edges included.
+        if bpy.app.version < (4, 1, 0):
+            mesh.use_auto_smooth = True
+            mesh.auto_smooth_angle = np.pi
+        mesh.normals_split_custom_set(data.corner_normals)
+    return mesh
+
+
+def _carry_uv_layers(source: bpy.types.Mesh, mesh: bpy.types.Mesh, subdivided: SubdividedMesh
+                     ) -> None:
+    for layer in source.uv_layers:
+        new = mesh.uv_layers.new(name=layer.name, do_init=False)
+        uvs = subdivided.interpolated(read(layer.data, 'uv', np.float32, 2))
+        new.data.foreach_set('uv', uvs.astype(np.float32).ravel())
+        new.active_render = layer.active_render
+    if source.uv_layers:
+        mesh.uv_layers.active_index = source.uv_layers.active_index
+
+
+def _carry_color_attributes(source: bpy.types.Mesh, mesh: bpy.types.Mesh,
+                            subdivided: SubdividedMesh) -> None:
+    corner_vertices = read(source.loops, 'vertex_index', np.int32)
+    for attribute in source.color_attributes:
+        colors = read(attribute.data, 'color', np.float32, 4)
+        if attribute.domain == 'POINT':
+            colors = colors[corner_vertices]
+        new = mesh.color_attributes.new(attribute.name, attribute.data_type, 'CORNER')
+        new.data.foreach_set('color', subdivided.interpolated(colors).astype(np.float32).ravel())

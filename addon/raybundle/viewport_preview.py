@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colour attributes in the solid shading of the 3D views, and back to what was there before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import bpy
+
+
+@dataclass(frozen=True)
+class _Shading:
+    type: str
+    color_type: str
+    light: str
+
+
+_PREVIEW = _Shading('SOLID', 'VERTEX', 'FLAT')
+_DEFAULT = _Shading('SOLID', 'MATERIAL', 'STUDIO')
+
+# What to go back to, by the view's address: views have no name and do not outlive the session.
+_earlier: dict[int, _Shading] = {}
+
+
+def toggle(window_manager: bpy.types.WindowManager) -> bool:
+    """Returns whether the views show the attribute now."""
+    views = list(_views(window_manager))
+    show = any(_read(view) != _PREVIEW for view in views)
+    for view in views:
+        if not show:
+            _apply(view, _earlier.pop(view.as_pointer(), _DEFAULT))
+        elif _read(view) != _PREVIEW:
+            _earlier[view.as_pointer()] = _read(view)
+            _apply(view, _PREVIEW)
+    return show
+
+
+def _views(window_manager: bpy.types.WindowManager) -> Iterator[bpy.types.SpaceView3D]:
+    for window in window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                yield area.spaces.active
+
+
+def _read(view: bpy.types.SpaceView3D) -> _Shading:
+    return _Shading(view.shading.type, view.shading.color_type, view.shading.light)
+
+
+def _apply(view: bpy.types.SpaceView3D, shading: _Shading) -> None:
+    view.shading.type = shading.type
+    view.shading.color_type = shading.color_type
+    view.shading.light = shading.light
