@@ -1,0 +1,361 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+r"""Run time against error: Raybundle's bake and Cycles' vertex bake, interleaved in one run.
+
+    blender -b --factory-startup -P blend_tests/benchmark.py -- \
+        [--scenes cornell_box big_room] [--runs 5] [--set name=value ...] [--threads 0] \
+        [--surface SAMPLES] [--out FILE.json]
+
+Each run bakes once with Raybundle (output LIGHTING, nothing kept from the run before) and with
+Cycles at 64, 256 and 1024 samples (Diffuse, direct and indirect, all objects at once, every bounce,
+no denoising). Times are those a user waits for, and medians over the runs. Two errors, both the
+relative RMSE over RGB, weighted by area, over all objects:
+
+vertex   Against scenes/NAME.cycles.npz (README there) at vertices off contact edges. Cycles has
+         point samples, as the reference, and only noise; Raybundle's values are those whose
+         interpolation is nearest to the light on the faces, which on coarse faces differ from point
+         samples.
+surface  What is seen: the values, interpolated over the faces, against Cycles at points inside the
+         faces (--surface gives the samples of that reference; it is made first, which takes time).
+
+For equal error Cycles' time is interpolated in the logarithms of time and error, and extrapolated
+with error ~ time^-1/2 as long as noise is its error. Where more samples do not help it any more
+(its surface error at contacts and shadow edges), there is no such time. --out appends one line of
+JSON per scene.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
+sys.dont_write_bytecode = True
+
+import raybundle  # noqa: E402
+from cycles_reference import (ATTRIBUTE, bakeable_objects, corner_values, load,  # noqa: E402
+                              prepare_scene, target_attribute)
+from raybundle import bake_cache  # noqa: E402
+from raybundle.properties import checked_value  # noqa: E402
+from surface_error import (SurfaceError, corner_areas, corner_vertices, face_means,  # noqa: E402
+                           face_sizes, is_defined, off_contact_edges, read_colors, surface_error,
+                           world_positions)
+
+SCENES = HERE.parent / "scenes"
+CYCLES_SAMPLES = (64, 256, 1024)
+ERRORS_OF_INTEREST = (0.05, 0.02, 0.01)
+# With four times the samples noise is halved; an error that keeps more than this is something else.
+STILL_NOISE = 0.7
+RAYBUNDLE = "Raybundle"
+
+Light = dict[str, np.ndarray]  # by object name, RGB per corner or point
+
+
+@dataclass
+class Contestant:
+    name: str
+    seconds: list[float] = field(default_factory=list)
+    vertex: list[SurfaceError] = field(default_factory=list)
+    surface: list[SurfaceError] = field(default_factory=list)
+
+    def median_seconds(self) -> float:
+        return float(np.median(self.seconds))
+
+    def median_error(self, kind: str) -> float:
+        return float(np.median([error.rmse for error in getattr(self, kind)]))
+
+    def json(self) -> dict:
+        return {"name": self.name, "seconds": self.seconds,
+                "vertex": [asdict(error) for error in self.vertex],
+                "surface": [asdict(error) for error in self.surface]}
+
+
+# --------------------------------------------------------------------------------------------------
+# Bakes
+# --------------------------------------------------------------------------------------------------
+
+
+def bake_raybundle(objects: Sequence[bpy.types.Object]) -> tuple[float, Light, dict]:
+    bake_cache.discard_all()
+    started = time.perf_counter()
+    if bpy.ops.raybundle.bake() != {'FINISHED'}:
+        sys.exit("the bake was cancelled")
+    seconds = time.perf_counter() - started
+    scene = bpy.context.scene
+    return (seconds, {item.name: read_colors(item, scene.raybundle.attribute) for item in objects},
+            json.loads(scene.raybundle.report))
+
+
+def bake_cycles(objects: Sequence[bpy.types.Object], samples: int, seed: int
+                ) -> tuple[float, Light]:
+    scene = bpy.context.scene
+    engine = scene.render.engine
+    prepare_scene(scene, samples, seed)
+    for item in bpy.context.view_layer.objects:
+        item.select_set(False)
+    for item in objects:
+        target_attribute(item.data)
+        item.select_set(True)
+    bpy.context.view_layer.objects.active = objects[0]
+    started = time.perf_counter()
+    bpy.ops.object.bake(type='DIFFUSE', pass_filter={'DIRECT', 'INDIRECT'},
+                        target='VERTEX_COLORS', use_selected_to_active=False, use_clear=True)
+    seconds = time.perf_counter() - started
+    scene.render.engine = engine
+    return seconds, {item.name: corner_values(item.data) for item in objects}
+
+
+# --------------------------------------------------------------------------------------------------
+# References
+# --------------------------------------------------------------------------------------------------
+
+
+class VertexReference:
+    """Cycles' light at the corners, and which of them are compared."""
+
+    def __init__(self, name: str, objects: Sequence[bpy.types.Object]) -> None:
+        self._values = load(SCENES / f"{name}.cycles.npz")
+        off_contacts = off_contact_edges(objects)
+        self._weights = {
+            item.name: corner_areas(item) * off_contacts[item.name]
+            * is_defined(item, self._values[item.name])
+            for item in objects}
+
+    def error(self, light: Light) -> SurfaceError:
+        return _joined_error(light, self._values, self._weights)
+
+
+class SurfaceReference:
+    """Cycles' light at points inside the faces, one half-way from each corner to the centre."""
+
+    def __init__(self, objects: Sequence[bpy.types.Object], samples: int) -> None:
+        self._weights = {item.name: corner_areas(item) for item in objects}
+        self._sizes = {item.name: face_sizes(item.data) for item in objects}
+        twins = {item.name: _with_inner_points(item) for item in objects}
+        hidden = [item.hide_render for item in objects]
+        for item in objects:
+            item.hide_render = True
+        values = _bake_points(list(twins.values()), samples)
+        self._values = {name: values[twin.name] for name, twin in twins.items()}
+        for item, was_hidden in zip(objects, hidden):
+            item.hide_render = was_hidden
+        for twin in twins.values():
+            bpy.data.meshes.remove(twin.data)
+        for item in objects:
+            # Faces that reflect nothing have no value, nor have points covered by other surfaces.
+            self._weights[item.name] = (self._weights[item.name]
+                                        * self._values[item.name].any(axis=1))
+
+    def error(self, light: Light) -> SurfaceError:
+        points = {name: self._interpolated(name, values) for name, values in light.items()}
+        return _joined_error(points, self._values, self._weights)
+
+    def _interpolated(self, name: str, corners: np.ndarray) -> np.ndarray:
+        """Bilinear in quads, linear in triangles, at the points in the order of the corners."""
+        sizes = self._sizes[name]
+        ends = np.cumsum(sizes)
+        starts = ends - sizes
+        face = np.repeat(np.arange(len(sizes)), sizes)
+        number = np.arange(len(corners)) - starts[face]
+        after, before = (corners[starts[face] + (number + step) % sizes[face]] for step in (1, -1))
+        mean = (np.add.reduceat(corners.astype(float), starts, axis=0) / sizes[:, None])[face]
+        opposite = corners[starts[face] + (number + 2) % sizes[face]]
+        bilinear = (9 * corners + 3 * after + 3 * before + opposite) / 16
+        return np.where((sizes == 4)[face, None], bilinear, 0.5 * (corners + mean))
+
+
+def _with_inner_points(item: bpy.types.Object) -> bpy.types.Object:
+    """A copy whose faces have a smaller face in their middle: its vertices are the points."""
+    vertices, sizes = corner_vertices(item.data), face_sizes(item.data)
+    positions = np.empty(3 * len(item.data.vertices), np.float32)
+    item.data.vertices.foreach_get('co', positions)
+    positions = positions.reshape(-1, 3)
+    centres = np.repeat(face_means(item, positions[vertices]), sizes, axis=0)
+    inner = 0.5 * (positions[vertices] + centres)
+    faces: list[list[int]] = []
+    slots: list[int] = []
+    for polygon in item.data.polygons:
+        outside = list(polygon.vertices)
+        inside = [len(positions) + corner for corner in polygon.loop_indices]
+        count = len(outside)
+        faces.append(inside)
+        faces += [[outside[k], outside[(k + 1) % count], inside[(k + 1) % count], inside[k]]
+                  for k in range(count)]
+        slots += [polygon.material_index] * (count + 1)
+    mesh = bpy.data.meshes.new(f"{item.name}.points")
+    mesh.from_pydata(np.concatenate([positions, inner]).tolist(), [], faces)
+    for material in item.data.materials:
+        mesh.materials.append(material)
+    mesh.polygons.foreach_set('material_index', slots)
+    mesh.color_attributes.new(ATTRIBUTE, 'FLOAT_COLOR', 'POINT')
+    mesh.color_attributes.active_color_index = 0
+    mesh.update()
+    twin = bpy.data.objects.new(mesh.name, mesh)
+    twin.matrix_world = item.matrix_world
+    bpy.context.scene.collection.objects.link(twin)
+    # How many vertices come before the points.
+    twin["first_point"] = len(positions)
+    return twin
+
+
+def _bake_points(twins: Sequence[bpy.types.Object], samples: int) -> Light:
+    scene = bpy.context.scene
+    engine = scene.render.engine
+    prepare_scene(scene, samples, 0)
+    bpy.context.view_layer.update()
+    for item in bpy.context.view_layer.objects:
+        item.select_set(item in twins)
+    bpy.context.view_layer.objects.active = twins[0]
+    bpy.ops.object.bake(type='DIFFUSE', pass_filter={'DIRECT', 'INDIRECT'},
+                        target='VERTEX_COLORS', use_selected_to_active=False, use_clear=True)
+    scene.render.engine = engine
+    return {twin.name: read_colors(twin, ATTRIBUTE)[twin["first_point"]:] for twin in twins}
+
+
+def _joined_error(light: Light, reference: Light, weights: dict[str, np.ndarray]) -> SurfaceError:
+    return surface_error(*(np.concatenate([entry[name] for name in light])
+                           for entry in (light, reference, weights)))
+
+
+# --------------------------------------------------------------------------------------------------
+# A scene
+# --------------------------------------------------------------------------------------------------
+
+
+def run_scene(name: str, options: argparse.Namespace) -> dict:
+    bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
+    settings = bpy.context.scene.raybundle
+    settings.output, settings.threads = 'LIGHTING', options.threads
+    for assignment in options.set:
+        key, _, value = assignment.partition("=")
+        setattr(settings, key, checked_value(key, value))
+    bpy.context.scene.render.threads_mode = 'FIXED' if options.threads else 'AUTO'
+    if options.threads:
+        bpy.context.scene.render.threads = options.threads
+    objects = bakeable_objects(bpy.context)
+    references = {"vertex": VertexReference(name, objects)}
+    if options.surface:
+        references["surface"] = SurfaceReference(objects, options.surface)
+
+    contestants = {key: Contestant(f"Cycles {key}" if key != RAYBUNDLE else key)
+                   for key in (RAYBUNDLE, *CYCLES_SAMPLES)}
+    reports = []
+    for run in range(options.runs):
+        for key, contestant in contestants.items():
+            if key == RAYBUNDLE:
+                settings.seed = run
+                seconds, light, report = bake_raybundle(objects)
+                reports.append(report)
+            else:
+                # The reference has seed 0.
+                seconds, light = bake_cycles(objects, key, 1 + run)
+            contestant.seconds.append(seconds)
+            for kind, reference in references.items():
+                getattr(contestant, kind).append(reference.error(light))
+
+    stages = {stage: float(np.median([report["seconds"][stage] for report in reports]))
+              for stage in reports[0]["seconds"]}
+    result = {"scene": name, "runs": options.runs, "cores": os.cpu_count(),
+              "threads": options.threads, "blender": bpy.app.version_string,
+              "settings": options.set, "surface_samples": options.surface,
+              "stages": stages, "bundles": [report["bundles"] for report in reports],
+              "patches": reports[0]["patches"],
+              "contestants": [entry.json() for entry in contestants.values()],
+              "ratios": {kind: time_ratios(contestants, kind) for kind in references}}
+    print_scene(result, contestants, list(references))
+    return result
+
+
+def time_ratios(contestants: dict, kind: str) -> dict[str, dict]:
+    """Times of Cycles over Raybundle's, at its error and at fixed ones, or why there is none."""
+    own = contestants[RAYBUNDLE]
+    own_error = own.median_error(kind)
+    cycles = [contestants[samples] for samples in CYCLES_SAMPLES]
+    ratios = {}
+    for name, error in (("own", own_error), *((f"{wanted:g}", wanted)
+                                              for wanted in ERRORS_OF_INTEREST)):
+        entry: dict = {"error": error, "ratio": None, "note": ""}
+        seconds = _time_at(cycles, kind, error)
+        if error < own_error:
+            entry["note"] = "Raybundle's error is larger"
+        elif seconds is None:
+            entry["note"] = "Cycles does not reach it"
+        else:
+            entry["ratio"] = seconds / own.median_seconds()
+        ratios[name] = entry
+    return ratios
+
+
+def _time_at(cycles: Sequence[Contestant], kind: str, error: float) -> float | None:
+    """None if more samples do not bring Cycles to this error."""
+    errors = np.array([entry.median_error(kind) for entry in cycles])
+    seconds = np.array([entry.median_seconds() for entry in cycles])
+    if error > errors[0]:
+        return float(seconds[0] * (errors[0] / error) ** 2)
+    if error < errors[-1]:
+        if errors[-1] > STILL_NOISE * errors[-2]:
+            return None
+        return float(seconds[-1] * (errors[-1] / error) ** 2)
+    # np.interp wants rising abscissae.
+    return float(np.exp(np.interp(-np.log(error), -np.log(errors), np.log(seconds))))
+
+
+def print_scene(result: dict, contestants: dict, kinds: Sequence[str]) -> None:
+    threads = result["threads"] or result["cores"]
+    print(f"\n{result['scene']}: {result['runs']} runs, medians; {threads} threads of "
+          f"{result['cores']} cores; {result['patches']} patches, "
+          f"{int(np.median(result['bundles']))} bundles; Blender {result['blender']}")
+    print("  Raybundle's seconds: " + ", ".join(
+        f"{stage} {seconds:.3f}" for stage, seconds in result["stages"].items()))
+    print(f"  {'':<12} {'seconds':>8} {'fastest':>8} {'slowest':>8}" + "".join(
+        f"   {kind + ' rmse':>13} {'bias':>7} {'p99':>7} {'max':>7}" for kind in kinds))
+    for entry in contestants.values():
+        line = (f"  {entry.name:<12} {entry.median_seconds():8.3f} {min(entry.seconds):8.3f} "
+                f"{max(entry.seconds):8.3f}")
+        for kind in kinds:
+            errors = getattr(entry, kind)
+            line += f"   {100 * entry.median_error(kind):11.2f} %" + "".join(
+                f" {100 * float(np.median([getattr(error, name) for error in errors])):{form}} %"
+                for name, form in (("bias", "+5.2f"), ("percentile_99", "5.1f"),
+                                   ("maximum", "5.0f")))
+        print(line)
+    for kind in kinds:
+        parts = []
+        for name, entry in result["ratios"][kind].items():
+            label = f"{100 * entry['error']:.3g} %" + (" (its own)" if name == "own" else "")
+            parts.append(f"{label}: " + (entry["note"] or f"{entry['ratio']:.1f}"))
+        print(f"  Cycles' time over Raybundle's for equal {kind} error: {'; '.join(parts)}")
+    sys.stdout.flush()
+
+
+def main(arguments: Sequence[str]) -> None:
+    parser = argparse.ArgumentParser(prog="benchmark.py", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", nargs="+", default=["cornell_box", "big_room"])
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--threads", type=int, default=0, help="of both; 0: all cores")
+    parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="name=value",
+                        help="settings of scene.raybundle")
+    parser.add_argument("--surface", type=int, default=0, metavar="SAMPLES",
+                        help="also the surface error, against so many samples (0: not)")
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args(arguments)
+    raybundle.register()
+    for name in options.scenes:
+        result = run_scene(name, options)
+        if options.out:
+            with options.out.open("a") as file:
+                file.write(json.dumps(result) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on of the source tree, registered once; an empty file for each test."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "addon"))
+sys.dont_write_bytecode = True
+
+import raybundle  # noqa: E402
+
+# The furnace: E, reflectance and the side of the box.
+FURNACE_EMISSION_RADIANCE = 0.5
+FURNACE_REFLECTANCE = 0.6
+
+
+def pytest_configure() -> None:
+    raybundle.register()
+
+
+def pytest_unconfigure() -> None:
+    raybundle.unregister()
+
+
+def _native_library_exists() -> bool:
+    return sys.modules["raybundle.native"].library_path().is_file()
+
+
+def pytest_collection_modifyitems(items: list) -> None:
+    if _native_library_exists():
+        return
+    missing = pytest.mark.skip(reason="the native library is not built")
+    for item in items:
+        if item.get_closest_marker("needs_library"):
+            item.add_marker(missing)
+
+
+@pytest.fixture(autouse=True)
+def empty_file():
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield
+
+
+@pytest.fixture
+def new_material():
+    """(name, reflectance, emission radiance) -> material of a Diffuse and an Emission shader."""
+
+    def create(name: str, reflectance=(0.8, 0.8, 0.8), emission=(0.0, 0.0, 0.0)):
+        material = bpy.data.materials.new(name)
+        material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        output = tree.nodes.new('ShaderNodeOutputMaterial')
+        diffuse = tree.nodes.new('ShaderNodeBsdfDiffuse')
+        diffuse.inputs['Color'].default_value = (*reflectance, 1.0)
+        shader = diffuse.outputs[0]
+        if any(emission):
+            emit = tree.nodes.new('ShaderNodeEmission')
+            emit.inputs['Color'].default_value = (*emission, 1.0)
+            emit.inputs['Strength'].default_value = 1.0
+            add = tree.nodes.new('ShaderNodeAddShader')
+            tree.links.new(shader, add.inputs[0])
+            tree.links.new(emit.outputs[0], add.inputs[1])
+            shader = add.outputs[0]
+        tree.links.new(shader, output.inputs['Surface'])
+        return material
+
+    return create
+
+
+@pytest.fixture
+def new_object():
+    """(name, vertices, faces, ...) -> mesh object in the scene."""
+
+    def create(name: str, vertices, faces, material=None, location=(0.0, 0.0, 0.0)):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata(vertices, [], faces)
+        if material is not None:
+            mesh.materials.append(material)
+        item = bpy.data.objects.new(name, mesh)
+        item.location = location
+        bpy.context.scene.collection.objects.link(item)
+        bpy.context.view_layer.update()
+        return item
+
+    return create
+
+
+@pytest.fixture
+def new_light():
+    def create(name: str, kind: str, energy: float, location=(0.0, 0.0, 0.0), **values):
+        light = bpy.data.lights.new(name, kind)
+        light.energy = energy
+        for key, value in values.items():
+            setattr(light, key, value)
+        item = bpy.data.objects.new(name, light)
+        item.location = location
+        bpy.context.scene.collection.objects.link(item)
+        bpy.context.view_layer.update()
+        return item
+
+    return create
+
+
+CUBE_VERTICES = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+# Normals point outwards.
+CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+@pytest.fixture
+def closed_box(new_object, new_material):
+    """A furnace: a box with inward normals, uniform emission and reflectance. Inside,
+    B = E / (1 - rho), so LIGHTING = H / pi = L_E / (1 - rho) with E = pi L_E."""
+    grey, radiance = FURNACE_REFLECTANCE, FURNACE_EMISSION_RADIANCE
+    material = new_material("Furnace", (grey,) * 3, (radiance,) * 3)
+    return new_object("Box", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES], material)

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs pytest inside Blender, from the repository root:
+
+    blender -b --factory-startup --python-exit-code 1 -P blend_tests/run.py -- [pytest arguments]
+"""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+arguments = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
+here = Path(__file__).parent
+# Blender sets its own sys.argv and paths: name the folder, unless a file in it was asked for.
+if not any(argument.split("::")[0].endswith(".py") for argument in arguments):
+    arguments.append(str(here))
+sys.exit(pytest.main(["-p", "no:cacheprovider", f"--rootdir={here}", *arguments]))

@@ -1,0 +1,645 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the native library is given: counts, areas, orientation, materials, lights, world.
+
+Coordinates are single precision: 1e-6 relative where nothing else is said.
+"""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from conftest import CUBE_FACES, CUBE_VERTICES
+from mathutils import Matrix
+from raybundle.corner_map import CORNER_CODE, VERTEX_CODE, build_corner_map
+from raybundle.light_export import (area_light_radiance,
+                                    sun_irradiance_factor)
+from raybundle.scene_export import export_scene
+
+SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+
+
+def export():
+    return export_scene(bpy.context)
+
+
+def world_vertices(scene, instance):
+    vertices = scene.meshes[instance.mesh].vertices
+    return vertices @ instance.transform[:, :3].T + instance.transform[:, 3]
+
+
+def face_area_vectors(scene, instance):
+    """(f, 3): area times normal of each face in the world, by its fan."""
+    mesh, points = scene.meshes[instance.mesh], world_vertices(scene, instance)
+    vectors = []
+    for first, last in zip(mesh.face_offsets[:-1], mesh.face_offsets[1:]):
+        ring = points[mesh.corner_vertices[first:last]]
+        vectors.append(0.5 * np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0))
+    sign = np.sign(np.linalg.det(instance.transform[:, :3]))
+    return np.array(vectors) * sign
+
+
+def area(scene):
+    return sum(np.linalg.norm(face_area_vectors(scene, item), axis=1).sum()
+               for item in scene.instances)
+
+
+# --------------------------------------------------------------------------------------------------
+# Geometry
+# --------------------------------------------------------------------------------------------------
+
+
+def test_box_counts_areas_and_winding(new_object):
+    new_object("Box", CUBE_VERTICES, CUBE_FACES, location=(3, 4, 5))
+    scene = export().scene
+    mesh = scene.meshes[0]
+    assert (len(mesh.vertices), mesh.corner_count, mesh.face_count) == (8, 24, 6)
+    assert area(scene) == pytest.approx(24.0)
+    vectors = face_area_vectors(scene, scene.instances[0])
+    centres = np.array([world_vertices(scene, scene.instances[0])[list(face)].mean(axis=0)
+                        for face in CUBE_FACES])
+    # Each face looks away from the centre of the box.
+    assert ((centres - [3, 4, 5]) * vectors).sum(axis=1).min() > 0.0
+
+
+def test_negative_scale_keeps_front_sides_outside(new_object):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    item.scale = (-1.0, 2.0, 1.0)
+    bpy.context.view_layer.update()
+    scene = export().scene
+    vectors = face_area_vectors(scene, scene.instances[0])
+    points = world_vertices(scene, scene.instances[0])
+    centres = np.array([points[list(face)].mean(axis=0) for face in CUBE_FACES])
+    assert (centres * vectors).sum(axis=1).min() > 0.0
+    # 2 x 4 x 2: two faces of 4, four of 8.
+    assert area(scene) == pytest.approx(40.0)
+
+
+def test_ngons_stay_ngons(new_object):
+    angles = np.arange(7) * 2.0 * np.pi / 7
+    ring = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
+    new_object("Heptagon", ring, [tuple(range(7))])
+    scene = export().scene
+    assert scene.meshes[0].face_offsets.tolist() == [0, 7]
+    assert area(scene) == pytest.approx(3.5 * math.sin(2.0 * np.pi / 7))
+
+
+def test_modifiers_are_applied_and_leave_no_trace(new_object):
+    item = new_object("Square", SQUARE, [(0, 1, 2, 3)])
+    array = item.modifiers.new("Array", 'ARRAY')
+    array.count = 3
+    result = export()
+    assert result.scene.meshes[0].face_count == 3
+    assert area(result.scene) == pytest.approx(3.0)
+    assert [attribute.name for attribute in item.data.attributes
+            if attribute.name in (VERTEX_CODE, CORNER_CODE)] == []
+    # Each of the four corners is the mean of its three copies.
+    corner_map = result.targets[0].corner_map
+    assert corner_map.filled == 0
+    values = np.repeat([[1.0], [2.0], [6.0]], 4, axis=0) * np.ones(3)
+    assert corner_map.to_original(values) == pytest.approx(np.full((4, 3), 3.0))
+
+
+def test_subdivision_surface_maps_back_to_the_corners(new_object):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    item.modifiers.new("Subdivision", 'SUBSURF').levels = 2
+    result = export()
+    mesh, corner_map = result.scene.meshes[0], result.targets[0].corner_map
+    assert mesh.face_count == 6 * 16
+    assert (corner_map.original_count, corner_map.filled) == (24, 0)
+    # Exactly one evaluated corner belongs to each original one: positions go the same way.
+    assert sorted(corner_map.original) == list(range(24))
+    positions = corner_map.to_original(mesh.vertices[mesh.corner_vertices])
+    original = np.array(CUBE_VERTICES, float)[[index for face in CUBE_FACES for index in face]]
+    assert np.array_equal(np.sign(positions), np.sign(original))
+
+
+@pytest.mark.parametrize("modifier, settings", [
+    ('BEVEL', {'width': 0.2}), ('REMESH', {'voxel_size': 0.2}), ('SOLIDIFY', {'thickness': 0.1}),
+    ('TRIANGULATE', {}), ('DECIMATE', {'ratio': 0.5}), ('MIRROR', {}), ('EDGE_SPLIT', {}),
+])
+def test_every_corner_gets_the_light_of_its_place(new_object, modifier, settings):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    added = item.modifiers.new(modifier.title(), modifier)
+    for name, value in settings.items():
+        setattr(added, name, value)
+    result = export()
+    mesh, corner_map = result.scene.meshes[0], result.targets[0].corner_map
+    positions = corner_map.to_original(mesh.vertices[mesh.corner_vertices])
+    original = np.array(CUBE_VERTICES, float)[[index for face in CUBE_FACES for index in face]]
+    if modifier == 'MIRROR':
+        # Each corner is the mean of itself and its mirror image.
+        assert positions == pytest.approx(original * [0, 1, 1], abs=1e-6)
+    elif modifier == 'DECIMATE':
+        # Vertices are gone; what remains is somewhere on the box.
+        assert np.abs(positions).max() <= 1.0 + 1e-6
+    else:
+        # The bevel's width is the largest shift; a voxel is not larger.
+        assert np.linalg.norm(positions - original, axis=1).max() < 0.3
+    filled = [text for text in result.warnings if "no trace" in text and '"Box"' in text]
+    assert len(filled) == (1 if corner_map.filled else 0)
+    assert bool(corner_map.filled) == (modifier in ('BEVEL', 'REMESH', 'DECIMATE'))
+
+
+def test_interpolated_codes_are_not_mistaken_for_corners(new_object):
+    # A grid of 50 x 50 squares, once subdivided: only the old corners have exact codes.
+    size = 50
+    vertices = [(x, y, 0) for y in range(size + 1) for x in range(size + 1)]
+    faces = [(i, i + 1, i + size + 2, i + size + 1)
+             for y in range(size) for i in range(y * (size + 1), y * (size + 1) + size)]
+    item = new_object("Grid", vertices, faces)
+    modifier = item.modifiers.new("Subdivision", 'SUBSURF')
+    modifier.subdivision_type = 'SIMPLE'
+    modifier.levels = 1
+    result = export()
+    mesh, corner_map = result.scene.meshes[0], result.targets[0].corner_map
+    assert (mesh.face_count, corner_map.filled) == (4 * size ** 2, 0)
+    positions = mesh.vertices[mesh.corner_vertices][corner_map.evaluated]
+    expected = np.array(vertices, float)[np.array(faces).ravel()][corner_map.original]
+    assert positions == pytest.approx(expected, abs=1e-4)
+
+
+def test_unchanged_topology_maps_one_to_one(new_object):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    item.modifiers.new("Cast", 'CAST')
+    assert export().targets[0].corner_map.is_identity
+    assert build_corner_map(item.data, item.data).is_identity
+
+
+def test_objects_with_one_mesh_export_it_once(new_object):
+    first = new_object("First", SQUARE, [(0, 1, 2, 3)])
+    second = bpy.data.objects.new("Second", first.data)
+    second.location.z = 2.0
+    bpy.context.scene.collection.objects.link(second)
+    # A copy with the same content counts as the same mesh.
+    third = bpy.data.objects.new("Third", first.data.copy())
+    bpy.context.scene.collection.objects.link(third)
+    bpy.context.view_layer.update()
+    result = export()
+    assert len(result.scene.meshes) == 1
+    assert [item.name for item in result.scene.instances] == ["First", "Second", "Third"]
+    assert len(result.targets) == 3
+
+
+def test_materials_of_objects_split_a_shared_mesh(new_object, new_material):
+    first = new_object("First", SQUARE, [(0, 1, 2, 3)], new_material("Red", (1, 0, 0)))
+    second = bpy.data.objects.new("Second", first.data)
+    bpy.context.scene.collection.objects.link(second)
+    second.material_slots[0].link = 'OBJECT'
+    second.material_slots[0].material = new_material("Blue", (0, 0, 1))
+    bpy.context.view_layer.update()
+    scene = export().scene
+    reflectances = [scene.materials[scene.meshes[item.mesh].face_materials[0]].reflectance[0]
+                    for item in scene.instances]
+    assert reflectances[0].tolist() == [1, 0, 0] and reflectances[1].tolist() == [0, 0, 1]
+
+
+def test_collection_instances_light_but_get_no_colours(new_object):
+    item = new_object("Lamp", SQUARE, [(0, 1, 2, 3)])
+    collection = bpy.data.collections.new("Lamps")
+    bpy.context.scene.collection.objects.unlink(item)
+    collection.objects.link(item)
+    for index in range(3):
+        empty = bpy.data.objects.new(f"Empty {index}", None)
+        empty.instance_type = 'COLLECTION'
+        empty.instance_collection = collection
+        empty.location.x = 2.0 * index
+        bpy.context.scene.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    result = export()
+    assert [item.role for item in result.scene.instances] == ['OCCLUDE'] * 3
+    assert sorted(item.transform[0, 3] for item in result.scene.instances) == [0, 2, 4]
+    assert result.targets == []
+    assert all("instance" in status for status in result.statuses.values())
+
+
+@pytest.mark.parametrize("add", [
+    lambda: bpy.ops.object.text_add(),
+    lambda: bpy.ops.object.metaball_add(),
+    lambda: bpy.ops.surface.primitive_nurbs_surface_sphere_add(),
+])
+def test_whatever_evaluates_to_a_mesh_takes_part(add):
+    add()
+    name = bpy.context.object.name
+    result = export()
+    assert [item.role for item in result.scene.instances] == ['OCCLUDE']
+    assert result.scene.meshes[0].face_count > 0
+    assert "no attribute" in result.statuses[name]
+
+
+def test_a_curve_without_surface_is_passed_over():
+    bpy.ops.curve.primitive_bezier_curve_add()
+    result = export()
+    assert result.scene.instances == [] and result.warnings == []
+
+
+def test_roles_and_hidden_objects(new_object):
+    roles = {"Bake": 'BAKE', "Occlude": 'OCCLUDE', "Ignore": 'IGNORE'}
+    for name, role in roles.items():
+        new_object(name, SQUARE, [(0, 1, 2, 3)]).raybundle.role = role
+    new_object("Hidden", SQUARE, [(0, 1, 2, 3)]).hide_render = True
+    collection = bpy.data.collections.new("Hidden")
+    bpy.context.scene.collection.children.link(collection)
+    inside = new_object("Inside", SQUARE, [(0, 1, 2, 3)])
+    bpy.context.scene.collection.objects.unlink(inside)
+    collection.objects.link(inside)
+    collection.hide_render = True
+    bpy.context.view_layer.update()
+    result = export()
+    assert {item.name: item.role for item in result.scene.instances} == {
+        "Bake": 'BAKE', "Occlude": 'OCCLUDE'}
+    assert [target.object.name for target in result.targets] == ["Bake"]
+
+
+def test_selected_objects_bake_and_the_others_occlude(new_object):
+    first = new_object("First", SQUARE, [(0, 1, 2, 3)])
+    new_object("Second", SQUARE, [(0, 1, 2, 3)])
+    result = export_scene(bpy.context, {first})
+    assert [(item.name, item.role) for item in result.scene.instances] == [
+        ("First", 'BAKE'), ("Second", 'OCCLUDE')]
+
+
+def test_smooth_and_flat_normals(new_object):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    flat = export().scene.meshes[0].corner_normals
+    # A flat face has its own normal at all corners: exactly one component of 1.
+    assert np.abs(flat).max(axis=1) == pytest.approx(np.ones(24))
+    item.data.polygons.foreach_set('use_smooth', [True] * 6)
+    item.data.update()
+    bpy.context.view_layer.update()
+    smooth = export().scene.meshes[0]
+    positions = smooth.vertices[smooth.corner_vertices]
+    # The mean of three faces points along the diagonal; normals may be stored in 16 bits.
+    assert smooth.corner_normals == pytest.approx(positions / math.sqrt(3.0), abs=1e-4)
+
+
+# --------------------------------------------------------------------------------------------------
+# Bad geometry
+# --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_not_finite_coordinates_leave_the_object_out(new_object, value):
+    bad = new_object("Bad", SQUARE, [(0, 1, 2, 3)])
+    bad.data.vertices[2].co.z = value
+    bad.data.update()
+    new_object("Good", SQUARE, [(0, 1, 2, 3)])
+    result = export()
+    assert [item.name for item in result.scene.instances] == ["Good"]
+    assert "not finite" in result.statuses["Bad"]
+    assert any('"Bad"' in text for text in result.warnings)
+
+
+@pytest.mark.parametrize("vertices", [[], SQUARE])
+def test_meshes_without_faces(new_object, vertices):
+    new_object("Empty", vertices, [])
+    result = export()
+    assert result.scene.instances == [] and result.statuses == {"Empty": "has no faces"}
+
+
+# --------------------------------------------------------------------------------------------------
+# Materials
+# --------------------------------------------------------------------------------------------------
+
+
+def exported_material(material):
+    mesh = bpy.data.meshes.new("Square")
+    mesh.from_pydata(SQUARE, [], [(0, 1, 2, 3)])
+    mesh.uv_layers.new(name="UVMap")
+    if material is not None:
+        mesh.materials.append(material)
+    item = bpy.data.objects.new("Square", mesh)
+    bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.update()
+    result = export()
+    return result.scene.materials[0], result
+
+
+@pytest.fixture
+def principled():
+    material = bpy.data.materials.new("Principled")
+    material.use_nodes = True
+    return material
+
+
+def shader_of(material):
+    return next(node for node in material.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
+
+
+def test_no_material_is_grey():
+    assert exported_material(None)[0].reflectance == pytest.approx(np.full((2, 3), 0.8))
+
+
+def test_material_without_nodes():
+    material = bpy.data.materials.new("Plain")
+    if bpy.app.version >= (5, 0, 0):
+        pytest.skip("every material has nodes")
+    material.use_nodes = False
+    material.diffuse_color = (0.1, 0.2, 0.3, 1.0)
+    assert exported_material(material)[0].reflectance[0] == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_principled(principled):
+    shader = shader_of(principled)
+    new = bpy.app.version >= (4, 0, 0)
+    shader.inputs['Base Color'].default_value = (0.8, 0.4, 0.2, 1.0)
+    shader.inputs['Metallic'].default_value = 0.5
+    shader.inputs['Transmission Weight' if new else 'Transmission'].default_value = 0.5
+    shader.inputs['Emission Color' if new else 'Emission'].default_value = (1.0, 0.5, 0.0, 1.0)
+    shader.inputs['Emission Strength'].default_value = 3.0
+    material, _ = exported_material(principled)
+    for side in range(2):
+        assert material.reflectance[side] == pytest.approx([0.2, 0.1, 0.05])
+        assert material.emission[side] == pytest.approx([3 * math.pi, 1.5 * math.pi, 0.0])
+
+
+def test_backfacing_separates_the_sides(new_material):
+    material = new_material("Sides", (1, 0, 0))
+    tree = material.node_tree
+    output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
+    red = output.inputs['Surface'].links[0].from_socket
+    blue = tree.nodes.new('ShaderNodeBsdfDiffuse')
+    blue.inputs['Color'].default_value = (0, 0, 1, 1)
+    geometry = tree.nodes.new('ShaderNodeNewGeometry')
+    mix = tree.nodes.new('ShaderNodeMixShader')
+    tree.links.new(geometry.outputs['Backfacing'], mix.inputs[0])
+    tree.links.new(red, mix.inputs[1])
+    tree.links.new(blue.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs['Surface'])
+    exported, result = exported_material(material)
+    assert exported.reflectance.tolist() == [[1, 0, 0], [0, 0, 1]]
+    assert result.warnings == []
+
+
+def test_mixed_shaders_and_colours_through_a_group(new_material):
+    # A group mixes two colours by 0.25 and passes the result through a reroute.
+    group = bpy.data.node_groups.new("Tint", 'ShaderNodeTree')
+    if bpy.app.version < (4, 0, 0):
+        group.inputs.new('NodeSocketColor', "First")
+        group.outputs.new('NodeSocketColor', "Result")
+    else:
+        group.interface.new_socket("First", in_out='INPUT', socket_type='NodeSocketColor')
+        group.interface.new_socket("Result", in_out='OUTPUT', socket_type='NodeSocketColor')
+    inside, outside = (group.nodes.new(kind) for kind in ('NodeGroupInput', 'NodeGroupOutput'))
+    mix = group.nodes.new('ShaderNodeMix')
+    mix.data_type = 'RGBA'
+    sockets = {socket.identifier: socket for socket in mix.inputs}
+    sockets['Factor_Float'].default_value = 0.25
+    sockets['B_Color'].default_value = (0.0, 0.8, 0.0, 1.0)
+    reroute = group.nodes.new('NodeReroute')
+    group.links.new(inside.outputs[0], sockets['A_Color'])
+    result_socket = next(item for item in mix.outputs if item.identifier == 'Result_Color')
+    group.links.new(result_socket, reroute.inputs[0])
+    group.links.new(reroute.outputs[0], outside.inputs[0])
+
+    material = new_material("Grouped")
+    tree = material.node_tree
+    node = tree.nodes.new('ShaderNodeGroup')
+    node.node_tree = group
+    color = tree.nodes.new('ShaderNodeRGB')
+    color.outputs[0].default_value = (0.4, 0.0, 0.0, 1.0)
+    diffuse = next(item for item in tree.nodes if item.type == 'BSDF_DIFFUSE')
+    tree.links.new(color.outputs[0], node.inputs[0])
+    tree.links.new(node.outputs[0], diffuse.inputs['Color'])
+    exported, result = exported_material(material)
+    assert exported.reflectance[0] == pytest.approx([0.3, 0.2, 0.0])
+    assert result.warnings == []
+
+
+def new_image(values, is_float):
+    height, width, _ = values.shape
+    image = bpy.data.images.new("Image", width, height, float_buffer=is_float)
+    rgba = np.ones((height, width, 4), np.float32)
+    rgba[:, :, :3] = values
+    image.pixels.foreach_set(rgba.ravel())
+    image.update()
+    return image
+
+
+@pytest.mark.parametrize("is_float", [False, True])
+def test_image_as_base_colour(principled, is_float):
+    values = np.zeros((2, 2, 3), np.float32)
+    values[0, 1] = 0.5
+    image = new_image(values, is_float)
+    tree = principled.node_tree
+    texture = tree.nodes.new('ShaderNodeTexImage')
+    texture.image = image
+    texture.extension = 'EXTEND'
+    mapping = tree.nodes.new('ShaderNodeMapping')
+    mapping.inputs['Location'].default_value = (0.25, 0.0, 0.0)
+    mapping.inputs['Scale'].default_value = (2.0, 3.0, 1.0)
+    coordinates = tree.nodes.new('ShaderNodeUVMap')
+    tree.links.new(coordinates.outputs[0], mapping.inputs['Vector'])
+    tree.links.new(mapping.outputs[0], texture.inputs['Vector'])
+    tree.links.new(texture.outputs['Color'], shader_of(principled).inputs['Base Color'])
+    material, result = exported_material(principled)
+    assert result.warnings == []
+    assert material.image == 0 and material.image_weight == pytest.approx(np.ones(3))
+    assert material.reflectance == pytest.approx(np.zeros((2, 3)))
+    data = result.scene.images[0]
+    assert data.extension == 'EXTEND'
+    # 8 bits of 0.5 are 128/255 (127.5 is rounded up), in sRGB; floats are linear already.
+    expected = 0.5 if is_float else ((128 / 255 + 0.055) / 1.055) ** 2.4
+    assert data.pixels[0, 1] == pytest.approx(np.full(3, expected), rel=1e-3)
+    assert data.pixels[1, 0] == pytest.approx(np.zeros(3))
+    uvs = result.scene.meshes[0].uvs
+    assert uvs == pytest.approx(np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * [2, 3] + [0.25, 0])
+
+
+def test_corner_colours_as_base_colour(principled):
+    tree = principled.node_tree
+    node = tree.nodes.new('ShaderNodeVertexColor')
+    node.layer_name = "Paint"
+    tree.links.new(node.outputs['Color'], shader_of(principled).inputs['Base Color'])
+    mesh = bpy.data.meshes.new("Square")
+    mesh.from_pydata(SQUARE, [], [(0, 1, 2, 3)])
+    mesh.materials.append(principled)
+    paint = mesh.color_attributes.new("Paint", 'FLOAT_COLOR', 'POINT')
+    paint.data.foreach_set('color', np.arange(16, dtype=np.float32) / 16)
+    item = bpy.data.objects.new("Square", mesh)
+    bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.update()
+    scene = export().scene
+    assert scene.materials[0].color_weight == pytest.approx(np.ones(3))
+    assert scene.meshes[0].corner_colors == pytest.approx(
+        (np.arange(16).reshape(4, 4) / 16)[:, :3])
+
+
+def test_what_cannot_be_read_is_named(principled):
+    tree = principled.node_tree
+    noise = tree.nodes.new('ShaderNodeTexNoise')
+    tree.links.new(noise.outputs['Color'], shader_of(principled).inputs['Base Color'])
+    shader_of(principled).inputs['Base Color'].default_value = (0.1, 0.2, 0.3, 1.0)
+    material, result = exported_material(principled)
+    assert material.reflectance[0] == pytest.approx([0.1, 0.2, 0.3])
+    assert len(result.warnings) == 1
+    assert '"Principled"' in result.warnings[0] and '"Noise Texture"' in result.warnings[0]
+
+
+def test_glass_reflects_nothing_and_is_named(new_material):
+    material = new_material("Window")
+    tree = material.node_tree
+    glass = tree.nodes.new('ShaderNodeBsdfGlass')
+    output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
+    tree.links.new(glass.outputs[0], output.inputs['Surface'])
+    exported, result = exported_material(material)
+    assert not exported.reflectance.any()
+    assert '"Window"' in result.warnings[0] and "Glass" in result.warnings[0]
+
+
+def test_two_materials_by_face(new_object, new_material):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES, new_material("Red", (1, 0, 0)))
+    item.data.materials.append(new_material("Blue", (0, 0, 1)))
+    item.data.polygons[3].material_index = 1
+    # Past the end: Blender shows the last one.
+    item.data.polygons[4].material_index = 7
+    item.data.update()
+    bpy.context.view_layer.update()
+    scene = export().scene
+    names = [scene.materials[index].name for index in scene.meshes[0].face_materials]
+    assert names == ["Red", "Red", "Red", "Blue", "Blue", "Red"]
+
+
+# --------------------------------------------------------------------------------------------------
+# Lights and world: Cycles' formulas, docs/method.md
+# --------------------------------------------------------------------------------------------------
+
+
+def only_light():
+    lights = export().scene.lights
+    assert len(lights) == 1
+    return lights[0]
+
+
+def test_point_light(new_light):
+    new_light("Point", 'POINT', 40.0, (1, 2, 3), color=(1.0, 0.5, 0.25), shadow_soft_size=0.1)
+    light = only_light()
+    assert light.intensity == pytest.approx(np.array([40, 20, 10]) / (4 * math.pi))
+    assert light.position.tolist() == [1, 2, 3] and light.radius == pytest.approx(0.1)
+    sphere = (4, 0, 0) <= bpy.app.version < (4, 1, 0)
+    assert light.shape == ('SPHERE' if sphere else 'DISK')
+    assert light.world_to_light is None
+
+
+def test_light_nodes_multiply(new_light):
+    item = new_light("Point", 'POINT', 40.0)
+    item.data.use_nodes = True
+    node = next(node for node in item.data.node_tree.nodes if node.type == 'EMISSION')
+    node.inputs['Strength'].default_value = 2.0
+    node.inputs['Color'].default_value = (1.0, 0.0, 0.5, 1.0)
+    assert only_light().intensity == pytest.approx(np.array([80, 0, 40]) / (4 * math.pi))
+
+
+def test_spot_light(new_light):
+    item = new_light("Spot", 'SPOT', 40.0, spot_size=1.0, spot_blend=0.3)
+    item.rotation_euler = (0.0, math.pi / 2, 0.0)
+    item.scale = (1.0, 2.0, 1.0)
+    bpy.context.view_layer.update()
+    light = only_light()
+    assert (light.cone_angle, light.cone_blend) == pytest.approx((1.0, 0.3))
+    # Not renormalised for the cone; up to 3.4 the cosine to the axis dims it.
+    assert light.intensity == pytest.approx(np.full(3, 40 / (4 * math.pi)))
+    assert light.cone_dims == (bpy.app.version < (3, 5, 0))
+    # It looks along -Z, which the rotation has turned to -X; across, the cone is twice as wide, if
+    # the version looks at the scale.
+    across = 1.0 if bpy.app.version < (3, 5, 0) else 0.5
+    assert light.world_to_light @ [-1, 0, 0] == pytest.approx([0, 0, -1], abs=1e-6)
+    assert light.world_to_light @ [0, 1, 0] == pytest.approx([0, across, 0], abs=1e-6)
+
+
+def test_sun_light(new_light):
+    item = new_light("Sun", 'SUN', 3.0, angle=0.1)
+    item.rotation_euler = (math.pi / 2, 0.0, 0.0)
+    item.scale = (5.0, 5.0, 5.0)
+    bpy.context.view_layer.update()
+    light = only_light()
+    assert light.irradiance == pytest.approx(np.full(3, 3 * sun_irradiance_factor(0.1)))
+    assert light.angle == pytest.approx(0.1)
+    assert light.direction == pytest.approx([0, -1, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("shape, area_share", [
+    ('SQUARE', 1.0), ('RECTANGLE', 1.0), ('DISK', math.pi / 4), ('ELLIPSE', math.pi / 4)])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_area_light(new_light, shape, area_share, mirrored):
+    item = new_light("Area", 'AREA', 10.0, (0, 0, 1), shape=shape, size=2.0)
+    item.data.size_y = 0.5
+    item.scale = (-3.0 if mirrored else 3.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    light = only_light()
+    height = 0.5 if shape in ('RECTANGLE', 'ELLIPSE') else 2.0
+    area = 6.0 * height * area_share
+    factor = 4.0 if bpy.app.version < (4, 0, 0) else math.pi
+    assert light.radiance == pytest.approx(np.full(3, 10.0 / (factor * area)))
+    assert light.shape == ('ELLIPSE' if shape in ('DISK', 'ELLIPSE') else 'RECTANGLE')
+    # Down, also when it is mirrored.
+    assert np.cross(light.axis_u, light.axis_v) == pytest.approx([0, 0, -6.0 * height / 4])
+
+
+def test_area_light_of_each_version():
+    power = np.full(3, 2.0)
+    assert area_light_radiance(power, 0.5, True, (3, 6, 0)) == pytest.approx(np.full(3, 1.0))
+    assert area_light_radiance(power, 0.5, True, (4, 0, 0)) == pytest.approx(
+        np.full(3, 4.0 / math.pi))
+    assert area_light_radiance(power, 0.5, False, (4, 5, 0)) == pytest.approx(
+        np.full(3, 2.0 / math.pi))
+
+
+def test_sun_of_each_version():
+    assert sun_irradiance_factor(1.0, (4, 0, 0)) == 1.0
+    assert sun_irradiance_factor(0.0, (3, 6, 0)) == 1.0
+    # The mean of cos over a disk of radius r at distance 1, by rings of equal area.
+    radius = math.tan(0.5)
+    rings = radius ** 2 * (np.arange(10_000) + 0.5) / 10_000
+    assert sun_irradiance_factor(1.0, (3, 6, 0)) == pytest.approx(
+        (1 / np.sqrt(1 + rings)).mean(), rel=1e-6)
+
+
+def test_lights_that_give_no_light(new_light):
+    new_light("Hidden", 'POINT', 10.0).hide_render = True
+    new_light("Off", 'POINT', 0.0)
+    new_light("Flat", 'AREA', 10.0).scale = (1.0, 0.0, 1.0)
+    bpy.context.view_layer.update()
+    assert export().scene.lights == []
+
+
+def test_spread_is_named(new_light):
+    new_light("Narrow", 'AREA', 10.0, spread=1.0)
+    assert any('"Narrow"' in text and "spread" in text for text in export().warnings)
+
+
+def new_world():
+    world = bpy.data.worlds.new("World")
+    world.use_nodes = True
+    bpy.context.scene.world = world
+    node = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
+    return world, node
+
+
+def test_world_colour():
+    _, background = new_world()
+    background.inputs['Color'].default_value = (0.2, 0.4, 0.6, 1.0)
+    background.inputs['Strength'].default_value = 2.0
+    assert export().scene.world == pytest.approx([0.4, 0.8, 1.2])
+
+
+def test_environment_image_counts_with_its_mean_over_the_sphere():
+    world, background = new_world()
+    # White in the middle half of the elevations, black near the poles: sin(45 degrees).
+    values = np.zeros((64, 8, 3), np.float32)
+    values[16:48] = 1.0
+    node = world.node_tree.nodes.new('ShaderNodeTexEnvironment')
+    node.image = new_image(values, True)
+    world.node_tree.links.new(node.outputs[0], background.inputs['Color'])
+    result = export()
+    # 64 rows approximate the integral over the elevation to 1e-3.
+    assert result.scene.world == pytest.approx(np.full(3, math.sqrt(0.5)), rel=1e-3)
+    assert any('"World"' in text and "mean" in text for text in result.warnings)
+
+
+def test_transforms_are_object_to_world(new_object):
+    item = new_object("Square", SQUARE, [(0, 1, 2, 3)])
+    item.matrix_world = Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(0.5, 4, 'X')
+    bpy.context.view_layer.update()
+    transform = export().scene.instances[0].transform
+    assert transform == pytest.approx(np.array(item.matrix_world)[:3])

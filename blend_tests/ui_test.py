@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake by the mouse, in a Blender with a window; started by run_ui_test.py.
+
+    blender --factory-startup FILE.blend -P blend_tests/ui_test.py -- --out DIR
+
+Shows the Raybundle panel in the Render properties, finds its Bake button on the screen, clicks it
+with xdotool and checks what the click has done. Leaves with exit code 0 or 1, and with pictures of
+the window in DIR.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "addon"))
+sys.dont_write_bytecode = True
+
+import raybundle  # noqa: E402
+
+# Buttons of operators have this colour while they are looked for; nothing else in Blender has it.
+MARK = (1.0, 0.0, 1.0)
+# Between two steps: Blender draws and handles events.
+PAUSE = 0.3
+BAKE_SECONDS = 60.0
+
+
+class UiError(Exception):
+    """What the test expected and did not see."""
+
+
+# --------------------------------------------------------------------------------------------------
+# The window
+# --------------------------------------------------------------------------------------------------
+
+
+def window() -> bpy.types.Window:
+    return bpy.context.window_manager.windows[0]
+
+
+def properties_area() -> bpy.types.Area:
+    for area in window().screen.areas:
+        if area.type == 'PROPERTIES':
+            return area
+    raise UiError("the file's screen has no Properties editor")
+
+
+def show_panel() -> None:
+    """The Render properties with no other panel but Raybundle's, which is open by default."""
+    panels = list(bpy.types.Panel.__subclasses__())
+    for panel in panels:
+        if (getattr(panel, 'bl_space_type', '') == 'PROPERTIES'
+                and getattr(panel, 'bl_region_type', '') == 'WINDOW'
+                and getattr(panel, 'bl_context', '') == 'render'
+                and not panel.__name__.startswith('RAYBUNDLE') and panel.is_registered):
+            bpy.utils.unregister_class(panel)
+    space = properties_area().spaces.active
+    space.context = 'RENDER'
+
+
+def screenshot(path: Path) -> np.ndarray:
+    """(height, width, 3) in 0..1, first row at the bottom."""
+    with bpy.context.temp_override(window=window(), area=properties_area()):
+        bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=2)
+        bpy.ops.screen.screenshot(filepath=str(path), check_existing=False)
+    image = bpy.data.images.load(str(path))
+    width, height = image.size
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, -1)[:, :, :3]
+
+
+def find_bake_button(path: Path) -> tuple[int, int]:
+    """Centre of the leftmost button in the top row of the panel's buttons, from the window's lower
+    left corner."""
+    theme = bpy.context.preferences.themes[0].user_interface.wcol_tool
+    before = tuple(theme.inner)
+    theme.inner = (*MARK, 1.0)
+    try:
+        pixels = screenshot(path)
+    finally:
+        theme.inner = before
+    region = next(region for region in properties_area().regions if region.type == 'WINDOW')
+    inside = pixels[region.y:region.y + region.height, region.x:region.x + region.width]
+    marked = (np.abs(inside - MARK) < 0.1).all(axis=2)
+    rows = np.flatnonzero(marked.sum(axis=1) > 8)
+    if not len(rows):
+        raise UiError("there is no button in the Render properties: is the panel closed or hidden?")
+    # Rows of the topmost button, without the rounding of its corners.
+    top = rows[-1]
+    bottom = next((row for row in range(top, -1, -1) if marked[row].sum() <= 8), -1) + 1
+    middle = (top + bottom) // 2
+    columns = np.flatnonzero(marked[bottom:top + 1].any(axis=0))
+    # The text lies in the button: gaps of a letter's width belong to it; between buttons there is a
+    # line of another colour from top to bottom.
+    left = columns[0]
+    right = left
+    while right + 1 < marked.shape[1] and marked[bottom:top + 1, right + 1].any():
+        right += 1
+    if top - bottom < 10 or right - left < 30:
+        raise UiError(f"the first button is only {right - left} x {top - bottom} pixels large")
+    return region.x + (left + right) // 2, region.y + middle
+
+
+def xdotool(*arguments: object) -> str:
+    return subprocess.run(["xdotool", *map(str, arguments)], check=True, capture_output=True,
+                          text=True).stdout
+
+
+def click(x: int, y: int) -> Iterator[float]:
+    """The steps of a click at x, y from the window's lower left corner, in pixels."""
+    identifiers = xdotool("search", "--onlyvisible", "--name", "Blender").split()
+    if len(identifiers) != 1:
+        raise UiError(f"there are {len(identifiers)} windows of Blender")
+    place = ["mousemove", "--window", identifiers[0], x]
+    # From outside the button, so that it knows of the mouse, with time for Blender to see it.
+    for offset in (40, 2, 0):
+        xdotool(*place, window().height - 1 - y - offset)
+        yield PAUSE
+    xdotool("mousedown", 1)
+    yield PAUSE
+    xdotool("mouseup", 1)
+    yield PAUSE
+    # Away, or the button's tooltip hides a part of the panel.
+    xdotool("mousemove", "--window", identifiers[0], 5, 5)
+
+
+# --------------------------------------------------------------------------------------------------
+# The steps
+# --------------------------------------------------------------------------------------------------
+
+
+def baked_objects() -> list[bpy.types.Object]:
+    return [item for item in bpy.context.scene.objects
+            if item.type == 'MESH' and "Radiosity" in item.data.color_attributes]
+
+
+def steps(out: Path) -> Iterator[float]:
+    """Each value is the pause before the next step, in seconds."""
+    show_panel()
+    yield 2.0 * PAUSE
+    if bpy.context.scene.raybundle.report or baked_objects():
+        raise UiError("the file was baked before")
+    x, y = find_bake_button(out / "buttons_found.png")
+    yield PAUSE
+    screenshot(out / "raybundle_panel_before.png")
+    yield from click(x, y)
+    deadline = time.monotonic() + BAKE_SECONDS
+    while not bpy.context.scene.raybundle.report:
+        if time.monotonic() > deadline:
+            raise UiError(f"nothing was baked {BAKE_SECONDS:.0f} s after a click at {x}, {y}")
+        yield PAUSE
+    yield 2.0 * PAUSE
+    screenshot(out / "raybundle_panel.png")
+    check_result()
+
+
+def check_result() -> None:
+    report = json.loads(bpy.context.scene.raybundle.report)
+    names = {entry["name"] for entry in report["objects"] if entry["status"] == "baked"}
+    meshes = {item.name for item in bpy.context.scene.objects if item.type == 'MESH'}
+    if names != meshes:
+        raise UiError(f"baked are {sorted(names)}, in the scene are {sorted(meshes)}")
+    for item in baked_objects():
+        attribute = item.data.color_attributes["Radiosity"]
+        colors = np.empty(4 * len(attribute.data), np.float32)
+        attribute.data.foreach_get('color', colors)
+        if not np.isfinite(colors).all() or colors.reshape(-1, 4)[:, :3].max() <= 0.0:
+            raise UiError(f'"{item.name}" has no light in its attribute')
+    if {item.name for item in baked_objects()} != meshes:
+        raise UiError("not every mesh has the attribute")
+
+
+def leave(code: int, message: str) -> None:
+    print(f"ui_test: {message}", flush=True)
+    sys.stdout.flush()
+    # Blender would ask whether to save the file.
+    os._exit(code)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="ui_test.py")
+    parser.add_argument("--out", type=Path, required=True)
+    out = parser.parse_args(sys.argv[sys.argv.index("--") + 1:]).out
+    out.mkdir(parents=True, exist_ok=True)
+    if bpy.app.background:
+        leave(1, "needs a window: start it without -b")
+    bpy.context.preferences.view.show_splash = False
+    raybundle.register()
+    script = steps(out)
+
+    def advance() -> float | None:
+        try:
+            return next(script)
+        except StopIteration:
+            leave(0, f"Bake was clicked and has baked {len(baked_objects())} objects")
+        except UiError as error:
+            screenshot(out / "failure.png")
+            leave(1, str(error))
+        except Exception:
+            traceback.print_exc()
+            leave(1, "failed, see above")
+        return None
+
+    bpy.app.timers.register(advance, first_interval=1.0)
+
+
+if __name__ == "__main__":
+    main()
