@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# What ./bake and ./test have in common: missing Debian packages are installed (as root or with sudo; else they are
+# named and the command stops), and the native library is configured and built as far as it is out of date.
+# Sourced with the repository root as working directory.
+
+bake_packages=(blender python3-numpy g++ cmake ninja-build libembree-dev libglm-dev libopenmesh-dev libtbb-dev
+    libeigen3-dev nlohmann-json3-dev)
+# The window of the UI test is drawn by Mesa in software.
+test_packages=(libgtest-dev python3-pytest xvfb xauth xdotool libgl1-mesa-dri libegl-mesa0)
+
+require_packages() {
+    local missing=() package
+    for package in "$@"; do
+        [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")
+    done
+    [ ${#missing[@]} -eq 0 ] && return
+    local as_root=()
+    if [ "$(id -u)" -ne 0 ]; then
+        if ! sudo -n true 2>/dev/null; then
+            echo "These Debian packages are missing; install them first:" >&2
+            echo "    apt-get install ${missing[*]}" >&2
+            exit 1
+        fi
+        as_root=(sudo -n)
+    fi
+    echo "Installing ${missing[*]}"
+    "${as_root[@]}" apt-get update -q >/dev/null
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -q -y --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+# build TESTS [TARGET ...]: TESTS is ON or OFF.
+build() {
+    local tests=$1 log=build/release.log
+    shift
+    mkdir -p build
+    if [ ! -f build/release/build.ninja ] || ! grep -q "RAYBUNDLE_TESTS:BOOL=$tests" build/release/CMakeCache.txt; then
+        cmake --preset release -D RAYBUNDLE_TESTS="$tests" >"$log" 2>&1 ||
+            { cat "$log" >&2; exit 1; }
+    fi
+    cmake --build --preset release "$@" >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
+}
