@@ -33,8 +33,8 @@ SCENES = Path(__file__).parent.parent / "scenes"
 # are lit evenly, and their vertices off contacts lie on convex edges only: as good as the walls.
 CORNELL_TOLERANCE = {"floor": 0.02, "wall_back": 0.02, "wall_left": 0.02, "wall_right": 0.02,
                      "ceiling": 0.10, "box_tall": 0.02, "box_short": 0.02}
-# All patches of an object share the bundles' directions: their noise does not average out in the
-# object's mean. With 8 seeds the means of walls, floor and boxes have a standard deviation of 0.3 %,
+# All patches of an object share the bundles' directions: their noise does not average out in its
+# mean. With 8 seeds the means of walls, floor and boxes have a standard deviation of 0.3 %,
 # that of the ceiling, which has no direct light, 0.7 %. About three times that.
 CORNELL_BIAS = {"ceiling": 0.025}
 

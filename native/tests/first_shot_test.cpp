@@ -19,7 +19,7 @@ using namespace test;
 constexpr size_t kMany = 10000000;
 constexpr float kTarget = 0.002f;
 // At most 256 stratified samples per side and source leave about half a per cent of noise
-// (method.md 5.4: 0.0037 relative RMS); twice that is safe for one side.
+// (0.0037 relative RMS in a test room); twice that is safe for one side.
 constexpr double kSampled = 0.01;
 // Closed forms in float, at sampled points of a patch that is small beside the light's distance.
 constexpr double kExact = 2e-4;

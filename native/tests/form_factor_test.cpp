@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Form factors by line counts and by Lambert's formula against closed forms (method.md 2.1).
+// Form factors by line counts and by Lambert's formula against closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ constexpr size_t kMany = 10000000;
 constexpr uint32_t kBundles = 4096;
 
 // One standard error of a form factor from as many independent lines as there are bundles, with the
-// factor 4/3 that the cosine's weight costs (method.md 2.4). All lines of a bundle share a
+// factor 4/3 that the cosine's weight costs. All lines of a bundle share a
 // direction, so more of them do not help; but the low-discrepancy directions do, by far more than a
 // factor of 4, so that one such standard error is a safe bound.
 double bound(double f) { return std::sqrt(4.0 / 3 * f * (1 - f) / kBundles); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The solver on line counts against closed-form solutions (method.md 2.2) and identities (2.3).
+// The solver on line counts against closed-form solutions and identities.
 #include "transport/line_reuse.h"
 
 #include <gtest/gtest.h>

@@ -64,7 +64,8 @@ double linesBetween(const LineCounts& counts, uint32_t i, uint32_t j);
 // Form factor from all fronts of an instance to all fronts of another, by the counts.
 double formFactor(const Patches& patches, const LineCounts& counts, uint32_t from, uint32_t to);
 
-// Closed forms of method.md 2.1. Aligned parallel rectangles a x b at distance c.
+// Closed forms (Howell, A Catalog of Radiation Heat Transfer Configuration Factors). Aligned
+// parallel rectangles a x b at distance c.
 double parallelRectangles(double a, double b, double c);
 // Perpendicular rectangles with a common edge l; w is the width of the first, h that of the second.
 double perpendicularRectangles(double w, double h, double l);

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The bake on one page: patches, first shot, bundles, solve, reconstruction.
-// Sources: the two-step structure is that of thesis section 5.2 (first shot, then bundles);
-// LINE_REUSE and its stop criterion are method.md 5.1 and 2.4. Differs: see the heads of the
-// stages' files.
+// Sources: the two-step structure is that of thesis section 5.2 (first shot, then bundles); the
+// stop criterion stands for section 4.3.3. Differs: see the heads of the stages' files.
 #include "bake/bake.h"
 
 #include <tbb/enumerable_thread_specific.h>
@@ -139,8 +138,7 @@ void Bake::makePatches(const Scene& scene, Report& report) {
         trace = std::make_unique<Trace>(
             hash, subdivide(scene, settings.patchSize, size_t(settings.maxPatches)));
         const Patches& patches = trace->patches;
-        // Fix the pixel for all bundles: power per line is the same for all only then
-        // (method.md 3.10).
+        // Fix the pixel for all bundles: power per line is the same for all only then.
         const double mean =
             std::min(double(patches.size) * patches.size,
                      patches.totalArea / double(std::max<size_t>(1, patches.count())));

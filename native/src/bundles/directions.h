@@ -2,16 +2,15 @@
 //
 // Directions of bundles. Sources: thesis sections 4.2.1 (uniform random) and 7.3.1 (quasi-Monte
 // Carlo); the low-discrepancy sequence is R2 (Roberts, "The Unreasonable Effectiveness of
-// Quasirandom Sequences", 2018). Differs:
+// Quasirandom Sequences", 2018).
+// Differs:
 // - The sequence covers a hemisphere, since a line serves both ways, and is turned by a random
-// rotation:
-//   each direction is then uniform, so any number of bundles is unbiased, and two independent
-//   halves give an error estimate.
-// - Spherical Fibonacci sets (design.md, lesson 3) are better for one fixed number of bundles. As a
-// union
-//   of sets made while the number doubles they are not: on cornell_box (3 seeds) the noise of 64,
-//   128, 256, 512 bundles was 3.5, 2.4, 1.6, 1.04 % against 4.8, 2.4, 1.6, 0.94 % for R2, which
-//   also serves any number in between.
+//   rotation: each direction is then uniform, so any number of bundles is unbiased, and two
+//   independent halves give an error estimate.
+// - Spherical Fibonacci sets (Marques et al., 2013) are better for one fixed number of bundles. As
+//   a union of sets made while the number doubles they are not: on cornell_box (3 seeds) the noise
+//   of 64, 128, 256, 512 bundles was 3.5, 2.4, 1.6, 1.04 % against 4.8, 2.4, 1.6, 0.94 % for R2,
+//   which also serves any number in between.
 #pragma once
 
 #include <cstdint>

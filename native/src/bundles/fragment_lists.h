@@ -7,20 +7,15 @@
 // Sources: thesis sections 4.2.1-4.2.2 and figures 4.10-4.12 (lists of polygons per pixel).
 // Differs from it:
 // - Fragments are ordered by their depth at the pixel's centre and not by the painter's algorithm,
-// whose
-//   centroid order is not a visibility order (method.md 3.13).
+//   whose centroid order is not a visibility order.
 // - Pixels are sampled at their centres with half-open edges, on a grid with a random shift: the
-// expected
-//   number of lines of a patch is its projected area over the pixel's, for every shape and size,
-//   and neighbouring faces never both take or both miss a pixel (method.md 3.11, 3.12).
-// - Whole parents are rasterised; the patch follows from the affine coordinates (design.md, lesson
-// 5).
-// - Lines that leave the scene are counted on a sky column (method.md 3.8).
+//   expected number of lines of a patch is its projected area over the pixel's, for every shape and
+//   size, and neighbouring faces never both take or both miss a pixel.
+// - Whole parents are rasterised; the patch follows from the affine coordinates.
+// - Lines that leave the scene are counted on a sky column.
 // - Surfaces that lie against each other exchange nothing: nobody sees the covered part of a patch,
-// which
-//   counts as not there.
-// - Surfaces are two-sided: each fragment has one line on its front and one on its back
-// (method.md 3.21).
+//   which counts as not there.
+// - Surfaces are two-sided: each fragment has one line on its front and one on its back.
 #pragma once
 
 #include <cstdint>

@@ -4,7 +4,7 @@
 // symmetric), how many leave the scene from a side (the sky column), and how many leave a side in
 // all (m_i). c_ij / m_i estimates the form factor F_ij (thesis section 2.3.2, eq. 2.30).
 //
-// Differs from the thesis: lines that leave the scene count in m_i (method.md 3.8). The two
+// Differs from the thesis: lines that leave the scene count in m_i. The two
 // independent halves of the bundles are counted apart for the error estimate. Counts are integers
 // and are merged before any floating-point work, so that the result does not depend on the number
 // of threads.

@@ -3,13 +3,13 @@
 // Patches: the finest units of transport. A face of the user's mesh is cut into parents (triangles
 // and parallelograms), and a parent into equal patches by a regular grid in its affine coordinates:
 //
-//   point = origin + s * a + t * b,   parallelogram: s, t in [0, 1];  triangle: s, t >= 0, s + t <=
-//   1
+//   point = origin + s * a + t * b
+//   parallelogram: s, t in [0, 1];  triangle: s, t >= 0, s + t <= 1
 //
 // so that whoever meets a parent at a point knows the patch without a search, and projecting the
 // parents costs the same however fine the patches are.
 //
-// Differs from the thesis (section 4.2, which projects each patch by itself): see docs/method.md.
+// Differs from the thesis (section 4.2), which projects each patch by itself.
 #pragma once
 
 #include <array>

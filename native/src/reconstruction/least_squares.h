@@ -3,14 +3,17 @@
 // LEAST_SQUARES: from patch sides to the corners of the user's mesh. The corner values are those
 // whose linear interpolation over the faces has, patch by patch, the mean that transport found:
 //
-//   minimise  sum_p A_p (mean_p(f) - H_p)^2  +  alpha sum_e area_e height_e^2 (slope change across
-//   e)^2
+//   minimise  sum_p A_p (mean_p(f) - H_p)^2  +  alpha sum_e area_e height_e^2 (slope change at e)^2
 //
 // Source: Kavan, Bargteil and Sloan, "Least Squares Vertex Baking" (EGSR 2011), also for the
-// regulariser, which leaves linear light alone. Differs: the data are means over patches, not point
-// samples, so that light that is linear comes out exactly up to the mesh's border; a twist term for
-// quads takes the place of their diagonal; patches (or shares of patches) that lie against another
-// surface, which nobody sees, do not count, so that contacts are neither dark nor leaking.
+// regulariser, which leaves linear light alone.
+// Differs:
+// - The data are means over patches, not point samples, so that light that is linear comes out
+//   exactly up to the mesh's border.
+// - A twist term for quads takes the place of their diagonal.
+// - Shares of patches that lie against another surface, which nobody sees, do not count, so that
+//   contacts are neither dark nor leaking.
+// - No value is negative, and at contacts none leaves the range of the light around it.
 #pragma once
 
 #include <glm/glm.hpp>

@@ -4,12 +4,14 @@
 // with stratified shadow rays; where the source has a closed form without occluders, the rays only
 // estimate the share that is visible, so that fully lit and fully dark patches have no noise.
 //
-// Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error); method.md 5.4; Szecsi, Sbert
-// and Szirmay-Kalos, "Combined Correlated and Importance Sampling in Direct Light Source
-// Computation" (2004) for the closed form as a control. Differs: the thesis shoots rays from the
-// sources, which needs some 45 times the rays (method.md 5.4). Emission that is not much brighter
-// than the scene's mean exitance is left to the bundles, which carry it without extra noise; then a
-// furnace is exact.
+// Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error); Szecsi, Sbert and
+// Szirmay-Kalos, "Combined Correlated and Importance Sampling in Direct Light Source Computation"
+// (2004) for the closed form as a control.
+// Differs:
+// - The thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer it is.
+//   Gathering spends its rays where the light is to be known.
+// - Emission that is not much brighter than the scene's mean exitance is left to the bundles, which
+//   carry it without extra noise; then a furnace is exact.
 #pragma once
 
 #include <cstdint>

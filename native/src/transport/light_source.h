@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Light sources as the first shot sees them: points to sample, and where there is one the closed
-// form of the irradiance without occluders. Sources: Lambert's formula for polygons
-// (method.md 2.1); Blender's light units (docs/method.md, "Lights").
+// form of the irradiance without occluders. Sources: Lambert's formula for polygons;
+// Blender's light units (addon/raybundle/light_export.py).
 #pragma once
 
 #include <glm/glm.hpp>

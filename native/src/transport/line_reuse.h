@@ -9,13 +9,15 @@
 // and positive definite, unit diagonal, solved by conjugate gradients for the three channels at
 // once.
 //
-// Sources: thesis section 2.3.2 (eq. 2.30: F = r_ij / r_i) and 2.1.4 (the radiosity system);
-// method.md 5.1 (c2). Differs: the thesis never solves on the counts; it transports power while it
-// traces. Each line is used for every bounce here. m_i counts the lines that leave the scene too,
-// so that rows sum to 1 and the system always contracts. The last solve weights each line by x_i
-// x_j, so that m_i becomes proportional to the true area of the patch while rows still sum to 1 and
-// the matrix stays symmetric (Sinkhorn scaling, method.md 1.3 c3): then no power is lost or made
-// between patches.
+// Sources: thesis section 2.3.2 (eq. 2.30: F = r_ij / r_i) and 2.1.4 (the radiosity system).
+// Differs:
+// - The thesis never solves on the counts; it transports power while it traces. Each line is used
+//   for every bounce here.
+// - m_i counts the lines that leave the scene too, so that rows sum to 1 and the system always
+//   contracts; dividing by counted lines, not by the true area, makes furnaces exact.
+// - The last solve weights each line by x_i x_j, so that m_i becomes proportional to the true area
+//   of the patch while rows still sum to 1 and the matrix stays symmetric (Sinkhorn scaling): then no
+//   power is lost or made between patches.
 #pragma once
 
 #include <glm/glm.hpp>
