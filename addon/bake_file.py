@@ -42,6 +42,8 @@ def main(arguments: list[str]) -> None:
 
     report = raybundle.bake(bpy.context, ProgressLines())
     (out / f"{name}.json").write_text(report.to_json(indent=2) + "\n")
+    # Without a backup of the result of an earlier run beside it.
+    bpy.context.preferences.filepaths.save_version = 0
     # Textures and libraries beside the original must still be found from the new place.
     bpy.ops.wm.save_as_mainfile(filepath=str(out / f"{name}.baked.blend"), relative_remap=True,
                                 compress=True, copy=True)
