@@ -35,8 +35,9 @@ class PointSource : public LightSource {
   public:
     PointSource(const Light& light, const glm::dvec3& centre)
         : light(light), position(light.position - centre), intensity(light.strength) {
+        meanCone = meanOverSphere();
         if (light.radius == 0 || light.pointShape == RB_POINT_SPHERE)
-            totalPower = 2 * glm::two_pi<float>() * intensity * meanCone();
+            totalPower = 2 * glm::two_pi<float>() * intensity * meanCone;
     }
 
     LightSample sample(const glm::vec3& point, const glm::vec3& normal,
@@ -96,7 +97,7 @@ class PointSource : public LightSource {
         EmittedRay ray;
         ray.origin = position;
         ray.direction = uniformDirection(glm::vec2(u));
-        ray.weight = cone(ray.direction) / meanCone();
+        ray.weight = cone(ray.direction) / meanCone;
         return ray;
     }
 
@@ -121,7 +122,8 @@ class PointSource : public LightSource {
         return float(t * t * (3 - 2 * t) * (light.coneDims ? std::max(0.0, -local.z) : 1));
     }
 
-    float meanCone() const {
+    // Mean of the cone over all directions.
+    float meanOverSphere() const {
         if (!light.hasCone) return 1;
         // Midpoint rule over the sphere; only the power balance needs it.
         constexpr int kSteps = 64;
@@ -135,6 +137,7 @@ class PointSource : public LightSource {
     const Light& light;
     const glm::vec3 position;
     const glm::vec3 intensity;
+    float meanCone = 1;
     glm::vec3 totalPower{0.0f};
 };
 
