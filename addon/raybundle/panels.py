@@ -6,6 +6,13 @@ import json
 import bpy
 
 
+def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
+    """The panel's layout with labels beside the values, and no dots for keyframes."""
+    panel.layout.use_property_split = True
+    panel.layout.use_property_decorate = False
+    return panel.layout
+
+
 class RaybundleRenderPanel:
     """In the Render properties, whatever the engine: the bake depends on none."""
     bl_space_type = 'PROPERTIES'
@@ -21,9 +28,7 @@ class RAYBUNDLE_PT_render(RaybundleRenderPanel, bpy.types.Panel):
     bl_label = "Raybundle"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = property_layout(self)
         settings = context.scene.raybundle
         row = layout.row(align=True)
         row.operator("raybundle.bake", text="Bake", icon='LIGHT')
@@ -57,9 +62,7 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
     bl_parent_id = "RAYBUNDLE_PT_render"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = property_layout(self)
         settings = context.scene.raybundle
         layout.prop(settings, "target_error")
         layout.prop(settings, "topology")
@@ -72,9 +75,7 @@ class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = property_layout(self)
         settings = context.scene.raybundle
         # Short, since the editor is narrow.
         layout.prop(settings, "max_patches", text="Patches")
@@ -89,9 +90,7 @@ class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = property_layout(self)
         settings = context.scene.raybundle
         layout.prop(settings, "solver")
         layout.prop(settings, "first_shot")
@@ -108,9 +107,7 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
     bl_parent_id = "RAYBUNDLE_PT_render"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = property_layout(self)
         settings = context.scene.raybundle
         layout.prop(settings, "output")
         layout.prop(settings, "attribute")
@@ -135,9 +132,7 @@ class RAYBUNDLE_PT_object(bpy.types.Panel):
             'MESH', 'CURVE', 'SURFACE', 'META', 'FONT'}
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = property_layout(self)
         settings = context.object.raybundle
         layout.prop(settings, "role")
         column = layout.column()
