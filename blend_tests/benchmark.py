@@ -13,7 +13,7 @@ relative RMSE over RGB, weighted by area, over all objects:
 vertex   Against scenes/NAME.cycles.npz (README there) at vertices off contact edges. Cycles has
          point samples, as the reference, and only noise; Raybundle's values are those whose
          interpolation is nearest to the light on the faces, which on coarse faces differ from point
-         samples.
+         samples; with --set reconstruction=POINT they are point samples too.
 surface  What is seen: the values, interpolated over the faces, against Cycles at points inside the
          faces (--surface gives the samples of that reference; it is made first, which takes time).
 

@@ -78,6 +78,7 @@ enum_small_patches = (
 enum_reconstruction = (
     ('LEAST_SQUARES', "Least Squares",
      "Vertex values whose interpolation over the faces is nearest to the light on the surface"),
+    ('POINT', "Point", "The light at the vertices themselves, as Cycles bakes it"),
 )
 
 enum_role = (

@@ -41,8 +41,9 @@ struct Shot {
 
 Shot shoot(const Scene& scene, float patchSize = 10) {
     Shot shot{subdivide(scene, patchSize, kMany), {}};
-    shot.light =
-        gatherFirstShot(scene, shot.patches, Visibility(shot.patches), kTarget, 0, Progress());
+    const Visibility visibility(shot.patches);
+    shot.light = gatherFirstShot(DirectLight(scene, shot.patches, visibility, 0), shot.patches,
+                                 kTarget, Progress());
     return shot;
 }
 

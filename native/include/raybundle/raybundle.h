@@ -204,8 +204,8 @@ RB_API void rb_release_bake(rb_bake bake);
  *   int    seed, threads   threads 0 = all (0, 0)
  *   float  regularization  of the reconstruction: weight of slope changes across edges (0.02)
  *   string solver LINE_REUSE, first_shot GATHER, directions LOW_DISCREPANCY | RANDOM,
- *          projector AUTO | FRAGMENT_LISTS, small_patches CENTRE_SAMPLING, reconstruction
- * LEAST_SQUARES
+ *          projector AUTO | FRAGMENT_LISTS, small_patches CENTRE_SAMPLING,
+ *          reconstruction LEAST_SQUARES | POINT
  */
 RB_API rb_error rb_set_bake_int(rb_bake bake, const char* name, int32_t value);
 RB_API rb_error rb_set_bake_float(rb_bake bake, const char* name, float value);

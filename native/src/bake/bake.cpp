@@ -17,8 +17,8 @@
 #include "bake/geometry_hash.h"
 #include "bundles/fragment_lists.h"
 #include "patches/reflectance.h"
-#include "reconstruction/least_squares.h"
-#include "reconstruction/smooth_regions.h"
+#include "reconstruction/reconstruction.h"
+#include "transport/direct_light.h"
 
 namespace raybundle {
 namespace {
@@ -39,8 +39,6 @@ constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 // Lines held before they are merged into the counts, bytes.
 constexpr size_t kMergeBytes = size_t(256) << 20;
-// An object whose front gets less than this share of the light of its back is probably inside out.
-constexpr double kInsideOut = 1e-3;
 
 class Stopwatch {
   public:
@@ -76,9 +74,7 @@ struct Bake::Trace {
 
 // What the solve found, per side, W/m^2.
 struct Bake::Solution {
-    explicit Solution(size_t sides)
-        : irradiance{std::vector<glm::vec3>(sides), std::vector<glm::vec3>(sides)},
-          reflected(sides) {}
+    explicit Solution(size_t sides) : irradiance(sides), reflected(sides) {}
 
     Irradiance irradiance;
     std::vector<glm::vec3> reflected;  // exitance without emission
@@ -99,11 +95,12 @@ void Bake::runStages(const Scene& scene) {
         report.warnings = scene.warnings;
         makePatches(scene, report);
 
+        const DirectLight directLight(scene, trace->patches, trace->visibility,
+                                      uint32_t(settings.seed));
         FirstShot shot;
         {
             Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
-            shot = gatherFirstShot(scene, trace->patches, trace->visibility, settings.targetError,
-                                   uint32_t(settings.seed), progress);
+            shot = gatherFirstShot(directLight, trace->patches, settings.targetError, progress);
         }
         report.shadowRays = shot.rays;
         report.skipped.push_back(
@@ -114,8 +111,9 @@ void Bake::runStages(const Scene& scene) {
         const Solution solution = solveToTarget(scene, shot, report);
         balanceEnergy(shot, solution, scene, report);
 
-        std::vector<InstanceLight> result = reconstruct(scene, solution, report);
-        light = std::move(result);
+        Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
+        light = reconstruct(scene, trace->patches, directLight, solution.irradiance,
+                            trace->counts.exposedShare(), settings, progress, report);
     }
     report.patches = trace->patches.count();
     report.bundles = trace->bundles;
@@ -313,85 +311,6 @@ void Bake::balanceEnergy(const FirstShot& shot, const Solution& solution, const 
     report.emitted = sum(emitted);
     report.absorbed = sum(absorbed);
     report.escaped = sum(escaped);
-}
-
-std::vector<InstanceLight> Bake::reconstruct(const Scene& scene, const Solution& solution,
-                                             Report& report) const {
-    Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
-    const Patches& patches = trace->patches;
-    const std::vector<float> exposed = trace->counts.exposedShare();
-    std::vector<glm::vec3> exitance(patches.sideCount());
-    for (size_t side = 0; side < exitance.size(); ++side)
-        exitance[side] = patches.emission[side] +
-                         patches.reflectance[side] * (solution.irradiance.direct[side] +
-                                                      solution.irradiance.indirect[side]);
-
-    // Cells and parents are in the order of the instances.
-    std::vector<InstanceRange> ranges(scene.instances.size());
-    for (uint32_t c = 0; c < patches.cells.size(); ++c) {
-        InstanceRange& range = ranges[patches.cells[c].instance];
-        if (range.lastCell == 0) range.firstCell = c;
-        range.lastCell = c + 1;
-    }
-    for (uint32_t p = 0; p < patches.parents.size(); ++p) {
-        InstanceRange& range = ranges[patches.parents[p].instance];
-        if (range.lastParent == 0) range.firstParent = p;
-        range.lastParent = p + 1;
-    }
-
-    std::vector<InstanceLight> result(scene.instances.size());
-    report.objects.resize(scene.instances.size());
-    size_t occluders = 0;
-    for (size_t i = 0; i < scene.instances.size(); ++i) {
-        progress.report(RB_STAGE_RECONSTRUCTION, double(i) / double(scene.instances.size()));
-        const Instance& instance = scene.instances[i];
-        const Mesh& mesh = scene.meshes[instance.mesh];
-        InstanceLight& out = result[i];
-        out.name = instance.name;
-        report.objects[i] = {instance.name, mesh.cornerCount(), "occluder"};
-        if (instance.role != RB_ROLE_BAKE) {
-            ++occluders;
-            continue;
-        }
-        report.objects[i].status = "baked";
-        out.isBaked = true;
-        out.cornerVertices = mesh.cornerVertices;
-        out.vertexCount = mesh.vertices.size();
-        out.cornerAngles = cornerAngles(mesh);
-        const SmoothRegions regions =
-            smoothRegions(mesh, patches.cells, ranges[i].firstCell, ranges[i].lastCell);
-        const auto fields = leastSquares(
-            patches, ranges[i], regions, instance.side, exposed, settings.regularization,
-            {&solution.irradiance.direct, &solution.irradiance.indirect, &exitance});
-        std::array<std::vector<glm::vec3>*, 3> perCorner{&out.direct, &out.indirect, &out.exitance};
-        for (size_t f = 0; f < 3; ++f) {
-            perCorner[f]->resize(mesh.cornerCount());
-            for (size_t c = 0; c < mesh.cornerCount(); ++c)
-                (*perCorner[f])[c] = fields[f][regions.nodeOf[c]];
-        }
-
-        // Name objects that seem to be inside out.
-        glm::dvec3 lit[2] = {glm::dvec3(0.0), glm::dvec3(0.0)};
-        for (uint32_t p = ranges[i].firstParent; p < ranges[i].lastParent; ++p)
-            for (uint32_t k = 0; k < 2 * patches.parents[p].patchCount(); ++k) {
-                const uint32_t side = 2 * patches.parents[p].firstPatch + k;
-                lit[side % 2] +=
-                    power(patches, side,
-                          solution.irradiance.direct[side] + solution.irradiance.indirect[side]);
-            }
-        if (sum(lit[instance.side]) < kInsideOut * sum(lit[1 - instance.side])) {
-            report.objects[i].status = "baked; no light on this side";
-            report.warnings.push_back(
-                "object \"" + instance.name +
-                "\": the baked sides of its faces "
-                "get no light but the other sides do; flip its normals or choose "
-                "the other side");
-        }
-    }
-    if (occluders)
-        report.skipped.push_back({"reconstruction", "objects that only occlude", occluders});
-    progress.report(RB_STAGE_RECONSTRUCTION, 1);
-    return result;
 }
 
 const InstanceLight& Bake::instanceLight(int32_t instance) const {

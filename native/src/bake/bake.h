@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "bake/instance_light.h"
 #include "bake/progress.h"
 #include "bake/report.h"
 #include "bake/settings.h"
 #include "bundles/line_counts.h"
 #include "patches/patches.h"
+#include "reconstruction/instance_light.h"
 #include "scene/scene.h"
 #include "transport/first_shot.h"
 #include "transport/line_reuse.h"
@@ -50,8 +50,6 @@ class Bake {
     void traceBundles(uint32_t count, Report& report);
     void balanceEnergy(const FirstShot& shot, const Solution& solution, const Scene& scene,
                        Report& report) const;
-    std::vector<InstanceLight> reconstruct(const Scene& scene, const Solution& solution,
-                                           Report& report) const;
 
     std::unique_ptr<Trace> trace;  // of the last run's geometry
     std::vector<InstanceLight> light;

@@ -52,7 +52,7 @@ const std::vector<Choice>& choices() {
         {"directions", &Settings::directions, {"LOW_DISCREPANCY", "RANDOM"}},
         {"projector", &Settings::projector, {"AUTO", "FRAGMENT_LISTS"}},
         {"small_patches", &Settings::smallPatches, {"CENTRE_SAMPLING"}},
-        {"reconstruction", &Settings::reconstruction, {"LEAST_SQUARES"}},
+        {"reconstruction", &Settings::reconstruction, {"LEAST_SQUARES", "POINT"}},
     };
     return table;
 }

@@ -55,6 +55,12 @@ struct Cell {
     int32_t face = 0;
 
     bool isTriangle() const { return corner[3] < 0; }
+    // Of corner k, relative to Patches::centre.
+    glm::vec3 position(int k) const {
+        if (k == 0) return origin;
+        if (k == 1) return origin + a;
+        return isTriangle() || k == 3 ? origin + b : origin + a + b;
+    }
     // Weight of each corner at a point: barycentric in a triangle, bilinear in a parallelogram.
     std::array<float, 4> weights(const glm::vec3& point) const;
 };

@@ -43,14 +43,6 @@ std::array<uint32_t, 4> nodesOf(const Cell& cell, const SmoothRegions& regions) 
     return node;
 }
 
-glm::dvec3 cornerPosition(const Cell& cell, int k) {
-    const glm::dvec3 origin(cell.origin), a(cell.a), b(cell.b);
-    if (k == 0) return origin;
-    if (k == 1) return origin + a;
-    if (cell.isTriangle()) return origin + b;
-    return k == 2 ? origin + a + b : origin + b;
-}
-
 double areaOf(const Cell& cell) {
     return glm::length(glm::cross(glm::dvec3(cell.a), glm::dvec3(cell.b))) *
            (cell.isTriangle() ? 0.5 : 1.0);
@@ -73,9 +65,9 @@ EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
     }
     glm::dvec3 far(0.0);
     for (int k = 0; k < n; ++k)
-        if (k != start && k != finish) far += cornerPosition(cell, k) / double(n - 2);
-    const glm::dvec3 origin = cornerPosition(cell, start);
-    const glm::dvec3 edge = cornerPosition(cell, finish) - origin;
+        if (k != start && k != finish) far += glm::dvec3(cell.position(k)) / double(n - 2);
+    const glm::dvec3 origin = glm::dvec3(cell.position(start));
+    const glm::dvec3 edge = glm::dvec3(cell.position(finish)) - origin;
     const double along = glm::dot(far - origin, edge) / glm::dot(edge, edge);
     slope.height = glm::length(far - origin - along * edge);
     for (int k = 0; k < n; ++k)

@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// GATHER: the first shot, seen from the receivers. Each patch side gathers the light of each source
-// with stratified shadow rays; where the source has a closed form without occluders, the rays only
-// estimate the share that is visible, so that fully lit and fully dark patches have no noise.
+// GATHER: the first shot, seen from the receivers: every patch side gathers the light of the
+// sources.
 //
-// Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error); Szecsi, Sbert and
-// Szirmay-Kalos, "Combined Correlated and Importance Sampling in Direct Light Source Computation"
-// (2004) for the closed form as a control.
-// Differs:
-// - The thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer it is.
-//   Gathering spends its rays where the light is to be known.
-// - Emission that is not much brighter than the scene's mean exitance is left to the bundles, which
-//   carry it without extra noise; then a furnace is exact.
+// Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error).
+// Differs: the thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer
+// it is. Gathering spends its rays where the light is to be known (transport/direct_light.h).
 #pragma once
 
 #include <cstdint>
@@ -20,8 +14,7 @@
 
 #include "bake/progress.h"
 #include "patches/patches.h"
-#include "scene/scene.h"
-#include "visibility/visibility.h"
+#include "transport/direct_light.h"
 
 namespace raybundle {
 
@@ -36,8 +29,8 @@ struct FirstShot {
     uint64_t hiddenSides = 0;     // side and source pairs that cannot see each other, without a ray
 };
 
-// Gathers direct light to about `targetError` relative standard error per patch.
-FirstShot gatherFirstShot(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                          float targetError, uint32_t seed, const Progress& progress);
+// Gathers direct light to about `targetError` relative standard error per patch side.
+FirstShot gatherFirstShot(const DirectLight& light, const Patches& patches, float targetError,
+                          const Progress& progress);
 
 }  // namespace raybundle

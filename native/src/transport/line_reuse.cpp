@@ -137,7 +137,7 @@ std::vector<float> LineReuse::lineWeights(Half half) const {
 
 Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const {
     const size_t n = counts.sideCount();
-    Irradiance result{Field(n), Field(n)};
+    Irradiance result(n);
     const std::vector<float> x = lineWeights(half);
     std::vector<float> m(n);  // weighted lines of each side
     PaddedField scaled(n);    // what the matrix multiplies next
@@ -153,7 +153,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
     forEachSide(n, [&](size_t i) { scaled[i] = Padded(x[i] * emission[i]); });
     forEachSide(n, [&](size_t i) {
-        result.direct[i] = throughExposed(i);
+        result.gathered[i] = result.direct[i] = throughExposed(i);
         if (m[i] == 0) return;
         glm::vec3 sum = float(linesOf(counts.sky[i], half)) * worldExitance;
         if (hasEmission) sum += rowTimes(counts, half, i, scaled);

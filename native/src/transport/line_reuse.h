@@ -16,8 +16,8 @@
 // - m_i counts the lines that leave the scene too, so that rows sum to 1 and the system always
 //   contracts; dividing by counted lines, not by the true area, makes furnaces exact.
 // - The last solve weights each line by x_i x_j, so that m_i becomes proportional to the true area
-//   of the patch while rows still sum to 1 and the matrix stays symmetric (Sinkhorn scaling): then no
-//   power is lost or made between patches.
+//   of the patch while rows still sum to 1 and the matrix stays symmetric (Sinkhorn scaling): then
+//   no power is lost or made between patches.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -31,7 +31,10 @@ namespace raybundle {
 
 // Irradiance per side, W/m^2, in two parts.
 struct Irradiance {
+    explicit Irradiance(size_t sides = 0) : direct(sides), gathered(sides), indirect(sides) {}
+
     std::vector<glm::vec3> direct;    // straight from sources, emission and world
+    std::vector<glm::vec3> gathered;  // part of it: from the sources of the first shot
     std::vector<glm::vec3> indirect;  // after one reflection or more
 };
 

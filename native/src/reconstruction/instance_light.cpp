@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bake/instance_light.h"
+#include "reconstruction/instance_light.h"
 
 #include <glm/gtc/constants.hpp>
 

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/corner_receivers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "transport/sobol.h"
+
+namespace raybundle {
+namespace {
+
+// How far inside a face a corner's receiver lies, as a share of the way to the centre.
+constexpr float kInside = 0.01f;
+
+// How far a point lies outside a parent, in its affine coordinates; negative inside.
+float outside(const Parent& parent, glm::vec2 st) {
+    const float beyond = parent.isTriangle ? st.x + st.y - 1 : std::max(st.x, st.y) - 1;
+    return std::max({-st.x, -st.y, beyond});
+}
+
+glm::vec2 affine(const Parent& parent, const glm::vec3& point) {
+    const glm::dvec3 a(parent.a), b(parent.b), d = glm::dvec3(point) - glm::dvec3(parent.origin);
+    const glm::dvec3 n = glm::cross(a, b);
+    const double area2 = glm::dot(n, n);
+    return {glm::dot(glm::cross(d, b), n) / area2, glm::dot(glm::cross(a, d), n) / area2};
+}
+
+}  // namespace
+
+std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& patches,
+                                            uint32_t instance, const InstanceRange& range) {
+    const Instance& placed = scene.instances[instance];
+    const Mesh& mesh = scene.meshes[placed.mesh];
+    const glm::dmat3 normalToWorld = glm::transpose(glm::inverse(glm::dmat3(placed.transform)));
+    const float turn = placed.side == RB_SIDE_BACK ? -1.0f : 1.0f;
+
+    // Of the parents of a corner's cells, the one that the receiver lies in or is nearest to.
+    std::vector<float> nearest(mesh.cornerCount(), INFINITY);
+    std::vector<Receiver> receivers(mesh.cornerCount());
+    for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+        const Parent& parent = patches.parents[p];
+        const Cell& cell = patches.cells[parent.cell];
+        const int n = cell.isTriangle() ? 3 : 4;
+        glm::vec3 centre(0.0f);
+        for (int k = 0; k < n; ++k) centre += cell.position(k) / float(n);
+        for (int k = 0; k < n; ++k) {
+            const int32_t corner = cell.corner[k];
+            const glm::vec3 point = glm::mix(cell.position(k), centre, kInside);
+            const glm::vec2 st = affine(parent, point);
+            const float off = outside(parent, st);
+            if (off >= nearest[corner]) continue;
+            nearest[corner] = off;
+            Receiver& receiver = receivers[corner];
+            receiver.side =
+                2 * (parent.firstPatch + parent.patchAt(st.x, st.y)) + uint32_t(placed.side);
+            receiver.point = point;
+            receiver.seed = hash(instance, uint32_t(corner));
+            receiver.normal = patches.normal(receiver.side);
+            if (mesh.cornerNormals.empty()) continue;
+            const glm::dvec3 shading = normalToWorld * glm::dvec3(mesh.cornerNormals[corner]);
+            const glm::vec3 normal = turn * glm::vec3(glm::normalize(shading));
+            if (glm::dot(normal, receiver.normal) > 0) receiver.normal = normal;
+        }
+    }
+    std::vector<CornerReceiver> result;
+    for (size_t c = 0; c < receivers.size(); ++c)
+        if (receivers[c].point) result.push_back({int32_t(c), receivers[c]});
+    return result;
+}
+
+}  // namespace raybundle

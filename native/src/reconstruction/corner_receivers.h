@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "patches/patches.h"
+#include "reconstruction/least_squares.h"
+#include "scene/scene.h"
+#include "transport/direct_light.h"
+
+namespace raybundle {
+
+// A corner of a mesh as a receiver of light.
+struct CornerReceiver {
+    int32_t corner = 0;  // of the instance's mesh
+    Receiver receiver;
+};
+
+// The corners of an instance's mesh that lie on patches, each a little inside its face, so that the
+// next wall of a room is beside it and not around it, with its shading normal.
+std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& patches,
+                                            uint32_t instance, const InstanceRange& range);
+
+}  // namespace raybundle

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/reconstruction.h"
+
+#include "reconstruction/corner_receivers.h"
+#include "reconstruction/least_squares.h"
+#include "reconstruction/smooth_regions.h"
+
+namespace raybundle {
+namespace {
+
+// An object whose front gets less than this share of the light of its back is probably inside out.
+constexpr double kInsideOut = 1e-3;
+// A corner whose patch is covered by more than this gathers no light itself.
+constexpr float kHalfCovered = 0.5f;
+
+using Field = std::vector<glm::vec3>;
+
+double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
+
+// Cells and parents are in the order of the instances.
+std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches) {
+    std::vector<InstanceRange> ranges(scene.instances.size());
+    for (uint32_t c = 0; c < patches.cells.size(); ++c) {
+        InstanceRange& range = ranges[patches.cells[c].instance];
+        if (range.lastCell == 0) range.firstCell = c;
+        range.lastCell = c + 1;
+    }
+    for (uint32_t p = 0; p < patches.parents.size(); ++p) {
+        InstanceRange& range = ranges[patches.parents[p].instance];
+        if (range.lastParent == 0) range.firstParent = p;
+        range.lastParent = p + 1;
+    }
+    return ranges;
+}
+
+// Light of the sources at corners, for all instances in one go.
+class CornerLight {
+  public:
+    CornerLight(const Scene& scene, const Patches& patches, const DirectLight& light,
+                const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,
+                float targetError, const Progress& progress) {
+        for (size_t i = 0; i < ranges.size(); ++i) {
+            first.push_back(corners.size());
+            if (scene.instances[i].role != RB_ROLE_BAKE) continue;
+            for (CornerReceiver& corner : cornerReceivers(scene, patches, uint32_t(i), ranges[i]))
+                if (exposed[corner.receiver.side] > kHalfCovered)
+                    corners.push_back(std::move(corner));
+        }
+        first.push_back(corners.size());
+        gathered = light.gather(
+            corners.size(), [&](size_t k) { return corners[k].receiver; }, targetError,
+            [&](double done) { progress.report(RB_STAGE_RECONSTRUCTION, 0.5 * done); });
+    }
+
+    // Replaces the gathered part of the direct light by that of the corners, where they have any:
+    // direct and gathered per node.
+    void replaceGathered(size_t instance, const SmoothRegions& regions,
+                         const std::vector<float>& cornerAngles, const Field& carried,
+                         Field& direct) const {
+        Field light(regions.nodeCount, glm::vec3(0.0f));
+        std::vector<float> weight(regions.nodeCount, 0.0f);
+        for (size_t k = first[instance]; k < first[instance + 1]; ++k) {
+            const uint32_t node = regions.nodeOf[corners[k].corner];
+            const float angle = cornerAngles[corners[k].corner];
+            light[node] += angle * gathered[k].irradiance;
+            weight[node] += angle;
+        }
+        for (size_t v = 0; v < direct.size(); ++v)
+            if (weight[v] > 0) direct[v] = carried[v] + light[v] / weight[v];
+    }
+
+    uint64_t rays() const {
+        uint64_t sum = 0;
+        for (const Gathered& g : gathered) sum += g.rays;
+        return sum;
+    }
+
+  private:
+    std::vector<CornerReceiver> corners;
+    std::vector<size_t> first;  // per instance, into corners
+    std::vector<Gathered> gathered;
+};
+
+bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side side,
+                 const Irradiance& irradiance) {
+    double lit[2] = {0, 0};
+    for (uint32_t p = range.firstParent; p < range.lastParent; ++p)
+        for (uint32_t k = 0; k < 2 * patches.parents[p].patchCount(); ++k) {
+            const uint32_t at = 2 * patches.parents[p].firstPatch + k;
+            lit[at % 2] += double(patches.area[at / 2]) *
+                           sum(glm::dvec3(irradiance.direct[at] + irradiance.indirect[at]));
+        }
+    return lit[side] < kInsideOut * lit[1 - side];
+}
+
+}  // namespace
+
+std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
+                                       const DirectLight& directLight, const Irradiance& irradiance,
+                                       const std::vector<float>& exposed, const Settings& settings,
+                                       const Progress& progress, Report& report) {
+    const bool isPoint = settings.reconstruction == "POINT";
+    const size_t sides = patches.sideCount();
+    Field exitance(sides), carried(isPoint ? sides : 0);
+    for (size_t side = 0; side < sides; ++side) {
+        exitance[side] =
+            patches.emission[side] +
+            patches.reflectance[side] * (irradiance.direct[side] + irradiance.indirect[side]);
+        if (isPoint) carried[side] = irradiance.direct[side] - irradiance.gathered[side];
+    }
+    const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
+    std::optional<CornerLight> cornerLight;
+    if (isPoint) {
+        cornerLight.emplace(scene, patches, directLight, ranges, exposed, settings.targetError,
+                            progress);
+        report.shadowRays += cornerLight->rays();
+    }
+
+    std::vector<InstanceLight> result(scene.instances.size());
+    report.objects.resize(scene.instances.size());
+    size_t occluders = 0;
+    for (size_t i = 0; i < scene.instances.size(); ++i) {
+        const double share = double(i) / double(scene.instances.size());
+        progress.report(RB_STAGE_RECONSTRUCTION, isPoint ? 0.5 + 0.5 * share : share);
+        const Instance& instance = scene.instances[i];
+        const Mesh& mesh = scene.meshes[instance.mesh];
+        InstanceLight& out = result[i];
+        out.name = instance.name;
+        report.objects[i] = {instance.name, mesh.cornerCount(), "occluder"};
+        if (instance.role != RB_ROLE_BAKE) {
+            ++occluders;
+            continue;
+        }
+        report.objects[i].status = "baked";
+        out.isBaked = true;
+        out.cornerVertices = mesh.cornerVertices;
+        out.vertexCount = mesh.vertices.size();
+        out.cornerAngles = cornerAngles(mesh);
+        const SmoothRegions regions =
+            smoothRegions(mesh, patches.cells, ranges[i].firstCell, ranges[i].lastCell);
+        std::vector<const Field*> fields{&irradiance.direct, &irradiance.indirect};
+        if (isPoint)
+            fields.insert(fields.end(), {&carried, &patches.emission, &patches.reflectance});
+        else
+            fields.push_back(&exitance);
+        std::vector<Field> nodes = leastSquares(patches, ranges[i], regions, instance.side, exposed,
+                                                settings.regularization, fields);
+        Field& direct = nodes[0];
+        const Field& indirect = nodes[1];
+        if (isPoint) {
+            cornerLight->replaceGathered(i, regions, out.cornerAngles, nodes[2], direct);
+            for (size_t v = 0; v < direct.size(); ++v)
+                nodes[2][v] = nodes[3][v] + nodes[4][v] * (direct[v] + indirect[v]);
+        }
+        std::array<Field*, 3> perCorner{&out.direct, &out.indirect, &out.exitance};
+        for (size_t f = 0; f < 3; ++f) {
+            perCorner[f]->resize(mesh.cornerCount());
+            for (size_t c = 0; c < mesh.cornerCount(); ++c)
+                (*perCorner[f])[c] = nodes[f][regions.nodeOf[c]];
+        }
+
+        if (isInsideOut(patches, ranges[i], instance.side, irradiance)) {
+            report.objects[i].status = "baked; no light on this side";
+            report.warnings.push_back("object \"" + instance.name +
+                                      "\": the baked sides of its faces get no light but the other "
+                                      "sides do; flip its normals or choose the other side");
+        }
+    }
+    if (occluders)
+        report.skipped.push_back({"reconstruction", "objects that only occlude", occluders});
+    progress.report(RB_STAGE_RECONSTRUCTION, 1);
+    return result;
+}
+
+}  // namespace raybundle

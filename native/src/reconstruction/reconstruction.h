@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// From patch sides to the corners of each mesh that is baked.
+//
+// LEAST_SQUARES: the corner values whose interpolation is nearest to the light on the faces
+//   (reconstruction/least_squares.h).
+// POINT: the light at the corners themselves, as Cycles' bake has it. Light of the sources, which
+//   changes within a face, is gathered at each corner; the rest, which is smooth, is that of least
+//   squares there. Corners that another surface covers, where no light arrives, keep the value of
+//   least squares.
+#pragma once
+
+#include <vector>
+
+#include "bake/progress.h"
+#include "bake/report.h"
+#include "bake/settings.h"
+#include "bundles/line_counts.h"
+#include "patches/patches.h"
+#include "reconstruction/instance_light.h"
+#include "scene/scene.h"
+#include "transport/direct_light.h"
+#include "transport/line_reuse.h"
+
+namespace raybundle {
+
+// Light of every instance; of those that only occlude, empty. exposed: per side, the share of it
+// that nothing covers. Adds the objects, warnings and skips to the report.
+std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
+                                       const DirectLight& directLight, const Irradiance& irradiance,
+                                       const std::vector<float>& exposed, const Settings& settings,
+                                       const Progress& progress, Report& report);
+
+}  // namespace raybundle

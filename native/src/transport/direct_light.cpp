@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/direct_light.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <numeric>
+
+#include "transport/sobol.h"
+
+namespace raybundle {
+namespace {
+
+// Emission up to this many times the mean exitance of the scene is left to the bundles.
+constexpr double kBundledEmission = 1.5;
+// Shadow rays per receiver and source: at first, for sources of little weight, and at most.
+constexpr int kFirstSamples = 16;
+constexpr int kFewSamples = 4;
+constexpr size_t kFewSources = 4;
+constexpr int kMaxSamples = 256;
+// A source of less than this share of the light that a receiver could get takes few samples, one of
+// less than the second half as many as others.
+constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
+// Standard error that a receiver may keep, as a share of the target: errors of receivers are
+// independent, while those of bundles are shared by many.
+constexpr float kDirectShare = 0.75f;
+// Receivers darker than this share of the mean may have the error of one that bright.
+constexpr float kDarkShare = 0.25f;
+constexpr int kBlocks = 4;
+// A closed form whose largest value is so many times its smallest on a patch takes more points.
+constexpr float kSmooth = 1.2f;
+// A patch smaller than this share of its distance from a source needs one point only: the error is
+// about a quarter of its square, 0.3 %.
+constexpr float kFar = 0.1f;
+// For the power balance: rays of all sources together, and of each at least.
+constexpr uint32_t kEscapeRays = 16384, kLeastEscapeRays = 1024;
+
+float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
+
+// Estimate of the scene's mean exitance: all power over the area, times the bounces of the mean
+// reflectance. Only its order of magnitude matters.
+double meanExitance(const Scene& scene, const Patches& patches) {
+    double emitted = 0, reflectance = 0;
+    for (size_t side = 0; side < patches.sideCount(); ++side) {
+        emitted += patches.area[side / 2] * brightest(patches.emission[side]);
+        if (side % 2 == 0)
+            reflectance += patches.area[side / 2] * brightest(patches.reflectance[side]);
+    }
+    const double area = patches.totalArea;
+    for (const Light& light : scene.lights) {
+        const double strength = std::max({light.strength.x, light.strength.y, light.strength.z});
+        switch (light.kind) {
+            case Light::Kind::POINT:
+                emitted += 4 * glm::pi<double>() * strength;
+                break;
+            case Light::Kind::SUN:
+                emitted += 0.25 * area * strength;
+                break;
+            case Light::Kind::AREA:
+                emitted += 4 * glm::pi<double>() * strength *
+                           glm::length(glm::cross(light.axisU, light.axisV));
+                break;
+        }
+    }
+    emitted += area * glm::pi<double>() * brightest(scene.worldRadiance);
+    return emitted / area / std::max(0.05, 1 - reflectance / area);
+}
+
+}  // namespace
+
+// Running sums of one source over a block of samples.
+struct DirectLight::Block {
+    glm::vec3 open{0.0f};     // sum of the samples as if unblocked
+    glm::vec3 visible{0.0f};  // sum of those that are not blocked
+    int count = 0;
+
+    void add(const Block& other) {
+        open += other.open;
+        visible += other.visible;
+        count += other.count;
+    }
+    // The closed form times the visible share; the plain mean where there is no closed form.
+    glm::vec3 estimate(const std::optional<glm::vec3>& closed) const {
+        if (count == 0) return glm::vec3(0.0f);
+        if (!closed) return visible / float(count);
+        glm::vec3 mean = *closed;
+        for (int c = 0; c < 3; ++c)
+            if (open[c] > 0) mean[c] *= visible[c] / open[c];
+        return mean;
+    }
+};
+
+DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                         uint32_t seed)
+    : patches(patches), visibility(visibility), seed(seed), bundled(patches.sideCount()) {
+    const double brightLimit = kBundledEmission * meanExitance(scene, patches);
+    std::vector<bool> isSource(patches.sideCount(), false);
+    for (size_t side = 0; side < isSource.size(); ++side) {
+        if (brightest(patches.emission[side]) > brightLimit)
+            isSource[side] = true;
+        else
+            bundled[side] = patches.emission[side];
+    }
+    sources = raybundle::lightSources(scene, patches, isSource);
+}
+
+std::vector<Gathered> DirectLight::gather(size_t count,
+                                          const std::function<Receiver(size_t)>& receiverAt,
+                                          float targetError,
+                                          const std::function<void(double)>& progress) const {
+    std::vector<Gathered> results(count);
+    if (sources.empty()) return results;
+    auto gatherThese = [&](const std::vector<uint32_t>& these, auto tolerance, double begin) {
+        constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
+        for (size_t from = 0; from < these.size(); from += kSlice) {
+            progress(begin + 0.5 * double(from) / double(these.size()));
+            tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
+                Gathered& result = results[these[k]];
+                const uint64_t before = result.rays;
+                result = gather(receiverAt(these[k]), tolerance(these[k]));
+                result.rays += before;
+            });
+        }
+    };
+    std::vector<uint32_t> these(count);
+    std::iota(these.begin(), these.end(), 0u);
+    gatherThese(
+        these, [](uint32_t) { return INFINITY; }, 0);
+
+    double lit = 0, litArea = 0;
+    for (size_t k = 0; k < count; ++k)
+        if (const float h = brightest(results[k].irradiance); h > 0) {
+            const Receiver receiver = receiverAt(k);
+            const double weight = receiver.point ? 1 : double(patches.area[receiver.side / 2]);
+            lit += weight * h;
+            litArea += weight;
+        }
+    const float floor = litArea > 0 ? float(kDarkShare * lit / litArea) : 0;
+    auto tolerance = [&](uint32_t k) {
+        return kDirectShare * targetError * std::max(floor, brightest(results[k].irradiance));
+    };
+    these.erase(
+        std::remove_if(these.begin(), these.end(),
+                       [&](uint32_t k) { return std::sqrt(results[k].variance) <= tolerance(k); }),
+        these.end());
+    gatherThese(these, tolerance, 0.5);
+    return results;
+}
+
+// Each source takes samples until its standard error is below `tolerance`.
+Gathered DirectLight::gather(const Receiver& receiver, float tolerance) const {
+    Gathered sum;
+    const std::vector<float> weights = unblockedWeights(receiver);
+    const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
+    for (size_t k = 0; k < sources.size(); ++k) {
+        const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
+        gatherFrom(*sources[k], hash(seed, hash(receiver.seed, uint32_t(k))), receiver,
+                   share < kSmallShare    ? kFewSamples
+                   : share < kMiddleShare ? kFirstSamples / 2
+                                          : kFirstSamples,
+                   tolerance, sum);
+    }
+    return sum;
+}
+
+// Mean of the closed form over a patch by Gauss quadrature (degree 3 on a parallelogram, 2 on a
+// triangle), on more parts where it varies much: beside a source it falls from a finite value
+// at the common edge with an infinite slope.
+std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source,
+                                                 const Receiver& receiver, float tolerance,
+                                                 float& error) const {
+    glm::vec3 low, high;
+    error = 0;
+    if (receiver.point) return source.irradiance(*receiver.point, receiver.normal);
+    const uint32_t side = receiver.side;
+    const bool isTriangle = patches.parents[patches.parentOf[side / 2]].isTriangle;
+    const glm::vec3 centroid = patches.point(side / 2, glm::vec2(isTriangle ? 1.0f / 3 : 0.5f));
+    if (radius(receiver) < kFar * source.distance(centroid))
+        return source.irradiance(centroid, receiver.normal);
+    const auto coarse = quadrature(source, side, 1, low, high);
+    if (!coarse || brightest(high) <= kSmooth * brightest(low)) return coarse;
+    const auto fine = quadrature(source, side, 4, low, high);
+    // The error falls with the square of the parts, or at a kink with their number.
+    error = brightest(glm::abs(*fine - *coarse)) / 4;
+    if (error <= tolerance) return fine;
+    error /= 4;
+    return quadrature(source, side, 16, low, high);
+}
+
+std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, uint32_t side,
+                                                 int parts, glm::vec3& low, glm::vec3& high) const {
+    const Parent& parent = patches.parents[patches.parentOf[side / 2]];
+    const uint32_t inParent = side / 2 - parent.firstPatch;
+    const glm::vec3 normal = patches.normal(side);
+    // The patch cut into parts is like a parent with that grid.
+    Parent grid = parent;
+    const glm::vec2 o = parent.pointOn(inParent, {0, 0});
+    const glm::vec2 a = parent.pointOn(inParent, {1, 0}) - o,
+                    b = parent.pointOn(inParent, {0, 1}) - o;
+    grid.countA = grid.countB = uint16_t(parts);
+    static constexpr float kGauss = 0.21132487f;  // (1 - 1 / sqrt 3) / 2
+    static const glm::vec2 kSquare[4] = {
+        {kGauss, kGauss}, {1 - kGauss, kGauss}, {kGauss, 1 - kGauss}, {1 - kGauss, 1 - kGauss}};
+    static const glm::vec2 kTriangle[3] = {
+        {1.0f / 6, 1.0f / 6}, {2.0f / 3, 1.0f / 6}, {1.0f / 6, 2.0f / 3}};
+    const int points = parent.isTriangle ? 3 : 4;
+    glm::vec3 sum(0.0f);
+    low = glm::vec3(INFINITY);
+    high = glm::vec3(0.0f);
+    for (uint32_t part = 0; part < grid.patchCount(); ++part)
+        for (int k = 0; k < points; ++k) {
+            const glm::vec2 st = grid.pointOn(part, parent.isTriangle ? kTriangle[k] : kSquare[k]);
+            const auto value = source.irradiance(parent.position(o + st.x * a + st.y * b), normal);
+            if (!value) return std::nullopt;
+            sum += *value;
+            low = glm::min(low, *value);
+            high = glm::max(high, *value);
+        }
+    return sum / float(grid.patchCount() * points);
+}
+
+// About what each source would give without occluders, to share out the samples; empty where
+// there are so few sources that it does not pay.
+std::vector<float> DirectLight::unblockedWeights(const Receiver& receiver) const {
+    if (sources.size() <= kFewSources) return {};
+    std::vector<float> weights(sources.size());
+    for (size_t k = 0; k < sources.size(); ++k) {
+        if (sources[k]->isOutOfSight(position(receiver, {0.5f, 0.5f}), receiver.normal,
+                                     radius(receiver)))
+            continue;
+        for (uint32_t i = 0; i < 2; ++i) {
+            const glm::vec4 u = sobolPoint(i, hash(receiver.seed, uint32_t(k)));
+            weights[k] +=
+                brightest(sources[k]
+                              ->sample(position(receiver, {u.x, u.y}), receiver.normal, {u.z, u.w})
+                              .irradiance);
+        }
+    }
+    return weights;
+}
+
+DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t seed,
+                                            const Receiver& receiver, int first, int count,
+                                            Gathered& sum) const {
+    Block block;
+    for (int i = first; i < first + count; ++i) {
+        const glm::vec4 u = sobolPoint(uint32_t(i), seed);
+        const glm::vec3 point = position(receiver, {u.x, u.y});
+        const LightSample sample = source.sample(point, receiver.normal, {u.z, u.w});
+        ++block.count;
+        if (brightest(sample.irradiance) <= 0) continue;
+        block.open += sample.irradiance;
+        ++sum.rays;
+        if (!visibility.isBlocked(receiver.side, point, sample.direction, sample.distance))
+            block.visible += sample.irradiance;
+    }
+    return block;
+}
+
+void DirectLight::gatherFrom(const LightSource& source, uint32_t seed, const Receiver& receiver,
+                             int samples, float tolerance, Gathered& sum) const {
+    if (source.isOutOfSight(position(receiver, {0.5f, 0.5f}), receiver.normal, radius(receiver))) {
+        ++sum.hidden;
+        return;
+    }
+    // Inside a solid it is dark, unless a source is in there too: look before taking all
+    // samples.
+    const bool isInside =
+        patches.parents[patches.parentOf[receiver.side / 2]].isSolid && receiver.side % 2 == 1;
+    int next = isInside ? std::min(kFewSamples, samples) : samples;
+    std::array<Block, kBlocks> blocks;
+    Block all;
+    std::optional<glm::vec3> closed;
+    float closedError = 0, variance = 0;
+    for (;;) {
+        // A quarter of the new samples to each block: consecutive ones are stratified.
+        const int first = all.count, each = (next - first) / kBlocks;
+        for (int b = 0; b < kBlocks; ++b) {
+            const Block block = sampleBlock(source, seed, receiver, first + b * each, each, sum);
+            blocks[size_t(b)].add(block);
+            all.add(block);
+        }
+        if (brightest(all.open) <= 0) ++sum.hidden;
+        if (brightest(all.visible) <= 0) return;
+        if (!closed) closed = closedMean(source, receiver, tolerance, closedError);
+        const glm::vec3 mean = all.estimate(closed);
+        variance = 0;
+        for (const Block& block : blocks) {
+            const float d = brightest(glm::abs(block.estimate(closed) - mean));
+            variance += d * d / (kBlocks * (kBlocks - 1));
+        }
+        if (all.count >= samples && (variance <= tolerance * tolerance || all.count >= kMaxSamples))
+            break;
+        next = all.count < samples ? samples : 4 * all.count;
+    }
+    if (closed && all.visible == all.open) ++sum.unblocked;
+    sum.irradiance += all.estimate(closed);
+    if (brightest(source.power()) <= 0) sum.unpowered += all.estimate(closed);
+    sum.variance += variance + closedError * closedError;
+}
+
+glm::vec3 DirectLight::position(const Receiver& receiver, glm::vec2 uv) const {
+    return receiver.point ? *receiver.point : patches.point(receiver.side / 2, uv);
+}
+
+// Radius of a sphere around position(receiver, {0.5, 0.5}) that holds the receiver, metres.
+float DirectLight::radius(const Receiver& receiver) const {
+    if (receiver.point) return 0;
+    const Parent& parent = patches.parents[patches.parentOf[receiver.side / 2]];
+    return 0.5f * (glm::length(parent.a) / parent.countA + glm::length(parent.b) / parent.countB);
+}
+
+glm::dvec3 DirectLight::escapedPower() const {
+    glm::dvec3 escaped(0.0);
+    if (sources.empty()) return escaped;
+    const uint32_t rays = std::max(kLeastEscapeRays, kEscapeRays / uint32_t(sources.size()));
+    for (size_t k = 0; k < sources.size(); ++k) {
+        const glm::vec3 power = sources[k]->power();
+        if (brightest(power) <= 0) continue;
+        tbb::enumerable_thread_specific<double> missed(0.0);
+        tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
+            for (uint32_t i = range.begin(); i < range.end(); ++i) {
+                const EmittedRay ray = sources[k]->emit(sobolPoint(i, hash(seed, uint32_t(k))));
+                const glm::vec3 origin = ray.origin + visibility.offset() * ray.direction;
+                if (ray.weight > 0 && visibility.isFree(origin, ray.direction))
+                    missed.local() += ray.weight;
+            }
+        });
+        double sum = 0;
+        for (double part : missed) sum += part;
+        escaped += glm::dvec3(power) * (sum / rays);
+    }
+    return escaped;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Light straight from the sources, seen from receivers: patch sides, or points on them. Each
+// gathers the light of each source with stratified shadow rays; where the source has a closed form
+// without occluders, the rays only estimate the share that is visible, so that fully lit and fully
+// dark receivers have no noise.
+//
+// Sources: Szecsi, Sbert and Szirmay-Kalos, "Combined Correlated and Importance Sampling in Direct
+// Light Source Computation" (2004) for the closed form as a control.
+// Differs:
+// - Emission that is not much brighter than the scene's mean exitance is no source here: bundles
+//   carry it without extra noise, and then a furnace is exact.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "patches/patches.h"
+#include "scene/scene.h"
+#include "transport/light_source.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// Where direct light is to be known: a whole patch side (the mean over it), or a point on one.
+struct Receiver {
+    uint32_t side = 0;
+    glm::vec3 normal{0.0f};          // unit; a point may have a shading normal
+    std::optional<glm::vec3> point;  // relative to Patches::centre
+    uint32_t seed = 0;               // of its samples
+};
+
+// What one receiver got.
+struct Gathered {
+    glm::vec3 irradiance{0.0f};  // W/m^2
+    glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
+    float variance = 0;          // of the brightest channel
+    uint64_t rays = 0;
+    uint64_t unblocked = 0;  // sources without noise: wholly visible
+    uint64_t hidden = 0;     // sources that it cannot see, without a ray
+};
+
+class DirectLight {
+  public:
+    // Everything passed must outlive the object.
+    DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                uint32_t seed);
+
+    // Per side: emission that is no source here, for the bundles to carry, W/m^2.
+    const std::vector<glm::vec3>& bundledEmission() const { return bundled; }
+    const std::vector<std::unique_ptr<LightSource>>& lightSources() const { return sources; }
+
+    // Gathers at `count` receivers to about `targetError` relative standard error each: all
+    // coarsely first, then those again whose error is too large beside the mean light.
+    // `progress` gets the share that is done.
+    std::vector<Gathered> gather(size_t count, const std::function<Receiver(size_t)>& receiverAt,
+                                 float targetError,
+                                 const std::function<void(double)>& progress) const;
+
+    // Power of the sources that meets no surface, W.
+    glm::dvec3 escapedPower() const;
+
+  private:
+    struct Block;
+
+    Gathered gather(const Receiver& receiver, float tolerance) const;
+    void gatherFrom(const LightSource& source, uint32_t seed, const Receiver& receiver, int samples,
+                    float tolerance, Gathered& sum) const;
+    Block sampleBlock(const LightSource& source, uint32_t seed, const Receiver& receiver, int first,
+                      int count, Gathered& sum) const;
+    std::optional<glm::vec3> closedMean(const LightSource& source, const Receiver& receiver,
+                                        float tolerance, float& error) const;
+    std::optional<glm::vec3> quadrature(const LightSource& source, uint32_t side, int parts,
+                                        glm::vec3& low, glm::vec3& high) const;
+    std::vector<float> unblockedWeights(const Receiver& receiver) const;
+    glm::vec3 position(const Receiver& receiver, glm::vec2 uv) const;
+    float radius(const Receiver& receiver) const;
+
+    const Patches& patches;
+    const Visibility& visibility;
+    const uint32_t seed;
+    std::vector<glm::vec3> bundled;
+    std::vector<std::unique_ptr<LightSource>> sources;
+};
+
+}  // namespace raybundle
