@@ -42,8 +42,10 @@ struct Shot {
 Shot shoot(const Scene& scene, float patchSize = 10) {
     Shot shot{subdivide(scene, patchSize, kMany), {}};
     const Visibility visibility(shot.patches);
-    shot.light = gatherFirstShot(DirectLight(scene, shot.patches, visibility, 0), shot.patches,
-                                 kTarget, Progress());
+    Settings settings;
+    settings.targetError = kTarget;
+    shot.light = gather({DirectLight(scene, shot.patches, visibility, 0), shot.patches, visibility,
+                         settings, Progress()});
     return shot;
 }
 

@@ -22,7 +22,7 @@ constexpr size_t kMany = 10000000;
 
 bool sameCounts(const LineCounts& a, const LineCounts& b) {
     if (a.sideCount() != b.sideCount() || a.exchangeCount() != b.exchangeCount() ||
-        a.lines != b.lines || a.sky != b.sky || a.total != b.total || a.touching != b.touching)
+        a.bundles != b.bundles || a.sky != b.sky || a.total != b.total || a.touching != b.touching)
         return false;
     for (uint32_t i = 0; i < a.sideCount(); ++i) {
         if (a.rowEnd(i) - a.rowBegin(i) != b.rowEnd(i) - b.rowBegin(i)) return false;
@@ -99,14 +99,12 @@ TEST(LineCounts, ManyAdditionsGiveTheSameAsOne) {
     const Patches patches = subdivide(roomWithBoxes(0.5f), 0.3f, kMany);
     FragmentLists projector(patches, 0.1f, 1e-5f);
     LineCounts once(patches.sideCount()), often(patches.sideCount());
-    std::array<std::vector<BundleLines>, 2> all;
-    for (const Bundle& bundle : bundles(DirectionKind::LOW_DISCREPANCY, 1, 0, 32)) {
-        BundleLines lines;
-        projector.project(bundle, lines);
-        std::array<std::vector<BundleLines>, 2> single;
-        single[bundle.half].push_back(lines);
-        often.add(single);
-        all[bundle.half].push_back(std::move(lines));
+    std::vector<TracedBundle> all;
+    for (const Bundle& bundle : Directions("LOW_DISCREPANCY", 1).next(32)) {
+        TracedBundle traced{bundle, {}};
+        projector.project(bundle, traced.lines);
+        often.add({traced});
+        all.push_back(std::move(traced));
     }
     once.add(all);
     EXPECT_TRUE(sameCounts(once, often));
@@ -130,8 +128,7 @@ TEST(Touching, TheFloorUnderABoxIsCoveredAndNothingElseIs) {
         place(scene, box("box", {1, 1, 0}, {2, 3, 1}, false), grey("", 0.5f),
               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, height)));
         const Patches patches = subdivide(scene, 0.5f, kMany);
-        const LineCounts counts =
-            traceLines(patches, 0.05f, 64, 1, DirectionKind::LOW_DISCREPANCY, 3e-4f);
+        const LineCounts counts = traceLines(patches, 0.05f, 64, 1, "LOW_DISCREPANCY", 3e-4f);
         const std::vector<float> exposed = counts.exposedShare();
         size_t covered = 0;
         float worst = 0, worstBack = 0;

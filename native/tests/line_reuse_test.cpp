@@ -28,15 +28,16 @@ struct System {
     System(const Scene& scene, float patchSize, float pixelSize, uint32_t bundleCount,
            uint32_t seed = 1)
         : patches(subdivide(scene, patchSize, kMany)),
-          counts(traceLines(patches, pixelSize, bundleCount, seed)),
-          gathered(patches.sideCount(), glm::vec3(0)),
-          emission(patches.emission) {}
+          counts(traceLines(patches, pixelSize, bundleCount, seed)) {
+        shot.irradiance.assign(patches.sideCount(), glm::vec3(0));
+        shot.emission = patches.emission;
+    }
 
     Irradiance solve(Half half = Half::BOTH) {
         reflected.assign(patches.sideCount(), glm::vec3(0));
         return solver().solve(half, kTolerance, reflected);
     }
-    LineReuse solver() const { return {patches, counts, gathered, emission, world}; }
+    LineReuse solver() const { return {patches, counts, shot, world, exposed}; }
 
     // Calls body(side, m_i) for all fronts that a line met, with the lines as the solver weights
     // them.
@@ -58,13 +59,15 @@ struct System {
         return lines;
     }
     glm::vec3 exitance(const Irradiance& h, uint32_t i) const {
-        return emission[i] + patches.reflectance[i] * (h.direct[i] + h.indirect[i]);
+        return shot.emission[i] + patches.reflectance[i] * (h.direct[i] + h.indirect[i]);
     }
 
     Patches patches;
     LineCounts counts;
-    Field gathered, emission, reflected;
+    FirstShot shot;
+    Field reflected;
     glm::vec3 world{0.0f};
+    std::vector<float> exposed;  // as the counts have it
 };
 
 glm::vec3 randomColour(std::mt19937& random, float low, float high) {
@@ -84,7 +87,7 @@ TEST(Furnace, IsExactForAnyNumberOfBundles) {
         std::mt19937 random(11);
         for (size_t side = 0; side < system.patches.sideCount(); ++side) {
             system.patches.reflectance[side] = randomColour(random, 0, 0.95f);
-            system.emission[side] = 1.0f - system.patches.reflectance[side];
+            system.shot.emission[side] = 1.0f - system.patches.reflectance[side];
         }
         const Irradiance h = system.solve();
         size_t met = 0;
@@ -152,7 +155,7 @@ TEST(Furnace, StarvedSidesGatherTheSameLight) {
 
 TEST(Furnace, StarvedSidesKeepTheirFirstShot) {
     System system(closedCube(0), 0.25f, 0.5f, 2);
-    for (glm::vec3& g : system.gathered) g = {1, 2, 3};
+    for (glm::vec3& g : system.shot.irradiance) g = {1, 2, 3};
     Irradiance h = system.solve();
     system.solver().gatherStarvedSides(Visibility(system.patches), 1000, 1,
                                        std::vector<bool>(system.patches.sideCount(), true),
@@ -166,12 +169,12 @@ TEST(MeanRadiosity, IsMeanEmissionOverOneMinusReflectance) {
     System system(roomWithBoxes(rho), 0.3f, 0.1f, 32);
     std::mt19937 random(2);
     for (uint32_t side = 0; side < system.patches.sideCount(); side += 2)
-        system.emission[side] = randomColour(random, 0, 1);
+        system.shot.emission[side] = randomColour(random, 0, 1);
     const Irradiance h = system.solve();
     glm::dvec3 exitance(0.0), emission(0.0), absorbed(0.0);
     system.forFronts([&](uint32_t i, double m) {
         exitance += m * glm::dvec3(system.exitance(h, i));
-        emission += m * glm::dvec3(system.emission[i]);
+        emission += m * glm::dvec3(system.shot.emission[i]);
         absorbed += m * (1 - double(rho)) * glm::dvec3(total(h, i));
     });
     for (int c = 0; c < 3; ++c) {
@@ -185,10 +188,10 @@ TEST(MeanRadiosity, TheMaximumPrincipleHolds) {
     std::mt19937 random(3);
     float least = 1, most = 0;
     for (uint32_t side = 0; side < system.patches.sideCount(); ++side) {
-        system.emission[side] = randomColour(random, 0.2f, 1);
+        system.shot.emission[side] = randomColour(random, 0.2f, 1);
         for (int c = 0; c < 3; ++c) {
-            least = std::min(least, system.emission[side][c]);
-            most = std::max(most, system.emission[side][c]);
+            least = std::min(least, system.shot.emission[side][c]);
+            most = std::max(most, system.shot.emission[side][c]);
         }
     }
     const Irradiance h = system.solve();
@@ -209,10 +212,10 @@ double sphereError(int levels) {
     std::mt19937 random(4);
     glm::dvec3 emitted(0.0), reflected(0.0);
     for (uint32_t i = 0; i < system.patches.sideCount(); i += 2) {
-        system.emission[i] = randomColour(random, 0, 1);
+        system.shot.emission[i] = randomColour(random, 0, 1);
         system.patches.reflectance[i] = randomColour(random, 0, 0.9f);
         const double share = double(system.patches.area[i / 2]) / system.patches.totalArea;
-        emitted += share * glm::dvec3(system.emission[i]);
+        emitted += share * glm::dvec3(system.shot.emission[i]);
         reflected += share * glm::dvec3(system.patches.reflectance[i]);
     }
     const glm::dvec3 exact = emitted / (1.0 - reflected);
@@ -237,7 +240,7 @@ TEST(SphereInterior, ConvergesToTheClosedForm) {
 TEST(Cube, OnePatchPerFaceHasItsClosedForm) {
     System system(closedCube(0.5f), 10, 0.02f, 4096);
     ASSERT_EQ(system.patches.count(), 6u);
-    system.emission[0] = glm::vec3(1);
+    system.shot.emission[0] = glm::vec3(1);
     const Irradiance h = system.solve();
     for (uint32_t i = 0; i < 12; i += 2) {
         const bool opposite = i > 0 && system.patches.normal(i) == -system.patches.normal(0);
@@ -293,12 +296,12 @@ TEST(LineReuse, IsLinearInTheEmission) {
         one[side] = randomColour(random, 0, 1);
         two[side] = side % 7 == 0 ? 5.0f * randomColour(random, 0, 1) : glm::vec3(0);
     }
-    system.emission = one;
+    system.shot.emission = one;
     const Irradiance h1 = system.solve();
-    system.emission = two;
+    system.shot.emission = two;
     const Irradiance h2 = system.solve();
     for (size_t side = 0; side < one.size(); ++side)
-        system.emission[side] = one[side] + 2.0f * two[side];
+        system.shot.emission[side] = one[side] + 2.0f * two[side];
     const Irradiance sum = system.solve();
     for (uint32_t i = 0; i < one.size(); ++i)
         ASSERT_LT(largest(total(sum, i) - total(h1, i) - 2.0f * total(h2, i)),
@@ -310,8 +313,8 @@ TEST(LineReuse, LightIsReciprocal) {
     System system(roomWithBoxes(0.6f), 0.5f, 0.1f, 32);
     const uint32_t a = 2, b = uint32_t(system.patches.sideCount()) - 40;
     auto lightFromTo = [&](uint32_t from, uint32_t to) {
-        std::fill(system.emission.begin(), system.emission.end(), glm::vec3(0));
-        system.emission[from] = glm::vec3(100);
+        std::fill(system.shot.emission.begin(), system.shot.emission.end(), glm::vec3(0));
+        system.shot.emission[from] = glm::vec3(100);
         return system.weightedLines()[to] * double(total(system.solve(), to).x);
     };
     const double there = lightFromTo(a, b), back = lightFromTo(b, a);
@@ -331,7 +334,7 @@ TEST(LineReuse, BlackSurfacesReflectNothing) {
 TEST(LineReuse, ChannelsDoNotMix) {
     System system(closedCube(0.5f), 0.2f, 0.05f, 16);
     for (uint32_t i = 0; i < system.patches.sideCount(); ++i) {
-        system.emission[i] = {1, 0, 2};
+        system.shot.emission[i] = {1, 0, 2};
         system.patches.reflectance[i] = {0.5f, 0.5f, 0};
     }
     const Irradiance h = system.solve();
@@ -368,7 +371,8 @@ TEST(LineReuse, LinesThatLeaveTheSceneTakeTheirLightAway) {
 
 TEST(LineReuse, TheFirstGuessDoesNotMatter) {
     System system(roomWithBoxes(0.9f, 0.1f), 0.3f, 0.1f, 16);
-    for (uint32_t i = 0; i < system.patches.sideCount(); i += 34) system.emission[i] = {3, 2, 1};
+    for (uint32_t i = 0; i < system.patches.sideCount(); i += 34)
+        system.shot.emission[i] = {3, 2, 1};
     const Irradiance cold = system.solve();
     Field guess(system.patches.sideCount());
     std::mt19937 random(8);

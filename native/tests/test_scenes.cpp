@@ -155,15 +155,18 @@ Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double
 }
 
 LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed,
-                      DirectionKind kind, float touchDistance) {
+                      const std::string& directions, float touchDistance) {
     FragmentLists projector(patches, pixelSize, touchDistance);
+    Directions sequence(directions, seed);
     LineCounts counts(patches.sideCount());
     constexpr uint32_t kBatch = 256;
     for (uint32_t first = 0; first < count; first += kBatch) {
-        std::array<std::vector<BundleLines>, 2> lines;
-        for (const Bundle& bundle : bundles(kind, seed, first, std::min(kBatch, count - first)))
-            projector.project(bundle, lines[bundle.half].emplace_back());
-        counts.add(lines);
+        std::vector<TracedBundle> traced;
+        for (const Bundle& bundle : sequence.next(std::min(kBatch, count - first))) {
+            traced.push_back({bundle, {}});
+            projector.project(bundle, traced.back().lines);
+        }
+        counts.add(traced);
     }
     return counts;
 }

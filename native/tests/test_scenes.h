@@ -54,7 +54,7 @@ Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double
 
 // Lines of the first `count` bundles of a sequence through the patches.
 LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed = 1,
-                      DirectionKind kind = DirectionKind::LOW_DISCREPANCY,
+                      const std::string& directions = "LOW_DISCREPANCY",
                       float touchDistance = 1e-5f);
 
 // m_i of both halves together.

@@ -5,8 +5,6 @@
 // stop criterion stands for section 4.3.3. Differs: see the heads of the stages' files.
 #include "bake/bake.h"
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -14,8 +12,8 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "bake/combination.h"
 #include "bake/geometry_hash.h"
-#include "bundles/fragment_lists.h"
 #include "patches/reflectance.h"
 #include "reconstruction/reconstruction.h"
 #include "transport/direct_light.h"
@@ -30,15 +28,11 @@ constexpr int kMaxPlanePixels = 4096;  // along the scene's diameter
 // Surfaces not further apart than these shares of the scene's radius and of a patch touch.
 constexpr float kTouchOfRadius = 1e-4f;
 constexpr float kTouchOfPatch = 0.02f;
-// Sides with fewer lines than this also gather with local rays.
-constexpr uint32_t kStarvedLines = 16;
 // The noise falls with the number of bundles to about this power.
 constexpr double kErrorSlope = 0.65;
 // Relative residual of the last solve: a share of the noise, within these bounds.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
-// Lines held before they are merged into the counts, bytes.
-constexpr size_t kMergeBytes = size_t(256) << 20;
 
 class Stopwatch {
   public:
@@ -57,33 +51,91 @@ glm::dvec3 power(const Patches& patches, size_t side, const glm::vec3& perArea) 
     return double(patches.area[side / 2]) * glm::dvec3(perArea);
 }
 
+// Edge of a pixel, metres. The same for all bundles: power per line is the same for all only then.
+float pixelSize(const Patches& patches, int linesPerBundle) {
+    if (linesPerBundle > 0)
+        return patches.radius * std::sqrt(glm::pi<float>() / float(linesPerBundle));
+    const double mean = std::min(double(patches.size) * patches.size,
+                                 patches.totalArea / double(std::max<size_t>(1, patches.count())));
+    return std::max(float(std::sqrt(mean / kPixelsPerPatch)), 2 * patches.radius / kMaxPlanePixels);
+}
+
+// Compares the power that the lights emit with what surfaces absorb and what leaves the scene.
+void balanceEnergy(const Patches& patches, const FirstShot& shot, const Irradiance& irradiance,
+                   const glm::vec3& worldRadiance, const std::vector<float>& exposedShare,
+                   const std::vector<float>& openShare, Report& report) {
+    const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
+    glm::dvec3 emitted = shot.emitted, absorbed(0.0), escaped = shot.escaped;
+    for (size_t side = 0; side < patches.sideCount(); ++side) {
+        const double exposed = double(exposedShare[side]);
+        const float open = openShare[side];
+        const glm::vec3 total = irradiance.direct[side] + irradiance.indirect[side];
+        emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
+        absorbed += exposed * power(patches, side, (1.0f - patches.reflectance[side]) * total);
+        escaped +=
+            exposed *
+            power(patches, side, open * (shot.emission[side] + patches.reflectance[side] * total));
+    }
+    report.emitted = sum(emitted);
+    report.absorbed = sum(absorbed);
+    report.escaped = sum(escaped);
+}
+
+// Whether there is nothing for bundles to carry; says so.
+bool isDark(const Scene& scene, const FirstShot& shot, Report& report) {
+    auto isBlack = [](const glm::vec3& v) { return v == glm::vec3(0.0f); };
+    const bool isEmpty = shot.irradiance.empty();
+    const bool isDark = isBlack(scene.worldRadiance) &&
+                        std::all_of(shot.emission.begin(), shot.emission.end(), isBlack) &&
+                        std::all_of(shot.irradiance.begin(), shot.irradiance.end(), isBlack);
+    if (isEmpty)
+        report.warnings.push_back("the scene has no faces");
+    else if (isDark)
+        report.warnings.push_back(
+            "no light reaches any surface: there is no lamp, no emission and no world that does; "
+            "the result is black");
+    return isEmpty || isDark;
+}
+
 }  // namespace
 
 // Patches and traced lines, which stay valid as long as the geometry does.
 struct Bake::Trace {
-    Trace(uint64_t hash, Patches made)
-        : hash(hash), patches(std::move(made)), visibility(patches), counts(patches.sideCount()) {}
+    Trace(uint64_t hash, Patches made, const Settings& settings)
+        : hash(hash), patches(std::move(made)), visibility(patches), counts(patches.sideCount()) {
+        const float touchDistance =
+            std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.size);
+        const ProjectorInput input{patches,
+                                   visibility,
+                                   pixelSize(patches, settings.linesPerBundle),
+                                   touchDistance,
+                                   settings.smallPatchesKind(),
+                                   settings.planeCount,
+                                   settings.planePlacementKind()};
+        tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
+                                                uint32_t(settings.seed));
+        // Only line reuse on exact projection sees what lies against what while it traces.
+        if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact())
+            exposed = exposedShare(input, uint32_t(settings.seed));
+    }
+
+    // Whether all traced lines are in the counts: not after a cancel on the way, and not where a
+    // transport uses lines without counting them.
+    bool isWhole() const { return tracer->bundleCount() == counts.bundles; }
 
     const uint64_t hash;
     Patches patches;
     const Visibility visibility;
+    std::vector<float> exposed;  // per side; empty: as the counts have it
     LineCounts counts;
-    uint32_t bundles = 0;
-    float pixelSize = 0;  // metres
-};
-
-// What the solve found, per side, W/m^2.
-struct Bake::Solution {
-    explicit Solution(size_t sides) : irradiance(sides), reflected(sides) {}
-
-    Irradiance irradiance;
-    std::vector<glm::vec3> reflected;  // exitance without emission
+    std::unique_ptr<BundleTracer> tracer;
 };
 
 Bake::Bake() = default;
 Bake::~Bake() = default;
 
 void Bake::run(const Scene& scene) {
+    checkCombination(settings);
     tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
     arena.execute([&] { runStages(scene); });
 }
@@ -95,12 +147,13 @@ void Bake::runStages(const Scene& scene) {
         report.warnings = scene.warnings;
         makePatches(scene, report);
 
-        const DirectLight directLight(scene, trace->patches, trace->visibility,
-                                      uint32_t(settings.seed));
+        const Patches& patches = trace->patches;
+        const DirectLight directLight(scene, patches, trace->visibility, uint32_t(settings.seed));
         FirstShot shot;
         {
             Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
-            shot = gatherFirstShot(directLight, trace->patches, settings.targetError, progress);
+            shot = firstShot(settings.firstShot,
+                             {directLight, patches, trace->visibility, settings, progress});
         }
         report.shadowRays = shot.rays;
         report.skipped.push_back(
@@ -108,16 +161,27 @@ void Bake::runStages(const Scene& scene) {
         report.skipped.push_back(
             {"shadow rays", "side and source face away from each other", shot.hiddenSides});
 
-        const Solution solution = solveToTarget(scene, shot, report);
-        balanceEnergy(shot, solution, scene, report);
+        irradiance = Irradiance(patches.sideCount());
+        std::vector<float> exposed(patches.sideCount(), 1.0f);
+        if (isDark(scene, shot, report)) {
+            report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
+        } else {
+            const auto transport = makeTransport(
+                settings.solver, {patches, trace->visibility, shot, scene.worldRadiance,
+                                  trace->exposed, settings, *trace->tracer, trace->counts});
+            irradiance = solveToTarget(scene, shot, *transport, report);
+            exposed = trace->exposed.empty() ? trace->counts.exposedShare() : trace->exposed;
+            balanceEnergy(patches, shot, irradiance, scene.worldRadiance, exposed,
+                          transport->openShare(), report);
+            report.bundles = transport->bundleCount();
+        }
 
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
-        light = reconstruct(scene, trace->patches, directLight, solution.irradiance,
-                            trace->counts.exposedShare(), settings, progress, report);
+        light = reconstruct(scene, patches, directLight, irradiance, exposed, settings, progress,
+                            report);
     }
     report.patches = trace->patches.count();
-    report.bundles = trace->bundles;
-    report.lines = trace->counts.lines;
+    report.lines = trace->tracer->lineCount();
     report.exchanges = trace->counts.exchangeCount();
     json = report.json();
     ran = true;
@@ -127,24 +191,14 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
     progress.report(RB_STAGE_PATCHES, 0);
     const uint64_t hash = geometryHash(scene, settings);
-    if (trace && trace->hash == hash) {
+    if (trace && trace->hash == hash && trace->isWhole()) {
         assignMaterials(scene, trace->patches);
-        report.skipped.push_back(
-            {"patches and lines", "geometry unchanged since the last bake", trace->bundles});
+        report.skipped.push_back({"patches and lines", "geometry unchanged since the last bake",
+                                  trace->tracer->bundleCount()});
     } else {
         trace.reset();
         trace = std::make_unique<Trace>(
-            hash, subdivide(scene, settings.patchSize, size_t(settings.maxPatches)));
-        const Patches& patches = trace->patches;
-        // Fix the pixel for all bundles: power per line is the same for all only then.
-        const double mean =
-            std::min(double(patches.size) * patches.size,
-                     patches.totalArea / double(std::max<size_t>(1, patches.count())));
-        trace->pixelSize =
-            settings.linesPerBundle > 0
-                ? patches.radius * std::sqrt(glm::pi<float>() / float(settings.linesPerBundle))
-                : std::max(float(std::sqrt(mean / kPixelsPerPatch)),
-                           2 * patches.radius / kMaxPlanePixels);
+            hash, subdivide(scene, settings.patchSize, size_t(settings.maxPatches)), settings);
     }
     const Patches& patches = trace->patches;
     report.warnings.insert(report.warnings.end(), patches.warnings.begin(), patches.warnings.end());
@@ -153,53 +207,39 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     progress.report(RB_STAGE_PATCHES, 1);
 }
 
-// Adds bundles by doubling until the difference of the two halves' solutions meets the target, then
-// solves on all lines.
-Bake::Solution Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Report& report) {
+// Adds bundles by doubling until the difference of the two halves' estimates meets the target.
+Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transport& transport,
+                               Report& report) {
     const Patches& patches = trace->patches;
     const size_t n = patches.sideCount();
-    const LineReuse solver(patches, trace->counts, shot.irradiance, shot.emission,
-                           scene.worldRadiance);
-    Solution solution(n);
-
-    auto isBlack = [](const glm::vec3& v) { return v == glm::vec3(0.0f); };
-    const bool isDark = isBlack(scene.worldRadiance) &&
-                        std::all_of(shot.emission.begin(), shot.emission.end(), isBlack) &&
-                        std::all_of(shot.irradiance.begin(), shot.irradiance.end(), isBlack);
-    if (n == 0) report.warnings.push_back("the scene has no faces");
-    if (n > 0 && isDark)
-        report.warnings.push_back(
-            "no light reaches any surface: there is no lamp, no emission and no "
-            "world that does; the result is black");
-    if (n == 0 || isDark) {
-        report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
-        return solution;
-    }
-
     // Sides whose noise counts: those with a result.
     std::vector<float> weight(n, 0);
+    std::vector<bool> wantedSides(n, false);
     bool anyBaked = false;
     for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
     for (size_t side = 0; side < n; ++side) {
         const Instance& instance =
             scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
-        if (!anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side)))
-            weight[side] = patches.area[side / 2];
+        wantedSides[side] =
+            !anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side));
+        if (wantedSides[side]) weight[side] = patches.area[side / 2];
     }
 
-    std::array<std::vector<glm::vec3>, 2> reflected{solution.reflected, solution.reflected};
     const uint32_t most = std::max(2u, uint32_t(settings.maxBundles) & ~1u);
-    uint32_t wanted =
-        std::max(trace->bundles, std::min(most, (uint32_t(settings.minBundles) + 1) & ~1u));
+    uint32_t wanted = std::max(transport.bundleCount(),
+                               std::min(most, (uint32_t(settings.minBundles) + 1) & ~1u));
     for (;;) {
-        if (wanted > trace->bundles) traceBundles(wanted - trace->bundles, report);
+        if (wanted > transport.bundleCount()) {
+            Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
+            transport.advance(wanted - transport.bundleCount(), progress);
+        }
 
         Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
-        progress.report(RB_STAGE_SOLVE,
-                        std::min(1.0, double(trace->bundles) / settings.maxBundles));
+        const uint32_t bundles = transport.bundleCount();
+        progress.report(RB_STAGE_SOLVE, std::min(1.0, double(bundles) / settings.maxBundles));
         std::array<Irradiance, 2> half;
         for (int h = 0; h < 2; ++h)
-            half[h] = solver.solve(Half(h), kHalfTolerance * settings.targetError, reflected[h]);
+            half[h] = transport.irradiance(Half(h), kHalfTolerance * settings.targetError);
         double noise = 0, signal = 0;
         for (size_t side = 0; side < n; ++side) {
             const glm::dvec3 a(half[0].direct[side] + half[0].indirect[side]);
@@ -208,14 +248,14 @@ Bake::Solution Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Re
             noise += weight[side] * (0.25 * glm::dot(a - b, a - b) + 3 * directVariance);
             signal += weight[side] * 0.25 * glm::dot(a + b, a + b);
         }
-        report.estimatedError = signal > 0 ? std::sqrt(noise / signal) : 0;
+        const double bias = std::hypot(transport.bias(), trace->tracer->disorderedShare());
+        report.estimatedError = signal > 0 ? std::sqrt(noise / signal + bias * bias) : 0;
 
-        const bool full = 2 * trace->counts.byteCount() > size_t(settings.memoryLimit * 1e6);
         if (report.estimatedError <= settings.targetError) break;
-        if (trace->bundles >= most || full) {
+        if (bundles >= most || transport.isFull()) {
             report.warnings.push_back(
-                std::string(full ? "memory_limit" : "max_bundles") + " was reached at " +
-                std::to_string(trace->bundles) + " bundles: the noise is " +
+                std::string(bundles >= most ? "max_bundles" : "memory_limit") + " was reached at " +
+                std::to_string(bundles) + " bundles: the noise is " +
                 std::to_string(100 * report.estimatedError) + " % and not below " +
                 std::to_string(100 * settings.targetError) + " %");
             break;
@@ -223,95 +263,18 @@ Bake::Solution Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Re
         // Double at most; less where the error's slope says that less will do.
         const double factor =
             std::pow(report.estimatedError / settings.targetError, 1 / kErrorSlope);
-        wanted =
-            std::min(most, (uint32_t(trace->bundles * std::min(2.0, 1.05 * factor)) + 2) & ~1u);
+        wanted = std::min(most, (uint32_t(bundles * std::min(2.0, 1.05 * factor)) + 2) & ~1u);
     }
 
     Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
-    for (size_t side = 0; side < n; ++side)
-        solution.reflected[side] = 0.5f * (reflected[0][side] + reflected[1][side]);
     const float tolerance =
         float(std::clamp(kFinalShare * report.estimatedError, kLeastTolerance, kMostTolerance));
-    solution.irradiance = solver.solve(Half::BOTH, tolerance, solution.reflected);
-    std::vector<bool> hasResult(n);
-    for (size_t side = 0; side < n; ++side) hasResult[side] = weight[side] > 0;
-    const size_t starved =
-        solver.gatherStarvedSides(trace->visibility, kStarvedLines, uint32_t(settings.seed),
-                                  hasResult, solution.reflected, solution.irradiance);
-    if (starved)
-        report.skipped.push_back({"bundles on small patches",
-                                  "too few lines met them: they gathered with local rays",
-                                  starved});
+    Irradiance irradiance = transport.finish(tolerance, wantedSides, report);
     progress.report(RB_STAGE_SOLVE, 1);
-    return solution;
+    return irradiance;
 }
 
-// Traces the next bundles of the sequence and merges their lines into the counts.
-void Bake::traceBundles(uint32_t count, Report& report) {
-    Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
-    // A cancel or failure on the way drops the trace: its number of bundles would no longer be
-    // known.
-    std::unique_ptr<Trace> target = std::move(trace);
-    const Patches& patches = target->patches;
-    const float touchDistance =
-        std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.size);
-    const std::vector<Bundle> sequence =
-        bundles(settings.directionKind(), uint32_t(settings.seed), target->bundles, count);
-
-    tbb::enumerable_thread_specific<FragmentLists> projectors(
-        [&] { return FragmentLists(patches, target->pixelSize, touchDistance); });
-    using Lines = std::array<std::vector<BundleLines>, 2>;
-    Lines lines;
-    size_t bytes = 0;
-    const size_t step = 4 * size_t(std::max(1, tbb::this_task_arena::max_concurrency()));
-    for (size_t from = 0; from < sequence.size(); from += step) {
-        progress.report(RB_STAGE_BUNDLES, double(from) / double(sequence.size()));
-        const size_t to = std::min(from + step, sequence.size());
-        std::vector<BundleLines> traced(to - from);
-        tbb::parallel_for(
-            from, to, [&](size_t k) { projectors.local().project(sequence[k], traced[k - from]); });
-        for (size_t k = from; k < to; ++k) {
-            bytes += traced[k - from].byteCount();
-            lines[sequence[k].half].push_back(std::move(traced[k - from]));
-        }
-        if (bytes > kMergeBytes || to == sequence.size()) {
-            target->counts.add(lines);
-            lines = Lines();
-            bytes = 0;
-        }
-    }
-    target->bundles += count;
-    trace = std::move(target);
-    progress.report(RB_STAGE_BUNDLES, 1);
-}
-
-// Compares the power that the lights emit with what surfaces absorb and what leaves the scene.
-void Bake::balanceEnergy(const FirstShot& shot, const Solution& solution, const Scene& scene,
-                         Report& report) const {
-    const Patches& patches = trace->patches;
-    const LineCounts& counts = trace->counts;
-    const glm::vec3 worldExitance = glm::pi<float>() * scene.worldRadiance;
-    const std::vector<float> share = counts.exposedShare();
-    const std::vector<double> exposed(share.begin(), share.end());
-    glm::dvec3 emitted = shot.emitted, absorbed(0.0), escaped = shot.escaped;
-    for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const glm::vec3 total =
-            solution.irradiance.direct[side] + solution.irradiance.indirect[side];
-        emitted += exposed[side] * power(patches, side, shot.emission[side]);
-        absorbed +=
-            exposed[side] * power(patches, side, (1.0f - patches.reflectance[side]) * total);
-        const float m = float(counts.total[side][0] + counts.total[side][1]);
-        if (m == 0) continue;
-        const float open = float(counts.sky[side][0] + counts.sky[side][1]) / m;
-        emitted += exposed[side] * power(patches, side, open * worldExitance);
-        escaped +=
-            exposed[side] *
-            power(patches, side, open * (shot.emission[side] + patches.reflectance[side] * total));
-    }
-    report.emitted = sum(emitted);
-    report.absorbed = sum(absorbed);
-    report.escaped = sum(escaped);
-}
+const Patches& Bake::patches() const { return trace->patches; }
 
 const InstanceLight& Bake::instanceLight(int32_t instance) const {
     if (!ran) throw Error(RB_ERROR_INVALID_OPERATION, "there is no result before a bake");

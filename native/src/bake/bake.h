@@ -16,7 +16,7 @@
 #include "reconstruction/instance_light.h"
 #include "scene/scene.h"
 #include "transport/first_shot.h"
-#include "transport/line_reuse.h"
+#include "transport/transport.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
@@ -37,21 +37,22 @@ class Bake {
     bool hasRun() const { return ran; }
     const std::string& reportJson() const { return json; }
 
+    // Patches of the last run and the light on them, for comparison of methods. Only after a run.
+    const Patches& patches() const;
+    const Irradiance& patchIrradiance() const { return irradiance; }
+
     // The result of an instance with role BAKE; throws Error if there is none.
     const InstanceLight& instanceLight(int32_t instance) const;
 
   private:
     struct Trace;
-    struct Solution;
-
     void runStages(const Scene& scene);
     void makePatches(const Scene& scene, Report& report);
-    Solution solveToTarget(const Scene& scene, const FirstShot& shot, Report& report);
-    void traceBundles(uint32_t count, Report& report);
-    void balanceEnergy(const FirstShot& shot, const Solution& solution, const Scene& scene,
-                       Report& report) const;
+    Irradiance solveToTarget(const Scene& scene, const FirstShot& shot, Transport& transport,
+                             Report& report);
 
     std::unique_ptr<Trace> trace;  // of the last run's geometry
+    Irradiance irradiance;
     std::vector<InstanceLight> light;
     std::string json;
     bool ran = false;

@@ -54,10 +54,11 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
         hasher.add(&instance.transform, sizeof(instance.transform));
     }
     hasher.add(&settings.patchSize, sizeof(float));
-    for (int value : {settings.maxPatches, settings.linesPerBundle, settings.seed})
+    for (int value :
+         {settings.maxPatches, settings.linesPerBundle, settings.seed, settings.planeCount})
         hasher.add(&value, sizeof(value));
-    for (const std::string* name :
-         {&settings.directions, &settings.projector, &settings.smallPatches})
+    for (const std::string* name : {&settings.solver, &settings.directions, &settings.projector,
+                                    &settings.smallPatches, &settings.planePlacement})
         hasher.add(name->data(), name->size());
     return hasher.value();
 }

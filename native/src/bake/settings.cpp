@@ -25,6 +25,9 @@ const std::vector<Number<int>>& integers() {
         {"lines_per_bundle", &Settings::linesPerBundle, 0, 1 << 26},
         {"seed", &Settings::seed, 0, INT32_MAX},
         {"threads", &Settings::threads, 0, 1024},
+        {"plane_count", &Settings::planeCount, 1, 64},
+        {"thesis_literal", &Settings::thesisLiteral, 0, 1},
+        {"local_rays", &Settings::localRays, 0, INT32_MAX},
     };
     return table;
 }
@@ -47,12 +50,20 @@ struct Choice {
 
 const std::vector<Choice>& choices() {
     static const std::vector<Choice> table = {
-        {"solver", &Settings::solver, {"LINE_REUSE"}},
-        {"first_shot", &Settings::firstShot, {"GATHER"}},
-        {"directions", &Settings::directions, {"LOW_DISCREPANCY", "RANDOM"}},
-        {"projector", &Settings::projector, {"AUTO", "FRAGMENT_LISTS"}},
-        {"small_patches", &Settings::smallPatches, {"CENTRE_SAMPLING"}},
+        {"solver",
+         &Settings::solver,
+         {"LINE_REUSE", "MULTIPATH", "STOCHASTIC_ITERATION", "RANDOM_WALK"}},
+        {"first_shot", &Settings::firstShot, {"GATHER", "SHOOT", "EXTENDED"}},
+        {"directions", &Settings::directions, {"LOW_DISCREPANCY", "RANDOM", "ADAPTIVE"}},
+        {"projector",
+         &Settings::projector,
+         {"AUTO", "FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL", "PLANE", "PLANES"}},
+        {"small_patches", &Settings::smallPatches, {"CENTRE_SAMPLING", "ROULETTE"}},
         {"reconstruction", &Settings::reconstruction, {"LEAST_SQUARES", "POINT"}},
+        {"plane_placement",
+         &Settings::planePlacement,
+         {"SYSTEMATIC", "STRATIFIED", "CLOSE_DISTANCE"}},
+        {"estimator", &Settings::estimator, {"COLLISION", "SURVIVAL", "ABSORPTION"}},
     };
     return table;
 }
@@ -77,6 +88,12 @@ void setNumber(Settings& settings, const std::vector<Number<T>>& table, const st
 }
 
 }  // namespace
+
+PlanePlacement Settings::planePlacementKind() const {
+    if (planePlacement == "STRATIFIED") return PlanePlacement::STRATIFIED;
+    if (planePlacement == "CLOSE_DISTANCE") return PlanePlacement::CLOSE_DISTANCE;
+    return PlanePlacement::SYSTEMATIC;
+}
 
 void Settings::set(const std::string& name, int value) {
     setNumber(*this, integers(), name, value);

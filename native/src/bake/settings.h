@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "bundles/directions.h"
+#include "bundles/projector.h"
 
 namespace raybundle {
 
@@ -26,6 +26,11 @@ struct Settings {
     std::string projector = "AUTO";
     std::string smallPatches = "CENTRE_SAMPLING";
     std::string reconstruction = "LEAST_SQUARES";
+    int planeCount = 4;  // of the projector PLANES
+    std::string planePlacement = "SYSTEMATIC";
+    int localRays = 0;                    // of a first shot that shoots; 0 = to targetError
+    std::string estimator = "COLLISION";  // of RANDOM_WALK
+    int thesisLiteral = 0;  // 1: MULTIPATH as the thesis' pseudo-code says, for comparison
 
     // Throw Error(INVALID_ARGUMENT) for unknown names, other types, and values out of range.
     void set(const std::string& name, int value);
@@ -35,8 +40,14 @@ struct Settings {
     void get(const std::string& name, float& value) const;
     const std::string& get(const std::string& name) const;
 
-    DirectionKind directionKind() const {
-        return directions == "RANDOM" ? DirectionKind::RANDOM : DirectionKind::LOW_DISCREPANCY;
+    SmallPatches smallPatchesKind() const {
+        return smallPatches == "ROULETTE" ? SmallPatches::ROULETTE : SmallPatches::CENTRE_SAMPLING;
+    }
+    PlanePlacement planePlacementKind() const;
+    // Whether the projector sees all surfaces along a line.
+    bool isProjectionExact() const {
+        return (projector == "AUTO" || projector == "FRAGMENT_LISTS") &&
+               smallPatches == "CENTRE_SAMPLING" && linesPerBundle != 1;
     }
 };
 

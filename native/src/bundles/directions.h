@@ -1,36 +1,82 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Directions of bundles. Sources: thesis sections 4.2.1 (uniform random) and 7.3.1 (quasi-Monte
-// Carlo); the low-discrepancy sequence is R2 (Roberts, "The Unreasonable Effectiveness of
-// Quasirandom Sequences", 2018).
-// Differs:
-// - The sequence covers a hemisphere, since a line serves both ways, and is turned by a random
-//   rotation: each direction is then uniform, so any number of bundles is unbiased, and two
-//   independent halves give an error estimate.
-// - Spherical Fibonacci sets (Marques et al., 2013) are better for one fixed number of bundles. As
-//   a union of sets made while the number doubles they are not: on cornell_box (3 seeds) the noise
-//   of 64, 128, 256, 512 bundles was 3.5, 2.4, 1.6, 1.04 % against 4.8, 2.4, 1.6, 0.94 % for R2,
-//   which also serves any number in between.
+// Directions of bundles. Each kind is a DirectionSequence in a file of its own and a row of the
+// table in directions.cpp; what all have in common (two independent halves, roll, shift) is here.
+//
+// Sources: thesis sections 4.2.1 (uniform random), 4.5 (adaptive) and 7.3.1 (quasi-Monte Carlo).
+// Differs: a sequence covers a hemisphere, since a line serves both ways.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
+#include <random>
+#include <string>
 #include <vector>
 
 namespace raybundle {
-
-enum class DirectionKind { LOW_DISCREPANCY, RANDOM };
 
 // One bundle: all lines along `direction`. The orthonormal frame (right, up, direction) carries the
 // random roll; shift in [0, 1)^2 moves the pixel grid, in pixels.
 struct Bundle {
     glm::dvec3 right, up, direction;
     glm::dvec2 shift;
-    uint32_t half;  // 0 or 1: of the two independent sets, for the error estimate
+    uint32_t half;      // 0 or 1: of the two independent sets, for the error estimate
+    uint32_t index;     // in the half's sequence
+    double weight = 1;  // uniform density of directions over that of the sequence
 };
 
-// The bundles first .. first + count - 1 of an endless sequence given by the seed; first and count
-// are even, and half of the bundles belong to each half.
-std::vector<Bundle> bundles(DirectionKind kind, uint32_t seed, uint32_t first, uint32_t count);
+// A direction with its weight (see Bundle).
+struct Direction {
+    glm::dvec3 direction;
+    double weight = 1;
+};
+
+// The directions of one half.
+class DirectionSequence {
+  public:
+    virtual ~DirectionSequence() = default;
+
+    // Direction `index` on the hemisphere; `random` is for this direction alone.
+    virtual Direction at(uint32_t index, std::mt19937_64& random) = 0;
+
+    // Tells how much power the bundle along a direction transported, W. Not called by transports
+    // that transport nothing while they trace.
+    virtual void learn(const glm::dvec3& /*direction*/, double /*power*/) {}
+};
+
+// Uniform in [0, 1), alike on every platform (std::uniform_real_distribution is not).
+double uniform(std::mt19937_64& random);
+// From [0, 1)^2 to the upper hemisphere, by area.
+glm::dvec3 onHemisphere(double u, double v);
+// Shoemake, "Uniform Random Rotations" (Graphics Gems III, 1992).
+glm::dmat3 randomRotation(std::mt19937_64& random);
+
+// The sequences, one a row of the table; `random` is for the whole half.
+std::unique_ptr<DirectionSequence> lowDiscrepancyDirections(std::mt19937_64& random);
+std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64& random);
+
+// The bundles of an endless sequence given by kind (a name of the table) and seed.
+class Directions {
+  public:
+    Directions(const std::string& kind, uint32_t seed, uint32_t first = 0);
+
+    // The next `count` bundles: count is even and half of them belong to each half, those of the
+    // first coming first.
+    std::vector<Bundle> next(uint32_t count);
+
+    void learn(const Bundle& bundle, double power) {
+        sequences[bundle.half]->learn(bundle.direction, power);
+    }
+
+    // Names of the table.
+    static std::vector<std::string> kinds();
+
+  private:
+    const uint32_t seed;
+    uint32_t done;  // bundles of both halves
+    std::array<std::unique_ptr<DirectionSequence>, 2> sequences;
+};
 
 }  // namespace raybundle

@@ -47,22 +47,19 @@ std::vector<float> LineCounts::exposedShare() const {
     return share;
 }
 
-void LineCounts::add(const std::array<std::vector<BundleLines>, 2>& added) {
+void LineCounts::add(const std::vector<TracedBundle>& bundles) {
     const size_t n = sideCount();
-    std::vector<std::pair<const BundleLines*, uint32_t>> bundles;  // and their half
-    for (uint32_t half = 0; half < 2; ++half)
-        for (const BundleLines& bundle : added[half]) {
-            bundles.emplace_back(&bundle, half);
-            for (uint32_t side : bundle.sky) ++sky[side][half];
-            for (uint32_t side : bundle.touching) ++touching[side];
-            lines += bundle.lines;
-        }
+    for (const TracedBundle& traced : bundles) {
+        for (uint32_t side : traced.lines.sky) ++sky[side][traced.bundle.half];
+        for (uint32_t side : traced.lines.touching) ++touching[side];
+    }
+    this->bundles += uint32_t(bundles.size());
 
     // Sort the directed exchanges by block, stably in the order of the bundles.
     const size_t blocks = (n >> kBlockBits) + 1;
     std::vector<std::vector<size_t>> places(bundles.size(), std::vector<size_t>(blocks, 0));
     tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
-        for (const Exchange& e : bundles[b].first->exchanges) {
+        for (const Exchange& e : bundles[b].lines.exchanges) {
             ++places[b][e.i >> kBlockBits];
             ++places[b][e.j >> kBlockBits];
         }
@@ -81,13 +78,13 @@ void LineCounts::add(const std::array<std::vector<BundleLines>, 2>& added) {
     const auto keys = uninitialised<uint64_t>(place);
     const auto rowOf = uninitialised<uint8_t>(place);  // within the block
     tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
-        const uint64_t half = uint64_t(bundles[b].second) << 31;
+        const uint64_t half = uint64_t(bundles[b].bundle.half) << 31;
         auto put = [&](uint32_t row, uint32_t partner, uint32_t count) {
             const size_t at = places[b][row >> kBlockBits]++;
             keys[at] = uint64_t(partner) << 32 | half | count;
             rowOf[at] = uint8_t(row & ((1u << kBlockBits) - 1));
         };
-        for (const Exchange& e : bundles[b].first->exchanges) {
+        for (const Exchange& e : bundles[b].lines.exchanges) {
             put(e.i, e.j, e.lines);
             put(e.j, e.i, e.lines);
         }

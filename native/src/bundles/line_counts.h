@@ -15,7 +15,7 @@
 #include <memory>
 #include <vector>
 
-#include "bundles/fragment_lists.h"
+#include "bundles/bundle_tracer.h"
 
 namespace raybundle {
 
@@ -28,8 +28,8 @@ class LineCounts {
   public:
     explicit LineCounts(size_t sideCount);
 
-    // Adds the lines of some bundles; lines[h] belong to half h.
-    void add(const std::array<std::vector<BundleLines>, 2>& lines);
+    // Adds the lines of some bundles.
+    void add(const std::vector<TracedBundle>& traced);
 
     size_t sideCount() const { return sky.size(); }
     // Merged pairs i < j.
@@ -47,7 +47,7 @@ class LineCounts {
     std::vector<std::array<uint32_t, 2>> sky;    // per side and half: lines that leave the scene
     std::vector<std::array<uint32_t, 2>> total;  // per side and half: m_i
     std::vector<uint32_t> touching;              // per side: lines that end where it is covered
-    uint64_t lines = 0;                          // that met the scene
+    uint32_t bundles = 0;                        // whose lines are in
 
   private:
     std::vector<size_t> rows;  // per side, into entries; one more at the end

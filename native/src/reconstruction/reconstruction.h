@@ -20,7 +20,7 @@
 #include "reconstruction/instance_light.h"
 #include "scene/scene.h"
 #include "transport/direct_light.h"
-#include "transport/line_reuse.h"
+#include "transport/transport.h"
 
 namespace raybundle {
 

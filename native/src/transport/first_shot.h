@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// GATHER: the first shot, seen from the receivers: every patch side gathers the light of the
-// sources.
+// The first shot: the light of the sources, distributed once before any bundle. Each kind is a file
+// of its own and a row of the table in first_shot.cpp.
 //
-// Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error).
-// Differs: the thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer
-// it is. Gathering spends its rays where the light is to be known (transport/direct_light.h).
+// Sources: thesis sections 2.4.2, 3 and 4.3.3.
 #pragma once
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <string>
 #include <vector>
 
 #include "bake/progress.h"
+#include "bake/settings.h"
 #include "patches/patches.h"
 #include "transport/direct_light.h"
 
 namespace raybundle {
 
 struct FirstShot {
-    std::vector<glm::vec3> irradiance;  // per side, gathered from the sources, W/m^2
-    std::vector<float> error;           // per side, standard error of the irradiance, W/m^2
-    std::vector<glm::vec3> emission;    // per side: emission that the bundles are to carry, W/m^2
+    std::vector<glm::vec3> irradiance;  // per side, mean over it, from the sources, W/m^2
+    // Where the first shot went on with reflected light: irradiance from it, and the reflected
+    // exitance that is left to the transport, per side, W/m^2; else both are empty.
+    std::vector<glm::vec3> indirect, unshot;
+    std::vector<float> error;         // per side, standard error of all irradiance, W/m^2
+    std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2
     glm::dvec3 emitted{0.0};  // power of the gathered sources, W; without a power: what arrives
     glm::dvec3 escaped{0.0};  // part of it that meets no surface, W
     uint64_t rays = 0;
@@ -29,8 +32,19 @@ struct FirstShot {
     uint64_t hiddenSides = 0;     // side and source pairs that cannot see each other, without a ray
 };
 
-// Gathers direct light to about `targetError` relative standard error per patch side.
-FirstShot gatherFirstShot(const DirectLight& light, const Patches& patches, float targetError,
-                          const Progress& progress);
+// What first shots are made of. References must outlive them.
+struct FirstShotInput {
+    const DirectLight& light;
+    const Patches& patches;
+    const Visibility& visibility;
+    const Settings& settings;  // targetError: relative standard error to reach
+    const Progress& progress;
+};
+
+// The first shots, one a row of the table.
+FirstShot gather(const FirstShotInput& input);
+
+// A first shot by the name of its row.
+FirstShot firstShot(const std::string& kind, const FirstShotInput& input);
 
 }  // namespace raybundle

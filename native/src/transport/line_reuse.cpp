@@ -94,28 +94,21 @@ glm::dvec3 ratio(const glm::dvec3& a, const glm::dvec3& b) {
 
 }  // namespace
 
-LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const Field& gathered,
-                     const Field& emission, const glm::vec3& worldRadiance)
+LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
+                     const glm::vec3& worldRadiance, const std::vector<float>& exposed)
     : patches(patches),
       counts(counts),
-      gathered(gathered),
-      emission(emission),
+      shot(shot),
       worldRadiance(worldRadiance),
-      hasEmission(std::any_of(emission.begin(), emission.end(),
+      exposed(exposed),
+      hasEmission(std::any_of(shot.emission.begin(), shot.emission.end(),
                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
-
-glm::vec3 LineReuse::throughExposed(size_t side) const {
-    const float open = float(counts.total[side][0] + counts.total[side][1]);
-    const float touching = float(counts.touching[side]);
-    if (touching == 0) return gathered[side];
-    return open > 0 ? gathered[side] * (1 + touching / open) : glm::vec3(0.0f);
-}
 
 std::vector<float> LineReuse::lineWeights(Half half) const {
     const size_t n = counts.sideCount();
     std::vector<float> x(n, 1.0f);
     if (half != Half::BOTH) return x;
-    const std::vector<float> exposed = counts.exposedShare();
+    const std::vector<float> exposed = exposedShare();
     double lines = 0, area = 0;
     for (size_t i = 0; i < n; ++i) {
         lines += linesOf(counts.total[i], half);
@@ -138,6 +131,7 @@ std::vector<float> LineReuse::lineWeights(Half half) const {
 Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const {
     const size_t n = counts.sideCount();
     Irradiance result(n);
+    const HandOver first = handOver(patches, shot, exposedShare());
     const std::vector<float> x = lineWeights(half);
     std::vector<float> m(n);  // weighted lines of each side
     PaddedField scaled(n);    // what the matrix multiplies next
@@ -151,9 +145,9 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
 
     // Direct light.
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
-    forEachSide(n, [&](size_t i) { scaled[i] = Padded(x[i] * emission[i]); });
+    forEachSide(n, [&](size_t i) { scaled[i] = Padded(x[i] * shot.emission[i]); });
     forEachSide(n, [&](size_t i) {
-        result.gathered[i] = result.direct[i] = throughExposed(i);
+        result.gathered[i] = result.direct[i] = first.gathered[i];
         if (m[i] == 0) return;
         glm::vec3 sum = float(linesOf(counts.sky[i], half)) * worldExitance;
         if (hasEmission) sum += rowTimes(counts, half, i, scaled);
@@ -166,7 +160,10 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
         scale[i] = m[i] > 0 ? glm::sqrt(patches.reflectance[i] / m[i]) : glm::vec3(0.0f);
         lineScale[i] = x[i] * scale[i];
         for (int c = 0; c < 3; ++c) z[i][c] = scale[i][c] > 0 ? reflected[i][c] / scale[i][c] : 0;
-        product[i] = scale[i] * m[i] * result.direct[i];  // the right-hand side, until the loop
+        // The right-hand side, until the loop: unshot and what the lines brought, over the scale.
+        const glm::vec3 unshot = patches.reflectance[i] * (result.direct[i] - first.gathered[i]);
+        for (int c = 0; c < 3; ++c)
+            product[i][c] = scale[i][c] > 0 ? (first.unshot[i][c] + unshot[c]) / scale[i][c] : 0;
         scaled[i] = Padded(lineScale[i] * z[i]);
     });
     const glm::dvec3 enough = dot(product, product) * double(tolerance) * double(tolerance);
@@ -200,8 +197,8 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
         scaled[i] = Padded(x[i] * reflected[i]);
     });
     forEachSide(n, [&](size_t i) {
-        result.indirect[i] =
-            m[i] > 0 ? x[i] * rowTimes(counts, half, i, scaled) / m[i] : glm::vec3(0.0f);
+        result.indirect[i] = first.indirect[i];
+        if (m[i] > 0) result.indirect[i] += x[i] * rowTimes(counts, half, i, scaled) / m[i];
     });
     return result;
 }
@@ -231,6 +228,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
     // cosine-distributed too: weigh all alike.
     constexpr uint32_t kNone = UINT32_MAX;
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
+    const HandOver shotLight = handOver(patches, shot, exposedShare());
     std::vector<uint32_t> hits;
     Field fromLines;  // indirect irradiance times the lines
     for (size_t first = 0; first < starved.size();) {
@@ -246,13 +244,13 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
                 const auto hit = visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}),
                                                      cosineDirection(normal, {u.z, u.w}));
                 if (hit) hits[k * rays + i] = *hit;
-                direct += hit ? emission[*hit] : worldExitance;
+                direct += hit ? shot.emission[*hit] : worldExitance;
             }
             const float m = linesAt(side);
-            const glm::vec3 fromSources = throughExposed(side);
+            const glm::vec3 fromSources = shotLight.gathered[side];
             const glm::vec3 lineDirect = irradiance.direct[side] - fromSources;
             irradiance.direct[side] = fromSources + (m * lineDirect + direct) / (m + float(rays));
-            fromLines[k] = m * irradiance.indirect[side];
+            fromLines[k] = m * (irradiance.indirect[side] - shotLight.indirect[side]);
         });
         for (size_t k = first * rays; k < last * rays; ++k)
             if (hits[k] != kNone && isOther[hits[k]]) {
@@ -270,9 +268,11 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
             glm::vec3 sum = fromLines[k];
             for (size_t i = 0; i < rays; ++i)
                 if (const uint32_t hit = hits[k * rays + i]; hit != kNone) sum += known[hit];
-            irradiance.indirect[side] = sum / (linesAt(side) + float(rays));
-            next[k] =
-                patches.reflectance[side] * (irradiance.direct[side] + irradiance.indirect[side]);
+            const glm::vec3 arriving = sum / (linesAt(side) + float(rays));
+            irradiance.indirect[side] = shotLight.indirect[side] + arriving;
+            next[k] = shotLight.unshot[side] +
+                      patches.reflectance[side] *
+                          (irradiance.direct[side] - shotLight.gathered[side] + arriving);
         });
         glm::vec3 change(0.0f), most(0.0f);
         for (size_t k = 0; k < starved.size(); ++k) {

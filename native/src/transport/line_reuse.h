@@ -5,6 +5,9 @@
 //   H_i = direct_i + (1 / m_i) sum_j c_ij R_j,   R_i = rho_i H_i   (reflected exitance)
 //   direct_i = gathered_i + (sum_j c_ij E_j + sky_i pi L_world) / m_i
 //
+// and where the first shot has already distributed some of the light that it reflected, R_i =
+// unshot_i + rho_i (H_i - first shot's H_i).
+//
 // With s_i = sqrt(rho_i / m_i) and R_i = s_i z_i it becomes (I - S C S) z = S M direct, symmetric
 // and positive definite, unit diagonal, solved by conjugate gradients for the three channels at
 // once.
@@ -25,33 +28,27 @@
 
 #include "bundles/line_counts.h"
 #include "patches/patches.h"
+#include "transport/first_shot.h"
+#include "transport/transport.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
 
-// Irradiance per side, W/m^2, in two parts.
-struct Irradiance {
-    explicit Irradiance(size_t sides = 0) : direct(sides), gathered(sides), indirect(sides) {}
-
-    std::vector<glm::vec3> direct;    // straight from sources, emission and world
-    std::vector<glm::vec3> gathered;  // part of it: from the sources of the first shot
-    std::vector<glm::vec3> indirect;  // after one reflection or more
-};
-
-// Which bundles a solve looks at.
-enum class Half { FIRST = 0, SECOND = 1, BOTH = 2 };
-
 class LineReuse {
   public:
-    // gathered: direct irradiance of the first shot; emission: what the bundles carry; both per
-    // side, W/m^2. All references must outlive the object.
-    LineReuse(const Patches& patches, const LineCounts& counts,
-              const std::vector<glm::vec3>& gathered, const std::vector<glm::vec3>& emission,
-              const glm::vec3& worldRadiance);
+    // exposed: per side, the share of it that nothing covers; empty: as the counts have it. All
+    // references must outlive the object.
+    LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
+              const glm::vec3& worldRadiance, const std::vector<float>& exposed);
 
     // Solves until the residual is below `tolerance` of the right-hand side in every channel.
     // `reflected` (R, per side, W/m^2) holds the first guess and takes the solution.
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const;
+
+    // The share of each side that nothing covers.
+    std::vector<float> exposedShare() const {
+        return exposed.empty() ? counts.exposedShare() : exposed;
+    }
 
     // The factors x_i of the lines of each side in a solve: 1 for a half, balanced for both.
     std::vector<float> lineWeights(Half half) const;
@@ -65,15 +62,11 @@ class LineReuse {
                               Irradiance& irradiance) const;
 
   private:
-    // What the first shot gathered over the whole patch came in through its exposed part: the
-    // irradiance there, W/m^2.
-    glm::vec3 throughExposed(size_t side) const;
-
     const Patches& patches;
     const LineCounts& counts;
-    const std::vector<glm::vec3>& gathered;
-    const std::vector<glm::vec3>& emission;
+    const FirstShot& shot;
     const glm::vec3 worldRadiance;
+    const std::vector<float>& exposed;
     bool hasEmission = false;
 };
 

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bundles/bundle_tracer.h"
+
+#include <tbb/parallel_for.h>
+
+namespace raybundle {
+
+namespace {
+constexpr uint32_t kExposureBundles = 32;
+}
+
+BundleTracer::BundleTracer(const std::string& projector, const ProjectorInput& input,
+                           const std::string& directions, uint32_t seed)
+    : pixelArea(double(input.pixelSize) * double(input.pixelSize)),
+      directions(directions, seed),
+      projectors([projector, input] { return makeProjector(projector, input); }) {}
+
+std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
+    const std::vector<Bundle> sequence = directions.next(count);
+    std::vector<TracedBundle> traced(sequence.size());
+    tbb::parallel_for(size_t(0), sequence.size(), [&](size_t k) {
+        traced[k].bundle = sequence[k];
+        projectors.local()->project(sequence[k], traced[k].lines);
+    });
+    bundles += count;
+    for (const TracedBundle& t : traced) {
+        lines += t.lines.lines;
+        for (const Exchange& e : t.lines.exchanges) exchanges += e.lines;
+        disordered += t.lines.disordered;
+        cycles += t.lines.cycles;
+    }
+    return traced;
+}
+
+std::vector<float> exposedShare(const ProjectorInput& input, uint32_t seed) {
+    BundleTracer tracer("FRAGMENT_LISTS", input, "LOW_DISCREPANCY", seed);
+    std::vector<uint32_t> open(input.patches.sideCount(), 0), touching(open);
+    for (const TracedBundle& traced : tracer.trace(kExposureBundles)) {
+        for (const Exchange& e : traced.lines.exchanges) {
+            open[e.i] += e.lines;
+            open[e.j] += e.lines;
+        }
+        for (uint32_t side : traced.lines.sky) ++open[side];
+        for (uint32_t side : traced.lines.touching) ++touching[side];
+    }
+    std::vector<float> share(open.size(), 1.0f);
+    for (size_t i = 0; i < share.size(); ++i)
+        if (touching[i] > 0) share[i] = float(open[i]) / (float(open[i]) + float(touching[i]));
+    return share;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Bundles, traced: the directions of a bake and the projector that finds their exchanges.
+#pragma once
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bundles/directions.h"
+#include "bundles/projector.h"
+
+namespace raybundle {
+
+struct TracedBundle {
+    Bundle bundle;
+    BundleLines lines;
+};
+
+class BundleTracer {
+  public:
+    // projector, directions: names of their tables. What `input` refers to must outlive it.
+    BundleTracer(const std::string& projector, const ProjectorInput& input,
+                 const std::string& directions, uint32_t seed);
+
+    // Traces the next `count` bundles (even; see Directions::next) in parallel.
+    std::vector<TracedBundle> trace(uint32_t count);
+
+    // Tells the directions how much power a bundle transported, W.
+    void learn(const Bundle& bundle, double power) { directions.learn(bundle, power); }
+
+    uint32_t bundleCount() const { return bundles; }
+    uint64_t lineCount() const { return lines; }  // that met the scene
+    // The share of all exchanges that join sides in a wrong order of depth (painters).
+    double disorderedShare() const {
+        return exchanges > 0 ? double(disordered) / double(exchanges) : 0;
+    }
+    uint64_t cycleCount() const { return cycles; }
+
+    // Power per area and unit of exitance that one line carries each way is 2 * pixelArea / bundles
+    // of all: the cross-section of the scene that a line stands for, m^2.
+    double pixelArea;
+
+  private:
+    Directions directions;
+    tbb::enumerable_thread_specific<std::unique_ptr<Projector>> projectors;
+    uint32_t bundles = 0;
+    uint64_t lines = 0, exchanges = 0, disordered = 0, cycles = 0;  // exchanges: line by line
+};
+
+// The share of each side, 0 to 1, that does not lie against another surface (1 where no line came
+// by), by lines of exact projection.
+std::vector<float> exposedShare(const ProjectorInput& input, uint32_t seed);
+
+}  // namespace raybundle

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What turns a bundle into exchanges. Each projector is a file of its own and a row of the table in
+// projector.cpp; their inner loops are their own, and only whole bundles go through this interface.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bundles/directions.h"
+#include "patches/patches.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// Two patch sides that face each other along `lines` lines of a bundle.
+struct Exchange {
+    uint32_t i, j;
+    uint32_t lines;
+};
+
+// What one bundle gives. Numbers of lines are integers also where a projector finds an exchange
+// only with some probability p: it stands for 1 / p lines, rounded up or down at random without
+// bias.
+struct BundleLines {
+    std::vector<Exchange> exchanges;  // equal pairs may occur several times
+    std::vector<uint32_t> sky;        // sides from which a line leaves the scene, once per line
+    std::vector<uint32_t>
+        touching;             // sides that lie against another one, once per line; no exchange
+    uint64_t lines = 0;       // that meet the scene
+    uint64_t disordered = 0;  // exchanges between sides whose order in depth is wrong (painters)
+    uint64_t cycles = 0;      // of patches that cover each other, broken anywhere (Newell)
+
+    size_t byteCount() const {
+        return exchanges.size() * sizeof(Exchange) +
+               (sky.size() + touching.size()) * sizeof(uint32_t);
+    }
+};
+
+class Projector {
+  public:
+    virtual ~Projector() = default;
+
+    // Projects the scene along a bundle and appends its lines to `out`.
+    virtual void project(const Bundle& bundle, BundleLines& out) = 0;
+};
+
+enum class SmallPatches { CENTRE_SAMPLING, ROULETTE };
+enum class PlanePlacement { STRATIFIED, SYSTEMATIC, CLOSE_DISTANCE };
+
+// What projectors are made of. References must outlive them.
+struct ProjectorInput {
+    const Patches& patches;
+    const Visibility& visibility;
+    float pixelSize;      // edge of a pixel in metres, the same for every bundle
+    float touchDistance;  // surfaces not further apart touch, metres
+    SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING;
+    int planeCount = 4;  // of PLANES
+    PlanePlacement planePlacement = PlanePlacement::SYSTEMATIC;
+};
+
+// The projectors, one a row of the table.
+std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input);
+
+// A projector by the name of its row. One object per thread: it keeps its memory from bundle to
+// bundle.
+std::unique_ptr<Projector> makeProjector(const std::string& kind, const ProjectorInput& input);
+
+}  // namespace raybundle

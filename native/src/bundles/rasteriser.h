@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The scene on the transillumination plane of a bundle, fragment by fragment.
+//
+// CENTRE_SAMPLING: pixels are sampled at their centres with half-open edges, on a grid with a random
+// shift: the expected number of lines of a patch is its projected area over the pixel's, for every
+// shape and size, and neighbouring faces never both take or both miss a pixel.
+//
+// Differs from the thesis (section 4.2): whole parents are rasterised; the patch follows from the
+// affine coordinates.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <vector>
+
+#include "bundles/projector.h"
+#include "patches/patches.h"
+
+namespace raybundle {
+
+class Rasteriser {
+  public:
+    // pixelSize: edge of a pixel in metres. `patches` must outlive it. Keeps its memory from bundle
+    // to bundle.
+    Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches);
+
+    // Turns to a bundle: places the window around the projected scene.
+    void begin(const Bundle& bundle);
+
+    // Calls visit(pixel, depth in metres, side that faces against the direction) for all fragments
+    // of the scene, parent after parent.
+    template <class Visit>
+    void forEachFragment(const Visit& visit) {
+        for (const Parent& parent : patches.parents) sampleParent(parent, visit);
+    }
+
+    // The window, pixels; a pixel's index is y * width + x.
+    size_t pixelCount() const { return size_t(width) * size_t(height); }
+    const glm::dvec3& direction() const { return frame.direction; }
+    // Depths along the direction that hold the scene, metres.
+    double depthLow() const { return lowest; }
+    double depthHigh() const { return highest; }
+
+  private:
+    template <class Visit>
+    void sampleParent(const Parent& parent, const Visit& visit);
+
+    const Patches& patches;
+    const float pixelSize;
+    const SmallPatches smallPatches;
+
+    Bundle frame{};                           // the bundle in hand
+    glm::dvec2 corner{0.0};                   // of the window, pixels
+    int width = 0, height = 0;                // of the window, pixels
+    double lowest = 0, highest = 0;           // depth, metres
+    std::vector<glm::dvec2> projected;        // per vertex: in the window, pixels
+    std::vector<double> depth;                // per vertex, metres
+    std::vector<double> spanLeft, spanRight;  // per row of a parent, pixels
+};
+
+template <class Visit>
+void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
+    const int sides = parent.isTriangle ? 3 : 4;
+    glm::dvec2 q[4];
+    double yMin = std::numeric_limits<double>::max(), yMax = -yMin;
+    double zMin = std::numeric_limits<double>::max(), zMax = -zMin;
+    for (int k = 0; k < sides; ++k) {
+        q[k] = projected[parent.vertex[k]];
+        yMin = std::min(yMin, q[k].y);
+        yMax = std::max(yMax, q[k].y);
+        zMin = std::min(zMin, depth[parent.vertex[k]]);
+        zMax = std::max(zMax, depth[parent.vertex[k]]);
+    }
+    // Row y belongs to the parent if its centre y + 0.5 lies in [yMin, yMax).
+    const int row0 = int(std::ceil(yMin - 0.5)), row1 = int(std::ceil(yMax - 0.5));
+    if (row0 >= row1) return;
+    const glm::dvec2 ea = q[1] - q[0], eb = q[sides - 1] - q[0];
+    const double det = ea.x * eb.y - ea.y * eb.x;
+    if (det == 0) return;  // seen edge-on
+
+    // Find the span of each row. An edge is evaluated from its lower end whichever way the parent
+    // turns, so that two parents with a common edge find the same crossing to the last bit.
+    spanLeft.resize(size_t(row1 - row0));
+    spanRight.resize(size_t(row1 - row0));
+    for (int k = 0; k < sides; ++k) {
+        glm::dvec2 lower = q[k], upper = q[(k + 1) % sides];
+        const bool rising = lower.y < upper.y;
+        if (!rising) std::swap(lower, upper);
+        const int first = int(std::ceil(lower.y - 0.5)), last = int(std::ceil(upper.y - 0.5));
+        if (first >= last) continue;
+        const double slope = (upper.x - lower.x) / (upper.y - lower.y);
+        std::vector<double>& bound = rising == (det > 0) ? spanRight : spanLeft;
+        for (int y = first; y < last; ++y)
+            bound[size_t(y - row0)] = lower.x + (y + 0.5 - lower.y) * slope;
+    }
+
+    // Affine coordinates at a pixel, and the depth of the parent's plane. The plane is taken in
+    // double from the world's coordinates, so that faces of different objects that coincide have
+    // the same depth.
+    const double inverse = 1 / det;
+    const float dsdx = float(eb.y * inverse), dsdy = float(-eb.x * inverse);
+    const float dtdx = float(-ea.y * inverse), dtdy = float(ea.x * inverse);
+    const glm::dvec3 normal = glm::cross(glm::dvec3(parent.a), glm::dvec3(parent.b));
+    const double slant = glm::dot(normal, frame.direction);
+    if (slant == 0) return;
+    const double dzdx = -glm::dot(normal, frame.right) / slant * double(pixelSize);
+    const double dzdy = -glm::dot(normal, frame.up) / slant * double(pixelSize);
+    const double z0 = glm::dot(normal, glm::dvec3(parent.origin)) / slant +
+                      (corner.x + 0.5) * dzdx + (corner.y + 0.5) * dzdy;
+    // (right, up, direction) is right-handed: det < 0 where the front faces against the direction.
+    const uint32_t facing = det < 0 ? 0 : 1;
+    for (int y = row0; y < row1; ++y) {
+        const double l = spanLeft[size_t(y - row0)], r = spanRight[size_t(y - row0)];
+        const int x0 = std::max(0, int(std::ceil(l - 0.5)));
+        const int x1 = std::min(width, int(std::ceil(r - 0.5)));
+        const float dy = float(y + 0.5 - q[0].y);
+        for (int x = x0; x < x1; ++x) {
+            const float dx = float(x + 0.5 - q[0].x);
+            const float s = dx * dsdx + dy * dsdy, t = dx * dtdx + dy * dtdy;
+            const double z = std::clamp(z0 + x * dzdx + y * dzdy, zMin, zMax);
+            const uint32_t patch = parent.firstPatch + parent.patchAt(s, t);
+            const uint32_t pixel = uint32_t(y) * uint32_t(width) + uint32_t(x);
+            visit(pixel, z, 2 * patch + facing);
+        }
+    }
+}
+
+}  // namespace raybundle

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// GATHER: the first shot, seen from the receivers: every patch side gathers the light of the
+// sources.
+//
+// Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error).
+// Differs: the thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer
+// it is. Gathering spends its rays where the light is to be known (transport/direct_light.h).
+#include <cmath>
+
+#include "transport/first_shot.h"
+
+namespace raybundle {
+
+FirstShot gather(const FirstShotInput& input) {
+    const DirectLight& light = input.light;
+    const Patches& patches = input.patches;
+    const size_t n = patches.sideCount();
+    FirstShot shot;
+    shot.emission = light.bundledEmission();
+    shot.irradiance.resize(n);
+    shot.error.resize(n);
+    const std::vector<Gathered> results = light.gather(
+        n,
+        [&](size_t side) {
+            return Receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
+                            uint32_t(side)};
+        },
+        input.settings.targetError,
+        [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); });
+    for (size_t side = 0; side < n; ++side) {
+        shot.irradiance[side] = results[side].irradiance;
+        shot.emitted += double(patches.area[side / 2]) * glm::dvec3(results[side].unpowered);
+        shot.error[side] = std::sqrt(results[side].variance);
+        shot.rays += results[side].rays;
+        shot.unblockedSides += results[side].unblocked;
+        shot.hiddenSides += results[side].hidden;
+    }
+    for (const auto& source : light.lightSources()) shot.emitted += glm::dvec3(source->power());
+    shot.escaped = light.escapedPower();
+    input.progress.report(RB_STAGE_FIRST_SHOT, 1);
+    return shot;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/transport.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace raybundle {
+namespace {
+
+struct Kind {
+    const char* name;
+    std::unique_ptr<Transport> (*make)(const TransportInput& input);
+};
+
+constexpr Kind kKinds[] = {
+    {"LINE_REUSE", lineReuse},
+};
+
+}  // namespace
+
+HandOver handOver(const Patches& patches, const FirstShot& shot,
+                  const std::vector<float>& exposed) {
+    const size_t n = patches.sideCount();
+    HandOver light{std::vector<glm::vec3>(n), std::vector<glm::vec3>(n), std::vector<glm::vec3>(n)};
+    for (size_t i = 0; i < n; ++i) {
+        // What came to the whole side came in through its exposed part.
+        const float concentrated = exposed[i] > 0 ? 1 / exposed[i] : 0;
+        light.gathered[i] = concentrated * shot.irradiance[i];
+        if (!shot.indirect.empty()) light.indirect[i] = concentrated * shot.indirect[i];
+        light.unshot[i] = shot.unshot.empty() ? patches.reflectance[i] * light.gathered[i]
+                                              : concentrated * shot.unshot[i];
+    }
+    return light;
+}
+
+std::unique_ptr<Transport> makeTransport(const std::string& kind, const TransportInput& input) {
+    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
+                                  [&](const Kind& k) { return kind == k.name; });
+    assert(row != std::end(kKinds) && "settings know the names");
+    return row->make(input);
+}
+
+}  // namespace raybundle

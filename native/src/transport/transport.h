@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What moves light between patch sides after the first shot. Each transport is a file of its own
+// and a row of the table in transport.cpp.
+//
+// A transport runs two independent estimates, one on each half of the bundles; their difference is
+// the stated error, and their mean the result.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bake/progress.h"
+#include "bake/report.h"
+#include "bake/settings.h"
+#include "bundles/bundle_tracer.h"
+#include "bundles/line_counts.h"
+#include "patches/patches.h"
+#include "transport/first_shot.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// Irradiance per side, W/m^2, in two parts.
+struct Irradiance {
+    explicit Irradiance(size_t sides = 0) : direct(sides), gathered(sides), indirect(sides) {}
+
+    std::vector<glm::vec3> direct;    // straight from sources, emission and world
+    std::vector<glm::vec3> gathered;  // part of it: from the sources of the first shot
+    std::vector<glm::vec3> indirect;  // after one reflection or more
+};
+
+// Which bundles an estimate looks at.
+enum class Half { FIRST = 0, SECOND = 1, BOTH = 2 };
+
+// What transports are made of. References must outlive them.
+struct TransportInput {
+    const Patches& patches;
+    const Visibility& visibility;
+    const FirstShot& shot;
+    const glm::vec3 worldRadiance;      // W/(m^2 sr)
+    const std::vector<float>& exposed;  // per side: the share of it that nothing covers
+    const Settings& settings;
+    BundleTracer& tracer;
+    LineCounts& counts;  // of the bundles traced so far; LINE_REUSE alone adds to it
+};
+
+class Transport {
+  public:
+    virtual ~Transport() = default;
+
+    // Does the work of the next `count` bundles (even). Reports the share that is done.
+    virtual void advance(uint32_t count, const Progress& progress) = 0;
+
+    // Bundles whose work is done.
+    virtual uint32_t bundleCount() const = 0;
+
+    // The estimate so far, solved to a relative `tolerance` where there is something to solve.
+    virtual Irradiance irradiance(Half half, float tolerance) = 0;
+
+    // The last estimate of all; sides that are not `wanted` may stay rough.
+    virtual Irradiance finish(float tolerance, const std::vector<bool>& /*wanted*/,
+                              Report& /*report*/) {
+        return irradiance(Half::BOTH, tolerance);
+    }
+
+    // Relative error that both halves have alike, so that their difference does not show it.
+    virtual double bias() const { return 0; }
+
+    // Per side: the share of the lines from it that leave the scene.
+    virtual std::vector<float> openShare() const = 0;
+
+    // No more bundles fit into the settings' memory limit.
+    virtual bool isFull() const { return false; }
+};
+
+// The first shot's light at the exposed part of each side, W/m^2.
+struct HandOver {
+    std::vector<glm::vec3> gathered;  // direct irradiance
+    std::vector<glm::vec3> indirect;  // irradiance from reflected light, already distributed
+    std::vector<glm::vec3> unshot;    // reflected exitance that is still to be distributed
+};
+HandOver handOver(const Patches& patches, const FirstShot& shot, const std::vector<float>& exposed);
+
+// The transports, one a row of the table.
+std::unique_ptr<Transport> lineReuse(const TransportInput& input);
+
+// A transport by the name of its row. Throws Error(INVALID_ARGUMENT) if it would not converge on
+// this scene.
+std::unique_ptr<Transport> makeTransport(const std::string& kind, const TransportInput& input);
+
+}  // namespace raybundle
