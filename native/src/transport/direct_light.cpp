@@ -31,7 +31,7 @@ constexpr float kDirectShare = 0.75f;
 constexpr float kDarkShare = 0.25f;
 constexpr int kBlocks = 4;
 // A closed form whose largest value is so many times its smallest on a patch takes more points.
-constexpr float kSmooth = 1.2f;
+constexpr float kSmooth = 1.1f;
 // A patch smaller than this share of its distance from a source needs one point only: the error is
 // about a quarter of its square, 0.3 %.
 constexpr float kFar = 0.1f;
@@ -181,7 +181,11 @@ std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source,
     if (radius(receiver) < kFar * source.distance(centroid))
         return source.irradiance(centroid, receiver.normal);
     const auto coarse = quadrature(source, side, 1, low, high);
-    if (!coarse || brightest(high) <= kSmooth * brightest(low)) return coarse;
+    if (!coarse) return coarse;
+    // The points of the quadrature alone may be alike by symmetry.
+    const auto middle = source.irradiance(centroid, receiver.normal);
+    if (brightest(glm::max(high, *middle)) <= kSmooth * brightest(glm::min(low, *middle)))
+        return coarse;
     const auto fine = quadrature(source, side, 4, low, high);
     // The error falls with the square of the parts, or at a kink with their number.
     error = brightest(glm::abs(*fine - *coarse)) / 4;

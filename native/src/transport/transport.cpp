@@ -14,6 +14,7 @@ struct Kind {
 
 constexpr Kind kKinds[] = {
     {"LINE_REUSE", lineReuse},
+    {"MULTIPATH", multipath},
 };
 
 }  // namespace
