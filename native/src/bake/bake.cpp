@@ -252,12 +252,11 @@ Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transp
         report.estimatedError = signal > 0 ? std::sqrt(noise / signal + bias * bias) : 0;
 
         if (report.estimatedError <= settings.targetError) break;
-        if (bundles >= most || transport.isFull()) {
+        if (bundles >= most) {
             report.warnings.push_back(
-                std::string(bundles >= most ? "max_bundles" : "memory_limit") + " was reached at " +
-                std::to_string(bundles) + " bundles: the noise is " +
-                std::to_string(100 * report.estimatedError) + " % and not below " +
-                std::to_string(100 * settings.targetError) + " %");
+                "max_bundles was reached at " + std::to_string(bundles) +
+                " bundles: the noise is " + std::to_string(100 * report.estimatedError) +
+                " % and not below " + std::to_string(100 * settings.targetError) + " %");
             break;
         }
         // Double at most; less where the error's slope says that less will do.

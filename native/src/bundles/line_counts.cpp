@@ -47,6 +47,26 @@ std::vector<float> LineCounts::exposedShare() const {
     return share;
 }
 
+void LineCounts::addTotals(const std::vector<TracedBundle>& traced) {
+    for (const TracedBundle& t : traced) {
+        const uint32_t half = t.bundle.half;
+        for (const Exchange& e : t.lines.exchanges) {
+            total[e.i][half] += e.lines;
+            total[e.j][half] += e.lines;
+        }
+        for (uint32_t side : t.lines.sky) {
+            ++sky[side][half];
+            ++total[side][half];
+        }
+        for (uint32_t side : t.lines.touching) ++touching[side];
+    }
+}
+
+void LineCounts::dropExchanges() {
+    std::fill(rows.begin(), rows.end(), 0);
+    entries.reset(new LineCount[0]);
+}
+
 void LineCounts::add(const std::vector<TracedBundle>& bundles) {
     const size_t n = sideCount();
     for (const TracedBundle& traced : bundles) {

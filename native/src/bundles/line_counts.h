@@ -31,6 +31,12 @@ class LineCounts {
     // Adds the lines of some bundles.
     void add(const std::vector<TracedBundle>& traced);
 
+    // Counts lines per side alone: sky, total and touching.
+    void addTotals(const std::vector<TracedBundle>& traced);
+
+    // Frees the matrix; what is counted per side stays.
+    void dropExchanges();
+
     size_t sideCount() const { return sky.size(); }
     // Merged pairs i < j.
     size_t exchangeCount() const { return rows.back() / 2; }

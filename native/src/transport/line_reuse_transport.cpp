@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// LINE_REUSE as a transport: while bundles are traced their lines are only counted; light moves when
-// the system on the counts is solved (transport/line_reuse.h).
+// LINE_REUSE as a transport: while bundles are traced their lines are only counted; light moves
+// when the system on the counts is solved (transport/line_reuse.h). When the counts would pass the
+// memory limit, they are dropped, and further bundles improve the solution one by one
+// (transport/streaming_reuse.h).
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
+#include <array>
+#include <glm/gtc/constants.hpp>
+#include <optional>
 
 #include "transport/line_reuse.h"
+#include "transport/streaming_reuse.h"
 #include "transport/transport.h"
 
 namespace raybundle {
@@ -12,29 +20,44 @@ namespace {
 
 // Sides with fewer lines than this also gather with local rays.
 constexpr uint32_t kStarvedLines = 16;
-// Lines held before they are merged into the counts, bytes.
+// Lines held before they are merged into the counts: bytes, and a share of the memory limit.
 constexpr size_t kMergeBytes = size_t(256) << 20;
+constexpr double kMergeShare = 0.25;
+constexpr uint32_t kStep = 16;  // bundles between two looks at the cancel flag
+// Of the solution that streaming starts from, relative.
+constexpr float kStartTolerance = 1e-4f;
 
 class LineReuseTransport : public Transport {
   public:
     explicit LineReuseTransport(const TransportInput& input)
         : input(input),
-          solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed) {
+          solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed),
+          limit(size_t(input.settings.memoryLimit * 1e6)) {
         for (auto& field : reflected) field.resize(input.patches.sideCount());
     }
 
     void advance(uint32_t count, const Progress& progress) override {
         std::vector<TracedBundle> held;
         size_t bytes = 0;
+        const size_t mostHeld = std::min(kMergeBytes, size_t(kMergeShare * double(limit)));
         for (uint32_t done = 0; done < count;) {
             progress.report(RB_STAGE_BUNDLES, double(done) / count);
+            // Merging needs room for the old and the new counts.
+            if (!streaming[0] && held.empty() && input.counts.bundles > 0 &&
+                2 * input.counts.byteCount() + mostHeld > limit)
+                startStreaming();
             const uint32_t step = std::min(kStep, count - done);
-            for (TracedBundle& traced : input.tracer.trace(step)) {
-                bytes += traced.lines.byteCount();
-                held.push_back(std::move(traced));
-            }
+            std::vector<TracedBundle> traced = input.tracer.trace(step);
             done += step;
-            if (bytes > kMergeBytes || done == count) {
+            if (streaming[0]) {
+                stream(traced);
+                continue;
+            }
+            for (TracedBundle& bundle : traced) {
+                bytes += bundle.lines.byteCount();
+                held.push_back(std::move(bundle));
+            }
+            if (bytes > mostHeld || done == count) {
                 input.counts.add(held);
                 held.clear();
                 bytes = 0;
@@ -46,6 +69,7 @@ class LineReuseTransport : public Transport {
     uint32_t bundleCount() const override { return input.tracer.bundleCount(); }
 
     Irradiance irradiance(Half half, float tolerance) override {
+        if (streaming[0]) return streamed(half);
         std::vector<glm::vec3>& guess = reflected[size_t(half)];
         if (half == Half::BOTH)
             for (size_t i = 0; i < guess.size(); ++i)
@@ -62,6 +86,12 @@ class LineReuseTransport : public Transport {
             report.skipped.push_back({"bundles on small patches",
                                       "too few lines met them: they gathered with local rays",
                                       starved});
+        if (streaming[0])
+            report.warnings.push_back(
+                "memory_limit was reached at " + std::to_string(input.counts.bundles) +
+                " bundles: each of the other " +
+                std::to_string(bundleCount() - input.counts.bundles) +
+                " was used once and forgotten, so that relighting has to trace them again");
         return result;
     }
 
@@ -74,16 +104,59 @@ class LineReuseTransport : public Transport {
         return share;
     }
 
-    bool isFull() const override {
-        return 2 * input.counts.byteCount() > size_t(input.settings.memoryLimit * 1e6);
+  private:
+    void startStreaming() {
+        first = handOver(input.patches, input.shot, solver.exposedShare());
+        for (uint32_t half = 0; half < 2; ++half) {
+            const Irradiance start = solver.solve(Half(half), kStartTolerance, reflected[half]);
+            const size_t n = input.patches.sideCount();
+            std::vector<float> lines(n);
+            std::vector<glm::vec3> direct(n), indirect(n);
+            for (size_t i = 0; i < n; ++i) {
+                lines[i] = float(input.counts.total[i][half]);
+                direct[i] = start.direct[i] - start.gathered[i];
+                indirect[i] = start.indirect[i] - first.indirect[i];
+            }
+            streaming[half].emplace(input.patches, input.counts.bundles / 2, lines, direct,
+                                    indirect, first.unshot, input.shot.emission,
+                                    glm::pi<float>() * input.worldRadiance);
+        }
+        input.counts.dropExchanges();
     }
 
-  private:
-    static constexpr uint32_t kStep = 16;  // bundles between two looks at the cancel flag
+    void stream(const std::vector<TracedBundle>& traced) {
+        auto advanceHalf = [&](uint32_t half) {
+            for (const TracedBundle& t : traced)
+                if (t.bundle.half == half) streaming[half]->add(t.lines);
+        };
+        tbb::parallel_invoke([&] { advanceHalf(0); }, [&] { advanceHalf(1); });
+        input.counts.addTotals(traced);
+    }
+
+    Irradiance streamed(Half half) {
+        Irradiance result(input.patches.sideCount());
+        result.gathered = result.direct = first.gathered;
+        result.indirect = first.indirect;
+        std::vector<glm::vec3>& exitance = reflected[size_t(half)];
+        std::fill(exitance.begin(), exitance.end(), glm::vec3(0.0f));
+        for (int h = 0; h < 2; ++h) {
+            if (half != Half::BOTH && h != int(half)) continue;
+            const float share = half == Half::BOTH ? 0.5f : 1.0f;
+            for (size_t i = 0; i < exitance.size(); ++i) {
+                result.direct[i] += share * streaming[h]->direct(i);
+                result.indirect[i] += share * streaming[h]->indirect(i);
+                exitance[i] += share * streaming[h]->reflected(i);
+            }
+        }
+        return result;
+    }
 
     const TransportInput input;
     const LineReuse solver;
+    const size_t limit;                   // bytes
     std::vector<glm::vec3> reflected[3];  // per half and for both: the last solution
+    std::array<std::optional<StreamingReuse>, 2> streaming;  // per half, once the limit is reached
+    HandOver first;                                          // while streaming
 };
 
 }  // namespace

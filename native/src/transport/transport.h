@@ -72,9 +72,6 @@ class Transport {
 
     // Per side: the share of the lines from it that leave the scene.
     virtual std::vector<float> openShare() const = 0;
-
-    // No more bundles fit into the settings' memory limit.
-    virtual bool isFull() const { return false; }
 };
 
 // The first shot's light at the exposed part of each side, W/m^2.

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/streaming_reuse.h"
+
+#include <algorithm>
+
+namespace raybundle {
+namespace {
+
+// Steps longer than those for this reflectance would forget too much of what was there.
+constexpr float kMostReflectance = 0.95f;
+
+}  // namespace
+
+StreamingReuse::StreamingReuse(const Patches& patches, uint32_t bundles,
+                               const std::vector<float>& lineCount,
+                               const std::vector<glm::vec3>& direct,
+                               const std::vector<glm::vec3>& indirect,
+                               const std::vector<glm::vec3>& source,
+                               const std::vector<glm::vec3>& emission,
+                               const glm::vec3& worldExitance)
+    : patches(patches),
+      emission(emission),
+      worldExitance(worldExitance),
+      source(source),
+      bundles(bundles),
+      totalWeight(bundles),
+      directSum(lineCount.size()),
+      indirectSum(lineCount.size()),
+      lines(lineCount.begin(), lineCount.end()),
+      weight(lines),
+      exitance(lineCount.size()),
+      isMet(lineCount.size(), false),
+      arriving(lineCount.size(), glm::dvec3(0.0)) {
+    float reflectance = 0;
+    for (size_t i = 0; i < lines.size(); ++i) {
+        const glm::vec3& rho = patches.reflectance[i];
+        reflectance = std::max({reflectance, rho.x, rho.y, rho.z});
+        directSum[i] = lines[i] * glm::dvec3(direct[i]);
+        indirectSum[i] = lines[i] * glm::dvec3(indirect[i]);
+        exitance[i] = source[i] + rho * (direct[i] + indirect[i]);
+    }
+    steps = 1 / (1 - double(std::min(reflectance, kMostReflectance)));
+}
+
+void StreamingReuse::meet(uint32_t side, double lineCount) {
+    if (!isMet[side]) {
+        isMet[side] = true;
+        met.push_back(side);
+    }
+    lines[side] += lineCount;
+}
+
+void StreamingReuse::add(const BundleLines& bundle) {
+    const double newest = totalWeight * steps / bundles;  // g_n
+    totalWeight += newest;
+    ++bundles;
+    auto send = [&](uint32_t from, uint32_t to, double lineCount) {
+        meet(to, lineCount);
+        weight[to] += newest * lineCount;
+        directSum[to] += lineCount * glm::dvec3(emission[from]);
+        arriving[to] += lineCount * glm::dvec3(exitance[from]);
+    };
+    for (const Exchange& x : bundle.exchanges) {
+        send(x.i, x.j, x.lines);
+        send(x.j, x.i, x.lines);
+    }
+    for (uint32_t side : bundle.sky) {
+        meet(side, 1);
+        weight[side] += newest;
+        directSum[side] += worldExitance;
+    }
+    for (uint32_t side : met) {
+        indirectSum[side] += newest * arriving[side];
+        exitance[side] = source[side] + patches.reflectance[side] * (direct(side) + indirect(side));
+        arriving[side] = glm::dvec3(0.0);
+        isMet[side] = false;
+    }
+    met.clear();
+}
+
+}  // namespace raybundle

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What LINE_REUSE does when no more exchanges fit into the memory limit: each further bundle is used
+// once, for a step of a Robbins-Monro iteration on the radiosity system, and forgotten.
+//
+//   N_i += g_n sum_j c_ij X_j,   D_i += g_n m_i,   X_i = source_i + rho_i N_i / D_i
+//
+// with growing weights g_n, such that the share of the newest bundle is a / (n + a),
+// a = 1 / (1 - rho_max): with equal weights (a = 1) the memory of the start fades as slowly as
+// n^-(1 - rho).
+//
+// Sources: thesis section 2.6 (one bundle, one iteration); Robbins and Monro, "A Stochastic
+// Approximation Method" (1951).
+// Differs from the thesis' stochastic iteration: what arrives is divided by the lines counted, not
+// by the true area, so that furnaces stay exact; the iterate is averaged as it goes, and so may use
+// low-discrepancy directions, from the solution on the exchanges kept until then.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "bundles/bundle_tracer.h"
+#include "patches/patches.h"
+
+namespace raybundle {
+
+class StreamingReuse {
+  public:
+    // One half, started from the solution on `bundles` bundles. Per side: lines (m_i of those
+    // bundles), direct and indirect (irradiance by their lines, W/m^2). source: exitance that is
+    // there without lines; emission and worldExitance: what lines bring straight, W/m^2.
+    StreamingReuse(const Patches& patches, uint32_t bundles, const std::vector<float>& lines,
+                   const std::vector<glm::vec3>& direct, const std::vector<glm::vec3>& indirect,
+                   const std::vector<glm::vec3>& source, const std::vector<glm::vec3>& emission,
+                   const glm::vec3& worldExitance);
+
+    void add(const BundleLines& bundle);
+
+    // Irradiance by lines, W/m^2, and the reflected exitance that goes with it.
+    glm::vec3 direct(size_t side) const { return ratio(directSum[side], lines[side]); }
+    glm::vec3 indirect(size_t side) const { return ratio(indirectSum[side], weight[side]); }
+    glm::vec3 reflected(size_t side) const { return exitance[side]; }
+
+  private:
+    static glm::vec3 ratio(const glm::dvec3& a, double b) {
+        return b > 0 ? glm::vec3(a / b) : glm::vec3(0.0f);
+    }
+    void meet(uint32_t side, double lineCount);
+
+    const Patches& patches;
+    const std::vector<glm::vec3>& emission;
+    const glm::dvec3 worldExitance;
+    std::vector<glm::vec3> source;
+    double steps;        // a
+    double bundles;      // n
+    double totalWeight;  // of all bundles so far
+
+    // Per side.
+    std::vector<glm::dvec3> directSum, indirectSum;  // over lines; the latter weighted
+    std::vector<double> lines, weight;               // what they are divided by
+    std::vector<glm::vec3> exitance;                 // X
+    // Of the bundle in hand.
+    std::vector<uint32_t> met;
+    std::vector<bool> isMet;
+    std::vector<glm::dvec3> arriving;
+};
+
+}  // namespace raybundle
