@@ -19,7 +19,7 @@ bool contains(const Names& names, const std::string& name) {
 // What a solver works with besides every first shot.
 struct Solver {
     const char* name;
-    Names directions;
+    bool needsIndependence, needsEqualWeights;  // of directions
     const char* whyDirections;
     Names projectors;
     const char* whyProjectors;
@@ -30,25 +30,20 @@ const Names kAllProjectors = {"AUTO",           "FRAGMENT_LISTS", "PAINTER",
 const Names kWholeLines = {"AUTO", "FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL"};
 
 const Solver kSolvers[] = {
-    {"LINE_REUSE",
-     {"LOW_DISCREPANCY", "RANDOM"},
-     "it moves no power while it traces, which ADAPTIVE would follow",
-     kAllProjectors,
-     ""},
-    {"MULTIPATH",
-     {"RANDOM", "ADAPTIVE"},
+    {"LINE_REUSE", false, true, "it moves no power while it traces, which directions could follow",
+     kAllProjectors, ""},
+    {"MULTIPATH", true, false,
      "light goes on from one bundle to the next, so that their directions must be independent",
-     kAllProjectors,
-     ""},
-    {"STOCHASTIC_ITERATION",
-     {"RANDOM"},
+     kAllProjectors, ""},
+    {"STOCHASTIC_ITERATION", true, true,
      "light goes on from one bundle to the next whole, so that their directions must be "
      "independent and of equal weight",
      kWholeLines,
      "exchanges found with a small probability have a weight without bound, with which the "
      "iteration does not converge"},
     {"RANDOM_WALK",
-     {"RANDOM"},
+     true,
+     true,
      "it walks along random local rays and has no bundles",
      {"AUTO"},
      "it walks along local rays and has no bundles to project"},
@@ -71,10 +66,15 @@ void checkCombination(const Settings& settings) {
     const Solver& solver =
         *std::find_if(std::begin(kSolvers), std::end(kSolvers),
                       [&](const Solver& s) { return settings.solver == s.name; });
-    if (!contains(solver.directions, settings.directions))
+    Names directions;
+    for (const DirectionKind& kind : directionKinds())
+        if ((kind.isIndependent || !solver.needsIndependence) &&
+            (!kind.isWeighted || !solver.needsEqualWeights))
+            directions.push_back(kind.name);
+    if (!contains(directions, settings.directions))
         refuse(
             "solver " + settings.solver + " does not work with directions " + settings.directions,
-            solver.whyDirections, "directions " + join(solver.directions));
+            solver.whyDirections, "directions " + join(directions));
     if (!contains(solver.projectors, settings.projector))
         refuse("solver " + settings.solver + " does not work with projector " + settings.projector,
                solver.whyProjectors, "projector " + join(solver.projectors));

@@ -48,13 +48,19 @@ struct Choice {
     std::vector<const char*> values;
 };
 
+std::vector<const char*> directionNames() {
+    std::vector<const char*> names;
+    for (const DirectionKind& kind : directionKinds()) names.push_back(kind.name);
+    return names;
+}
+
 const std::vector<Choice>& choices() {
     static const std::vector<Choice> table = {
         {"solver",
          &Settings::solver,
          {"LINE_REUSE", "MULTIPATH", "STOCHASTIC_ITERATION", "RANDOM_WALK"}},
         {"first_shot", &Settings::firstShot, {"GATHER", "SHOOT", "EXTENDED"}},
-        {"directions", &Settings::directions, {"LOW_DISCREPANCY", "RANDOM", "ADAPTIVE"}},
+        {"directions", &Settings::directions, directionNames()},
         {"projector",
          &Settings::projector,
          {"AUTO", "FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL", "PLANE", "PLANES"}},

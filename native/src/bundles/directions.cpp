@@ -8,18 +8,23 @@
 #include <glm/gtc/quaternion.hpp>
 
 namespace raybundle {
+
+// The sequences, each in a file of its own but for the plainest.
+std::unique_ptr<DirectionSequence> lowDiscrepancyDirections(std::mt19937_64& random);
+std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64& random);
+
+const std::vector<DirectionKind>& directionKinds() {
+    static const std::vector<DirectionKind> table = {
+        // name, factory, independent, weighted
+        {"LOW_DISCREPANCY", lowDiscrepancyDirections, false, false},
+        {"RANDOM", randomDirections, true, false},
+    };
+    return table;
+}
+
 namespace {
 
-struct Kind {
-    const char* name;
-    std::unique_ptr<DirectionSequence> (*make)(std::mt19937_64& random);
-};
-
-constexpr Kind kKinds[] = {
-    {"LOW_DISCREPANCY", lowDiscrepancyDirections},
-    {"RANDOM", randomDirections},
-};
-
+// RANDOM: uniform and independent (thesis section 4.2.1).
 class RandomDirections : public DirectionSequence {
   public:
     Direction at(uint32_t, std::mt19937_64& random) override {
@@ -71,9 +76,10 @@ std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64&) {
 Directions::Directions(const std::string& kind, uint32_t seed, uint32_t first)
     : seed(seed), done(first) {
     assert(first % 2 == 0 && "two halves of equal size");
-    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
-                                  [&](const Kind& k) { return kind == k.name; });
-    assert(row != std::end(kKinds) && "settings know the names");
+    const std::vector<DirectionKind>& table = directionKinds();
+    const auto row = std::find_if(table.begin(), table.end(),
+                                  [&](const DirectionKind& k) { return kind == k.name; });
+    assert(row != table.end() && "settings know the names");
     for (uint32_t half = 0; half < 2; ++half) {
         std::seed_seq words{seed, half};
         std::mt19937_64 random(words);
@@ -94,12 +100,6 @@ std::vector<Bundle> Directions::next(uint32_t count) {
         }
     done += count;
     return bundles;
-}
-
-std::vector<std::string> Directions::kinds() {
-    std::vector<std::string> names;
-    for (const Kind& kind : kKinds) names.push_back(kind.name);
-    return names;
 }
 
 }  // namespace raybundle

@@ -53,9 +53,14 @@ glm::dvec3 onHemisphere(double u, double v);
 // Shoemake, "Uniform Random Rotations" (Graphics Gems III, 1992).
 glm::dmat3 randomRotation(std::mt19937_64& random);
 
-// The sequences, one a row of the table; `random` is for the whole half.
-std::unique_ptr<DirectionSequence> lowDiscrepancyDirections(std::mt19937_64& random);
-std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64& random);
+// A row of the table of sequences.
+struct DirectionKind {
+    const char* name;  // as the setting `directions` has it
+    std::unique_ptr<DirectionSequence> (*make)(std::mt19937_64& random);  // `random`: of the half
+    bool isIndependent;  // each direction is independent of those before
+    bool isWeighted;     // weights differ from 1
+};
+const std::vector<DirectionKind>& directionKinds();
 
 // The bundles of an endless sequence given by kind (a name of the table) and seed.
 class Directions {
@@ -69,9 +74,6 @@ class Directions {
     void learn(const Bundle& bundle, double power) {
         sequences[bundle.half]->learn(bundle.direction, power);
     }
-
-    // Names of the table.
-    static std::vector<std::string> kinds();
 
   private:
     const uint32_t seed;
