@@ -33,7 +33,10 @@ std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
 }
 
 std::vector<float> exposedShare(const ProjectorInput& input, uint32_t seed) {
-    BundleTracer tracer("FRAGMENT_LISTS", input, "LOW_DISCREPANCY", seed);
+    // Not by ROULETTE, which lets neighbouring patches of a surface lie against each other.
+    ProjectorInput exact = input;
+    exact.smallPatches = SmallPatches::CENTRE_SAMPLING;
+    BundleTracer tracer("FRAGMENT_LISTS", exact, "LOW_DISCREPANCY", seed);
     std::vector<uint32_t> open(input.patches.sideCount(), 0), touching(open);
     for (const TracedBundle& traced : tracer.trace(kExposureBundles)) {
         for (const Exchange& e : traced.lines.exchanges) {

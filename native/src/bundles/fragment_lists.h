@@ -18,6 +18,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "bundles/contacts.h"
 #include "bundles/projector.h"
 #include "bundles/rasteriser.h"
 #include "patches/patches.h"
@@ -41,13 +42,13 @@ class FragmentLists : public Projector {
     };
 
     void sortIntoLists();
-    // Distance between two fragments of a list across the nearer surface, metres.
-    double gapAcross(uint64_t a, uint64_t b) const;
+    // How much deeper b lies than a, metres.
+    double along(uint64_t a, uint64_t b) const;
     void orderCoinciding(uint64_t* first, uint64_t* last) const;
     void pairLists(BundleLines& out);
 
-    const Patches& patches;
-    const float touchDistance;
+    Contacts contacts;
+    const bool hasLeaks;  // lines may pass through the surface of a solid: ROULETTE
     Rasteriser rasteriser;
 
     double depthSteps = 1;  // depth in metres -> quantised depth

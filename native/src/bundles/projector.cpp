@@ -15,6 +15,8 @@ struct Kind {
 constexpr Kind kKinds[] = {
     {"AUTO", fragmentLists},
     {"FRAGMENT_LISTS", fragmentLists},
+    {"PAINTER", painter},
+    {"PAINTER_NEWELL", painterNewell},
 };
 
 }  // namespace

@@ -64,6 +64,8 @@ struct ProjectorInput {
 
 // The projectors, one a row of the table.
 std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input);
+std::unique_ptr<Projector> painter(const ProjectorInput& input);
+std::unique_ptr<Projector> painterNewell(const ProjectorInput& input);
 
 // A projector by the name of its row. One object per thread: it keeps its memory from bundle to
 // bundle.

@@ -8,6 +8,7 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
 
 void Rasteriser::begin(const Bundle& bundle) {
     frame = bundle;
+    if (smallPatches == SmallPatches::ROULETTE) roulette.begin(bundle);
     const size_t n = patches.vertices.size();
     projected.resize(n);
     depth.resize(n);
@@ -30,6 +31,19 @@ void Rasteriser::begin(const Bundle& bundle) {
     lowest = low.z;
     highest = high.z;
     for (glm::dvec2& q : projected) q -= corner;
+}
+
+bool Rasteriser::findPlane(const Parent& parent, DepthPlane& plane) const {
+    // In double from the world's coordinates, so that faces of different objects that coincide have
+    // the same depth.
+    const glm::dvec3 normal = glm::cross(glm::dvec3(parent.a), glm::dvec3(parent.b));
+    const double slant = glm::dot(normal, frame.direction);
+    if (slant == 0) return false;
+    plane.dzdx = -glm::dot(normal, frame.right) / slant * double(pixelSize);
+    plane.dzdy = -glm::dot(normal, frame.up) / slant * double(pixelSize);
+    plane.z0 = glm::dot(normal, glm::dvec3(parent.origin)) / slant + (corner.x + 0.5) * plane.dzdx +
+               (corner.y + 0.5) * plane.dzdy;
+    return true;
 }
 
 }  // namespace raybundle

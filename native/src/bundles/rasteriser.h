@@ -5,9 +5,10 @@
 // CENTRE_SAMPLING: pixels are sampled at their centres with half-open edges, on a grid with a random
 // shift: the expected number of lines of a patch is its projected area over the pixel's, for every
 // shape and size, and neighbouring faces never both take or both miss a pixel.
+// ROULETTE: see bundles/roulette.h.
 //
-// Differs from the thesis (section 4.2): whole parents are rasterised; the patch follows from the
-// affine coordinates.
+// Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised; the patch
+// follows from the affine coordinates.
 #pragma once
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "bundles/projector.h"
+#include "bundles/roulette.h"
 #include "patches/patches.h"
 
 namespace raybundle {
@@ -35,7 +37,12 @@ class Rasteriser {
     // of the scene, parent after parent.
     template <class Visit>
     void forEachFragment(const Visit& visit) {
-        for (const Parent& parent : patches.parents) sampleParent(parent, visit);
+        for (const Parent& parent : patches.parents) {
+            if (smallPatches == SmallPatches::ROULETTE)
+                fillPatches(parent, visit);
+            else
+                sampleParent(parent, visit);
+        }
     }
 
     // The window, pixels; a pixel's index is y * width + x.
@@ -48,6 +55,17 @@ class Rasteriser {
   private:
     template <class Visit>
     void sampleParent(const Parent& parent, const Visit& visit);
+    // Patch by patch, for ROULETTE.
+    template <class Visit>
+    void fillPatches(const Parent& parent, const Visit& visit);
+
+    // Depth over the window, metres: at the centre of pixel (0, 0) and its change per pixel.
+    struct DepthPlane {
+        double z0, dzdx, dzdy;
+        double at(glm::dvec2 p) const { return z0 + (p.x - 0.5) * dzdx + (p.y - 0.5) * dzdy; }
+    };
+    // Of a parent; false where it is seen edge-on.
+    bool findPlane(const Parent& parent, DepthPlane& plane) const;
 
     const Patches& patches;
     const float pixelSize;
@@ -60,6 +78,8 @@ class Rasteriser {
     std::vector<glm::dvec2> projected;        // per vertex: in the window, pixels
     std::vector<double> depth;                // per vertex, metres
     std::vector<double> spanLeft, spanRight;  // per row of a parent, pixels
+    Roulette roulette;
+    PolygonFiller filler;
 };
 
 template <class Visit>
@@ -98,19 +118,12 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
             bound[size_t(y - row0)] = lower.x + (y + 0.5 - lower.y) * slope;
     }
 
-    // Affine coordinates at a pixel, and the depth of the parent's plane. The plane is taken in
-    // double from the world's coordinates, so that faces of different objects that coincide have
-    // the same depth.
+    // Affine coordinates at a pixel, and the depth of the parent's plane.
     const double inverse = 1 / det;
     const float dsdx = float(eb.y * inverse), dsdy = float(-eb.x * inverse);
     const float dtdx = float(-ea.y * inverse), dtdy = float(ea.x * inverse);
-    const glm::dvec3 normal = glm::cross(glm::dvec3(parent.a), glm::dvec3(parent.b));
-    const double slant = glm::dot(normal, frame.direction);
-    if (slant == 0) return;
-    const double dzdx = -glm::dot(normal, frame.right) / slant * double(pixelSize);
-    const double dzdy = -glm::dot(normal, frame.up) / slant * double(pixelSize);
-    const double z0 = glm::dot(normal, glm::dvec3(parent.origin)) / slant +
-                      (corner.x + 0.5) * dzdx + (corner.y + 0.5) * dzdy;
+    DepthPlane plane;
+    if (!findPlane(parent, plane)) return;
     // (right, up, direction) is right-handed: det < 0 where the front faces against the direction.
     const uint32_t facing = det < 0 ? 0 : 1;
     for (int y = row0; y < row1; ++y) {
@@ -121,11 +134,57 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
         for (int x = x0; x < x1; ++x) {
             const float dx = float(x + 0.5 - q[0].x);
             const float s = dx * dsdx + dy * dsdy, t = dx * dtdx + dy * dtdy;
-            const double z = std::clamp(z0 + x * dzdx + y * dzdy, zMin, zMax);
+            const double z = std::clamp(plane.z0 + x * plane.dzdx + y * plane.dzdy, zMin, zMax);
             const uint32_t patch = parent.firstPatch + parent.patchAt(s, t);
             const uint32_t pixel = uint32_t(y) * uint32_t(width) + uint32_t(x);
             visit(pixel, z, 2 * patch + facing);
         }
+    }
+}
+
+template <class Visit>
+void Rasteriser::fillPatches(const Parent& parent, const Visit& visit) {
+    const int sides = parent.isTriangle ? 3 : 4;
+    const glm::dvec2 q0 = projected[parent.vertex[0]];
+    const glm::dvec2 ea = projected[parent.vertex[1]] - q0;
+    const glm::dvec2 eb = projected[parent.vertex[size_t(sides) - 1]] - q0;
+    const double det = ea.x * eb.y - ea.y * eb.x;
+    DepthPlane plane;
+    if (det == 0 || !findPlane(parent, plane)) return;
+    const uint32_t facing = det < 0 ? 0 : 1;
+    auto visitPixel = [&](int x, int y, double z, uint32_t patch) {
+        if (x < 0 || y < 0 || x >= width || y >= height) return;
+        visit(uint32_t(y) * uint32_t(width) + uint32_t(x), z, 2 * patch + facing);
+    };
+    // In pixels; all patches of a parent have the same.
+    const double area = std::abs(det) / (parent.isTriangle ? 2 : 1) / parent.patchCount();
+    const glm::vec2 middle(parent.isTriangle ? 1.0f / 3 : 0.5f);
+    constexpr glm::vec2 kCorners[2][4] = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}},
+                                          {{0, 0}, {1, 0}, {0, 1}, {0, 0}}};
+    for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+        const uint32_t patch = parent.firstPatch + k;
+        auto place = [&](const glm::vec2& uv) {
+            const glm::dvec2 st(parent.pointOn(k, uv));
+            return q0 + st.x * ea + st.y * eb;
+        };
+        if (area < 1) {
+            if (!roulette.isDrawn(patch, area)) continue;
+            const glm::dvec2 centroid = place(middle);
+            visitPixel(int(std::floor(centroid.x)), int(std::floor(centroid.y)),
+                       std::clamp(plane.at(centroid), lowest, highest), patch);
+            continue;
+        }
+        glm::dvec2 corners[4];
+        double zMin = highest, zMax = lowest;
+        for (int c = 0; c < sides; ++c) {
+            corners[c] = place(kCorners[sides == 3][c]);
+            const double z = std::clamp(plane.at(corners[c]), lowest, highest);
+            zMin = std::min(zMin, z);
+            zMax = std::max(zMax, z);
+        }
+        for (const Pixel& p : filler.fill(corners, sides))
+            visitPixel(p.x, p.y, std::clamp(plane.at(glm::dvec2(p.x, p.y) + 0.5), zMin, zMax),
+                       patch);
     }
 }
 
