@@ -163,19 +163,92 @@ bool Visibility::isBlocked(uint32_t side, const glm::vec3& point, const glm::vec
     return ray.tfar < 0;
 }
 
+namespace {
+
+// What the filter below has found among the surfaces that coincide where a ray ends; starts with
+// Embree's own part.
+struct Meeting {
+    RTCIntersectContext context;
+    const Patches* patches;
+    const uint32_t* parentOfTriangle;
+    uint32_t first;  // the parent that comes before all others so far
+    glm::vec3 direction;
+};
+
+// Looks at every surface within the ray's short range and lets the ray pass.
+void findFirst(const RTCFilterFunctionNArguments* args) {
+    Meeting& meeting = *reinterpret_cast<Meeting*>(args->context);
+    args->valid[0] = 0;
+    const uint32_t other = meeting.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    if (other == meeting.first) return;
+    const Parent& a = meeting.patches->parents[meeting.first];
+    const Parent& b = meeting.patches->parents[other];
+    auto enters = [&](const Parent& parent) {
+        return glm::dot(parent.normal, meeting.direction) < 0;
+    };
+    if (areParallel(a, b) &&
+        comesBefore(*meeting.patches, other, enters(b), meeting.first, enters(a)))
+        meeting.first = other;
+}
+
+}  // namespace
+
+// Of the parents that coincide with one that a ray meets at some distance, the first.
+uint32_t Visibility::firstCoinciding(uint32_t parent, const glm::vec3& origin,
+                                     const glm::vec3& direction, float distance) const {
+    Meeting meeting;
+    rtcInitIntersectContext(&meeting.context);
+    meeting.context.filter = findFirst;
+    meeting.patches = &patches;
+    meeting.parentOfTriangle = embree->parentOfTriangle.data();
+    meeting.first = parent;
+    meeting.direction = direction;
+    const float cosine = std::abs(glm::dot(patches.parents[parent].normal, direction));
+    const float zone = 2 * surfaceOffset / std::max(0.01f, cosine);
+    RTCRay ray{};
+    setRay(ray, origin, direction, distance + zone);
+    ray.tnear = std::max(0.0f, distance - zone);
+    rtcOccluded1(embree->scene, &meeting.context, &ray);
+    return meeting.first;
+}
+
+// The side of a parent, at a point on it, that a direction looks at.
+uint32_t Visibility::sideOf(uint32_t parent, const glm::vec3& point,
+                            const glm::vec3& direction) const {
+    const bool front = glm::dot(patches.parents[parent].normal, direction) < 0;
+    return 2 * patches.patchAt(parent, point) + (front ? 0 : 1);
+}
+
 std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& point,
-                                             const glm::vec3& direction) const {
+                                             const glm::vec3& direction, float* distance) const {
     FromSide start(*this, side);
+    const glm::vec3 origin = start.origin(point, direction);
     RTCRayHit query{};
-    setRay(query.ray, start.origin(point, direction), direction,
-           std::numeric_limits<float>::infinity());
+    setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(embree->scene, &start.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-    const uint32_t parent = embree->parentOfTriangle[query.hit.primID];
-    const uint32_t patch = patches.patchAt(parent, point + query.ray.tfar * direction);
-    const bool front = glm::dot(patches.normal(2 * patch), direction) < 0;
-    return 2 * patch + (front ? 0 : 1);
+    if (distance) *distance = std::max(0.0f, query.ray.tfar - glm::length(point - origin));
+    uint32_t parent = embree->parentOfTriangle[query.hit.primID];
+    // What coincides with the start has its order already.
+    if (query.ray.tfar * glm::dot(direction, start.normal) > 2 * start.zone)
+        parent = firstCoinciding(parent, origin, direction, query.ray.tfar);
+    return sideOf(parent, origin + query.ray.tfar * direction, direction);
+}
+
+std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm::vec3& direction,
+                                             float* distance) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit query{};
+    setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(embree->scene, &context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+    if (distance) *distance = query.ray.tfar;
+    const uint32_t parent = firstCoinciding(embree->parentOfTriangle[query.hit.primID], origin,
+                                            direction, query.ray.tfar);
+    return sideOf(parent, origin + query.ray.tfar * direction, direction);
 }
 
 bool Visibility::isFree(const glm::vec3& origin, const glm::vec3& direction) const {

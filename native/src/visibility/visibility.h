@@ -26,9 +26,14 @@ class Visibility {
     bool isBlocked(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
                    float distance) const;
 
-    // The patch side that a ray from a side meets first, if any.
+    // The patch side that a ray from a side meets first, if any, and how far from the point. Of
+    // surfaces that coincide there, it meets the one that comesBefore.
     std::optional<uint32_t> firstHit(uint32_t side, const glm::vec3& point,
-                                     const glm::vec3& direction) const;
+                                     const glm::vec3& direction, float* distance = nullptr) const;
+
+    // The same for origins that lie on no surface, or at least `offset` off it.
+    std::optional<uint32_t> firstHit(const glm::vec3& origin, const glm::vec3& direction,
+                                     float* distance = nullptr) const;
 
     // Whether a ray meets nothing; for origins that lie on no surface, or at least `offset` off it.
     bool isFree(const glm::vec3& origin, const glm::vec3& direction) const;
@@ -39,6 +44,10 @@ class Visibility {
   private:
     struct Embree;
     struct FromSide;
+    uint32_t firstCoinciding(uint32_t parent, const glm::vec3& origin, const glm::vec3& direction,
+                             float distance) const;
+    uint32_t sideOf(uint32_t parent, const glm::vec3& point, const glm::vec3& direction) const;
+
     const Patches& patches;
     float surfaceOffset;
     std::unique_ptr<Embree> embree;
