@@ -24,9 +24,6 @@ constexpr int kMaxSamples = 256;
 // A source of less than this share of the light that a receiver could get takes few samples, one of
 // less than the second half as many as others.
 constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
-// Standard error that a receiver may keep, as a share of the target: errors of receivers are
-// independent, while those of bundles are shared by many.
-constexpr float kDirectShare = 0.75f;
 // Receivers darker than this share of the mean may have the error of one that bright.
 constexpr float kDarkShare = 0.25f;
 constexpr int kBlocks = 4;
@@ -327,10 +324,12 @@ glm::dvec3 DirectLight::escapedPower() const {
         tbb::enumerable_thread_specific<double> missed(0.0);
         tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
-                const EmittedRay ray = sources[k]->emit(sobolPoint(i, hash(seed, uint32_t(k))));
-                const glm::vec3 origin = ray.origin + visibility.offset() * ray.direction;
-                if (ray.weight > 0 && visibility.isFree(origin, ray.direction))
-                    missed.local() += ray.weight;
+                const EmittedRay ray =
+                    sources[k]->emit(sobolPoint(i, hash(seed, uint32_t(k))), patches.radius);
+                const bool isFree =
+                    ray.side ? !visibility.isBlocked(*ray.side, ray.origin, ray.direction, INFINITY)
+                             : visibility.isFree(ray.start(visibility.offset()), ray.direction);
+                if (isFree) missed.local() += ray.weight;
             }
         });
         double sum = 0;

@@ -26,6 +26,10 @@
 
 namespace raybundle {
 
+// Standard error that direct light may keep, as a share of the target: errors of receivers are
+// independent, while those of bundles are shared by many.
+constexpr float kDirectShare = 0.75f;
+
 // Where direct light is to be known: a whole patch side (the mean over it), or a point on one.
 struct Receiver {
     uint32_t side = 0;

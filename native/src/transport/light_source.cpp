@@ -10,6 +10,7 @@
 
 #include "transport/mesh_source.h"
 #include "transport/sphere_sampling.h"
+#include "transport/spot_cone.h"
 
 namespace raybundle {
 
@@ -35,9 +36,8 @@ class PointSource : public LightSource {
   public:
     PointSource(const Light& light, const glm::dvec3& centre)
         : light(light), position(light.position - centre), intensity(light.strength) {
-        meanCone = meanOverSphere();
-        if (light.radius == 0 || light.pointShape == RB_POINT_SPHERE)
-            totalPower = 2 * glm::two_pi<float>() * intensity * meanCone;
+        if (light.hasCone) cone.emplace(light);
+        totalPower = 2 * glm::two_pi<float>() * intensity * (cone ? cone->meanOverSphere() : 1);
     }
 
     LightSample sample(const glm::vec3& point, const glm::vec3& normal,
@@ -74,7 +74,7 @@ class PointSource : public LightSource {
             sample.irradiance = intensity / (glm::pi<float>() * radius * radius) * solidAngle *
                                 std::max(0.0f, glm::dot(normal, sample.direction));
         }
-        sample.irradiance *= cone(-sample.direction);
+        if (cone) sample.irradiance *= cone->share(-sample.direction);
         return sample;
     }
 
@@ -91,53 +91,46 @@ class PointSource : public LightSource {
         return glm::length(position - point) - float(light.radius);
     }
 
-    glm::vec3 power() const override { return totalPower; }
+    glm::vec3 power() const override { return isDisk() ? glm::vec3(0.0f) : totalPower; }
 
-    EmittedRay emit(const glm::vec4& u) const override {
+    // A disk that faces each receiver has no surface to emit from, but each line through it has
+    // its radiance (see emit), and they carry as much as those of the sphere.
+    glm::vec3 shootingPower(float) const override { return totalPower; }
+
+    EmittedRay emit(const glm::vec4& u, float) const override {
         EmittedRay ray;
         ray.origin = position;
-        ray.direction = uniformDirection(glm::vec2(u));
-        ray.weight = cone(ray.direction) / meanCone;
+        if (cone) {
+            const SpotCone::Ray along = cone->emit({u.x, u.y});
+            ray.direction = along.direction;
+            ray.weight = along.weight;
+        } else {
+            ray.direction = uniformDirection({u.x, u.y});
+        }
+        if (light.radius == 0) return ray;
+        // All lines of a direction that pass within the radius r of the centre, at a distance d.
+        const float r2 = float(light.radius * light.radius);
+        const glm::vec2 across = float(light.radius) * onDisk({u.z, u.w});
+        const auto [x, y] = frame(ray.direction);
+        const float d2 = glm::dot(across, across), rest = std::sqrt(std::max(0.0f, r2 - d2));
+        ray.origin += across.x * x + across.y * y;
+        // A sphere emits them where they leave it. The disk that faces a point at t along the line
+        // (t = 0 where it is nearest to the centre) lies across the line only if the point is
+        // far enough, t > d^2 / sqrt(r^2 - d^2): nearer points see the line pass beside the disk.
+        if (isDisk())
+            ray.from = rest > 0 ? d2 / rest : kInfinity;
+        else
+            ray.origin += rest * ray.direction;
         return ray;
     }
 
-    static glm::vec3 inCone(const glm::vec3& axis, float cosMax, glm::vec2 uv) {
-        const glm::vec2 d = onDisk(uv);
-        const float r2 = glm::dot(d, d);
-        const float z = 1 - r2 * (1 - cosMax);
-        const float scale = r2 > 0 ? std::sqrt(std::max(0.0f, 1 - z * z) / r2) : 0;
-        const auto [x, y] = frame(axis);
-        return scale * (d.x * x + d.y * y) + z * axis;
-    }
-
   private:
-    // Share of the intensity that a spot sends in a direction away from it (Blender's smoothstep).
-    float cone(const glm::vec3& direction) const {
-        if (!light.hasCone) return 1;
-        const glm::dvec3 local = glm::normalize(light.worldToCone * glm::dvec3(direction));
-        const double edge = std::cos(0.5 * light.coneAngle);
-        const double soft = (1 - edge) * light.coneBlend;
-        if (-local.z <= edge) return 0;
-        const double t = soft > 0 ? std::min(1.0, (-local.z - edge) / soft) : 1;
-        return float(t * t * (3 - 2 * t) * (light.coneDims ? std::max(0.0, -local.z) : 1));
-    }
-
-    // Mean of the cone over all directions.
-    float meanOverSphere() const {
-        if (!light.hasCone) return 1;
-        // Midpoint rule over the sphere; only the power balance needs it.
-        constexpr int kSteps = 64;
-        float sum = 0;
-        for (int i = 0; i < kSteps; ++i)
-            for (int j = 0; j < kSteps; ++j)
-                sum += cone(uniformDirection((glm::vec2(i, j) + 0.5f) / float(kSteps)));
-        return sum / (kSteps * kSteps);
-    }
+    bool isDisk() const { return light.radius > 0 && light.pointShape == RB_POINT_DISK; }
 
     const Light& light;
     const glm::vec3 position;
     const glm::vec3 intensity;
-    float meanCone = 1;
+    std::optional<SpotCone> cone;
     glm::vec3 totalPower{0.0f};
 };
 
@@ -150,11 +143,10 @@ class SunSource : public LightSource {
         LightSample sample;
         sample.distance = kInfinity;
         const float cosMax = std::cos(half);
-        sample.direction = half > 0 ? PointSource::inCone(direction, cosMax, uv) : direction;
+        sample.direction = half > 0 ? inCone(direction, cosMax, uv) : direction;
         // Radiance E / (pi sin^2 half) over the solid angle 2 pi (1 - cos half).
-        const float perCosine = half > 0 ? 2 / (1 + cosMax) : 1;
         sample.irradiance =
-            strength * perCosine * std::max(0.0f, glm::dot(normal, sample.direction));
+            strength * perCosine() * std::max(0.0f, glm::dot(normal, sample.direction));
         return sample;
     }
 
@@ -173,9 +165,30 @@ class SunSource : public LightSource {
     float distance(const glm::vec3&) const override { return kInfinity; }
 
     glm::vec3 power() const override { return glm::vec3(0.0f); }
-    EmittedRay emit(const glm::vec4&) const override { return {}; }
+
+    // Parallel rays of each direction, from a disk that covers the scene.
+    glm::vec3 shootingPower(float sceneRadius) const override {
+        const float r = kCover * sceneRadius;
+        return strength * (perCosine() * glm::pi<float>() * r * r);
+    }
+
+    EmittedRay emit(const glm::vec4& u, float sceneRadius) const override {
+        EmittedRay ray;
+        const glm::vec3 towards =
+            half > 0 ? inCone(direction, std::cos(half), {u.x, u.y}) : direction;
+        const auto [x, y] = frame(towards);
+        const glm::vec2 d = onDisk({u.z, u.w});
+        ray.origin = kCover * sceneRadius * (towards + d.x * x + d.y * y);
+        ray.direction = -towards;
+        return ray;
+    }
 
   private:
+    static constexpr float kCover = 1.001f;  // radius of the disk over the scene's
+
+    // Irradiance across a ray of the sun, whose disk it covers, over that across its middle.
+    float perCosine() const { return half > 0 ? 2 / (1 + std::cos(half)) : 1; }
+
     const glm::vec3 direction, strength;
     const float half;  // angular radius
 };
@@ -220,8 +233,12 @@ class AreaSource : public LightSource {
 
     glm::vec3 power() const override { return glm::pi<float>() * radiance * area; }
 
-    EmittedRay emit(const glm::vec4& r) const override {
-        return {onSurface({r.x, r.y}), cosineDirection(normal, {r.z, r.w}), 1};
+    EmittedRay emit(const glm::vec4& r, float) const override {
+        EmittedRay ray;
+        ray.origin = onSurface({r.x, r.y});
+        ray.direction = cosineDirection(normal, {r.z, r.w});
+        ray.normal = normal;
+        return ray;
     }
 
   private:

@@ -25,7 +25,13 @@ struct LightSample {
 // A ray that leaves a source with an equal share of its power.
 struct EmittedRay {
     glm::vec3 origin{0.0f}, direction{0.0f};
-    float weight = 1;  // times the mean share
+    float weight = 1;              // times the mean share
+    glm::vec3 normal{0.0f};        // of the lamp's surface; zero if it has none
+    std::optional<uint32_t> side;  // the patch side that it leaves, if its source is a mesh
+    float from = 0;  // metres along the ray: surfaces before that get nothing, but block
+
+    // The origin, moved off the lamp's surface.
+    glm::vec3 start(float offset) const { return origin + offset * (direction + normal); }
 };
 
 // Sample of a surface point `on` with normal onNormal and radiance towards the receiver; area: m^2
@@ -57,8 +63,13 @@ class LightSource {
     // and disks that turn towards each receiver.
     virtual glm::vec3 power() const = 0;
 
-    // A ray of the source's light; u uniform in [0, 1)^4. Not called when power() is zero.
-    virtual EmittedRay emit(const glm::vec4& u) const = 0;
+    // Power of all that emit() gives, W, in a scene within a sphere of this radius around
+    // Patches::centre.
+    virtual glm::vec3 shootingPower(float /*sceneRadius*/) const { return power(); }
+
+    // A ray of the source's light into such a scene; u uniform in [0, 1)^4. Not called when
+    // shootingPower() is zero.
+    virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;
 };
 
 // All sources of the scene whose light the first shot gathers: its lights, and the emissive faces

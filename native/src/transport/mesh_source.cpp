@@ -59,9 +59,9 @@ MeshSource::MeshSource(const Patches& patches, std::vector<uint32_t> parents,
 
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
                                glm::vec2 uv) const {
-    const auto [on, normal] = onSurface(uv);
-    const bool front = glm::dot(point - on, normal) > 0;
-    return surfaceSample(point, receiver, on, front ? normal : -normal,
+    const SurfacePoint on = onSurface(uv);
+    const bool front = glm::dot(point - on.position, on.normal) > 0;
+    return surfaceSample(point, receiver, on.position, front ? on.normal : -on.normal,
                          emission[front ? 0 : 1] / glm::pi<float>(), float(total));
 }
 
@@ -91,13 +91,18 @@ bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
            std::abs(glm::dot(point - centre, planeNormal)) > radius;
 }
 
-EmittedRay MeshSource::emit(const glm::vec4& r) const {
+EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     // Choose the side by its share of the power.
     const float share0 = strength(emission[0]) / (strength(emission[0]) + strength(emission[1]));
     const bool front = r.x < share0;
     const float u = front ? r.x / share0 : (r.x - share0) / (1 - share0);
-    const auto [on, normal] = onSurface({std::min(u, 0.9999999f), r.y});
-    return {on, cosineDirection(front ? normal : -normal, {r.z, r.w}), 1};
+    const SurfacePoint on = onSurface({std::min(u, 0.9999999f), r.y});
+    EmittedRay ray;
+    ray.origin = on.position;
+    ray.normal = front ? on.normal : -on.normal;
+    ray.direction = cosineDirection(ray.normal, {r.z, r.w});
+    ray.side = 2 * patches.patchAt(on.parent, on.position) + (front ? 0 : 1);
+    return ray;
 }
 
 // The closed form of a planar source that lies wholly above the receiver's horizon: the edges
@@ -162,7 +167,7 @@ void MeshSource::boundSource() {
 }
 
 // A point uniform by area and the front's normal there.
-std::pair<glm::vec3, glm::vec3> MeshSource::onSurface(glm::vec2 uv) const {
+MeshSource::SurfacePoint MeshSource::onSurface(glm::vec2 uv) const {
     const double at = uv.x * total;
     const size_t k = std::min<size_t>(
         size_t(std::upper_bound(areaUpTo.begin(), areaUpTo.end(), at) - areaUpTo.begin()),
@@ -174,7 +179,7 @@ std::pair<glm::vec3, glm::vec3> MeshSource::onSurface(glm::vec2 uv) const {
         s = 1 - s;
         t = 1 - t;
     }
-    return {parent.position({s, t}), parent.normal};
+    return {parent.position({s, t}), parent.normal, parents[k]};
 }
 
 }  // namespace raybundle

@@ -28,14 +28,18 @@ class MeshSource : public LightSource {
         return glm::length(centre - point) - extent;
     }
     glm::vec3 power() const override { return float(total) * (emission[0] + emission[1]); }
-    EmittedRay emit(const glm::vec4& u) const override;
+    EmittedRay emit(const glm::vec4& u, float sceneRadius) const override;
 
   private:
     std::optional<glm::vec3> outlineIrradiance(const glm::vec3& point,
                                                const glm::vec3& receiver) const;
     void boundSource();
     void findOutline();
-    std::pair<glm::vec3, glm::vec3> onSurface(glm::vec2 uv) const;
+    struct SurfacePoint {
+        glm::vec3 position, normal;
+        uint32_t parent;
+    };
+    SurfacePoint onSurface(glm::vec2 uv) const;
 
     const Patches& patches;
     const std::vector<uint32_t> parents;

@@ -32,6 +32,16 @@ inline glm::vec3 cosineDirection(const glm::vec3& normal, glm::vec2 uv) {
     return x * d.x + y * d.y + normal * std::sqrt(std::max(0.0f, 1 - glm::dot(d, d)));
 }
 
+// Uniform in the cone around an axis.
+inline glm::vec3 inCone(const glm::vec3& axis, float cosMax, glm::vec2 uv) {
+    const glm::vec2 d = onDisk(uv);
+    const float r2 = glm::dot(d, d);
+    const float z = 1 - r2 * (1 - cosMax);
+    const float scale = r2 > 0 ? std::sqrt(std::max(0.0f, 1 - z * z) / r2) : 0;
+    const auto [x, y] = frame(axis);
+    return scale * (d.x * x + d.y * y) + z * axis;
+}
+
 inline glm::vec3 uniformDirection(glm::vec2 uv) {
     const float z = 1 - 2 * uv.x, r = std::sqrt(std::max(0.0f, 1 - z * z));
     const float phi = glm::two_pi<float>() * uv.y;
