@@ -103,8 +103,7 @@ bool isDark(const Scene& scene, const FirstShot& shot, Report& report) {
 struct Bake::Trace {
     Trace(uint64_t hash, Patches made, const Settings& settings)
         : hash(hash), patches(std::move(made)), visibility(patches), counts(patches.sideCount()) {
-        const float touchDistance =
-            std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.size);
+        touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.size);
         const ProjectorInput input{patches,
                                    visibility,
                                    pixelSize(patches, settings.linesPerBundle),
@@ -123,8 +122,15 @@ struct Bake::Trace {
     // transport uses lines without counting them.
     bool isWhole() const { return tracer->bundleCount() == counts.bundles; }
 
+    // Through the bounding sphere.
+    double linesPerBundle() const {
+        return glm::pi<double>() * double(patches.radius) * double(patches.radius) /
+               tracer->pixelArea;
+    }
+
     const uint64_t hash;
     Patches patches;
+    float touchDistance = 0;  // surfaces not further apart touch, metres
     const Visibility visibility;
     std::vector<float> exposed;  // per side; empty: as the counts have it
     LineCounts counts;
@@ -153,7 +159,8 @@ void Bake::runStages(const Scene& scene) {
         {
             Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
             shot = firstShot(settings.firstShot,
-                             {directLight, patches, trace->visibility, settings, progress});
+                             {directLight, patches, trace->visibility, settings, progress,
+                              trace->touchDistance, trace->linesPerBundle()});
         }
         report.shadowRays = shot.rays;
         report.skipped.push_back(

@@ -14,6 +14,8 @@ struct Kind {
 
 constexpr Kind kKinds[] = {
     {"GATHER", gather},
+    {"SHOOT", shoot},
+    {"EXTENDED", extendedFirstShot},
 };
 
 }  // namespace

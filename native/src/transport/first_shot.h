@@ -39,10 +39,21 @@ struct FirstShotInput {
     const Visibility& visibility;
     const Settings& settings;  // targetError: relative standard error to reach
     const Progress& progress;
+    float touchDistance = 0;    // surfaces not further apart touch, metres
+    double linesPerBundle = 0;  // lines of a bundle through the scene's bounding sphere
 };
 
 // The first shots, one a row of the table.
 FirstShot gather(const FirstShotInput& input);
+FirstShot shoot(const FirstShotInput& input);
+FirstShot extendedFirstShot(const FirstShotInput& input);
+
+// The best number of local lines of the first shot over global lines after it (thesis eq. 3.1).
+// intersections: of a random line with the scene, mean; meanReflectance: of the scene;
+// sourceReflectance: of the surfaces that the first shot leaves light on; share: of the scene's
+// area that they take, 0 to 1.
+double localToGlobalRatio(double intersections, double meanReflectance, double sourceReflectance,
+                          double share);
 
 // A first shot by the name of its row.
 FirstShot firstShot(const std::string& kind, const FirstShotInput& input);
