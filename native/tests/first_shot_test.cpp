@@ -387,5 +387,38 @@ TEST(FirstShot, TheSameSeedGivesTheSameLight) {
         ASSERT_EQ(one.light.irradiance[side], two.light.irradiance[side]);
 }
 
+TEST(GatheredMesh, ALampAgainstTheCeilingLightsTheCeilingAroundIt) {
+    // Its top lies on the ceiling and covers part of it; its four sides shine along it.
+    Scene scene;
+    place(scene, rectangle("ceiling", {-2, 2, 0}, {4, 0, 0}, {0, -4, 0}), grey("", 0.5f));
+    place(scene, box("lamp", {-0.33f, -0.33f, -0.2f}, {0.33f, 0.33f, 0}, false), grey("", 0, 30));
+    const Shot shot = shoot(scene, 0.25f);
+    const glm::dvec3 c[8] = {{-.33, -.33, -.2}, {.33, -.33, -.2}, {.33, .33, -.2}, {-.33, .33, -.2},
+                             {-.33, -.33, 0},   {.33, -.33, 0},   {.33, .33, 0},   {-.33, .33, 0}};
+    double found = 0, exact = 0;
+    for (uint32_t k = 0; k < shot.patches.parents[0].patchCount(); ++k) {
+        const double area = double(shot.patches.area[k]);
+        found += area * double(shot.light.irradiance[2 * k].x);
+        // Midpoint rule of Lambert's formula outside the lamp; under it nothing arrives.
+        constexpr int kSteps = 16;
+        double sum = 0;
+        for (int i = 0; i < kSteps * kSteps; ++i) {
+            const glm::vec2 uv((float(i % kSteps) + 0.5f) / kSteps,
+                               (float(i / kSteps) + 0.5f) / kSteps);
+            const glm::dvec3 at = glm::dvec3(shot.patches.point(k, uv)) + shot.patches.centre;
+            if (std::abs(at.x) < 0.33 && std::abs(at.y) < 0.33) continue;
+            for (int side = 0; side < 4; ++side) {
+                const int next = (side + 1) % 4;
+                const glm::dvec3 quad[4] = {c[side], c[next], c[4 + next], c[4 + side]};
+                const glm::dvec3 outward = glm::cross(c[next] - c[side], glm::dvec3(0, 0, 1));
+                if (glm::dot(at - c[side], outward) > 0)
+                    sum += polygonIrradiance(at, {0, 0, -1}, quad, 4);
+            }
+        }
+        exact += area * sum / (kSteps * kSteps) * 30 / kPi;
+    }
+    EXPECT_NEAR(found, exact, 0.01 * exact);
+}
+
 }  // namespace
 }  // namespace raybundle

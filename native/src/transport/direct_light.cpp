@@ -284,9 +284,16 @@ void DirectLight::gatherFrom(const LightSource& source, uint32_t seed, const Rec
             blocks[size_t(b)].add(block);
             all.add(block);
         }
+        if (!closed && (brightest(all.open) <= 0 || brightest(all.visible) > 0))
+            closed = closedMean(source, receiver, tolerance, closedError);
+        // No sample faced the receiver: few of them may, beside a source of many faces.
+        if (brightest(all.open) <= 0 && closed && brightest(*closed) > 0 &&
+            all.count < kMaxSamples) {
+            next = 4 * all.count;
+            continue;
+        }
         if (brightest(all.open) <= 0) ++sum.hidden;
         if (brightest(all.visible) <= 0) return;
-        if (!closed) closed = closedMean(source, receiver, tolerance, closedError);
         const glm::vec3 mean = all.estimate(closed);
         variance = 0;
         for (const Block& block : blocks) {
