@@ -14,6 +14,7 @@
 #include <tbb/info.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -58,9 +59,6 @@ A fixed number of bundles: min_bundles and max_bundles equal. The first shot sti
 target_error. Exit code 1 if any combination failed; the others are in the output.
 )";
 
-// Gathered direct light of the reference: standard error relative to the light.
-constexpr float kReferenceShotError = 0.002f;
-constexpr int kReferenceSeed = 1 << 30;  // no run has it
 constexpr unsigned kReferenceSeconds = 1800;
 constexpr int kFailed = 3;  // exit code of a bake that threw
 
@@ -259,33 +257,24 @@ struct BenchScene {
 
 // The path of the reference of this scene with the run's patches, made if it is missing.
 std::string reference(const BenchScene& scene, const Settings& run, const Options& options) {
-    Settings settings;
-    settings.patchSize = run.patchSize;
-    settings.maxPatches = run.maxPatches;
-    settings.minBundles = settings.maxBundles = options.referenceBundles;
-    settings.targetError = kReferenceShotError;
-    settings.seed = kReferenceSeed;
     std::ostringstream key;
     key << scene.text << '\n'
-        << settings.patchSize << ' ' << settings.maxPatches << ' ' << settings.maxBundles << ' '
-        << settings.targetError;
+        << run.patchSize << ' ' << run.maxPatches << ' ' << options.referenceBundles;
     std::ostringstream path;
     path << (options.work / scene.name).string() << '-' << std::hex << fnv1a(key.str()) << ".light";
     if (fs::exists(path.str())) return path.str();
     const Outcome outcome = inProcessOfItsOwn(kReferenceSeconds, [&] {
-        Bake bake;
-        bake.settings = settings;
-        bake.run(scene.scene);
-        writePatchLight(path.str(), patchLight(scene.scene, bake));
-        return Json::parse(bake.reportJson());
+        const auto start = std::chrono::steady_clock::now();
+        const PatchLight light = referenceLight(scene.scene, run, options.referenceBundles);
+        writePatchLight(path.str(), light);
+        const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+        std::fprintf(stderr, "reference of %s: %zu sides, %u bundles, noise %.2f %%, %.1f s\n",
+                     scene.name.c_str(), light.size(), light.bundles, 100 * light.estimatedError,
+                     seconds.count());
+        return Json::object();
     });
     if (outcome.result.is_null())
         throw invalidArgument("the reference of " + scene.name + ": " + outcome.failure);
-    std::fprintf(stderr, "reference of %s: %zu patches, %u bundles, noise %.2f %%, %.1f s\n",
-                 scene.name.c_str(), outcome.result["patches"].get<size_t>(),
-                 outcome.result["bundles"].get<unsigned>(),
-                 100 * outcome.result["estimated_error"].get<double>(),
-                 outcome.result["seconds"]["total"].get<double>());
     return path.str();
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patch_light.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -9,6 +11,10 @@
 #include <numeric>
 
 #include "bake/error.h"
+#include "transport/direct_light.h"
+#include "transport/light_source.h"
+#include "transport/sobol.h"
+#include "visibility/visibility.h"
 
 namespace raybundle::bench {
 namespace {
@@ -17,7 +23,66 @@ namespace {
 constexpr float kUnlit = 0.01f;
 constexpr char kMagic[8] = {'r', 'b', 'l', 'i', 'g', 'h', 't', '1'};
 
+// Of the reference: samples per side and source (more where it is
+// partly visible), points of closed forms, and a seed that no run has.
+constexpr uint32_t kFirstSamples = 1024, kSamples = 8192, kClosedSamples = 256;
+// A surface no further away than this share of a patch lies against it.
+constexpr float kTouchOfPatch = 1e-3f;
+constexpr int kReferenceSeed = 1 << 30;
+// The GATHER of the reference bake, whose noise enters the indirect light alone.
+constexpr float kReferenceShotError = 0.002f;
+
 float sum(const glm::vec3& v) { return v.x + v.y + v.z; }
+
+// Whether the light of a side is a result.
+bool isBaked(const Scene& scene, const Patches& patches, size_t side) {
+    const Instance& instance =
+        scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
+    return instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side);
+}
+
+// Mean irradiance of a side from a source. A share below one in kFirstSamples may be overlooked.
+glm::dvec3 sampledIrradiance(const LightSource& source, const Patches& patches,
+                             const Visibility& visibility, uint32_t side, uint32_t seed) {
+    const glm::vec3 normal = patches.normal(side);
+    glm::dvec3 mean(0.0);
+    uint32_t open = 0, blocked = 0, k = 0;
+    for (; k < kSamples && (k < kFirstSamples || (open > 0 && blocked > 0)); ++k) {
+        const glm::vec4 u = sobolPoint(k, seed);
+        const glm::vec3 point = patches.point(side / 2, {u.x, u.y});
+        const LightSample sample = source.sample(point, normal, {u.z, u.w});
+        if (!(sum(sample.irradiance) > 0)) continue;
+        if (visibility.isBlocked(side, point, sample.direction, sample.distance)) {
+            ++blocked;
+        } else {
+            ++open;
+            mean += glm::dvec3(sample.irradiance);
+        }
+    }
+    mean /= double(k);
+    if (open == 0 || blocked > 0) return mean;
+    // Wholly visible: the closed form, if there is one, has no noise.
+    glm::dvec3 closedMean(0.0);
+    for (k = 0; k < kClosedSamples; ++k) {
+        const glm::vec4 u = sobolPoint(k, seed);
+        const auto closed = source.irradiance(patches.point(side / 2, {u.x, u.y}), normal);
+        if (!closed) return mean;
+        closedMean += glm::dvec3(*closed);
+    }
+    return closedMean / double(kClosedSamples);
+}
+
+// The share of a side that no other surface lies against.
+float exposedShare(const Patches& patches, const Visibility& visibility, uint32_t side) {
+    const float touching = kTouchOfPatch * patches.size;
+    uint32_t open = 0;
+    for (uint32_t k = 0; k < kClosedSamples; ++k) {
+        const glm::vec4 u = sobolPoint(k, hash(uint32_t(kReferenceSeed), side));
+        open += !visibility.isBlocked(side, patches.point(side / 2, {u.x, u.y}),
+                                      patches.normal(side), touching);
+    }
+    return float(open) / float(kClosedSamples);
+}
 
 template <class T>
 void write(std::ofstream& file, const std::vector<T>& values) {
@@ -38,16 +103,48 @@ PatchLight patchLight(const Scene& scene, const Bake& bake) {
     const Irradiance& irradiance = bake.patchIrradiance();
     PatchLight light;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const Instance& instance =
-            scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
-        if (instance.role != RB_ROLE_BAKE || side % 2 != size_t(instance.side)) continue;
+        if (!isBaked(scene, patches, side)) continue;
         light.area.push_back(patches.area[side / 2]);
+        light.exposed.push_back(1);
         light.direct.push_back(irradiance.direct[side]);
         light.indirect.push_back(irradiance.indirect[side]);
     }
     const auto report = nlohmann::json::parse(bake.reportJson());
     light.bundles = report.at("bundles");
     light.estimatedError = report.at("estimated_error");
+    return light;
+}
+
+PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles) {
+    Bake bake;
+    bake.settings.patchSize = like.patchSize;
+    bake.settings.maxPatches = like.maxPatches;
+    bake.settings.minBundles = bake.settings.maxBundles = bundles;
+    bake.settings.targetError = kReferenceShotError;
+    bake.settings.seed = kReferenceSeed;
+    bake.run(scene);
+    PatchLight light = patchLight(scene, bake);
+
+    // Replace the gathered part of the direct light.
+    const Patches& patches = bake.patches();
+    const Visibility visibility(patches);
+    const DirectLight directLight(scene, patches, visibility, uint32_t(kReferenceSeed));
+    const auto& sources = directLight.lightSources();
+    std::vector<uint32_t> sides;
+    for (size_t side = 0; side < patches.sideCount(); ++side)
+        if (isBaked(scene, patches, side)) sides.push_back(uint32_t(side));
+    tbb::parallel_for(size_t(0), sides.size(), [&](size_t i) {
+        const uint32_t side = sides[i];
+        glm::dvec3 gathered(0.0);
+        for (size_t k = 0; k < sources.size(); ++k)
+            gathered += sampledIrradiance(*sources[k], patches, visibility, side,
+                                          hash(uint32_t(kReferenceSeed), hash(side, uint32_t(k))));
+        // All light comes in through the exposed part.
+        light.exposed[i] = exposedShare(patches, visibility, side);
+        const double concentrated = light.exposed[i] > 0 ? 1 / double(light.exposed[i]) : 0;
+        light.direct[i] +=
+            glm::vec3(concentrated * gathered) - bake.patchIrradiance().gathered[side];
+    });
     return light;
 }
 
@@ -61,8 +158,9 @@ LightError lightError(const PatchLight& light, const PatchLight& reference, Part
     };
     double area = 0, mean = 0;
     for (size_t i = 0; i < n; ++i) {
-        area += double(reference.area[i]);
-        mean += double(reference.area[i] * sum(reference.direct[i] + reference.indirect[i]));
+        const float weight = reference.area[i] * reference.exposed[i];
+        area += double(weight);
+        mean += double(weight * sum(reference.direct[i] + reference.indirect[i]));
     }
     const double darkest = double(kUnlit) * mean / area;
 
@@ -71,7 +169,8 @@ LightError lightError(const PatchLight& light, const PatchLight& reference, Part
     double squares = 0, signal = 0, found = 0, wanted = 0;
     for (size_t i = 0; i < n; ++i) {
         if (part == Part::UNLIT && double(sum(reference.direct[i])) > darkest) continue;
-        const double weight = double(reference.area[i]);
+        const double weight = double(reference.area[i] * reference.exposed[i]);
+        if (weight <= 0) continue;
         const glm::dvec3 x(value(light, i)), y(value(reference, i));
         const double squared = glm::dot(x - y, x - y);
         differences.emplace_back(squared, weight);
@@ -109,6 +208,7 @@ void writePatchLight(const std::string& path, const PatchLight& light) {
         file.write(reinterpret_cast<const char*>(&light.estimatedError),
                    sizeof light.estimatedError);
         write(file, light.area);
+        write(file, light.exposed);
         write(file, light.direct);
         write(file, light.indirect);
         if (!file) throw invalidArgument("cannot write " + partial);
@@ -129,6 +229,7 @@ PatchLight readPatchLight(const std::string& path) {
     if (!file || !std::equal(std::begin(magic), std::end(magic), std::begin(kMagic)))
         throw invalidArgument("cannot read " + path);
     read(file, light.area, count);
+    read(file, light.exposed, count);
     read(file, light.direct, count);
     read(file, light.indirect, count);
     if (!file) throw invalidArgument("cannot read " + path);

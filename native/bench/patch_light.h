@@ -17,6 +17,7 @@ namespace raybundle::bench {
 // Of the sides with a result, in the order of the patches.
 struct PatchLight {
     std::vector<float> area;          // m^2
+    std::vector<float> exposed;       // share that nothing covers; 1 except in a reference
     std::vector<glm::vec3> direct;    // irradiance, W/m^2
     std::vector<glm::vec3> indirect;  // irradiance, W/m^2
     uint32_t bundles = 0;             // of the bake
@@ -28,7 +29,11 @@ struct PatchLight {
 // After a run of the bake on the scene.
 PatchLight patchLight(const Scene& scene, const Bake& bake);
 
-// Weighted by area; noise, maximum and p99 are relative to the RMS of the reference.
+// What is taken for the truth: the indirect light is that of a LINE_REUSE bake of `bundles` bundles
+// with the patches of `like`; the direct light is sampled much more finely than by any first shot.
+PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles);
+
+// Weighted by exposed area; noise, maximum and p99 are relative to the RMS of the reference.
 struct LightError {
     double noise = 0;    // RMSE over RGB
     double bias = 0;     // mean / mean of the reference - 1
