@@ -44,7 +44,7 @@ constexpr char kUsage[] =
 
   SCENE.json          of blend_tests/export_scene.py
   --run SETTINGS      one combination of settings by name (raybundle.h), the rest being defaults;
-                      "label=TEXT" names it in the output
+                      "label=TEXT" names it in the output, and x=NUMBER is copied there
   --runs FILE         combinations, one per line; lines that begin with # do not count
   --common SETTINGS   for all combinations, which may overrule it
   --seeds N           bakes each with the seeds 1 .. N (1); a seed goes once through all
@@ -64,6 +64,7 @@ constexpr int kFailed = 3;  // exit code of a bake that threw
 
 struct Run {
     std::string label;
+    Json x;  // null: not given
     Settings settings;
     Json given = Json::object();  // the settings that were named, as they were written
 };
@@ -122,6 +123,8 @@ Run parseRun(const std::string& text) {
         const std::string name = word.substr(0, equals), value = word.substr(equals + 1);
         if (name == "label") {
             run.label = value;
+        } else if (name == "x") {
+            run.x = number<double>(name, value);
         } else {
             set(run.settings, name, value);
             run.given[name] = value;
@@ -299,11 +302,14 @@ Json bakeAndCompare(const BenchScene& scene, const Run& run, int seed, const Opt
     return {{"tag", options.tag},
             {"scene", scene.name},
             {"label", run.label},
+            {"x", run.x},
             {"settings", run.given},
             {"seed", seed},
             {"threads", threads > 0 ? threads : tbb::info::default_concurrency()},
             {"seconds", report.at("seconds")},
             {"patches", report.at("patches")},
+            {"patch_area", bake.patches().totalArea / double(bake.patches().count())},
+            {"scene_radius", bake.patches().radius},
             {"bundles", report.at("bundles")},
             {"lines", report.at("lines")},
             {"exchanges", report.at("exchanges")},

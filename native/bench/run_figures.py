@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exports the scenes, runs the comparisons of figure_table.py and draws them; see `figures`."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+sys.dont_write_bytecode = True
+
+from figure_table import FIGURES, SCENES, Figure  # noqa: E402
+from plot import draw  # noqa: E402
+
+ROOT = Path(__file__).parent.parent.parent
+COMPARE = ROOT / "build/release/native/bench/compare"
+EXPORT = ROOT / "blend_tests/export_scene.py"
+# At least 10 times the bundles of any run that is nearly as good.
+REFERENCE_BUNDLES = 8192
+SECONDS_PER_BAKE = 60
+
+
+def export(name: str, folder: Path) -> Path:
+    """The scene as JSON, made again if its .blend is newer."""
+    blend, show, hide = SCENES[name]
+    source, target = ROOT / f"scenes/{blend}.blend", folder / f"{name}.json"
+    if target.exists() and target.stat().st_mtime > source.stat().st_mtime:
+        return target
+    command = ["blender", "-b", "--factory-startup", "--python-exit-code", "1", str(source), "-P",
+               str(EXPORT), "--", str(target)]
+    command += ["--show", *show] if show else []
+    command += ["--hide", *hide] if hide else []
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"figures: cannot export {name}:\n{done.stdout}{done.stderr}")
+    return target
+
+
+def compare(figure: Figure, folder: Path) -> bool:
+    """Writes FOLDER/NAME.jsonl; returns whether every run went well."""
+    runs, results = folder / f"{figure.name}.runs", folder / f"{figure.name}.jsonl"
+    runs.write_text("\n".join(figure.runs) + "\n")
+    results.unlink(missing_ok=True)
+    scenes = [str(export(name, folder)) for name in figure.scenes]
+    code = subprocess.run([
+        str(COMPARE), *scenes, "--runs", str(runs), "--seeds", str(figure.seeds), "--tag",
+        figure.name, "--work", str(folder / "references"), "--out", str(results),
+        "--reference-bundles", str(REFERENCE_BUNDLES), "--limit", str(SECONDS_PER_BAKE)]
+    ).returncode
+    if code > 1:
+        sys.exit(f"figures: {figure.name} failed")
+    return code == 0
+
+
+def main() -> None:
+    names = [figure.name for figure in FIGURES]
+    parser = argparse.ArgumentParser(prog="figures", description=__doc__)
+    parser.add_argument("out", nargs="?", type=Path, default=ROOT / "build/figures",
+                        help="folder of scenes, references and results")
+    parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="FIGURE",
+                        help=" ".join(names))
+    parser.add_argument("--images", type=Path, default=ROOT / "docs/images",
+                        help="folder of the pictures")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    all_well = True
+    started = time.monotonic()
+    for figure in FIGURES:
+        if figure.name not in arguments.only:
+            continue
+        before = time.monotonic()
+        all_well &= compare(figure, arguments.out)
+        now = time.monotonic()
+        print(f"{figure.name}: {now - before:.0f} s ({now - started:.0f} s so far)", flush=True)
+    draw(arguments.out, arguments.images, arguments.only)
+    if not all_well:
+        sys.exit("figures: some combinations failed; see above")
+
+
+if __name__ == "__main__":
+    main()
