@@ -114,8 +114,12 @@ struct Bake::Trace {
         tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                                 uint32_t(settings.seed));
         // Only line reuse on exact projection sees what lies against what while it traces.
-        if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact())
-            exposed = exposedShare(input, uint32_t(settings.seed));
+        if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact()) {
+            ProjectorInput fine = input;
+            // Single lines are traced, not projected, and too few to see it.
+            if (settings.linesPerBundle == 1) fine.pixelSize = pixelSize(patches, 0);
+            exposed = exposedShare(fine, uint32_t(settings.seed));
+        }
     }
 
     // Whether all traced lines are in the counts: not after a cancel on the way, and not where a
