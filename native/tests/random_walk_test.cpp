@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Random walks against closed forms, of their mean and of their variance.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "bake/bake.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+#include "test_transports.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+constexpr const char* kEstimators[] = {"COLLISION", "SURVIVAL", "ABSORPTION"};
+
+void setWalks(Bake& bake, int bundleCount) {
+    setQuick(bake, bundleCount);
+    bake.settings.solver = "RANDOM_WALK";
+    bake.settings.directions = "RANDOM";
+}
+
+// A cube with one patch per face of which one shines, and walks whose results are gathered.
+struct Cube : TransportScene {
+    explicit Cube(float pixelSize) : TransportScene(closedCube(0.5f), 10, pixelSize) {
+        shot.emission[0] = glm::vec3(1);
+    }
+};
+
+TEST(RandomWalk, TheMeanIsExactOnACube) {
+    Cube cube(0.1f);  // 236 walks per bundle
+    for (const char* estimator : kEstimators) {
+        cube.settings.estimator = estimator;
+        Statistics faces[3];
+        for (int seed = 0; seed < 200; ++seed) {
+            const auto walk = cube.make("RANDOM_WALK", seed);
+            walk->advance(2, Progress());
+            const Irradiance h = walk->irradiance(Half::BOTH, 0);
+            double exitance[3] = {0, 0, 0};
+            for (uint32_t p = 0; p < 6; ++p) {
+                const glm::vec3 all = h.direct[2 * p] + h.indirect[2 * p];
+                exitance[cubeFace(cube.patches, p)] +=
+                    double(cube.shot.emission[2 * p].x + 0.5f * all.x);
+            }
+            exitance[2] /= 4;
+            for (int k = 0; k < 3; ++k) faces[k].add(exitance[k]);
+            EXPECT_EQ(walk->bias(), 0);
+        }
+        // Three standard errors of the mean of 200 seeds: one comparison in 370 would fail by
+        // chance if the seeds were not always the same.
+        for (int k = 0; k < 3; ++k) {
+            EXPECT_NEAR(faces[k].mean(), kCubeExitance[k], 3 * faces[k].standardError())
+                << estimator << ", face " << k;
+            EXPECT_LT(faces[k].standardError(), 0.01 * kCubeExitance[k]);
+        }
+    }
+}
+
+TEST(RandomWalk, TheMeanIsExactOnABakedCube) {
+    Bake bake;
+    setWalks(bake, 8);
+    bake.settings.linesPerBundle = 200;
+    expectExactOnBakedCube(bake.settings, 200);
+}
+
+TEST(RandomWalk, TheVariancesAreThoseOfTheory) {
+    // Sbert's formulas for the reflected radiosity b of a patch of area A with reflectance rho,
+    // after N walks from power Phi; zeta = [(I - RF)^-1]_ii - 1. Survivals at a patch are geometric
+    // like visits, but rho times as many.
+    //   absorption  [rho / (1 - rho) Phi / A b - b^2] / N
+    //   collision   [rho (1 + 2 zeta) Phi / A b - b^2] / N
+    //   survival    [    (1 + 2 zeta) Phi / A b - b^2] / N
+    const double rho = 0.5, zeta = kCubeExitance[0] - 1;
+    Cube cube(0.15f);
+    const double walks =
+        std::round(kPi * double(cube.patches.radius) * double(cube.patches.radius) / (0.15 * 0.15));
+    constexpr int kRuns = 4096;
+    for (const char* estimator : kEstimators) {
+        cube.settings.estimator = estimator;
+        Statistics faces[6];
+        for (int seed = 0; seed < kRuns / 2; ++seed) {
+            const auto walk = cube.make("RANDOM_WALK", seed);
+            walk->advance(2, Progress());
+            for (Half half : {Half::FIRST, Half::SECOND}) {
+                const Irradiance h = walk->irradiance(half, 0);
+                for (uint32_t p = 0; p < 6; ++p)
+                    faces[p].add(rho * double(h.direct[2 * p].x + h.indirect[2 * p].x));
+            }
+        }
+        double found[3] = {0, 0, 0};
+        for (uint32_t p = 0; p < 6; ++p) found[cubeFace(cube.patches, p)] += faces[p].variance();
+        found[2] /= 4;
+        for (int k = 0; k < 3; ++k) {
+            const double b = kCubeExitance[k] - (k == 0 ? 1 : 0);
+            const double factor = estimator == kEstimators[0]   ? rho * (1 + 2 * zeta)
+                                  : estimator == kEstimators[1] ? 1 + 2 * zeta
+                                                                : rho / (1 - rho);
+            const double exact = (factor * b - b * b) / walks;
+            std::printf("[ figures  ] %-10s face %d: variance %.4g, theory %.4g, ratio %.3f\n",
+                        estimator, k, found[k], exact, found[k] / exact);
+            // The variance of 4096 runs has a standard error of sqrt(2 / 4095) = 2.2 %: 10 % are
+            // 4.5 of them, one failure in 10^5.
+            EXPECT_NEAR(found[k] / exact, 1, 0.1) << estimator << ", face " << k;
+        }
+    }
+}
+
+TEST(RandomWalk, ColoursAreUnbiased) {
+    // Red is black, green 0.5 and blue 0.8 everywhere; the same emission.
+    Cube cube(0.1f);
+    for (glm::vec3& rho : cube.patches.reflectance) rho = {0, 0.5f, 0.8f};
+    cube.shot.emission[0] = {1, 2, 0.5f};
+    for (const char* estimator : kEstimators) {
+        cube.settings.estimator = estimator;
+        const auto walk = cube.make("RANDOM_WALK", 1);
+        walk->advance(1000, Progress());
+        const Irradiance h = walk->irradiance(Half::BOTH, 0);
+        // Mean irradiance of all faces: E / (6 (1 - rho)), and it is E / 6 straight.
+        glm::dvec3 direct(0.0), all(0.0);
+        for (uint32_t i = 0; i < 12; i += 2) {
+            direct += glm::dvec3(h.direct[i]) / 6.0;
+            all += glm::dvec3(h.direct[i] + h.indirect[i]) / 6.0;
+        }
+        // 236 000 walks: a standard error of 0.2 to 0.9 % (SURVIVAL in blue and direct light by
+        // ABSORPTION are the worst).
+        for (int c = 0; c < 3; ++c) {
+            const double e = double(cube.shot.emission[0][c]) / 6;
+            EXPECT_NEAR(direct[c], e, 0.02 * e) << estimator << ", channel " << c;
+            const double rho = double(cube.patches.reflectance[0][c]);
+            EXPECT_NEAR(all[c], e / (1 - rho), 0.02 * e / (1 - rho))
+                << estimator << ", channel " << c;
+        }
+    }
+}
+
+TEST(RandomWalk, BlackSidesGetTheirLightToo) {
+    for (const char* estimator : kEstimators) {
+        TransportScene cube(closedCube(0, 1), 10, 0.05f);
+        cube.settings.estimator = estimator;
+        const auto walk = cube.make("RANDOM_WALK", 1);
+        walk->advance(100, Progress());
+        const Irradiance h = walk->irradiance(Half::BOTH, 0);
+        // 94 000 walks, 16 000 of them at each face: 0.8 %.
+        for (uint32_t i = 0; i < 12; i += 2) {
+            EXPECT_NEAR(h.direct[i].x, 1, 0.04) << estimator;
+            EXPECT_EQ(h.indirect[i], glm::vec3(0));
+        }
+    }
+}
+
+TEST(RandomWalk, AConvexObjectGetsAllTheWorldsLight) {
+    Scene scene;
+    place(scene, icosphere("ball", 1, 0, false), grey("", 0.5f));
+    TransportScene ball(scene, 10, 0.05f);
+    ball.world = {1, 2, 0.5f};
+    const auto walk = ball.make("RANDOM_WALK", 1);
+    walk->advance(200, Progress());
+    const Irradiance h = walk->irradiance(Half::BOTH, 0);
+    const std::vector<float> open = walk->openShare();
+    for (uint32_t i = 0; i < ball.patches.sideCount(); i += 2) {
+        // 250 000 walks, 60 % of which hit one of 20 faces: 1.2 % each; four times that.
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(h.direct[i][c] / (float(kPi) * ball.world[c]), 1, 0.05);
+        EXPECT_EQ(h.indirect[i], glm::vec3(0));
+        EXPECT_EQ(open[i], 1);
+        EXPECT_EQ(h.direct[i + 1], glm::vec3(0)) << "nothing comes in";
+    }
+}
+
+TEST(RandomWalk, ABakedFurnaceHasTheStatedError) {
+    double stated = 0, found = 0;
+    for (float gap : {0.1f, 0.0f}) {
+        const Scene scene = roomWithBoxes(0.5f, 0.5f, gap);
+        Bake bake;
+        setWalks(bake, 512);
+        bake.run(scene);
+        const Patches& patches = bake.patches();
+        Irradiance exact = bake.patchIrradiance();
+        for (size_t i = 0; i < exact.direct.size(); ++i) {
+            const bool isReached = exact.direct[i] != glm::vec3(0);
+            // Where the boxes stand, nothing reaches their bottoms.
+            exact.direct[i] = glm::vec3(isReached ? 1 : 0);
+            exact.indirect[i] = glm::vec3(0);
+        }
+        const double error = frontNoise(patches, bake.patchIrradiance(), exact);
+        stated += std::pow(reportOf(bake)["estimated_error"].get<double>(), 2);
+        found += error * error;
+        EXPECT_LT(error, 0.05);
+        const Json energy = reportOf(bake)["energy"];
+        EXPECT_LT(energy["balance_error"].get<double>(), 0.01) << energy;
+        EXPECT_EQ(energy["escaped"].get<double>(), 0) << "the room is closed";
+    }
+    // Many patches with independent noise: the stated error is right to a few per cent. Partly
+    // covered patches add what the share of them that is covered is off.
+    EXPECT_NEAR(std::sqrt(found / stated), 1, 0.2);
+}
+
+TEST(RandomWalk, AgreesWithLineReuse) {
+    Bake reference, bake;
+    setQuick(reference, 4096);
+    reference.run(litRoom());
+    setWalks(bake, 256);
+    for (const char* estimator : kEstimators) {
+        bake.settings.estimator = estimator;
+        bake.run(litRoom());
+        const double stated = reportOf(bake)["estimated_error"];
+        const double found =
+            frontNoise(bake.patches(), bake.patchIrradiance(), reference.patchIrradiance());
+        // The reference has 0.2 % of noise, and both have that of the gathered light in common.
+        EXPECT_LT(found, 1.3 * stated) << estimator;
+        EXPECT_GT(found, 0.7 * stated) << estimator;
+        // What is alike on all patches: less than the noise by the root of their number (1000).
+        double sum = 0, exact = 0;
+        for (size_t i = 0; i < bake.patches().sideCount(); i += 2) {
+            const double area = double(bake.patches().area[i / 2]);
+            sum += area * double(bake.patchIrradiance().indirect[i].y);
+            exact += area * double(reference.patchIrradiance().indirect[i].y);
+        }
+        EXPECT_NEAR(sum / exact, 1, 0.01) << estimator;
+    }
+}
+
+TEST(RandomWalk, EnergyIsBalancedUnderTheSky) {
+    Scene scene;
+    place(scene, rectangle("ground", {-3, -3, 0}, {6, 0, 0}, {0, 6, 0}), grey("", 0.5f));
+    place(scene, box("house", {-0.5f, -0.5f, 0.01f}, {0.5f, 0.5f, 1}, false), grey("", 0.8f));
+    place(scene, box("black", {1.5f, 1.5f, 0.01f}, {2, 2, 1}, false), grey("", 0));
+    scene.worldRadiance = {0.5f, 0.7f, 1};
+    Bake bake;
+    setWalks(bake, 256);
+    bake.run(scene);
+    const Json energy = reportOf(bake)["energy"];
+    EXPECT_GT(energy["escaped"].get<double>(), 0);
+    // A million walks; the share of each patch that is open has noise of its own.
+    EXPECT_LT(energy["balance_error"].get<double>(), 0.01) << energy;
+}
+
+TEST(RandomWalk, TheNumberOfThreadsDoesNotMatter) {
+    std::vector<glm::vec3> results[2];
+    for (int threads : {1, 2}) {
+        Bake bake;
+        setWalks(bake, 8);
+        bake.settings.threads = threads;
+        bake.run(litRoom());
+        results[threads - 1] = everything(bake);
+    }
+    EXPECT_LT(difference(results[0], results[1]), 1e-5);
+}
+
+TEST(RandomWalk, SeedsAreIndependent) {
+    Cube cube(0.1f);
+    const auto one = cube.make("RANDOM_WALK", 1);
+    one->advance(2, Progress());
+    const Irradiance a = one->irradiance(Half::FIRST, 0), b = one->irradiance(Half::SECOND, 0);
+    EXPECT_NE(a.direct[2], b.direct[2]);
+    one->advance(2, Progress());
+    const Irradiance c = one->irradiance(Half::FIRST, 0);
+    EXPECT_NE(2.0f * a.direct[2], 2.0f * c.direct[2]) << "the second call brings new walks";
+    EXPECT_EQ(one->bundleCount(), 4u);
+}
+
+}  // namespace
+}  // namespace raybundle
