@@ -15,6 +15,7 @@ struct Kind {
 constexpr Kind kKinds[] = {
     {"LINE_REUSE", lineReuse},
     {"MULTIPATH", multipath},
+    {"STOCHASTIC_ITERATION", stochasticIteration},
     {"RANDOM_WALK", randomWalk},
 };
 

@@ -85,6 +85,7 @@ HandOver handOver(const Patches& patches, const FirstShot& shot, const std::vect
 // The transports, one a row of the table.
 std::unique_ptr<Transport> lineReuse(const TransportInput& input);
 std::unique_ptr<Transport> multipath(const TransportInput& input);
+std::unique_ptr<Transport> stochasticIteration(const TransportInput& input);
 std::unique_ptr<Transport> randomWalk(const TransportInput& input);
 
 // A transport by the name of its row. Throws Error(INVALID_ARGUMENT) if it would not converge on

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// STOCHASTIC_ITERATION with the ray-bundle operator: each iterate is the light that one bundle
+// brings, to all sides at once, from what the iterate before reflects and from the sources.
+//
+//   H_n = T_n (E + unshot + rho H_n-1),   H = mean of the H_n
+//   (T_n x)_i = 2 s^2 / (A_i exposed_i) * sum of x_j over the bundle's lines between i and j
+//
+// E: emission left to the bundles, and pi L on lines to the sky; unshot: light of the first shot,
+// reflected for the first time; A_i exposed_i: the part of the side that nothing covers, m^2;
+// s^2: area of a pixel, m^2.
+//
+// Sources: thesis section 2.6; Szirmay-Kalos, "Stochastic Iteration for Non-diffuse Global
+// Illumination" (1999).
+// Differs:
+// - The first iterates lack the later bounces. Some are left out of the mean, a quarter of the
+//   first call's at most; what the others lack is stated (bias).
+// - Each half of the bundles has iterates of its own.
+// - Scenes on which the mean square of the iterates would grow without bound are refused
+//   (mean_square_growth.cpp); the thesis gives no condition.
+#include "transport/stochastic_iteration.h"
+
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstdio>
+#include <glm/gtc/constants.hpp>
+
+#include "bake/error.h"
+
+namespace raybundle {
+namespace {
+
+constexpr uint32_t kBatch = 16;  // bundles of both halves traced at a time
+constexpr double kMissing = 1e-3;
+
+double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
+
+// What sides share in both halves.
+struct Sides {
+    std::vector<glm::vec3> reflectance, unshot;
+    std::vector<float> perLine;  // irradiance per exitance that one line brings
+    glm::vec3 worldExitance;     // W/m^2
+    bool hasDirect;              // there is light straight from emission or the world
+};
+
+// The iterates of one half.
+class Iterates {
+  public:
+    Iterates(const Sides& sides, const std::vector<glm::vec3>& emission)
+        : sides(sides),
+          exitance(emission.size()),
+          received(emission.size()),
+          totals(emission.size()),
+          sky(emission.size()) {
+        for (size_t i = 0; i < exitance.size(); ++i) exitance[i] = {emission[i], sides.unshot[i]};
+    }
+
+    // Goes on by the next bundle; its light counts in the mean if `counts`.
+    void step(const BundleLines& lines, bool counts) {
+        if (sides.hasDirect)
+            step<true>(lines, counts);
+        else
+            step<false>(lines, counts);
+    }
+
+    uint32_t counted() const { return count; }
+    const glm::dvec3& direct(size_t side) const { return totals[side].direct; }
+    const glm::dvec3& indirect(size_t side) const { return totals[side].indirect; }
+    uint32_t skyLines(size_t side) const { return sky[side]; }
+
+  private:
+    struct Exitance {
+        glm::vec3 emission{0.0f}, reflected{0.0f};
+    };
+    template <class Vector>
+    struct Light {
+        Vector direct{0.0f}, indirect{0.0f};
+    };
+
+    template <bool kHasDirect>
+    void step(const BundleLines& lines, bool counts) {
+        for (const Exchange& e : lines.exchanges) {
+            const float n = float(e.lines);
+            received[e.i].indirect += n * exitance[e.j].reflected;
+            received[e.j].indirect += n * exitance[e.i].reflected;
+            if (kHasDirect) {
+                received[e.i].direct += n * exitance[e.j].emission;
+                received[e.j].direct += n * exitance[e.i].emission;
+            }
+        }
+        if (kHasDirect)
+            for (uint32_t side : lines.sky) received[side].direct += sides.worldExitance;
+        if (counts) {
+            for (uint32_t side : lines.sky) ++sky[side];
+            ++count;
+        }
+        for (size_t i = 0; i < received.size(); ++i) {
+            const glm::vec3 direct = sides.perLine[i] * received[i].direct;
+            const glm::vec3 indirect = sides.perLine[i] * received[i].indirect;
+            exitance[i].reflected = sides.unshot[i] + sides.reflectance[i] * (direct + indirect);
+            if (counts) {
+                totals[i].direct += glm::dvec3(direct);
+                totals[i].indirect += glm::dvec3(indirect);
+            }
+            received[i] = {};
+        }
+    }
+
+    const Sides& sides;
+    std::vector<Exitance> exitance;          // W/m^2
+    std::vector<Light<glm::vec3>> received;  // exitance times lines, W/m^2
+    std::vector<Light<glm::dvec3>> totals;   // of the irradiances that count, W/m^2
+    std::vector<uint32_t> sky;               // lines that left the scene, of bundles that count
+    uint32_t count = 0;                      // bundles that count
+};
+
+class BundleIteration : public Transport {
+  public:
+    explicit BundleIteration(const TransportInput& input) : input(input), sides(makeSides(input)) {
+        assert(input.exposed.size() == input.patches.sideCount());
+        // Judge by the first bundles, and keep them.
+        std::vector<TracedBundle> traced = input.tracer.trace(kBatch);
+        refuseIfUnstable(traced);
+        keep(std::move(traced));
+    }
+
+    void advance(uint32_t count, const Progress& progress) override {
+        assert(count % 2 == 0 && "two halves of equal size");
+        if (done == 0)
+            warmUp = warmUpIterates(largestReflectance(input.patches), kMissing, count / 8);
+        for (uint32_t left = count / 2; left > 0;) {
+            progress.report(RB_STAGE_BUNDLES, 1 - 2.0 * left / count);
+            if (next == waiting[0].size()) keep(input.tracer.trace(std::min(kBatch, 2 * left)));
+            const uint32_t steps = uint32_t(std::min<size_t>(left, waiting[0].size() - next));
+            auto go = [&](size_t half) {
+                for (uint32_t k = 0; k < steps; ++k)
+                    halves[half].step(waiting[half][next + k].lines, done + k >= warmUp);
+            };
+            tbb::parallel_invoke([&] { go(0); }, [&] { go(1); });
+            next += steps;
+            done += steps;
+            left -= steps;
+        }
+        progress.report(RB_STAGE_BUNDLES, 1);
+    }
+
+    uint32_t bundleCount() const override { return 2 * done; }
+
+    Irradiance irradiance(Half half, float) override {
+        const HandOver first = handOver(input.patches, input.shot, input.exposed);
+        Irradiance result(sides.unshot.size());
+        for (size_t i = 0; i < sides.unshot.size(); ++i) {
+            const auto [direct, indirect] = mean(half, i);
+            result.gathered[i] = first.gathered[i];
+            result.direct[i] = first.gathered[i] + glm::vec3(direct);
+            result.indirect[i] = first.indirect[i] + glm::vec3(indirect);
+        }
+        return result;
+    }
+
+    // Iterate n lacks the bounces after the n-th: rho^n of the lines' light, with rho the
+    // reflectance that this light meets, lines to the sky counted as black; on average over the
+    // iterates that count, rho^(w+1) (1 - rho^N) / (N (1 - rho)) after w that do not.
+    double bias() const override {
+        const std::vector<float> open = openShare();
+        double arriving = 0, goingOn = 0, all = 0;
+        for (size_t i = 0; i < open.size(); ++i) {
+            const auto [direct, indirect] = mean(Half::BOTH, i);
+            const glm::dvec3 light = direct + indirect;
+            const double area = double(input.patches.area[i / 2]) * double(input.exposed[i]);
+            arriving += area * sum(light);
+            goingOn += area * std::max(0.0, 1 - double(open[i])) *
+                       sum(glm::dvec3(sides.reflectance[i]) * light);
+            glm::dvec3 fromShot(input.shot.irradiance[i]);
+            if (!input.shot.indirect.empty()) fromShot += glm::dvec3(input.shot.indirect[i]);
+            all += area * sum(light) + double(input.patches.area[i / 2]) * sum(fromShot);
+        }
+        const double n = halves[0].counted();
+        if (!(arriving > 0) || n == 0) return 0;
+        const double rho = std::min(goingOn / arriving, 0.999);
+        return arriving / all * std::pow(rho, warmUp + 1) * (1 - std::pow(rho, n)) /
+               (n * (1 - rho));
+    }
+
+    // Per true area, as the light is: so the world's light in it is what the lines brought in.
+    // Noise can bring it above 1.
+    std::vector<float> openShare() const override {
+        std::vector<float> share(sides.perLine.size(), 0.0f);
+        const float counted = float(halves[0].counted() + halves[1].counted());
+        for (size_t i = 0; i < share.size(); ++i)
+            if (counted > 0)
+                share[i] = sides.perLine[i] * float(halves[0].skyLines(i) + halves[1].skyLines(i)) /
+                           counted;
+        return share;
+    }
+
+  private:
+    static Sides makeSides(const TransportInput& input) {
+        const Patches& patches = input.patches;
+        Sides sides{patches.reflectance, handOver(patches, input.shot, input.exposed).unshot,
+                    std::vector<float>(patches.sideCount()), glm::pi<float>() * input.worldRadiance,
+                    false};
+        const glm::vec3 black(0.0f);
+        sides.hasDirect = input.worldRadiance != black;
+        for (size_t i = 0; i < patches.sideCount(); ++i) {
+            const double area = double(patches.area[i / 2]) * double(input.exposed[i]);
+            sides.perLine[i] = area > 0 ? float(2 * input.tracer.pixelArea / area) : 0;
+            sides.hasDirect |= input.shot.emission[i] != black;
+        }
+        return sides;
+    }
+
+    void refuseIfUnstable(const std::vector<TracedBundle>& traced) const {
+        const double growth = meanSquareGrowth(input, traced);
+        if (growth < 1) return;
+        char number[32];
+        std::snprintf(number, sizeof(number), "%.3g", growth);
+        throw invalidArgument(
+            "solver STOCHASTIC_ITERATION does not converge on this scene: from bundle to bundle "
+            "the mean square of its noise would grow by a factor of " +
+            std::string(number) +
+            ", which must be below 1. Lower the reflectances (large patches allow 0.86), raise "
+            "lines_per_bundle or patch_size until the patches are larger than the distance of "
+            "the lines, or choose solver LINE_REUSE, MULTIPATH or RANDOM_WALK");
+    }
+
+    // Takes bundles to go on by; those before have been used.
+    void keep(std::vector<TracedBundle> traced) {
+        for (auto& bundles : waiting) bundles.clear();
+        for (TracedBundle& t : traced) waiting[t.bundle.half].push_back(std::move(t));
+        next = 0;
+    }
+
+    // Mean irradiance by the lines, direct and indirect.
+    std::pair<glm::dvec3, glm::dvec3> mean(Half half, size_t side) const {
+        glm::dvec3 direct(0.0), indirect(0.0);
+        double count = 0;
+        for (size_t h = 0; h < 2; ++h) {
+            if (half != Half::BOTH && h != size_t(half)) continue;
+            direct += halves[h].direct(side);
+            indirect += halves[h].indirect(side);
+            count += halves[h].counted();
+        }
+        return {direct / std::max(1.0, count), indirect / std::max(1.0, count)};
+    }
+
+    const TransportInput input;
+    const Sides sides;
+    std::array<Iterates, 2> halves{Iterates(sides, input.shot.emission),
+                                   Iterates(sides, input.shot.emission)};
+    std::array<std::vector<TracedBundle>, 2> waiting;  // per half: traced bundles,
+    size_t next = 0;                                   // of which these have been used
+    uint32_t done = 0;                                 // bundles of each half
+    uint32_t warmUp = 0;                               // of them, those that do not count
+};
+
+}  // namespace
+
+std::unique_ptr<Transport> stochasticIteration(const TransportInput& input) {
+    if (input.settings.linesPerBundle == 1) return singleRayIteration(input);
+    return std::make_unique<BundleIteration>(input);
+}
+
+}  // namespace raybundle
