@@ -110,15 +110,18 @@ struct Bake::Trace {
                                    touchDistance,
                                    settings.smallPatchesKind(),
                                    settings.planeCount,
-                                   settings.planePlacementKind()};
+                                   settings.planePlacementKind(),
+                                   settings.planeCoherence != 0,
+                                   settings.linesPerBundle == 1};
         tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                                 uint32_t(settings.seed));
         // Only line reuse on exact projection sees what lies against what while it traces.
         if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact()) {
-            ProjectorInput fine = input;
-            // Single lines are traced, not projected, and too few to see it.
-            if (settings.linesPerBundle == 1) fine.pixelSize = pixelSize(patches, 0);
-            exposed = exposedShare(fine, uint32_t(settings.seed));
+            // By lists of pixels also where a bundle is one line.
+            ProjectorInput exact = input;
+            exact.singleLine = false;
+            if (input.singleLine) exact.pixelSize = pixelSize(patches, 0);
+            exposed = exposedShare(exact, uint32_t(settings.seed));
         }
     }
 

@@ -54,8 +54,8 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
         hasher.add(&instance.transform, sizeof(instance.transform));
     }
     hasher.add(&settings.patchSize, sizeof(float));
-    for (int value :
-         {settings.maxPatches, settings.linesPerBundle, settings.seed, settings.planeCount})
+    for (int value : {settings.maxPatches, settings.linesPerBundle, settings.seed,
+                      settings.planeCount, settings.planeCoherence})
         hasher.add(&value, sizeof(value));
     for (const std::string* name : {&settings.solver, &settings.directions, &settings.projector,
                                     &settings.smallPatches, &settings.planePlacement})

@@ -28,6 +28,7 @@ const std::vector<Number<int>>& integers() {
         {"plane_count", &Settings::planeCount, 1, 64},
         {"thesis_literal", &Settings::thesisLiteral, 0, 1},
         {"local_rays", &Settings::localRays, 0, INT32_MAX},
+        {"plane_coherence", &Settings::planeCoherence, 0, 1},
     };
     return table;
 }

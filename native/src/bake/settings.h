@@ -28,6 +28,7 @@ struct Settings {
     std::string reconstruction = "LEAST_SQUARES";
     int planeCount = 4;  // of the projector PLANES
     std::string planePlacement = "SYSTEMATIC";
+    int planeCoherence = 1;               // 0: makes the planes' depth buffers one by one
     int localRays = 0;                    // of a first shot that shoots; 0 = to targetError
     std::string estimator = "COLLISION";  // of RANDOM_WALK
     int thesisLiteral = 0;  // 1: MULTIPATH as the thesis' pseudo-code says, for comparison

@@ -33,6 +33,7 @@ std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
 }
 
 std::vector<float> exposedShare(const ProjectorInput& input, uint32_t seed) {
+    if (input.patches.count() == 0) return {};
     // Not by ROULETTE, which lets neighbouring patches of a surface lie against each other.
     ProjectorInput exact = input;
     exact.smallPatches = SmallPatches::CENTRE_SAMPLING;

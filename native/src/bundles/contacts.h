@@ -33,11 +33,13 @@ class Contacts {
         return kCoincidence * touchDistance;
     }
 
+    // Surfaces further apart along a line neither touch nor coincide, metres. (A grazing line
+    // stretches the gap; beyond some stretch it is not worth a look.)
+    double zone() const { return 100 * touchDistance; }
+
     // Distance between the two across the nearer surface, metres.
     double gapAcross(uint32_t a, double along) const {
-        // A grazing line stretches the gap; beyond some stretch it is not worth a look.
-        constexpr double kMostStretch = 100;
-        if (std::abs(along) > kMostStretch * touchDistance) return std::abs(along);
+        if (std::abs(along) > zone()) return std::abs(along);
         return std::abs(along * glm::dot(glm::dvec3(patches.normal(a)), direction));
     }
 

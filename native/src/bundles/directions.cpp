@@ -12,12 +12,14 @@ namespace raybundle {
 // The sequences, each in a file of its own but for the plainest.
 std::unique_ptr<DirectionSequence> lowDiscrepancyDirections(std::mt19937_64& random);
 std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64& random);
+std::unique_ptr<DirectionSequence> adaptiveDirections(std::mt19937_64& random);
 
 const std::vector<DirectionKind>& directionKinds() {
     static const std::vector<DirectionKind> table = {
         // name, factory, independent, weighted
         {"LOW_DISCREPANCY", lowDiscrepancyDirections, false, false},
         {"RANDOM", randomDirections, true, false},
+        {"ADAPTIVE", adaptiveDirections, true, true},
     };
     return table;
 }

@@ -13,10 +13,9 @@ struct Kind {
 };
 
 constexpr Kind kKinds[] = {
-    {"AUTO", fragmentLists},
-    {"FRAGMENT_LISTS", fragmentLists},
-    {"PAINTER", painter},
-    {"PAINTER_NEWELL", painterNewell},
+    {"AUTO", fragmentLists}, {"FRAGMENT_LISTS", fragmentLists},
+    {"PAINTER", painter},    {"PAINTER_NEWELL", painterNewell},
+    {"PLANE", plane},        {"PLANES", planes},
 };
 
 }  // namespace
@@ -25,7 +24,7 @@ std::unique_ptr<Projector> makeProjector(const std::string& kind, const Projecto
     const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
                                   [&](const Kind& k) { return kind == k.name; });
     assert(row != std::end(kKinds) && "settings know the names");
-    return row->make(input);
+    return input.singleLine ? singleLine(input) : row->make(input);
 }
 
 }  // namespace raybundle

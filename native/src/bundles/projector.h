@@ -60,15 +60,23 @@ struct ProjectorInput {
     SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING;
     int planeCount = 4;  // of PLANES
     PlanePlacement planePlacement = PlanePlacement::SYSTEMATIC;
+    // PLANES: false makes the depth buffers of each plane anew, to measure what coherence saves.
+    bool planeCoherence = true;
+    bool singleLine = false;  // a bundle is one line through the whole scene
 };
 
 // The projectors, one a row of the table.
 std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input);
 std::unique_ptr<Projector> painter(const ProjectorInput& input);
 std::unique_ptr<Projector> painterNewell(const ProjectorInput& input);
+std::unique_ptr<Projector> plane(const ProjectorInput& input);
+std::unique_ptr<Projector> planes(const ProjectorInput& input);
 
-// A projector by the name of its row. One object per thread: it keeps its memory from bundle to
-// bundle.
+// The projector of bundles that are one line, instead of any row.
+std::unique_ptr<Projector> singleLine(const ProjectorInput& input);
+
+// A projector by the name of its row, or that of single lines. One object per thread: it keeps its
+// memory from bundle to bundle.
 std::unique_ptr<Projector> makeProjector(const std::string& kind, const ProjectorInput& input);
 
 }  // namespace raybundle

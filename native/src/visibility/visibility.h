@@ -8,10 +8,17 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "patches/patches.h"
 
 namespace raybundle {
+
+// Where a line crosses a surface.
+struct LineHit {
+    double depth;   // along the line from its point, metres
+    uint32_t side;  // that faces against the direction
+};
 
 class Visibility {
   public:
@@ -37,6 +44,12 @@ class Visibility {
 
     // Whether a ray meets nothing; for origins that lie on no surface, or at least `offset` off it.
     bool isFree(const glm::vec3& origin, const glm::vec3& direction) const;
+
+    // All hits along the endless line through a point (relative to Patches::centre, not outside the
+    // scene's sphere), in order of depth. A line through an edge or a vertex between faces that
+    // turn alike crosses one of them.
+    void lineHits(const glm::dvec3& point, const glm::dvec3& direction,
+                  std::vector<LineHit>& hits) const;
 
     // Some tens of float rounding errors, metres.
     float offset() const { return surfaceOffset; }

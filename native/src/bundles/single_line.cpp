@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Bundles of one line: a random line through the whole scene, traced and not projected. All its
+// crossings count, ordered and paired like the list of one pixel in fragment_lists.cpp.
+//
+// Sources: thesis sections 2.3.2 and 2.4.1, figure 2.8 (multipath by single global lines).
+// Differs: a line is a direction and a point on the disc across it instead of two points on the
+// sphere around the scene. Both densities are the uniform one of global lines (Crofton); with a
+// direction of the common sequences, low discrepancy and importance serve single lines too.
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <utility>
+#include <vector>
+
+#include "bundles/contacts.h"
+#include "bundles/projector.h"
+
+namespace raybundle {
+namespace {
+
+class SingleLine : public Projector {
+  public:
+    explicit SingleLine(const ProjectorInput& input)
+        : input(input), contacts(input.patches, input.touchDistance) {}
+
+    void project(const Bundle& bundle, BundleLines& out) override {
+        // Uniform on a disc as large as the sphere around the scene.
+        const double r = double(input.patches.radius) * std::sqrt(bundle.shift.x);
+        const double phi = glm::two_pi<double>() * bundle.shift.y;
+        input.visibility.lineHits(r * (std::cos(phi) * bundle.right + std::sin(phi) * bundle.up),
+                                  bundle.direction, hits);
+        if (hits.empty()) return;
+        contacts.begin(bundle.direction);
+        for (size_t a = 1; a < hits.size(); ++a)
+            for (size_t b = a; b > 0 && contacts.belongBackwards(hits[b - 1].side, hits[b].side,
+                                                                 along(hits[b - 1], hits[b]));
+                 --b)
+                std::swap(hits[b], hits[b - 1]);
+
+        ++out.lines;
+        out.sky.push_back(hits.front().side);
+        for (size_t k = 0; k + 1 < hits.size(); ++k) {
+            const uint32_t i = hits[k].side ^ 1, j = hits[k + 1].side;
+            if (contacts.touches(hits[k].side, j, along(hits[k], hits[k + 1]))) {
+                out.touching.push_back(i);
+                out.touching.push_back(j);
+            } else {
+                out.exchanges.push_back({std::min(i, j), std::max(i, j), 1});
+            }
+        }
+        out.sky.push_back(hits.back().side ^ 1);
+    }
+
+  private:
+    static double along(const LineHit& a, const LineHit& b) { return b.depth - a.depth; }
+
+    const ProjectorInput input;
+    Contacts contacts;
+    std::vector<LineHit> hits;
+};
+
+}  // namespace
+
+std::unique_ptr<Projector> singleLine(const ProjectorInput& input) {
+    return std::make_unique<SingleLine>(input);
+}
+
+}  // namespace raybundle
