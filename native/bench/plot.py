@@ -131,8 +131,8 @@ def draw_figure(figure: Figure, scenes: dict[str, Curves], path: Path) -> None:
     places = [(scene, panel) for scene in scenes for panel in figure.panels]
     columns = min(3, len(places))
     # The legend has a place of its own.
-    rows = -(-(len(places) + 1) // columns) if len(places) >= 3 else 1
-    beside = len(places) < 3
+    beside = len(places) <= 3
+    rows = 1 if beside else -(-(len(places) + 1) // columns)
     width = 3.4 * columns + (2.2 if beside else 0)
     picture, grid = pyplot.subplots(rows, columns + beside, figsize=(width, 3.1 * rows),
                                     squeeze=False, layout='constrained')
