@@ -6,8 +6,8 @@
 
 The scene is exported by the add-on itself. --show and --hide include and exclude collections of the
 view layer first: scenes/office.blend has its lamps in lamps_up and lamps_down. The .blend file is
-never saved. The format, read by native/bench/scene_file.cpp, is that of SceneData: one list per kind,
-arrays flat, indices are positions in the lists; fields that are None are left out.
+never saved. The format, read by native/bench/scene_file.cpp, is that of SceneData: one list per
+kind, arrays flat, indices are positions in the lists; fields that are None are left out.
 """
 
 from __future__ import annotations

@@ -68,6 +68,10 @@ SETTINGS: dict[str, type] = {
     'projector': str,
     'small_patches': str,
     'reconstruction': str,
+    'plane_count': int,
+    'plane_placement': str,
+    'local_rays': int,
+    'estimator': str,
 }
 
 # Called with the stage and the share of it that is done (0 to 1); returning False cancels.

@@ -93,9 +93,16 @@ class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):
         layout = property_layout(self)
         settings = context.scene.raybundle
         layout.prop(settings, "solver")
+        if settings.solver == 'RANDOM_WALK':
+            layout.prop(settings, "estimator")
         layout.prop(settings, "first_shot")
+        if settings.first_shot != 'GATHER':
+            layout.prop(settings, "local_rays")
         layout.prop(settings, "directions")
         layout.prop(settings, "projector")
+        if settings.projector == 'PLANES':
+            layout.prop(settings, "plane_count")
+            layout.prop(settings, "plane_placement", text="Placement")
         layout.prop(settings, "small_patches")
         layout.prop(settings, "reconstruction")
         layout.prop(settings, "seed")

@@ -54,25 +54,56 @@ enum_shared_meshes = (
 enum_solver = (
     ('LINE_REUSE', "Line Reuse",
      "Keep all lines as a sparse matrix and solve on it to convergence"),
+    ('MULTIPATH', "Multipath",
+     "Each bundle passes on a part of the light that is still to be distributed"),
+    ('STOCHASTIC_ITERATION', "Stochastic Iteration",
+     "Each bundle reflects all the light that the one before brought; the result is the mean"),
+    ('RANDOM_WALK', "Random Walk",
+     "Light walks along local rays from surface to surface; there are no bundles"),
 )
 
 enum_first_shot = (
     ('GATHER', "Gather", "Shadow rays from the receivers to the lights"),
+    ('SHOOT', "Shoot", "Rays from the lights to the surfaces that they meet first"),
+    ('EXTENDED', "Extended",
+     "Shoot, and go on from the surfaces that became bright until light is everywhere"),
 )
 
 enum_directions = (
     ('LOW_DISCREPANCY', "Low Discrepancy", "Directions spread evenly: the least noise"),
     ('RANDOM', "Random", "Independent uniform directions"),
+    ('ADAPTIVE', "Adaptive", "Independent directions, more of them where more light passes"),
 )
 
 enum_projector = (
     ('AUTO', "Automatic", "The fastest exact projector"),
     ('FRAGMENT_LISTS', "Fragment Lists", "Exact lists of fragments per pixel, ordered by depth"),
+    ('PAINTER', "Painter",
+     "Faces in the order of their centres: wrong where they overlap in depth"),
+    ('PAINTER_NEWELL', "Painter, Newell",
+     "Faces in an order that Newell's tests have proved; cycles are broken and counted"),
+    ('PLANE', "Plane", "Two depth buffers, one on each side of a random plane per direction"),
+    ('PLANES', "Planes", "Two depth buffers on the sides of each of several planes per direction"),
+)
+
+enum_plane_placement = (
+    ('SYSTEMATIC', "Systematic", "At equal distances, all moved by one random shift"),
+    ('STRATIFIED', "Stratified", "One at a random place of each of equal intervals"),
+    ('CLOSE_DISTANCE', "Close Distance",
+     "Some of the planes near surfaces, so that they part what lies close together"),
+)
+
+enum_estimator = (
+    ('COLLISION', "Collision", "A walk counts at every surface that it meets: the least noise"),
+    ('SURVIVAL', "Survival", "A walk counts where it goes on"),
+    ('ABSORPTION', "Absorption", "A walk counts where it ends"),
 )
 
 enum_small_patches = (
     ('CENTRE_SAMPLING', "Centre Sampling",
      "A line meets what covers the pixel's centre: unbiased for patches of any size"),
+    ('ROULETTE', "Roulette",
+     "A patch fills whole pixels; if it is smaller than a pixel, with a probability of its area"),
 )
 
 enum_reconstruction = (
@@ -135,15 +166,29 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     solver: EnumProperty(
         name="Solver", description="How light is passed on between surfaces", items=enum_solver,
         default='LINE_REUSE')
+    estimator: EnumProperty(
+        name="Estimator", description="What a walk of the solver Random Walk counts as light",
+        items=enum_estimator, default='COLLISION')
     first_shot: EnumProperty(
         name="First Shot", description="How the light of lamps and world is distributed",
         items=enum_first_shot, default='GATHER')
+    local_rays: IntProperty(
+        name="Local Rays",
+        description="Rays from the lights, of a first shot that shoots; 0 is as many as the noise "
+                    "asks for",
+        default=0, min=0, max=2 ** 31 - 1, soft_max=100_000_000)
     directions: EnumProperty(
         name="Directions", description="How the directions of the bundles are chosen",
         items=enum_directions, default='LOW_DISCREPANCY')
     projector: EnumProperty(
         name="Projector", description="How a bundle's lines find the surfaces they meet",
         items=enum_projector, default='AUTO')
+    plane_count: IntProperty(
+        name="Planes", description="Planes per direction, of the projector Planes", default=4,
+        min=1, max=64)
+    plane_placement: EnumProperty(
+        name="Plane Placement", description="Where the projector Planes puts its planes",
+        items=enum_plane_placement, default='SYSTEMATIC')
     small_patches: EnumProperty(
         name="Small Patches", description="How patches smaller than a pixel are met",
         items=enum_small_patches, default='CENTRE_SAMPLING')
@@ -199,9 +244,13 @@ class BakeSettings:
     patch_size: float
     max_patches: int
     solver: str
+    estimator: str
     first_shot: str
+    local_rays: int
     directions: str
     projector: str
+    plane_count: int
+    plane_placement: str
     small_patches: str
     reconstruction: str
     max_bundles: int

@@ -232,7 +232,7 @@ FIGURES: tuple[Figure, ...] = (
            "first shot and extended first shot are alike, and better than the local walk",
            ('office_down',), first_shots(0.85), FIRST_SHOT_PANELS),
     Figure('fig_4_14', "Fig. 4.14: pixel area, one million lines in all",
-           "the error is level from a pixel area of one mean patch down; smaller bundles take longer",
+           "the error is level below a pixel area of one mean patch; small bundles take longer",
            ('office_down',), pixel_areas(),
            (Panel('pixel_per_patch', 'noise'), Panel('pixel_per_patch', 'seconds_bundles')),
            error=INDIRECT),

@@ -220,7 +220,8 @@ def figure_table(figure: Figure, scenes: dict[str, Curves]) -> Iterator[str]:
                  f"{bundle_seconds(p):.3g}", f"{p.seconds:.3g}",
                  f"{p.median(lambda row: row['peak_memory_bytes']) / 1e6:.0f}"]
                 for label, points in curves.items() for p in sorted(points, key=x_value)]
-        yield f"`{scene}`, {ERROR_NAMES[figure.error]}, {len(next(iter(curves.values()))[0].rows)} seeds:"
+        seeds = len(next(iter(curves.values()))[0].rows)
+        yield f"`{scene}`, {ERROR_NAMES[figure.error]}, {seeds} seeds:"
         yield table(["curve", x_name, "RMSE %", "bias %", "stated % (all light)",
                      "s, bundles and solve", "s, whole", "MB"], rows)
         if figure.panels[0].x == 'seconds':
