@@ -81,6 +81,36 @@ void balanceEnergy(const Patches& patches, const FirstShot& shot, const Irradian
     report.escaped = sum(escaped);
 }
 
+// The share of the lines of the weighted sides that leave the scene, or stay in it, only because
+// the projector lets lines through surfaces (ROULETTE): the difference to exact projection, object
+// by object, so that the noise of single sides cancels.
+double leakedShare(const Scene& scene, const Patches& patches, const std::vector<float>& weight,
+                   const std::vector<float>& exactOpen, const std::vector<float>& open) {
+    std::vector<double> difference(2 * scene.instances.size(), 0);
+    double total = 0;
+    for (size_t side = 0; side < weight.size(); ++side) {
+        const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
+        difference[2 * instance + side % 2] +=
+            double(weight[side] * (open[side] - exactOpen[side]));
+        total += double(weight[side]);
+    }
+    double sum = 0;
+    for (double d : difference) sum += std::abs(d);
+    return total > 0 ? sum / total : 0;
+}
+
+// Relative error of the light where so large a share of the exchanges is wrong: each reflection
+// adds to it.
+double errorByWrongExchanges(const Patches& patches, double share) {
+    double reflectance = 0, area = 0;
+    for (size_t side = 0; side < patches.sideCount(); ++side) {
+        const glm::vec3& rho = patches.reflectance[side];
+        reflectance += double(patches.area[side / 2] * std::max({rho.x, rho.y, rho.z}));
+        area += double(patches.area[side / 2]);
+    }
+    return area > 0 ? share / (1 - reflectance / area * (1 - share)) : 0;
+}
+
 // Whether there is nothing for bundles to carry; says so.
 bool isDark(const Scene& scene, const FirstShot& shot, Report& report) {
     auto isBlack = [](const glm::vec3& v) { return v == glm::vec3(0.0f); };
@@ -121,7 +151,7 @@ struct Bake::Trace {
             ProjectorInput exact = input;
             exact.singleLine = false;
             if (input.singleLine) exact.pixelSize = pixelSize(patches, 0);
-            exposed = exposedShare(exact, uint32_t(settings.seed));
+            surrounding = surroundings(exact, uint32_t(settings.seed));
         }
     }
 
@@ -139,7 +169,7 @@ struct Bake::Trace {
     Patches patches;
     float touchDistance = 0;  // surfaces not further apart touch, metres
     const Visibility visibility;
-    std::vector<float> exposed;  // per side; empty: as the counts have it
+    Surroundings surrounding;  // empty: as the counts have it
     LineCounts counts;
     std::unique_ptr<BundleTracer> tracer;
 };
@@ -180,11 +210,13 @@ void Bake::runStages(const Scene& scene) {
         if (isDark(scene, shot, report)) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
         } else {
-            const auto transport = makeTransport(
-                settings.solver, {patches, trace->visibility, shot, scene.worldRadiance,
-                                  trace->exposed, settings, *trace->tracer, trace->counts});
+            const auto transport =
+                makeTransport(settings.solver, {patches, trace->visibility, shot,
+                                                scene.worldRadiance, trace->surrounding.exposed,
+                                                settings, *trace->tracer, trace->counts});
             irradiance = solveToTarget(scene, shot, *transport, report);
-            exposed = trace->exposed.empty() ? trace->counts.exposedShare() : trace->exposed;
+            exposed = trace->surrounding.exposed.empty() ? trace->counts.exposedShare()
+                                                         : trace->surrounding.exposed;
             balanceEnergy(patches, shot, irradiance, scene.worldRadiance, exposed,
                           transport->openShare(), report);
             report.bundles = transport->bundleCount();
@@ -262,7 +294,7 @@ Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transp
             noise += weight[side] * (0.25 * glm::dot(a - b, a - b) + 3 * directVariance);
             signal += weight[side] * 0.25 * glm::dot(a + b, a + b);
         }
-        const double bias = std::hypot(transport.bias(), trace->tracer->disorderedShare());
+        const double bias = transport.bias();
         report.estimatedError = signal > 0 ? std::sqrt(noise / signal + bias * bias) : 0;
 
         if (report.estimatedError <= settings.targetError) break;
@@ -283,6 +315,21 @@ Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transp
     const float tolerance =
         float(std::clamp(kFinalShare * report.estimatedError, kLeastTolerance, kMostTolerance));
     Irradiance irradiance = transport.finish(tolerance, wantedSides, report);
+
+    // What more bundles do not help.
+    double wrong = trace->tracer->disorderedShare();
+    if (settings.smallPatches == "ROULETTE")
+        wrong +=
+            leakedShare(scene, patches, weight, trace->surrounding.open, transport.openShare());
+    if (wrong > 0) {
+        const double error = errorByWrongExchanges(patches, wrong);
+        report.estimatedError = std::hypot(report.estimatedError, error);
+        if (error > settings.targetError)
+            report.warnings.push_back("the projector put " + std::to_string(100 * wrong) +
+                                      " % of the lines in a wrong order or through surfaces, which "
+                                      "more bundles do not mend: the error is about " +
+                                      std::to_string(100 * error) + " %");
+    }
     progress.report(RB_STAGE_SOLVE, 1);
     return irradiance;
 }

@@ -6,7 +6,7 @@
 namespace raybundle {
 
 namespace {
-constexpr uint32_t kExposureBundles = 32;
+constexpr uint32_t kExactBundles = 32;
 }
 
 BundleTracer::BundleTracer(const std::string& projector, const ProjectorInput& input,
@@ -32,25 +32,32 @@ std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
     return traced;
 }
 
-std::vector<float> exposedShare(const ProjectorInput& input, uint32_t seed) {
+Surroundings surroundings(const ProjectorInput& input, uint32_t seed) {
     if (input.patches.count() == 0) return {};
     // Not by ROULETTE, which lets neighbouring patches of a surface lie against each other.
     ProjectorInput exact = input;
     exact.smallPatches = SmallPatches::CENTRE_SAMPLING;
     BundleTracer tracer("FRAGMENT_LISTS", exact, "LOW_DISCREPANCY", seed);
-    std::vector<uint32_t> open(input.patches.sideCount(), 0), touching(open);
-    for (const TracedBundle& traced : tracer.trace(kExposureBundles)) {
+    std::vector<uint32_t> lines(input.patches.sideCount(), 0), sky(lines), touching(lines);
+    for (const TracedBundle& traced : tracer.trace(kExactBundles)) {
         for (const Exchange& e : traced.lines.exchanges) {
-            open[e.i] += e.lines;
-            open[e.j] += e.lines;
+            lines[e.i] += e.lines;
+            lines[e.j] += e.lines;
         }
-        for (uint32_t side : traced.lines.sky) ++open[side];
+        for (uint32_t side : traced.lines.sky) {
+            ++lines[side];
+            ++sky[side];
+        }
         for (uint32_t side : traced.lines.touching) ++touching[side];
     }
-    std::vector<float> share(open.size(), 1.0f);
-    for (size_t i = 0; i < share.size(); ++i)
-        if (touching[i] > 0) share[i] = float(open[i]) / (float(open[i]) + float(touching[i]));
-    return share;
+    Surroundings result{std::vector<float>(lines.size(), 1.0f),
+                        std::vector<float>(lines.size(), 0.0f)};
+    for (size_t i = 0; i < lines.size(); ++i) {
+        const float all = float(lines[i] + touching[i]);
+        if (touching[i] > 0) result.exposed[i] = float(lines[i]) / all;
+        if (lines[i] > 0) result.open[i] = float(sky[i]) / float(lines[i]);
+    }
+    return result;
 }
 
 }  // namespace raybundle

@@ -51,8 +51,13 @@ class BundleTracer {
     uint64_t lines = 0, exchanges = 0, disordered = 0, cycles = 0;  // exchanges: line by line
 };
 
-// The share of each side, 0 to 1, that does not lie against another surface (1 where no line came
-// by), by lines of exact projection.
-std::vector<float> exposedShare(const ProjectorInput& input, uint32_t seed);
+// What lines of exact projection meet on each side.
+struct Surroundings {
+    std::vector<float> exposed;  // per side: the share of it that lies against no other surface
+    std::vector<float> open;  // per side: the share of the lines from the rest that leave the scene
+};
+
+// By some bundles, with `input`'s pixels; sides that no line met are exposed and not open.
+Surroundings surroundings(const ProjectorInput& input, uint32_t seed);
 
 }  // namespace raybundle
