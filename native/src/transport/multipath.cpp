@@ -38,6 +38,12 @@ constexpr uint32_t kBatch = 16;  // bundles that are traced before the direction
 // Of the cosine-weighted unshot power, what a bundle takes where bundles or lines have weights:
 // the largest weight of ADAPTIVE is the inverse of this.
 constexpr float kWeightedShare = 0.3f;
+// The same for exchanges found with a small probability, which stand for many lines.
+constexpr float kPlaneShare = 0.1f;
+// All lines of a bundle together take at most so many times the unshot power, and leave a debt.
+// Stopping at 1 favours grazing directions, since the number of lines of a patch varies; beyond 2
+// debts would grow.
+constexpr float kMostOfUnshot = 2.0f;
 
 double sum(const glm::vec3& v) { return double(v.x) + double(v.y) + double(v.z); }
 
@@ -72,9 +78,8 @@ class Multipath : public Transport {
           first(handOver(input.patches, input.shot, input.exposed)),
           halves{Estimate(input.patches.sideCount()), Estimate(input.patches.sideCount())} {
         const std::string& projector = input.settings.projector;
-        const bool isWeighted = input.settings.directions == "ADAPTIVE" || projector == "PLANE" ||
-                                projector == "PLANES";
-        share = isWeighted ? kWeightedShare : 1.0f;
+        if (input.settings.directions == "ADAPTIVE") share = kWeightedShare;
+        if (projector == "PLANE" || projector == "PLANES") share = kPlaneShare;
         const double s2 = input.tracer.pixelArea;
         const size_t n = input.patches.sideCount();
         perLine.resize(n);
@@ -180,9 +185,8 @@ class Multipath : public Transport {
         }
         for (uint32_t i : e.met) {
             e.lines[i] += e.inBundle[i];
-            // All lines of the bundle together may take more than all, and leave a debt: bounding
-            // that favours grazing directions (0.5 % too dark opposite to a cube's lit face).
-            e.fraction[i] = share * weight * perLine[i];
+            e.fraction[i] =
+                std::min(share * weight * perLine[i], kMostOfUnshot / float(e.inBundle[i]));
         }
         for (const Exchange& x : traced.lines.exchanges) {
             const float lines = float(x.lines);
@@ -254,7 +258,7 @@ class Multipath : public Transport {
     const TransportInput input;
     const HandOver first;
     std::array<Estimate, 2> halves;
-    float share = 1;             // see kWeightedShare
+    float share = 1;             // see kWeightedShare and kPlaneShare
     std::vector<float> perLine;  // per side: min(1, s^2 / A_i)
     // What a line takes from a side in every bundle, W times the bundles: emission and the light of
     // the first shot, reflected; and what it brings from the sky.
