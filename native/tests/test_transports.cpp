@@ -24,7 +24,8 @@ std::unique_ptr<Transport> TransportScene::make(const std::string& solver, int s
     settings.seed = seed;
     tracer = std::make_unique<BundleTracer>("AUTO", projector, "RANDOM", uint32_t(seed));
     return makeTransport(solver,
-                         {patches, visibility, shot, world, exposed, settings, *tracer, counts});
+                         {patches, visibility, shot, world, exposed, 1e-4f * patches.radius,
+                          settings, *tracer, counts});
 }
 
 int cubeFace(const Patches& patches, uint32_t patch) {

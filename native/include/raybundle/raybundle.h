@@ -195,7 +195,8 @@ RB_API rb_error rb_new_bake(rb_bake* bake);
 RB_API void rb_release_bake(rb_bake bake);
 
 /* Settings by name; an unknown name, a wrong type or a value out of range is
- * RB_ERROR_INVALID_ARGUMENT. float  target_error    relative noise at which bundles stop (0.02)
+ * RB_ERROR_INVALID_ARGUMENT.
+ *   float  target_error    relative noise at which bundles stop (0.02)
  *   float  patch_size      edge of a patch in metres, 0 = automatic (0)
  *   int    max_patches     most patches that subdivision may make (100000)
  *   int    min_bundles, max_bundles   bounds of the number of bundles (64, 4096)
@@ -203,9 +204,19 @@ RB_API void rb_release_bake(rb_bake bake);
  *   float  memory_limit    for the exchanges, in MB (4096)
  *   int    seed, threads   threads 0 = all (0, 0)
  *   float  regularization  of the reconstruction: weight of slope changes across edges (0.02)
- *   string solver LINE_REUSE, first_shot GATHER, directions LOW_DISCREPANCY | RANDOM,
- *          projector AUTO | FRAGMENT_LISTS, small_patches CENTRE_SAMPLING,
- *          reconstruction LEAST_SQUARES | POINT
+ *   string reconstruction  LEAST_SQUARES | POINT
+ *   string solver          LINE_REUSE | MULTIPATH | STOCHASTIC_ITERATION | RANDOM_WALK
+ *   string first_shot      GATHER | SHOOT | EXTENDED
+ *   string directions      LOW_DISCREPANCY | RANDOM | ADAPTIVE
+ *   string projector       AUTO | FRAGMENT_LISTS | PAINTER | PAINTER_NEWELL | PLANE | PLANES
+ *   string small_patches   CENTRE_SAMPLING | ROULETTE
+ *   int    plane_count, plane_coherence   of PLANES (4, 1)
+ *   string plane_placement   of PLANES: SYSTEMATIC | STRATIFIED | CLOSE_DISTANCE
+ *   int    local_rays      of SHOOT and EXTENDED, 0 = to target_error (0)
+ *   string estimator       of RANDOM_WALK: COLLISION | SURVIVAL | ABSORPTION
+ *   int    thesis_literal  1: MULTIPATH as the thesis' pseudo-code has it, for comparison (0)
+ * The first of each choice is the default; docs/method.md says what they do and which work
+ * together. rb_execute_bake refuses others with the reason.
  */
 RB_API rb_error rb_set_bake_int(rb_bake bake, const char* name, int32_t value);
 RB_API rb_error rb_set_bake_float(rb_bake bake, const char* name, float value);

@@ -210,10 +210,10 @@ void Bake::runStages(const Scene& scene) {
         if (isDark(scene, shot, report)) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
         } else {
-            const auto transport =
-                makeTransport(settings.solver, {patches, trace->visibility, shot,
-                                                scene.worldRadiance, trace->surrounding.exposed,
-                                                settings, *trace->tracer, trace->counts});
+            const auto transport = makeTransport(
+                settings.solver,
+                {patches, trace->visibility, shot, scene.worldRadiance, trace->surrounding.exposed,
+                 trace->touchDistance, settings, *trace->tracer, trace->counts});
             irradiance = solveToTarget(scene, shot, *transport, report);
             exposed = trace->surrounding.exposed.empty() ? trace->counts.exposedShare()
                                                          : trace->surrounding.exposed;

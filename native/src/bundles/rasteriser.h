@@ -2,9 +2,9 @@
 //
 // The scene on the transillumination plane of a bundle, fragment by fragment.
 //
-// CENTRE_SAMPLING: pixels are sampled at their centres with half-open edges, on a grid with a random
-// shift: the expected number of lines of a patch is its projected area over the pixel's, for every
-// shape and size, and neighbouring faces never both take or both miss a pixel.
+// CENTRE_SAMPLING: pixels are sampled at their centres with half-open edges, on a grid with a
+// random shift: the expected number of lines of a patch is its projected area over the pixel's, for
+// every shape and size, and neighbouring faces never both take or both miss a pixel.
 // ROULETTE: see bundles/roulette.h.
 //
 // Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised; the patch

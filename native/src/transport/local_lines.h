@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Local lines that carry power from emitters (light sources, patch sides) to the sides that they
-// meet first, and what they bring.
+// meet first, and what they bring: for first shots. (Rays that choose their source one by one, for
+// walks: transport/local_rays.h.)
 //
 // Sources: thesis sections 2.4.2 (fig. 2.11) and 3.3 (fig. 3.5).
 // Differs:

@@ -11,10 +11,6 @@
 namespace raybundle {
 namespace {
 
-// Surfaces not further apart than these shares of the scene's radius and of a patch touch, as in
-// bake.cpp.
-constexpr float kTouchOfRadius = 1e-4f;
-constexpr float kTouchOfPatch = 0.02f;
 // Points looked at before a partly covered patch is taken for wholly covered.
 constexpr int kMostPoints = 64;
 constexpr uint32_t kNoSide = UINT32_MAX;
@@ -30,8 +26,7 @@ LocalRays::LocalRays(const TransportInput& input)
     : patches(input.patches),
       visibility(input.visibility),
       exposed(input.exposed),
-      touchDistance(
-          std::min(kTouchOfRadius * input.patches.radius, kTouchOfPatch * input.patches.size)) {
+      touchDistance(input.touchDistance) {
     assert(exposed.size() == patches.sideCount() && "bake knows what is covered before it traces");
     const HandOver first = handOver(patches, input.shot, exposed);
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What LINE_REUSE does when no more exchanges fit into the memory limit: each further bundle is used
-// once, for a step of a Robbins-Monro iteration on the radiosity system, and forgotten.
+// What LINE_REUSE does when no more exchanges fit into the memory limit: each further bundle is
+// used once, for a step of a Robbins-Monro iteration on the radiosity system, and forgotten.
 //
 //   N_i += g_n sum_j c_ij X_j,   D_i += g_n m_i,   X_i = source_i + rho_i N_i / D_i
 //

@@ -43,6 +43,7 @@ struct TransportInput {
     const FirstShot& shot;
     const glm::vec3 worldRadiance;      // W/(m^2 sr)
     const std::vector<float>& exposed;  // per side: the share of it that nothing covers
+    const float touchDistance;          // surfaces not further apart touch, metres
     const Settings& settings;
     BundleTracer& tracer;
     LineCounts& counts;  // of the bundles traced so far; LINE_REUSE alone adds to it
