@@ -25,25 +25,33 @@ import raybundle
 from conftest import FURNACE_EMISSION_RADIANCE, FURNACE_REFLECTANCE
 from raybundle.native import ErrorCode, RaybundleError
 from raybundle.properties import RaybundleSceneSettings
-from surface_error import corner_areas, read_colors
+from surface_error import corner_areas, off_contact_edges, read_colors
 
 pytestmark = pytest.mark.needs_library
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SEEDS = 4
 TIMES_STATED = 2.0
-# At this noise a bake takes some tenths of a second. Every method must reach it.
+# At this noise a bake takes some tenths of a second.
 TARGET = 0.1
-COARSE = {'target_error': TARGET, 'max_bundles': 4096, 'output': 'LIGHTING'}
+COARSE = {'output': 'LIGHTING', 'target_error': TARGET, 'max_bundles': 4096}
+# Bundles stop when their noise is low enough; what a wrong order of patches (PAINTER) and lines
+# through surfaces (ROULETTE) add is stated, but stays. Roulette covers pixels twice and misses
+# others along all edges of patches: finer pixels lower that. A statement of more than MOST_STATED
+# would say nothing any more.
+ROULETTE = {'lines_per_bundle': 20_000}
+MOST_STATED = 0.5
 
 # B = E / (1 - rho) in a closed box.
 FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
 # What no stated error has to cover: in the furnace single precision and the solver's tolerance, and
 # for LINE_REUSE there is nothing else.
 FURNACE_FLOOR = 1e-4
-# In the Cornell box also the reference's own noise (0.5 %), and corners on contact edges, where
-# reconstruction goes beyond the few patches that are not covered (another 1 %).
-CORNELL_FLOOR = 0.015
+# In the Cornell box also the reference's own noise (0.5 %) and, since stated errors are those of
+# patches, what reconstruction adds to it (at most as much).
+CORNELL_FLOOR = 0.01
+# Coarser than the faces: each is one patch.
+CORNELL_PATCH = 0.5
 
 SETTINGS = ('solver', 'first_shot', 'directions', 'projector', 'small_patches')
 
@@ -76,17 +84,18 @@ ALL_LEGAL = [combination for combination in ALL if is_legal(combination)]
 
 
 def bake(combination: Combination, **overrides: object):
-    return raybundle.bake(bpy.context, **dict(zip(SETTINGS, combination)), **COARSE, **overrides)
+    settings = {**dict(zip(SETTINGS, combination)), **COARSE}
+    if combination[-1] == 'ROULETTE':
+        settings.update(ROULETTE)
+    return raybundle.bake(bpy.context, **settings, **overrides)
 
 
 def check(combination: Combination, true_errors: list[float], stated_errors: list[float],
           floor: float) -> None:
     true, stated = (float(np.sqrt(np.mean(np.square(errors))))
                     for errors in (true_errors, stated_errors))
-    # Bundles stop when their noise is low enough; what a wrong order of patches and lines through
-    # surfaces add is stated, but stays.
-    if combination[3] != 'PAINTER' and combination[4] != 'ROULETTE':
-        assert max(stated_errors) <= TARGET
+    has_bias = 'PAINTER' in combination or 'ROULETTE' in combination
+    assert max(stated_errors) <= (MOST_STATED if has_bias else TARGET)
     assert true <= TIMES_STATED * stated + floor, f"error {true:.4f}, stated {stated:.4f}"
 
 
@@ -146,17 +155,15 @@ def cornell_objects(report) -> list[bpy.types.Object]:
 
 @functools.lru_cache(maxsize=None)
 def cornell_reference() -> tuple[np.ndarray, np.ndarray]:
-    """Light of all corners in the order of the report, and their areas."""
+    """Light of all corners in the order of the report, and their areas. Corners at contact edges
+    weigh nothing: where a box stands on the floor they lie on patches that nobody sees."""
     open_cornell_box()
     report = raybundle.bake(bpy.context, output='LIGHTING', target_error=0.005, seed=1000,
                             max_bundles=8192, patch_size=CORNELL_PATCH)
     items = cornell_objects(report)
+    off_contacts = off_contact_edges(items)
     return (np.concatenate([read_colors(item) for item in items]),
-            np.concatenate([corner_areas(item) for item in items]))
-
-
-# Coarser than the faces: each is one patch.
-CORNELL_PATCH = 0.5
+            np.concatenate([corner_areas(item) * off_contacts[item.name] for item in items]))
 
 
 @pytest.mark.parametrize("combination", ALL_LEGAL, ids="-".join)
