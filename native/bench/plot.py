@@ -129,23 +129,24 @@ def draw(results: Path, images: Path, names: Sequence[str]) -> None:
 
 def draw_figure(figure: Figure, scenes: dict[str, Curves], path: Path) -> None:
     places = [(scene, panel) for scene in scenes for panel in figure.panels]
-    columns = min(3, len(places))
-    # The legend has a place of its own.
-    beside = len(places) <= 3
-    rows = 1 if beside else -(-(len(places) + 1) // columns)
-    width = 3.4 * columns + (2.2 if beside else 0)
-    picture, grid = pyplot.subplots(rows, columns + beside, figsize=(width, 3.1 * rows),
-                                    squeeze=False, layout='constrained')
-    axes = list(grid.ravel())
+    # A row per scene, unless there is but one diagram of each. The legend has a place of its own.
+    columns = len(figure.panels) if len(figure.panels) > 1 else min(3, len(places))
+    rows = -(-len(places) // columns)
+    beside = len(places) == rows * columns
+    picture, grid = pyplot.subplots(
+        rows, columns + beside, figsize=(3.4 * columns + 2.2 * beside, 3.1 * rows), squeeze=False,
+        layout='constrained', width_ratios=[1.0] * columns + [0.6] * beside)
+    axes = list(grid[:, :columns].ravel())
+    for axis in axes[len(places):] + list(grid[:, columns:].ravel()):
+        axis.axis('off')
+    legend = grid[0, columns] if beside else axes[len(places)]
     styles = curve_styles(scenes)
     for axis, (scene, panel) in zip(axes, places):
         draw_panel(axis, panel, scenes[scene], styles)
         axis.set_title(scene, fontsize=9)
-    for axis in axes[len(places):]:
-        axis.axis('off')
     handles = {label: line for axis in axes[:len(places)]
                for line, label in zip(*axis.get_legend_handles_labels())}
-    axes[len(places)].legend(handles.values(), handles.keys(), loc='center left')
+    legend.legend(handles.values(), handles.keys(), loc='center left')
     picture.suptitle(f"{figure.title} ({ERROR_NAMES[figure.error]})", fontsize=10)
     picture.savefig(path, metadata={'Date': None})
     pyplot.close(picture)
