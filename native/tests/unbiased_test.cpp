@@ -33,7 +33,7 @@ void PrintTo(const Method& method, std::ostream* out) { *out << method.name; }
 const Method kMethods[] = {
     {"Multipath", {{"solver", "MULTIPATH"}}},
     {"MultipathSingleLines", {{"solver", "MULTIPATH"}}, 4096, 1},
-    {"MultipathAdaptive", {{"solver", "MULTIPATH"}, {"directions", "ADAPTIVE"}}},
+    {"MultipathAdaptive", {{"solver", "MULTIPATH"}, {"directions", "ADAPTIVE"}}, 512},
     {"MultipathShoot", {{"solver", "MULTIPATH"}, {"first_shot", "SHOOT"}}},
     {"MultipathExtended", {{"solver", "MULTIPATH"}, {"first_shot", "EXTENDED"}}},
     {"StochasticIteration", {{"solver", "STOCHASTIC_ITERATION"}}},

@@ -15,9 +15,9 @@
 // - Lines to the sky take their power away, and bring the world's light.
 // - Power per line is s^2 over the number of bundles, whatever the number of lines was to be.
 // - The light of the first shot is kept in the result; the figure loses it or counts it twice.
-// - Power still unshot at the end would be missing: it is spread evenly over the lit sides, as the
-//   ambient term of Cohen et al., "A Progressive Refinement Approach to Fast Radiosity Image
-//   Generation" (1988). Half of it counts as bias.
+// - Power still unshot at the end would be missing. It is taken to arrive where light arrived so
+//   far: an ambient term like that of Cohen et al., "A Progressive Refinement Approach to Fast
+//   Radiosity Image Generation" (1988), who spread it evenly. Half of it counts as bias.
 // - The weight of a bundle (ADAPTIVE) and exchanges that stand for several lines (PLANE) multiply
 //   what is sent; a smaller fraction of the unshot power is taken there, which keeps its variance
 //   bounded.
@@ -127,14 +127,14 @@ class Multipath : public Transport {
             const Estimate& estimate = halves[h];
             if (estimate.bundles == 0) continue;
             const float share = half == Half::BOTH ? 0.5f : 1.0f;
-            const glm::vec3 ambient = share * ambientIrradiance(estimate);
+            const glm::vec3 later = laterShare(estimate);
             for (size_t i = 0; i < n; ++i) {
                 const float area = input.patches.area[i / 2] * input.exposed[i];
                 if (area <= 0) continue;
                 const float scale = share / (float(estimate.bundles) * area);
                 result.direct[i] += scale * estimate.direct[i];
-                result.indirect[i] += scale * estimate.indirect[i];
-                if (isLit(estimate, i)) result.indirect[i] += ambient;
+                result.indirect[i] += scale * (estimate.indirect[i] +
+                                               later * (estimate.direct[i] + estimate.indirect[i]));
             }
         }
         return result;
@@ -143,18 +143,18 @@ class Multipath : public Transport {
     double bias() const override {
         double worst = 0;
         for (const Estimate& estimate : halves) {
-            double received = 0, area = 0;
+            double later = 0, all = 0;
+            const glm::dvec3 share(laterShare(estimate));
             for (size_t i = 0; i < estimate.unshot.size(); ++i) {
-                if (!isLit(estimate, i)) continue;
-                const double a = double(input.patches.area[i / 2] * input.exposed[i]);
-                area += a;
-                received += sum(estimate.direct[i] + estimate.indirect[i]) / estimate.bundles +
-                            a * sum(first.gathered[i] + first.indirect[i]);
+                const glm::dvec3 received(estimate.direct[i] + estimate.indirect[i]);
+                const double area = double(input.patches.area[i / 2] * input.exposed[i]);
+                later += glm::dot(share, received);
+                all += received.x + received.y + received.z +
+                       estimate.bundles * area * sum(first.gathered[i] + first.indirect[i]);
             }
-            if (received > 0)
-                worst = std::max(worst, 0.5 * area * sum(ambientIrradiance(estimate)) / received);
+            if (all > 0) worst = std::max(worst, 0.5 * later / all);
         }
-        return input.settings.thesisLiteral ? 0 : worst;
+        return worst;
     }
 
     std::vector<float> openShare() const override {
@@ -234,25 +234,26 @@ class Multipath : public Transport {
         return power;
     }
 
-    static bool isLit(const Estimate& e, size_t i) { return sum(e.direct[i] + e.indirect[i]) > 0; }
-
-    // Irradiance of the lit sides if what is unshot were spread over them evenly, W/m^2.
-    glm::vec3 ambientIrradiance(const Estimate& e) const {
+    // What the power still unshot would bring over all bounces to come, as a share of what all
+    // sides received so far.
+    glm::vec3 laterShare(const Estimate& e) const {
         if (input.settings.thesisLiteral) return glm::vec3(0.0f);
-        glm::dvec3 unshot(0.0), reflectance(0.0);
-        double area = 0, open = 0;
+        glm::dvec3 unshot(0.0), received(0.0), reflected(0.0), open(0.0);
         for (size_t i = 0; i < e.unshot.size(); ++i) {
+            const glm::dvec3 r(e.direct[i] + e.indirect[i]);
             unshot += e.unshot[i];
-            if (!isLit(e, i)) continue;
-            const double a = double(input.patches.area[i / 2] * input.exposed[i]);
-            area += a;
-            reflectance += a * glm::dvec3(input.patches.reflectance[i]);
-            if (e.lines[i] > 0) open += a * e.skyLines[i] / e.lines[i];
+            received += r;
+            reflected += r * glm::dvec3(input.patches.reflectance[i]);
+            if (e.lines[i] > 0) open += r * (double(e.skyLines[i]) / e.lines[i]);
         }
-        if (!(area > 0)) return glm::vec3(0.0f);
-        const double staying = 1 - open / area;
-        return glm::vec3(staying * unshot / (1.0 - staying * reflectance / area) /
-                         (double(e.bundles) * area));
+        glm::vec3 share(0.0f);
+        for (int c = 0; c < 3; ++c) {
+            if (!(received[c] > 0)) continue;
+            const double staying = 1 - open[c] / received[c];
+            const double later = staying * unshot[c] / (1 - staying * reflected[c] / received[c]);
+            share[c] = float(std::max(0.0, later) / received[c]);
+        }
+        return share;
     }
 
     const TransportInput input;
