@@ -190,6 +190,20 @@ TEST(PainterNewell, CountsTheCyclesOfInterlockedClosedObjects) {
     EXPECT_TRUE(Merged(parted) == Merged(cut.along("FRAGMENT_LISTS", bundle)));
 }
 
+TEST(PainterNewell, ABakeReportsBrokenCycles) {
+    Scene scene = interlockedBars();
+    scene.worldRadiance = {1, 1, 1};
+    for (const char* projector : {"PAINTER_NEWELL", "AUTO"}) {
+        Bake bake;
+        bake.settings.projector = projector;
+        bake.settings.patchSize = 100;
+        bake.settings.maxBundles = 64;
+        bake.run(scene);
+        EXPECT_EQ(mentions(reportOf(bake)["warnings"], "cycles of patches"),
+                  std::string(projector) == "PAINTER_NEWELL");
+    }
+}
+
 TEST(PainterNewell, CountsIntersectingPatchesAsACycle) {
     Scene scene;
     place(scene, rectangle("one", {-1, -1, -1}, {2, 0, 2}, {0, 2, 0}), grey("", 0.5f));

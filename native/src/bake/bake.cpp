@@ -316,6 +316,11 @@ Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transp
         float(std::clamp(kFinalShare * report.estimatedError, kLeastTolerance, kMostTolerance));
     Irradiance irradiance = transport.finish(tolerance, wantedSides, report);
 
+    if (const uint64_t cycles = trace->tracer->cycleCount())
+        report.warnings.push_back(std::to_string(cycles) +
+                                  " cycles of patches that cover each other were broken anywhere: "
+                                  "the projector AUTO has none");
+
     // What more bundles do not help.
     double wrong = trace->tracer->disorderedShare();
     if (settings.smallPatches == "ROULETTE")

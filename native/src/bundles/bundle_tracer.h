@@ -34,11 +34,12 @@ class BundleTracer {
 
     uint32_t bundleCount() const { return bundles; }
     uint64_t lineCount() const { return lines; }  // that met the scene
-    // The share of all exchanges that join sides in a wrong order of depth (painters).
+    // The share of all exchanges that join sides in a wrong order of depth (painters) or through a
+    // surface (ROULETTE).
     double disorderedShare() const {
         return exchanges > 0 ? double(disordered) / double(exchanges) : 0;
     }
-    uint64_t cycleCount() const { return cycles; }
+    uint64_t cycleCount() const { return cycles; }  // that Newell's order broke
 
     // Power per area and unit of exitance that one line carries each way is 2 * pixelArea / bundles
     // of all: the cross-section of the scene that a line stands for, m^2.
