@@ -34,6 +34,8 @@ const Method kMethods[] = {
     {"Multipath", {{"solver", "MULTIPATH"}}},
     {"MultipathSingleLines", {{"solver", "MULTIPATH"}}, 4096, 1},
     {"MultipathAdaptive", {{"solver", "MULTIPATH"}, {"directions", "ADAPTIVE"}}, 512},
+    {"MultipathPlane", {{"solver", "MULTIPATH"}, {"projector", "PLANE"}}, 512},
+    {"MultipathPlanes", {{"solver", "MULTIPATH"}, {"projector", "PLANES"}}, 512},
     {"MultipathShoot", {{"solver", "MULTIPATH"}, {"first_shot", "SHOOT"}}},
     {"MultipathExtended", {{"solver", "MULTIPATH"}, {"first_shot", "EXTENDED"}}},
     {"StochasticIteration", {{"solver", "STOCHASTIC_ITERATION"}}},

@@ -19,8 +19,9 @@
 //   has reached: the ambient term of Cohen et al., "A Progressive Refinement Approach to Fast
 //   Radiosity Image Generation" (1988), who spread it over all. Half of it counts as bias.
 // - The weight of a bundle (ADAPTIVE) and exchanges that stand for several lines (PLANE) multiply
-//   what is sent; a smaller fraction of the unshot power is taken there, which keeps its variance
-//   bounded.
+//   what is sent; a smaller fraction of the unshot power is taken there. A side of which a bundle
+//   took more than all sends a smaller fraction from then on: fractions follow what was met before
+//   and not the bundle in hand, so that the mean stays right.
 // thesis_literal does what figure 2.8 says, line by line; only the first shot's light is kept.
 #include <tbb/parallel_invoke.h>
 
@@ -38,12 +39,6 @@ constexpr uint32_t kBatch = 16;  // bundles that are traced before the direction
 // Of the cosine-weighted unshot power, what a bundle takes where bundles or lines have weights:
 // the largest weight of ADAPTIVE is the inverse of this.
 constexpr float kWeightedShare = 0.3f;
-// The same for exchanges found with a small probability, which stand for many lines.
-constexpr float kPlaneShare = 0.1f;
-// All lines of a bundle together take at most so much of the unshot power: beyond it debts grow
-// between sides that see only each other. With weights it makes near surfaces exchange too little
-// (0.5 % on boxes 10 cm above a floor, PLANES).
-constexpr float kMostOfUnshot = 1.0f;
 
 // Of the mean irradiance: sides that receive more take a full part in the light of later bounces.
 // A larger share loses that of sides that few lines have met so far (one: 15 % too dark with 50
@@ -55,7 +50,8 @@ double sum(const glm::vec3& v) { return double(v.x) + double(v.y) + double(v.z);
 // One independent estimate.
 struct Estimate {
     explicit Estimate(size_t sides)
-        : unshot(sides, glm::vec3(0.0f)),
+        : perLine(sides, 0),
+          unshot(sides, glm::vec3(0.0f)),
           direct(sides, glm::vec3(0.0f)),
           indirect(sides, glm::vec3(0.0f)),
           lines(sides, 0),
@@ -65,6 +61,7 @@ struct Estimate {
           arriving(sides, glm::vec3(0.0f)) {}
 
     uint32_t bundles = 0;
+    std::vector<float> perLine;               // of the unshot power, what a line takes
     std::vector<glm::vec3> unshot;            // W, times the bundles
     std::vector<glm::vec3> direct, indirect;  // received, W, times the bundles
     std::vector<uint32_t> lines, skyLines;    // so far
@@ -89,16 +86,16 @@ class Multipath : public Transport {
           first(handOver(input.patches, input.shot, input.exposed)),
           halves{Estimate(input.patches.sideCount()), Estimate(input.patches.sideCount())} {
         const std::string& projector = input.settings.projector;
-        if (input.settings.directions == "ADAPTIVE") share = kWeightedShare;
-        if (projector == "PLANE" || projector == "PLANES") share = kPlaneShare;
+        const bool isWeighted = input.settings.directions == "ADAPTIVE" || projector == "PLANE" ||
+                                projector == "PLANES";
+        const float share = isWeighted ? kWeightedShare : 1;
         const double s2 = input.tracer.pixelArea;
         const size_t n = input.patches.sideCount();
-        perLine.resize(n);
         emission.resize(n);
         reflected.resize(n);
         for (size_t i = 0; i < n; ++i) {
             const double area = double(input.patches.area[i / 2] * input.exposed[i]);
-            perLine[i] = area > s2 ? float(s2 / area) : 1.0f;
+            for (Estimate& e : halves) e.perLine[i] = share * (area > s2 ? float(s2 / area) : 1.0f);
             emission[i] = float(2 * s2) * input.shot.emission[i];
             reflected[i] = float(2 * s2) * first.unshot[i];
         }
@@ -194,9 +191,12 @@ class Multipath : public Transport {
             e.arriving[side] += weight * world;
         }
         for (uint32_t i : e.met) {
+            const float lines = float(e.inBundle[i]);
             e.lines[i] += e.inBundle[i];
-            e.fraction[i] =
-                std::min(share * weight * perLine[i], kMostOfUnshot / float(e.inBundle[i]));
+            e.fraction[i] = weight * e.perLine[i];
+            // From now on no such bundle takes more than all; this one leaves a debt.
+            const float all = lines * e.fraction[i];
+            if (all > 1) e.perLine[i] /= all;
         }
         for (const Exchange& x : traced.lines.exchanges) {
             const float lines = float(x.lines);
@@ -292,8 +292,6 @@ class Multipath : public Transport {
     const TransportInput input;
     const HandOver first;
     std::array<Estimate, 2> halves;
-    float share = 1;             // see kWeightedShare and kPlaneShare
-    std::vector<float> perLine;  // per side: min(1, s^2 / A_i)
     // What a line takes from a side in every bundle, W times the bundles: emission and the light of
     // the first shot, reflected; and what it brings from the sky.
     std::vector<glm::vec3> emission, reflected;
