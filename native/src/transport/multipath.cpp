@@ -40,9 +40,9 @@ constexpr uint32_t kBatch = 16;  // bundles that are traced before the direction
 // the largest weight of ADAPTIVE is the inverse of this.
 constexpr float kWeightedShare = 0.3f;
 
-// Of the mean irradiance: sides that receive more take a full part in the light of later bounces.
-// A larger share loses that of sides that few lines have met so far (one: 15 % too dark with 50
-// bundles of PLANES), a smaller one lights the outsides of rooms through their leaks.
+// Of the mean irradiance: sides that receive more take a full part in the light of later bounces. A
+// larger share loses that of sides that few lines have met so far, a smaller one lights the outsides
+// of rooms through their leaks.
 constexpr double kLit = 0.33;
 
 double sum(const glm::vec3& v) { return double(v.x) + double(v.y) + double(v.z); }
@@ -271,19 +271,21 @@ class Multipath : public Transport {
         Later result;
         result.area = reached(e);
         if (input.settings.thesisLiteral) return result;
-        glm::dvec3 unshot(0.0), reflected(0.0);
-        double area = 0, open = 0;
+        glm::dvec3 unshot(0.0), received(0.0), reflected(0.0), open(0.0);
+        double area = 0;
         for (size_t i = 0; i < e.unshot.size(); ++i) {
+            const glm::dvec3 r(e.direct[i] + e.indirect[i]);
             unshot += e.unshot[i];
-            const double a = result.area[i];
-            area += a;
-            reflected += a * glm::dvec3(input.patches.reflectance[i]);
-            if (e.lines[i] > 0) open += a * (double(e.skyLines[i]) / e.lines[i]);
+            received += r;
+            reflected += r * glm::dvec3(input.patches.reflectance[i]);
+            if (e.lines[i] > 0) open += r * (double(e.skyLines[i]) / e.lines[i]);
+            area += double(result.area[i]);
         }
         if (!(area > 0)) return result;
-        const double staying = 1 - open / area;
         for (int c = 0; c < 3; ++c) {
-            const double power = staying * unshot[c] / (1 - staying * reflected[c] / area);
+            if (!(received[c] > 0)) continue;
+            const double staying = 1 - open[c] / received[c];
+            const double power = staying * unshot[c] / (1 - staying * reflected[c] / received[c]);
             result.irradiance[c] = float(std::max(0.0, power) / area);
         }
         return result;
