@@ -40,9 +40,9 @@ constexpr uint32_t kBatch = 16;  // bundles that are traced before the direction
 // the largest weight of ADAPTIVE is the inverse of this.
 constexpr float kWeightedShare = 0.3f;
 
-// Of the mean irradiance: sides that receive more take a full part in the light of later bounces. A
-// larger share loses that of sides that few lines have met so far, a smaller one lights the outsides
-// of rooms through their leaks.
+// Of the mean irradiance: sides that receive more take a full part in the light of later bounces.
+// A larger share loses that of sides that few lines have met so far, a smaller one lights the
+// outsides of rooms through their leaks.
 constexpr double kLit = 0.33;
 
 double sum(const glm::vec3& v) { return double(v.x) + double(v.y) + double(v.z); }
