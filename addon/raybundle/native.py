@@ -107,6 +107,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_add_sun_light': (_handle, _text, _floats, _floats, _float, _out(_int)),
     'rb_add_area_light': (_handle, _text, _floats, _floats, _floats, _floats, _enum, _out(_int)),
     'rb_set_world': (_handle, _floats),
+    'rb_set_world_image': (_handle, _int, _int, _floats),
     'rb_new_bake': (_out(_handle),),
     'rb_set_bake_int': (_handle, _text, _int),
     'rb_set_bake_float': (_handle, _text, _float),
@@ -411,6 +412,13 @@ class Scene(_Handle):
         """radiance: (3,) W/(m^2 sr)."""
         radiance = _float_array(radiance, (3,), "radiance")
         self._library.rb_set_world(self._pointer, _as_floats(radiance))
+
+    def set_world_image(self, pixels: np.ndarray) -> None:
+        """pixels: (height, width, 3) W/(m^2 sr) on top of set_world, equirectangular as in Cycles,
+        bottom row first."""
+        pixels = _float_array(pixels, (None, None, 3), "pixels")
+        self._library.rb_set_world_image(
+            self._pointer, pixels.shape[1], pixels.shape[0], _as_floats(pixels))
 
 
 # --------------------------------------------------------------------------------------------------

@@ -87,6 +87,7 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_add_area_light(scene, "", kOne, nullptr, kOne, kOne, RB_AREA_ELLIPSE, &id),
                   "axis_u");
     expectInvalid(rb_set_world(scene, nullptr), "radiance");
+    expectInvalid(rb_set_world_image(scene, 1, 1, nullptr), "rgb");
     expectInvalid(rb_get_bake_int(bake, "seed", nullptr), "value");
     expectInvalid(rb_execute_bake(bake, nullptr), "scene");
     expectInvalid(rb_set_bake_int(bake, nullptr, 1), "setting");
@@ -202,6 +203,8 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
         rb_add_area_light(scene, "panel", kOne, infinite, kOne, kOne, RB_AREA_RECTANGLE, &id),
         "panel");
     expectInvalid(rb_set_world(scene, infinite), "world");
+    expectInvalid(rb_set_world_image(scene, 1, 1, infinite), "world");
+    expectInvalid(rb_set_world_image(scene, 0, 1, kOne), "world");
     float transform[12];
     std::copy(std::begin(kIdentity), std::end(kIdentity), transform);
     transform[5] = NAN;

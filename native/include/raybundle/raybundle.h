@@ -182,6 +182,13 @@ RB_API rb_error rb_add_area_light(rb_scene scene, const char* name, const float 
 /* Sets the constant radiance (RGB) of the world around the scene; black by default. */
 RB_API rb_error rb_set_world(rb_scene scene, const float radiance[3]);
 
+/* Sets what the world adds to its constant radiance, by direction: an equirectangular image of
+ * width * height pixels, linear RGB in W/(m^2 sr), bottom row first. Cycles' mapping: the middle
+ * column is +X, the one at 3/4 of the width -Y, the top row +Z. Its light comes with the lights',
+ * by shadow rays from the receivers. */
+RB_API rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height,
+                                   const float* rgb);
+
 /* ------------------------------------------------------------------------------------------------
  * Bake
  * --------------------------------------------------------------------------------------------- */

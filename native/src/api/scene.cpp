@@ -247,3 +247,13 @@ rb_error rb_set_world(rb_scene scene, const float radiance[3]) {
         scene->scene.worldRadiance = glm::max(vec3(radiance), glm::vec3(0.0f));
     });
 }
+
+rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height, const float* rgb) {
+    return guarded([&] {
+        need(scene, "scene");
+        if (width <= 0 || height <= 0) throw invalidArgument("world image has no pixels");
+        const size_t pixels = size_t(width) * size_t(height);
+        needArray(rgb, pixels, "rgb");
+        scene->scene.setWorldImage({width, height, vectors<glm::vec3>(rgb, pixels)});
+    });
+}

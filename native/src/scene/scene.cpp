@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/constants.hpp>
 
 #include "bake/error.h"
 
@@ -135,6 +136,26 @@ int32_t Scene::addLight(Light light) {
     }
     lights.push_back(std::move(light));
     return int32_t(lights.size()) - 1;
+}
+
+glm::vec3 WorldImage::meanRadiance() const {
+    glm::dvec3 sum(0.0);
+    for (int y = 0; y < height; ++y) {
+        glm::dvec3 row(0.0);
+        for (int x = 0; x < width; ++x) row += pixels[size_t(y) * size_t(width) + size_t(x)];
+        const double low = glm::pi<double>() * y / height,
+                     up = glm::pi<double>() * (y + 1) / height;
+        sum += 0.5 * (std::cos(low) - std::cos(up)) * row;
+    }
+    return width > 0 ? glm::vec3(sum / double(width)) : glm::vec3(0.0f);
+}
+
+void Scene::setWorldImage(WorldImage image) {
+    if (image.width <= 0 || image.height <= 0) throw invalidArgument("world image has no pixels");
+    for (const glm::vec3& pixel : image.pixels)
+        if (!isFiniteAndPositive(pixel))
+            throw invalidArgument("world image: its pixels must be finite and not negative");
+    worldImage = std::move(image);
 }
 
 Material& Scene::material(int32_t id) { return checked(materials, id, "material"); }

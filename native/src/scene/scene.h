@@ -87,6 +87,17 @@ struct Light {
     bool coneDims = false;        // the intensity falls with the cosine to the axis
 };
 
+// Radiance of the world by direction, W/(m^2 sr): equirectangular, bottom row first. Cycles' mapping:
+// the middle column is +X, the one at 3/4 of the width -Y, the top row +Z. Without pixels: none.
+struct WorldImage {
+    int width = 0;
+    int height = 0;
+    std::vector<glm::vec3> pixels;
+
+    // Over all directions.
+    glm::vec3 meanRadiance() const;
+};
+
 // Everything the caller gave, as given, after validation. Nothing of it changes during a bake.
 class Scene {
   public:
@@ -97,6 +108,7 @@ class Scene {
     int32_t addMesh(Mesh mesh);
     int32_t addInstance(Instance instance);
     int32_t addLight(Light light);
+    void setWorldImage(WorldImage image);
 
     // Checks that an id was given out; `what` names its kind in the message.
     Material& material(int32_t id);
@@ -111,7 +123,8 @@ class Scene {
     std::vector<Mesh> meshes;
     std::vector<Instance> instances;
     std::vector<Light> lights;
-    glm::vec3 worldRadiance{0.0f};      // W/(m^2 sr)
+    glm::vec3 worldRadiance{0.0f};      // W/(m^2 sr), constant
+    WorldImage worldImage;              // what comes on top of it
     std::vector<std::string> warnings;  // what was changed to make the scene usable
 };
 

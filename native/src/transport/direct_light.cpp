@@ -16,11 +16,10 @@ namespace {
 
 // Emission up to this many times the mean exitance of the scene is left to the bundles.
 constexpr double kBundledEmission = 1.5;
-// Shadow rays per receiver and source: at first, for sources of little weight, and at most.
+// Shadow rays per receiver and source: at first, and for sources of little weight.
 constexpr int kFirstSamples = 16;
 constexpr int kFewSamples = 4;
 constexpr size_t kFewSources = 4;
-constexpr int kMaxSamples = 256;
 // A source of less than this share of the light that a receiver could get takes few samples, one of
 // less than the second half as many as others.
 constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
@@ -62,7 +61,8 @@ double meanExitance(const Scene& scene, const Patches& patches) {
                 break;
         }
     }
-    emitted += area * glm::pi<double>() * brightest(scene.worldRadiance);
+    emitted +=
+        area * glm::pi<double>() * brightest(scene.worldRadiance + scene.worldImage.meanRadiance());
     return emitted / area / std::max(0.05, 1 - reflectance / area);
 }
 
@@ -288,7 +288,7 @@ void DirectLight::gatherFrom(const LightSource& source, uint32_t seed, const Rec
             closed = closedMean(source, receiver, tolerance, closedError);
         // No sample faced the receiver: few of them may, beside a source of many faces.
         if (brightest(all.open) <= 0 && closed && brightest(*closed) > 0 &&
-            all.count < kMaxSamples) {
+            all.count < source.mostSamples()) {
             next = 4 * all.count;
             continue;
         }
@@ -300,7 +300,8 @@ void DirectLight::gatherFrom(const LightSource& source, uint32_t seed, const Rec
             const float d = brightest(glm::abs(block.estimate(closed) - mean));
             variance += d * d / (kBlocks * (kBlocks - 1));
         }
-        if (all.count >= samples && (variance <= tolerance * tolerance || all.count >= kMaxSamples))
+        if (all.count >= samples &&
+            (variance <= tolerance * tolerance || all.count >= source.mostSamples()))
             break;
         next = all.count < samples ? samples : 4 * all.count;
     }
@@ -328,7 +329,7 @@ glm::dvec3 DirectLight::escapedPower() const {
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::vec3 power = sources[k]->power();
         if (brightest(power) <= 0) continue;
-        tbb::enumerable_thread_specific<double> missed(0.0);
+        tbb::enumerable_thread_specific<glm::dvec3> missed(glm::dvec3(0.0));
         tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
                 const EmittedRay ray =
@@ -336,12 +337,12 @@ glm::dvec3 DirectLight::escapedPower() const {
                 const bool isFree =
                     ray.side ? !visibility.isBlocked(*ray.side, ray.origin, ray.direction, INFINITY)
                              : visibility.isFree(ray.start(visibility.offset()), ray.direction);
-                if (isFree) missed.local() += ray.weight;
+                if (isFree) missed.local() += glm::dvec3(ray.weight);
             }
         });
-        double sum = 0;
-        for (double part : missed) sum += part;
-        escaped += glm::dvec3(power) * (sum / rays);
+        glm::dvec3 sum(0.0);
+        for (const glm::dvec3& part : missed) sum += part;
+        escaped += glm::dvec3(power) * (sum / double(rays));
     }
     return escaped;
 }

@@ -11,6 +11,7 @@
 #include "transport/mesh_source.h"
 #include "transport/sphere_sampling.h"
 #include "transport/spot_cone.h"
+#include "transport/world_source.h"
 
 namespace raybundle {
 
@@ -103,7 +104,7 @@ class PointSource : public LightSource {
         if (cone) {
             const SpotCone::Ray along = cone->emit({u.x, u.y});
             ray.direction = along.direction;
-            ray.weight = along.weight;
+            ray.weight = glm::vec3(along.weight);
         } else {
             ray.direction = uniformDirection({u.x, u.y});
         }
@@ -273,6 +274,9 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
                 break;
         }
     }
+
+    if (!scene.worldImage.pixels.empty() && scene.worldImage.meanRadiance() != glm::vec3(0.0f))
+        sources.push_back(std::make_unique<WorldSource>(scene.worldImage));
 
     std::map<std::pair<uint32_t, int32_t>, std::vector<uint32_t>>
         groups;  // by instance and material

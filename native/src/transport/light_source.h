@@ -25,7 +25,7 @@ struct LightSample {
 // A ray that leaves a source with an equal share of its power.
 struct EmittedRay {
     glm::vec3 origin{0.0f}, direction{0.0f};
-    float weight = 1;              // times the mean share
+    glm::vec3 weight{1.0f};        // times the mean share, by channel
     glm::vec3 normal{0.0f};        // of the lamp's surface; zero if it has none
     std::optional<uint32_t> side;  // the patch side that it leaves, if its source is a mesh
     float from = 0;  // metres along the ray: surfaces before that get nothing, but block
@@ -59,8 +59,11 @@ class LightSource {
     // A lower bound of the distance from a point to the source, metres.
     virtual float distance(const glm::vec3& point) const = 0;
 
+    // Most shadow rays that a receiver needs.
+    virtual int mostSamples() const { return 256; }
+
     // Emitted power, W; zero for sources whose power depends on where their light arrives: suns,
-    // and disks that turn towards each receiver.
+    // worlds, and disks that turn towards each receiver.
     virtual glm::vec3 power() const = 0;
 
     // Power of all that emit() gives, W, in a scene within a sphere of this radius around
@@ -72,8 +75,8 @@ class LightSource {
     virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;
 };
 
-// All sources of the scene whose light the first shot gathers: its lights, and the emissive faces
-// of sides that are marked. `patches` must outlive them.
+// All sources of the scene whose light the first shot gathers: its lights, the image of its world,
+// and the emissive faces of sides that are marked. `patches` must outlive them.
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
                                                        const std::vector<bool>& gatheredSides);
 

@@ -17,8 +17,8 @@ class Tally {
   public:
     explicit Tally(size_t sides) : weight(sides), squares(sides) {}
 
-    void add(uint32_t side, double w) {
-        if (weight[side] == 0) touched.push_back(side);
+    void add(uint32_t side, const glm::dvec3& w) {
+        if (weight[side] == glm::dvec3(0.0)) touched.push_back(side);
         weight[side] += w;
         squares[side] += w * w;
     }
@@ -27,20 +27,21 @@ class Tally {
     void moveTo(LocalLines& sums, uint64_t lines, const glm::dvec3& perLine, double scale) {
         const double n = double(lines);
         for (uint32_t side : touched) {
-            double& w = weight[side];
-            double& w2 = squares[side];
+            glm::dvec3& w = weight[side];
+            glm::dvec3& w2 = squares[side];
             // A single line knows its second moment only: an upper bound, close where p is small.
-            const double variance = lines > 1 ? n / (n - 1) * (w2 - w * w / n) : w2;
+            const glm::dvec3 variance = lines > 1 ? n / (n - 1) * (w2 - w * w / n) : w2;
             sums.received[side] += scale * w * perLine;
-            sums.variance[side] += scale * scale * std::max(0.0, variance) * perLine * perLine;
-            w = w2 = 0;
+            sums.variance[side] +=
+                scale * scale * glm::max(glm::dvec3(0.0), variance) * perLine * perLine;
+            w = w2 = glm::dvec3(0.0);
         }
         touched.clear();
     }
 
   private:
-    std::vector<double> weight, squares;  // per side
-    std::vector<uint32_t> touched;        // sides with a weight
+    std::vector<glm::dvec3> weight, squares;  // per side
+    std::vector<uint32_t> touched;            // sides with a weight
 };
 
 }  // namespace
@@ -105,8 +106,8 @@ void LocalLines::cast(const std::vector<uint64_t>& counts, const std::vector<glm
             }
             --left;
             const LineEnd& lineEnd = ends[line - slice];
-            if (lineEnd.side == LineEnd::kNowhere || !(lineEnd.weight > 0)) continue;
-            const double weight = double(lineEnd.weight);
+            if (lineEnd.side == LineEnd::kNowhere || lineEnd.weight == glm::vec3(0.0f)) continue;
+            const glm::dvec3 weight(lineEnd.weight);
             if (lineEnd.side == LineEnd::kSky) {
                 missed[emitter] += scale * weight * perLine[emitter];
             } else {

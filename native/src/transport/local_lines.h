@@ -31,7 +31,7 @@ struct LineEnd {
     static constexpr uint32_t kSky = UINT32_MAX;          // met nothing
     static constexpr uint32_t kNowhere = UINT32_MAX - 1;  // could not leave: nothing was carried
     uint32_t side = kNowhere;
-    float weight = 1;  // times the power of a line
+    glm::vec3 weight{1.0f};  // times the power of a line, by channel
 };
 
 // Whether a line that left a side met at once what covers the side there: it is dark in between.

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/world_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <limits>
+
+#include "transport/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+// A region whose radiance varies by less than this share of the mean radiance's integral over the
+// sphere has no children if it is also small enough to be flat: the cosine's mean over a flat
+// piece is wrong by about the square of its size, on a ring as wide as that.
+constexpr double kLeastVariation = 1e-5;
+constexpr double kFlat = 0.06;  // radians
+
+// Of the cosine that a region may have at most: what its samples take for sure.
+constexpr float kLeastAbove = 1e-3f;
+// Reach of regions that no horizon leaves whole.
+constexpr float kMoreThanHalf = 2;
+
+constexpr float kCover = 1.001f;  // radius of the disk that rays start from over the scene's
+
+float sum(const glm::vec3& v) { return v.x + v.y + v.z; }
+
+// Mean over the unit square [-1, 1]^2 of max(0, s + a x + b y).
+double meanAbove(double s, double a, double b) {
+    a = std::abs(a);
+    b = std::abs(b);
+    if (a < b) std::swap(a, b);
+    if (s >= a + b) return s;
+    if (s <= -a - b) return 0;
+    auto power = [](double x, int n) { return x <= 0 ? 0 : n == 2 ? x * x : x * x * x; };
+    if (b < 1e-3 * a) return power(s + a, 2) / (4 * a) - power(s - a, 2) / (4 * a);
+    return (power(s + a + b, 3) - power(s + a - b, 3) - power(s - a + b, 3) + power(s - a - b, 3)) /
+           (24 * a * b);
+}
+
+// The same light on pixels that are small enough to be flat.
+WorldImage refined(const WorldImage& image) {
+    const int across = int(std::ceil(glm::two_pi<double>() / kFlat / image.width)),
+              up = int(std::ceil(glm::pi<double>() / kFlat / image.height));
+    if (across <= 1 && up <= 1) return image;
+    WorldImage fine{image.width * across, image.height * up, {}};
+    fine.pixels.reserve(size_t(fine.width) * size_t(fine.height));
+    for (int y = 0; y < fine.height; ++y)
+        for (int x = 0; x < fine.width; ++x)
+            fine.pixels.push_back(
+                image.pixels[size_t(y / up) * size_t(image.width) + size_t(x / across)]);
+    return fine;
+}
+
+}  // namespace
+
+WorldSource::WorldSource(const WorldImage& given) : image(refined(given)) {
+    for (int y = 0; y <= image.height; ++y) {
+        const double elevation = glm::pi<double>() * (double(y) / image.height - 0.5);
+        height.push_back(std::sin(elevation));
+        heightAngle.push_back(0.5 * elevation + 0.25 * std::sin(2 * elevation));
+    }
+    for (int x = 0; x <= image.width; ++x) {
+        const double azimuth = glm::pi<double>() * (1 - 2.0 * x / image.width);
+        cosine.push_back(std::cos(azimuth));
+        sine.push_back(std::sin(azimuth));
+    }
+    leastVariation = float(kLeastVariation * 4 * glm::pi<double>()) * sum(image.meanRadiance());
+    build(0, uint32_t(image.width), 0, uint32_t(image.height));
+    regions.shrink_to_fit();
+}
+
+// Appends the region and what is in it; children first looked at, then left out where they differ
+// little.
+WorldSource::Extremes WorldSource::build(uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1) {
+    const size_t index = regions.size();
+    regions.emplace_back();
+    Region made;
+    made.x0 = x0;
+    made.x1 = x1;
+    made.y0 = y0;
+    made.y1 = y1;
+    measure(made);
+    if (x1 - x0 == 1 && y1 - y0 == 1) {
+        setPixel(made);
+        regions[index] = made;
+        const float value = made.solidAngle > 0 ? made.strength / made.solidAngle : 0;
+        return {value, value};
+    }
+    // The longer edge is cut.
+    const double width = double(glm::length(made.half[0])),
+                 height_ = double(glm::length(made.half[1]));
+    made.cutsColumns = x1 - x0 > 1 && (y1 - y0 == 1 || width >= height_);
+    const uint32_t x = (x0 + x1) / 2, y = (y0 + y1) / 2;
+    const Extremes a = made.cutsColumns ? build(x0, x, y0, y1) : build(x0, x1, y0, y);
+    made.second = uint32_t(regions.size());
+    const Extremes b = made.cutsColumns ? build(x, x1, y0, y1) : build(x0, x1, y, y1);
+    const Region &first = regions[index + 1], &second = regions[made.second];
+    made.flux = first.flux + second.flux;
+    made.strength = first.strength + second.strength;
+    made.moment = first.moment + second.moment;
+    for (size_t c = 0; c < 3; ++c) made.moments[c] = first.moments[c] + second.moments[c];
+    const Extremes both{std::min(a.least, b.least), std::max(a.most, b.most)};
+    const bool isFlat = 2 * std::max(width, height_) < kFlat;
+    if ((isFlat && (both.most - both.least) * made.solidAngle < leastVariation) || both.most <= 0) {
+        made.second = 0;
+        regions.resize(index + 1);
+    }
+    regions[index] = made;
+    return both;
+}
+
+// Everything but the light.
+void WorldSource::measure(Region& region) const {
+    const double azimuth = glm::two_pi<double>() * (region.x1 - region.x0) / image.width;
+    region.solidAngle = float(azimuth * (height[region.y1] - height[region.y0]));
+    const double middle =
+        glm::pi<double>() * (1 - (double(region.x0) + double(region.x1)) / image.width);
+    const double low = glm::pi<double>() * (double(region.y0) / image.height - 0.5),
+                 high = glm::pi<double>() * (double(region.y1) / image.height - 0.5);
+    const double elevation = 0.5 * (low + high);
+    auto towards = [](double phi, double e) {
+        return glm::dvec3(std::cos(e) * std::cos(phi), std::cos(e) * std::sin(phi), std::sin(e));
+    };
+    const glm::dvec3 axis = towards(middle, elevation);
+    region.axis = glm::vec3(axis);
+    region.half[0] = glm::vec3(0.5 * azimuth * std::cos(elevation) *
+                               glm::dvec3(-std::sin(middle), std::cos(middle), 0));
+    region.half[1] =
+        glm::vec3(0.5 * (high - low) *
+                  glm::dvec3(-std::sin(elevation) * std::cos(middle),
+                             -std::sin(elevation) * std::sin(middle), std::cos(elevation)));
+    // The farthest directions are corners, or on the edge that is nearest to the equator.
+    double least = 1;
+    const double equator = std::clamp(0.0, low, high);
+    for (double e : {low, high, equator})
+        least = std::min(least, glm::dot(axis, towards(middle + 0.5 * azimuth, e)));
+    region.reach = azimuth > glm::pi<double>() || least <= 0
+                       ? kMoreThanHalf
+                       : float(std::sqrt(std::max(0.0, 1 - least * least)));
+}
+
+// The light of one pixel, whose radiance is constant.
+void WorldSource::setPixel(Region& region) const {
+    const glm::vec3& radiance = image.pixels[size_t(region.y0) * size_t(image.width) + region.x0];
+    const uint32_t x = region.x0, y = region.y0;
+    const double across = heightAngle[y + 1] - heightAngle[y];
+    const double azimuth = glm::two_pi<double>() / image.width;
+    // The azimuth falls from column to column.
+    const glm::dvec3 directions(
+        across * (sine[x] - sine[x + 1]), across * (cosine[x + 1] - cosine[x]),
+        0.5 * azimuth * (height[y + 1] * height[y + 1] - height[y] * height[y]));
+    region.flux = radiance * region.solidAngle;
+    region.strength = sum(region.flux);
+    region.moment = glm::vec3(double(sum(radiance)) * directions);
+    for (int c = 0; c < 3; ++c)
+        region.moments[size_t(c)] = glm::vec3(double(radiance[c]) * directions);
+}
+
+// Walks from the root to a region without children; weights(region, wa, wb) tells those of its
+// children.
+template <class Weights>
+WorldSource::Choice WorldSource::choose(glm::vec2 uv, Weights weights) const {
+    Choice choice{&regions[0], uv, 1};
+    while (choice.region->second != 0) {
+        const Region &a = regions[firstChild(*choice.region)], &b = regions[choice.region->second];
+        float wa = 0, wb = 0;
+        weights(*choice.region, wa, wb);
+        if (!(wa + wb > 0)) return {nullptr, uv, 0};
+        const float p = wa / (wa + wb);
+        float& u = choice.region->cutsColumns ? choice.uv.x : choice.uv.y;
+        const bool isFirst = u < p;
+        u = std::min(isFirst ? u / p : (u - p) / (1 - p), 0.9999999f);
+        choice.probability *= isFirst ? p : 1 - p;
+        choice.region = isFirst ? &a : &b;
+    }
+    return choice;
+}
+
+// Uniform by solid angle.
+glm::vec3 WorldSource::directionIn(const Region& region, glm::vec2 uv, glm::vec3& radiance) const {
+    const double x = region.x0 + double(uv.x) * (region.x1 - region.x0);
+    const double z = height[region.y0] + double(uv.y) * (height[region.y1] - height[region.y0]);
+    const auto above =
+        std::upper_bound(height.begin() + region.y0 + 1, height.begin() + region.y1, z);
+    const size_t row = size_t(above - height.begin()) - 1;
+    const size_t column = std::min(size_t(x), size_t(region.x1) - 1);
+    radiance = image.pixels[row * size_t(image.width) + column];
+    const double azimuth = glm::pi<double>() * (1 - 2 * x / image.width);
+    const double r = std::sqrt(std::max(0.0, 1 - z * z));
+    return glm::vec3(r * std::cos(azimuth), r * std::sin(azimuth), z);
+}
+
+LightSample WorldSource::sample(const glm::vec3&, const glm::vec3& normal, glm::vec2 uv) const {
+    LightSample sample;
+    sample.distance = std::numeric_limits<float>::infinity();
+    const Facing& facing = facingOf(normal);
+    bool isCut = true;
+    const Choice choice = choose(uv, [&](const Region& region, float& wa, float& wb) {
+        isCut = isCut && isCutBy(region, normal);
+        const uint32_t first = firstChild(region);
+        wa = isCut ? facing.weight[first] : glm::dot(normal, regions[first].moment);
+        wb = isCut ? facing.weight[region.second] : glm::dot(normal, regions[region.second].moment);
+        wa = std::max(0.0f, wa);
+        wb = std::max(0.0f, wb);
+    });
+    if (!choice.region) return sample;
+    glm::vec3 radiance;
+    sample.direction = directionIn(*choice.region, choice.uv, radiance);
+    const float c = std::max(0.0f, glm::dot(normal, sample.direction));
+    sample.irradiance = radiance * (c * choice.region->solidAngle / choice.probability);
+    return sample;
+}
+
+bool WorldSource::isCutBy(const Region& region, const glm::vec3& normal) const {
+    return std::abs(glm::dot(normal, region.axis)) < region.reach;
+}
+
+// Irradiance from a region; notes the weights of all regions that it looks at.
+glm::vec3 WorldSource::look(uint32_t index, const glm::vec3& normal,
+                            std::vector<float>& weights) const {
+    const Region& region = regions[index];
+    float& weight = weights[index];
+    const float s = glm::dot(normal, region.axis), h = region.reach;
+    weight = 0;
+    if (!(region.strength > 0) || s <= -h) return glm::vec3(0.0f);
+    if (s >= h) {
+        weight = glm::dot(normal, region.moment);
+        return {glm::dot(normal, region.moments[0]), glm::dot(normal, region.moments[1]),
+                glm::dot(normal, region.moments[2])};
+    }
+    if (region.second != 0) {
+        const glm::vec3 sum =
+            look(index + 1, normal, weights) + look(region.second, normal, weights);
+        weight = weights[index + 1] + weights[region.second];
+        return sum;
+    }
+    const float mean = float(meanAbove(double(s), double(glm::dot(normal, region.half[0])),
+                                       double(glm::dot(normal, region.half[1]))));
+    // A curved piece may rise above a horizon that the flat one is below.
+    weight = region.strength * std::max(mean, kLeastAbove * (s + h) * (s + h) / h);
+    return region.flux * mean;
+}
+
+const WorldSource::Facing& WorldSource::facingOf(const glm::vec3& normal) const {
+    Facing& known = facing.local();
+    if (known.normal != normal) {
+        known.normal = normal;
+        known.weight.resize(regions.size());
+        known.irradiance = glm::max(glm::vec3(0.0f), look(0, normal, known.weight));
+    }
+    return known;
+}
+
+std::optional<glm::vec3> WorldSource::irradiance(const glm::vec3&, const glm::vec3& normal) const {
+    return facingOf(normal).irradiance;
+}
+
+bool WorldSource::isSeen(uint32_t index, const glm::vec3& normal) const {
+    const Region& region = regions[index];
+    const float s = glm::dot(normal, region.axis);
+    if (!(region.strength > 0) || s <= -region.reach) return false;
+    if (s >= region.reach || region.second == 0) return true;
+    return isSeen(index + 1, normal) || isSeen(region.second, normal);
+}
+
+bool WorldSource::isOutOfSight(const glm::vec3&, const glm::vec3& normal, float) const {
+    return !isSeen(0, normal);
+}
+
+float WorldSource::distance(const glm::vec3&) const {
+    return std::numeric_limits<float>::infinity();
+}
+
+// Parallel rays of each direction, from a disk that covers the scene.
+glm::vec3 WorldSource::shootingPower(float sceneRadius) const {
+    const float r = kCover * sceneRadius;
+    return regions[0].flux * (glm::pi<float>() * r * r);
+}
+
+EmittedRay WorldSource::emit(const glm::vec4& u, float sceneRadius) const {
+    EmittedRay ray;
+    const Choice choice = choose({u.x, u.y}, [&](const Region& region, float& wa, float& wb) {
+        wa = regions[firstChild(region)].strength;
+        wb = regions[region.second].strength;
+    });
+    glm::vec3 radiance;
+    const glm::vec3 towards = directionIn(*choice.region, choice.uv, radiance);
+    const auto [x, y] = frame(towards);
+    const glm::vec2 d = onDisk({u.z, u.w});
+    ray.origin = kCover * sceneRadius * (towards + d.x * x + d.y * y);
+    ray.direction = -towards;
+    for (int c = 0; c < 3; ++c)
+        ray.weight[c] = regions[0].flux[c] > 0 ? radiance[c] * choice.region->solidAngle /
+                                                     (choice.probability * regions[0].flux[c])
+                                               : 0;
+    return ray;
+}
+
+}  // namespace raybundle
