@@ -623,20 +623,6 @@ def test_world_colour():
     assert export().scene.world == pytest.approx([0.4, 0.8, 1.2])
 
 
-def test_environment_image_counts_with_its_mean_over_the_sphere():
-    world, background = new_world()
-    # White in the middle half of the elevations, black near the poles: sin(45 degrees).
-    values = np.zeros((64, 8, 3), np.float32)
-    values[16:48] = 1.0
-    node = world.node_tree.nodes.new('ShaderNodeTexEnvironment')
-    node.image = new_image(values, True)
-    world.node_tree.links.new(node.outputs[0], background.inputs['Color'])
-    result = export()
-    # 64 rows approximate the integral over the elevation to 1e-3.
-    assert result.scene.world == pytest.approx(np.full(3, math.sqrt(0.5)), rel=1e-3)
-    assert any('"World"' in text and "mean" in text for text in result.warnings)
-
-
 def test_transforms_are_object_to_world(new_object):
     item = new_object("Square", SQUARE, [(0, 1, 2, 3)])
     item.matrix_world = Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(0.5, 4, 'X')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lights and world in the units of Cycles, whose formulas changed between Blender versions."""
+"""Lights in the units of Cycles, whose formulas changed between Blender versions."""
 
 from __future__ import annotations
 
@@ -30,21 +30,6 @@ def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: I
         return SunLightData(name, direction / max(np.linalg.norm(direction), 1e-30),
                             strength * sun_irradiance_factor(light.angle), light.angle)
     return _area_light(light, name, matrix_world, strength)
-
-
-def export_world(world: bpy.types.World | None, images: ImagePixels, warnings: Warnings
-                 ) -> np.ndarray:
-    """(3,) W/(m^2 sr), the mean radiance of the world."""
-    if world is None:
-        return np.zeros(3)
-    # From 5.0 on every world has nodes and use_nodes only warns.
-    if bpy.app.version < (5, 0, 0) and not world.use_nodes or world.node_tree is None:
-        return np.array(world.color)
-    output = output_node(world.node_tree)
-    if output is None:
-        return np.zeros(3)
-    reader = NodeReader(f'world "{world.name}"', images, warnings)
-    return np.maximum(reader.surface(output.inputs['Surface']).emission, 0.0)
 
 
 def area_light_radiance(power: np.ndarray, area: float, normalize: bool = True,

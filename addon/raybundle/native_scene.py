@@ -26,6 +26,8 @@ def build_native_scene(data: SceneData) -> native.Scene:
     for light in data.lights:
         _add_light(scene, light)
     scene.set_world(data.world)
+    if data.world_image is not None:
+        scene.set_world_image(data.world_image)
     return scene
 
 

@@ -21,7 +21,7 @@ from .image_export import ImagePixels, sphere_mean
 from .scene_data import Warnings
 
 # Values of the Light Path node as diffuse light sees a surface.
-_LIGHT_PATH = {'Is Diffuse Ray': 1.0, 'Is Reflection Ray': 1.0, 'Ray Depth': 1.0,
+LIGHT_PATH = {'Is Diffuse Ray': 1.0, 'Is Reflection Ray': 1.0, 'Ray Depth': 1.0,
                'Diffuse Depth': 1.0}
 
 # Nodes that change a colour in a way that is not linear: exact for constants is not attempted.
@@ -308,7 +308,7 @@ class NodeReader:
         if node.type == 'NEW_GEOMETRY' and source.output.name == 'Backfacing':
             return float(self.backfacing)
         if node.type == 'LIGHT_PATH':
-            return _LIGHT_PATH.get(source.output.name, 0.0)
+            return LIGHT_PATH.get(source.output.name, 0.0)
         if node.type == 'MATH' and node.operation in _MATH:
             a, b = (self.value(socket, path) for socket in node.inputs[:2])
             result = _MATH[node.operation](a, b)

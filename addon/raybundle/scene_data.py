@@ -119,6 +119,8 @@ class SceneData:
     instances: list[InstanceData] = field(default_factory=list)
     lights: list[LightData] = field(default_factory=list)
     world: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr)
+    # (height, width, 3) W/(m^2 sr) on top of it, equirectangular as in Cycles, bottom row first
+    world_image: np.ndarray | None = None
 
     def diagonal(self) -> float:
         """Of the bounding box of all instances in the world, m."""

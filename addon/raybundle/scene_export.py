@@ -14,10 +14,11 @@ import bpy
 import numpy as np
 
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
-from .light_export import export_light, export_world
+from .light_export import export_light
 from .material_export import MaterialExporter
 from .mesh_export import MeshError, export_mesh
 from .scene_data import InstanceData, MeshData, SceneData, Warnings
+from .world_export import export_world
 
 # Object types whose evaluated geometry is a mesh.
 GEOMETRY_TYPES = ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT')
@@ -135,8 +136,9 @@ class _Exporter:
             elif item.type in _UNREAD_TYPES:
                 self._refuse(item.name, f"{item.type} geometry is not read")
         scene = self.result.scene
-        scene.world = export_world(self.context.scene.world, self.materials.images,
-                                   self.result.warnings)
+        world = export_world(self.context.scene, self.materials.images, self.result.warnings)
+        scene.world, scene.world_image = world.radiance, world.image
+        scene.lights.extend(world.suns)
         for (parent, name), count in self._instance_counts.items():
             label = name if parent == name else f"{parent} / {name}"
             plural = "s" if count > 1 else ""

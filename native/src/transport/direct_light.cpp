@@ -26,6 +26,11 @@ constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
 // Receivers darker than this share of the mean may have the error of one that bright.
 constexpr float kDarkShare = 0.25f;
 constexpr int kBlocks = 4;
+// What n samples tell nothing of: a part s of a source is missed by all with the probability
+// (1 - s)^n, and then s is wrong; this over n at most, in the mean.
+constexpr float kMissed = 0.37f;
+// A receiver that is in the dark after so many samples of a source that surrounds it stays there.
+constexpr int kDarkSamples = 256;
 // A closed form whose largest value is so many times its smallest on a patch takes more points.
 constexpr float kSmooth = 1.1f;
 // A patch smaller than this share of its distance from a source needs one point only: the error is
@@ -110,6 +115,7 @@ std::vector<Gathered> DirectLight::gather(size_t count,
                                           const std::function<void(double)>& progress) const {
     std::vector<Gathered> results(count);
     if (sources.empty()) return results;
+    Seen seen(sources.size());
     auto gatherThese = [&](const std::vector<uint32_t>& these, auto tolerance, double begin) {
         constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
         for (size_t from = 0; from < these.size(); from += kSlice) {
@@ -117,7 +123,7 @@ std::vector<Gathered> DirectLight::gather(size_t count,
             tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
                 Gathered& result = results[these[k]];
                 const uint64_t before = result.rays;
-                result = gather(receiverAt(these[k]), tolerance(these[k]));
+                result = gather(receiverAt(these[k]), tolerance(these[k]), seen);
                 result.rays += before;
             });
         }
@@ -148,17 +154,17 @@ std::vector<Gathered> DirectLight::gather(size_t count,
 }
 
 // Each source takes samples until its standard error is below `tolerance`.
-Gathered DirectLight::gather(const Receiver& receiver, float tolerance) const {
+Gathered DirectLight::gather(const Receiver& receiver, float tolerance, Seen& seen) const {
     Gathered sum;
     const std::vector<float> weights = unblockedWeights(receiver);
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
     for (size_t k = 0; k < sources.size(); ++k) {
         const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
-        gatherFrom(*sources[k], hash(seed, hash(receiver.seed, uint32_t(k))), receiver,
+        gatherFrom(k, receiver,
                    share < kSmallShare    ? kFewSamples
                    : share < kMiddleShare ? kFirstSamples / 2
                                           : kFirstSamples,
-                   tolerance, sum);
+                   tolerance, seen, sum);
     }
     return sum;
 }
@@ -261,8 +267,10 @@ DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t 
     return block;
 }
 
-void DirectLight::gatherFrom(const LightSource& source, uint32_t seed, const Receiver& receiver,
-                             int samples, float tolerance, Gathered& sum) const {
+void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples, float tolerance,
+                             Seen& seen, Gathered& sum) const {
+    const LightSource& source = *sources[index];
+    const uint32_t sampleSeed = hash(seed, hash(receiver.seed, uint32_t(index)));
     if (source.isOutOfSight(position(receiver, {0.5f, 0.5f}), receiver.normal, radius(receiver))) {
         ++sum.hidden;
         return;
@@ -280,7 +288,8 @@ void DirectLight::gatherFrom(const LightSource& source, uint32_t seed, const Rec
         // A quarter of the new samples to each block: consecutive ones are stratified.
         const int first = all.count, each = (next - first) / kBlocks;
         for (int b = 0; b < kBlocks; ++b) {
-            const Block block = sampleBlock(source, seed, receiver, first + b * each, each, sum);
+            const Block block =
+                sampleBlock(source, sampleSeed, receiver, first + b * each, each, sum);
             blocks[size_t(b)].add(block);
             all.add(block);
         }
@@ -293,9 +302,22 @@ void DirectLight::gatherFrom(const LightSource& source, uint32_t seed, const Rec
             continue;
         }
         if (brightest(all.open) <= 0) ++sum.hidden;
-        if (brightest(all.visible) <= 0) return;
+        const float missed =
+            source.surrounds() && !isInside
+                ? kMissed * brightest(all.open) / (float(all.count) * float(all.count))
+                : 0;
+        if (brightest(all.visible) <= 0) {
+            if (missed > tolerance && all.count < kDarkSamples && seen[index]) {
+                next = 4 * all.count;
+                continue;
+            }
+            sum.variance += missed * missed;
+            return;
+        }
+        // By the first pass alone, so that the order of the receivers does not matter.
+        if (std::isinf(tolerance)) seen[index] = true;
         const glm::vec3 mean = all.estimate(closed);
-        variance = 0;
+        variance = missed * missed;
         for (const Block& block : blocks) {
             const float d = brightest(glm::abs(block.estimate(closed) - mean));
             variance += d * d / (kBlocks * (kBlocks - 1));

@@ -12,6 +12,7 @@
 //   carry it without extra noise, and then a furnace is exact.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -70,10 +71,11 @@ class DirectLight {
 
   private:
     struct Block;
+    using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
 
-    Gathered gather(const Receiver& receiver, float tolerance) const;
-    void gatherFrom(const LightSource& source, uint32_t seed, const Receiver& receiver, int samples,
-                    float tolerance, Gathered& sum) const;
+    Gathered gather(const Receiver& receiver, float tolerance, Seen& seen) const;
+    void gatherFrom(size_t source, const Receiver& receiver, int samples, float tolerance,
+                    Seen& seen, Gathered& sum) const;
     Block sampleBlock(const LightSource& source, uint32_t seed, const Receiver& receiver, int first,
                       int count, Gathered& sum) const;
     std::optional<glm::vec3> closedMean(const LightSource& source, const Receiver& receiver,

@@ -62,6 +62,10 @@ class LightSource {
     // Most shadow rays that a receiver needs.
     virtual int mostSamples() const { return 256; }
 
+    // Whether it is so wide that anything near a receiver hides part of it, or most of it: that a
+    // few samples agree means little then.
+    virtual bool surrounds() const { return false; }
+
     // Emitted power, W; zero for sources whose power depends on where their light arrives: suns,
     // worlds, and disks that turn towards each receiver.
     virtual glm::vec3 power() const = 0;

@@ -38,6 +38,7 @@ class WorldSource : public LightSource {
     bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal, float radius) const override;
     float distance(const glm::vec3& point) const override;
     int mostSamples() const override { return 4096; }
+    bool surrounds() const override { return true; }
     glm::vec3 power() const override { return glm::vec3(0.0f); }
     glm::vec3 shootingPower(float sceneRadius) const override;
     EmittedRay emit(const glm::vec4& u, float sceneRadius) const override;

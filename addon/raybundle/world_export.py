@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world's light: a constant radiance, and for all else an image and suns."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from . import world_panorama
+from .image_export import ImagePixels
+from .node_reader import NodeReader, output_node
+from .scene_data import SunLightData, Warnings
+
+# Images that vary by less than this share of their mean are constant: noise and rounding.
+_LEAST_VARIATION = 1e-3
+# Worlds that are remembered: the last ones, so that a bake after a change of lamps is quick.
+_REMEMBERED = 4
+
+
+@dataclass(frozen=True)
+class WorldData:
+    radiance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr), constant
+    image: np.ndarray | None = None  # (height, width, 3) W/(m^2 sr), on top of it
+    suns: tuple[SunLightData, ...] = ()
+
+
+_evaluated: dict[bytes, WorldData] = {}
+
+
+def export_world(scene: bpy.types.Scene, images: ImagePixels, warnings: Warnings) -> WorldData:
+    """The light of the scene's world on diffuse surfaces."""
+    world = scene.world
+    if world is None or not getattr(world.cycles_visibility, 'diffuse', True):
+        return WorldData()
+    # From 5.0 on every world has nodes and use_nodes only warns.
+    if bpy.app.version < (5, 0, 0) and not world.use_nodes or world.node_tree is None:
+        return WorldData(np.array(world.color))
+    output = output_node(world.node_tree)
+    if output is None:
+        return WorldData()
+    unread = Warnings()
+    reader = NodeReader(f'world "{world.name}"', images, unread)
+    radiance = np.maximum(reader.surface(output.inputs['Surface']).emission, 0.0)
+    # What is read without a word is constant.
+    if not unread:
+        return WorldData(radiance)
+    if not world_panorama.is_available():
+        for message in unread:
+            warnings.add(message)
+        return WorldData(radiance)
+    key = _digest(world, scene.frame_current)
+    if key not in _evaluated:
+        try:
+            evaluated = _split(world_panorama.evaluate(world, scene.frame_current))
+        except RuntimeError as error:
+            warnings.add(f'world "{world.name}": Cycles could not evaluate its nodes, and its mean '
+                         f'is used ({error})')
+            for message in unread:
+                warnings.add(message)
+            return WorldData(radiance)
+        while len(_evaluated) >= _REMEMBERED:
+            _evaluated.pop(next(iter(_evaluated)))
+        _evaluated[key] = evaluated
+    return _evaluated[key]
+
+
+def _split(panorama: world_panorama.Panorama) -> WorldData:
+    """The least radiance of all directions is constant: bundles bring it, without shadow rays."""
+    pixels = panorama.pixels
+    angles = world_panorama.solid_angles(*pixels.shape[:2])
+    mean = (pixels * angles[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi)
+    if np.ptp(pixels, axis=(0, 1)).max() <= _LEAST_VARIATION * mean.max():
+        return WorldData(mean, None, panorama.suns)
+    least = pixels.min(axis=(0, 1))
+    return WorldData(least, (pixels - least).astype(np.float32), panorama.suns)
+
+
+# --------------------------------------------------------------------------------------------------
+# Whether a world is the same as before
+# --------------------------------------------------------------------------------------------------
+
+# What moves or looks different in the node editor only.
+_OF_THE_EDITOR = {'rna_type', 'location', 'width', 'width_hidden', 'height', 'dimensions', 'select',
+                  'label', 'color', 'use_custom_color', 'show_options', 'show_preview',
+                  'show_texture', 'show_expanded', 'hide', 'hide_value', 'parent', 'internal_links',
+                  'is_active_output', 'active', 'users', 'preview', 'animation_data', 'view_center',
+                  'grease_pencil', 'interface', 'asset_data', 'override_library', 'library',
+                  'library_weak_reference', 'original', 'link_limit', 'node', 'id_data',
+                  'links', 'location_absolute', 'warning_propagation', 'color_tag'}
+
+
+def _digest(world: bpy.types.World, frame: int) -> bytes:
+    """The same for worlds whose nodes, values and images are the same."""
+    content = hashlib.blake2b(digest_size=16)
+    content.update(repr(bpy.app.version).encode())
+    _add(content, world.node_tree, frame, set())
+    return content.digest()
+
+
+def _add(content: hashlib.blake2b, item: bpy.types.bpy_struct, frame: int, seen: set[int]) -> None:
+    if item.as_pointer() in seen:
+        return
+    seen.add(item.as_pointer())
+    if isinstance(item, bpy.types.Image):
+        _add_image(content, item, frame)
+        return
+    if isinstance(item, bpy.types.ID) and not isinstance(item, bpy.types.NodeTree):
+        # An object gives its coordinates, a text its code.
+        content.update(repr((item.name_full, getattr(item, 'matrix_world', None))).encode())
+        if isinstance(item, bpy.types.Text):
+            content.update(item.as_string().encode())
+        return
+    for prop in item.bl_rna.properties:
+        name = prop.identifier
+        if name in _OF_THE_EDITOR or name.startswith('bl_'):
+            continue
+        value = getattr(item, name)
+        content.update(name.encode())
+        if prop.type == 'POINTER':
+            if value is not None:
+                _add(content, value, frame, seen)
+        elif prop.type == 'COLLECTION':
+            for member in value:
+                _add(content, member, frame, seen)
+        elif getattr(prop, 'is_array', False):
+            content.update(repr(tuple(map(tuple, value) if isinstance(value[0], (tuple, list))
+                                      else value)).encode())
+        else:
+            content.update(repr(value).encode())
+    if isinstance(item, bpy.types.NodeTree):
+        for link in item.links:
+            content.update(repr((link.from_node.name, link.from_socket.identifier,
+                                 link.to_node.name, link.to_socket.identifier,
+                                 link.is_muted)).encode())
+
+
+def _add_image(content: hashlib.blake2b, image: bpy.types.Image, frame: int) -> None:
+    content.update(repr((image.name_full, tuple(image.size), image.source, image.alpha_mode,
+                         image.colorspace_settings.name)).encode())
+    if image.source in ('SEQUENCE', 'MOVIE'):
+        content.update(repr(frame).encode())
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    if image.source == 'FILE' and not image.is_dirty and image.packed_file is None \
+            and os.path.isfile(path):
+        status = os.stat(path)
+        content.update(repr((path, status.st_size, status.st_mtime_ns)).encode())
+    elif image.size[0] > 0 and image.size[1] > 0:
+        values = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(values)
+        content.update(values.data)

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Any world node tree -> radiance by direction, evaluated by Cycles itself.
+
+A copy of the world is rendered as diffuse surfaces see it, in a scene of its own that has nothing
+but a camera: as a panorama, again in finer pixels where it is very bright, and the sun discs of Sky
+Textures alone, as small pictures of each. All that is made for it is removed again.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from .node_reader import LIGHT_PATH
+from .scene_data import SunLightData
+
+# Pixels around the horizon: 0.7 degrees each. Suns are far finer, and are dealt with apart.
+_WIDTH = 512
+_SAMPLES = 16
+# Pixels that bring more than this share of all light are rendered again, with a margin, _FINER
+# times as fine; the image keeps _KEPT times as many pixels as the first.
+_BRIGHT = 1e-4
+_MARGIN = 2
+_FINER = 16
+_KEPT = 2
+_MAX_TILES = 24
+# A sun disc is looked for with at least this diameter, then measured in a picture this wide.
+_LARGE_DISC = 0.06  # radians
+_DISC_WIDTH = 128
+# Larger discs stay in the panorama, which has enough pixels for them.
+_LARGEST_DISC = 0.5  # radians
+_SKIES_WITHOUT_DISC = ('PREETHAM', 'HOSEK_WILKIE')
+_HANDLERS = ('render_init', 'render_pre', 'render_post', 'render_write', 'render_stats',
+             'render_complete', 'render_cancel')
+
+
+@dataclass(frozen=True)
+class Panorama:
+    """pixels: (height, width, 3) W/(m^2 sr), equirectangular, bottom row first, without suns."""
+
+    pixels: np.ndarray
+    suns: tuple[SunLightData, ...]
+
+
+def is_available() -> bool:
+    """Whether this Blender has Cycles."""
+    return hasattr(bpy.types.Scene, 'cycles') and hasattr(bpy.types.World, 'cycles')
+
+
+def evaluate(world: bpy.types.World, frame: int) -> Panorama:
+    """The world at a frame. Raises RuntimeError when Blender cannot render it."""
+    with _Renderer(world, frame) as renderer:
+        discs = renderer.sun_discs()
+        for node in discs:
+            node.sun_disc = False
+        base = renderer.panorama(_WIDTH)
+        pixels = _refined(renderer, base)
+        suns = [sun for node in discs if (sun := _sun(renderer, node, base)) is not None]
+    return Panorama(pixels, tuple(suns))
+
+
+def directions(height: int, width: int) -> np.ndarray:
+    """(height, width, 3), unit vectors to the middles of the pixels, as Cycles maps them."""
+    elevation = ((np.arange(height) + 0.5) / height - 0.5)[:, None] * np.pi
+    azimuth = (1.0 - 2.0 * (np.arange(width) + 0.5) / width)[None, :] * np.pi
+    return np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth),
+                     np.broadcast_to(np.sin(elevation), (height, width))], axis=-1)
+
+
+def solid_angles(height: int, width: int) -> np.ndarray:
+    """(height, 1) sr of a pixel of each row."""
+    edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
+    return (np.diff(edges) * 2.0 * np.pi / width)[:, None]
+
+
+# --------------------------------------------------------------------------------------------------
+# Bright spots and suns
+# --------------------------------------------------------------------------------------------------
+
+
+def _refined(renderer: _Renderer, base: np.ndarray) -> np.ndarray:
+    """_KEPT times the pixels; those of bright spots from finer ones."""
+    height, width = base.shape[:2]
+    pixels = base.repeat(_KEPT, axis=0).repeat(_KEPT, axis=1)
+    power = base.sum(axis=2) * solid_angles(height, width)
+    mean = power.sum() / power.size
+    # Never more than a small part: in a sky that is bright all over nothing stands out.
+    left = np.where(power > max(_BRIGHT * power.sum(), 4.0 * mean), power, 0.0)
+    for _ in range(_MAX_TILES):
+        row, column = np.unravel_index(left.argmax(), left.shape)
+        if left[row, column] <= 0.0:
+            break
+        tile = (slice(max(row - _MARGIN, 0), min(row + _MARGIN + 1, height)),
+                slice(max(column - _MARGIN, 0), min(column + _MARGIN + 1, width)))
+        left[tile] = 0.0
+        fine = renderer.panorama(_FINER * width, tuple(
+            (_FINER * part.start, _FINER * part.stop) for part in tile))
+        step = _FINER // _KEPT
+        kept = fine.reshape(fine.shape[0] // step, step, fine.shape[1] // step, step, 3)
+        pixels[tuple(slice(_KEPT * part.start, _KEPT * part.stop) for part in tile)] = (
+            kept.mean(axis=(1, 3)))
+    return pixels
+
+
+def _sun(renderer: _Renderer, node: bpy.types.Node, base: np.ndarray) -> SunLightData | None:
+    """What the disc of a Sky Texture adds to the world, as a light; None if it is below."""
+    size = node.sun_size
+    node.sun_disc = True
+    try:
+        # Where it is, through whatever nodes: as a large disc it cannot fall between samples.
+        node.sun_size = max(size, _LARGE_DISC)
+        added = (renderer.panorama(_WIDTH) - base).sum(axis=2)
+        added = np.where(added > 0.1 * max(added.max(), 0.0), added, 0.0)
+        power = added * solid_angles(*added.shape)
+        towards = (power[..., None] * directions(*added.shape)).sum(axis=(0, 1))
+        if power.sum() <= 1e-6 * (base.sum(axis=2) * solid_angles(*added.shape)).sum():
+            return None
+        node.sun_size = size
+        # Wide enough for the error of the place, too.
+        field_of_view = 1.2 * size + 0.02
+        view = Vector(towards / np.linalg.norm(towards))
+        added, view_directions, angles = renderer.view(view, field_of_view, _DISC_WIDTH)
+        node.sun_disc = False
+        added = added - renderer.view(view, field_of_view, _DISC_WIDTH)[0]
+    finally:
+        node.sun_size = size
+        node.sun_disc = False
+    flux = added * angles[..., None]
+    towards = (flux.sum(axis=2)[..., None] * view_directions).sum(axis=(0, 1))
+    if not np.linalg.norm(towards) > 0.0:
+        return None
+    direction = towards / np.linalg.norm(towards)
+    irradiance = (flux * (view_directions @ direction)[..., None]).sum(axis=(0, 1))
+    return SunLightData(f'sun of "{node.name}"', direction, np.maximum(irradiance, 0.0), size)
+
+
+# --------------------------------------------------------------------------------------------------
+# Rendering
+# --------------------------------------------------------------------------------------------------
+
+
+class _Renderer:
+    """A scene with a copy of the world and a camera, for as long as the context lasts."""
+
+    def __init__(self, world: bpy.types.World, frame: int) -> None:
+        self._original, self._frame = world, frame
+        self._made: list[bpy.types.ID] = []
+
+    def __enter__(self) -> _Renderer:
+        # Blender makes these when it renders first.
+        self._had = {name for name in ('Render Result', 'Viewer Node') if name in bpy.data.images}
+        try:
+            self._build()
+        except BaseException:
+            self._remove()
+            raise
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self._remove()
+
+    def sun_discs(self) -> list[bpy.types.Node]:
+        return [node for tree in self._trees for node in tree.nodes
+                if node.type == 'TEX_SKY' and getattr(node, 'sun_disc', False)
+                and node.sky_type not in _SKIES_WITHOUT_DISC and not node.mute
+                and node.sun_size <= _LARGEST_DISC and node.outputs[0].is_linked]
+
+    def panorama(self, width: int, part: tuple[tuple[int, int], tuple[int, int]] | None = None
+                 ) -> np.ndarray:
+        """(height, width, 3) of all directions, or the rows and columns (begin, end) of a part."""
+        camera = self._camera.data
+        camera.type = 'PANO'
+        # 5.0 moved it from Cycles to Blender.
+        owner = camera if hasattr(camera, 'panorama_type') else camera.cycles
+        owner.panorama_type = 'EQUIRECTANGULAR'
+        # The middle of the image looks along +X, as that of an environment texture.
+        self._camera.rotation_euler = (math.pi / 2.0, 0.0, -math.pi / 2.0)
+        return self._render(width, width // 2, part)
+
+    def view(self, towards: Vector, field_of_view: float, width: int
+             ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A square view: (n, n, 3) radiance, (n, n, 3) directions and (n, n) solid angles."""
+        camera = self._camera.data
+        camera.type = 'PERSP'
+        camera.lens_unit, camera.angle = 'FOV', field_of_view
+        rotation = towards.to_track_quat('-Z', 'Y')
+        self._camera.rotation_euler = rotation.to_euler()
+        pixels = self._render(width, width, None)
+        half = math.tan(field_of_view / 2.0)
+        across = half * (2.0 * (np.arange(width) + 0.5) / width - 1.0)
+        local = np.stack([np.broadcast_to(across[None, :], (width, width)),
+                          np.broadcast_to(across[:, None], (width, width)),
+                          np.full((width, width), -1.0)], axis=-1)
+        lengths = np.linalg.norm(local, axis=-1)
+        seen = (local / lengths[..., None]) @ np.array(rotation.to_matrix()).T
+        return pixels, seen, (2.0 * half / width) ** 2 / lengths ** 3
+
+    def _build(self) -> None:
+        world = self._keep(self._original.copy())
+        world.cycles_visibility.camera = True
+        # No map of where the world is bright: nothing here is lit by it.
+        world.cycles.sampling_method = 'NONE'
+        self._trees = [world.node_tree]
+        for tree in self._trees:
+            self._open_groups(tree)
+            _replace_light_paths(tree)
+        scene = self._scene = self._keep(bpy.data.scenes.new("Raybundle World"))
+        scene.world = world
+        scene.frame_current = self._frame
+        self._camera = self._keep(bpy.data.objects.new(
+            scene.name, self._keep(bpy.data.cameras.new(scene.name))))
+        scene.collection.objects.link(self._camera)
+        scene.camera = self._camera
+        render, cycles = scene.render, scene.cycles
+        render.engine = 'CYCLES'
+        cycles.device, cycles.samples = 'CPU', _SAMPLES
+        cycles.use_adaptive_sampling = cycles.use_denoising = False
+        cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+        # Each pixel is the mean of what it covers.
+        cycles.pixel_filter_type = 'BOX'
+        cycles.film_exposure = 1.0
+        render.film_transparent = False
+        render.use_compositing = render.use_sequencer = False
+        render.resolution_percentage = 100
+        render.use_file_extension = True
+        render.image_settings.file_format = 'OPEN_EXR'
+        render.image_settings.color_mode = 'RGB'
+        render.image_settings.color_depth = '32'
+
+    def _open_groups(self, tree: bpy.types.NodeTree) -> None:
+        """Copies the groups of a tree, which others may use."""
+        for node in tree.nodes:
+            if node.type == 'GROUP' and node.node_tree is not None:
+                node.node_tree = self._keep(node.node_tree.copy())
+                self._trees.append(node.node_tree)
+
+    def _keep(self, made: bpy.types.ID) -> bpy.types.ID:
+        self._made.append(made)
+        return made
+
+    def _remove(self) -> None:
+        for made in reversed(self._made):
+            _collection_of(made).remove(made)
+        self._made.clear()
+        for name in ('Render Result', 'Viewer Node'):
+            image = bpy.data.images.get(name)
+            if image is not None and name not in self._had:
+                image.user_clear()
+                bpy.data.images.remove(image)
+
+    def _render(self, width: int, height: int,
+                part: tuple[tuple[int, int], tuple[int, int]] | None) -> np.ndarray:
+        render = self._scene.render
+        render.resolution_x, render.resolution_y = width, height
+        rows, columns = part or ((0, height), (0, width))
+        render.use_border = render.use_crop_to_border = part is not None
+        # A little inside the pixel, so that neither rounding nor cutting off moves the edge.
+        render.border_min_x, render.border_max_x = ((x + 0.25) / width for x in columns)
+        render.border_min_y, render.border_max_y = ((y + 0.25) / height for y in rows)
+        shape = (rows[1] - rows[0], columns[1] - columns[0])
+        with tempfile.TemporaryDirectory() as folder, _silent_handlers():
+            path = Path(folder) / "world.exr"
+            render.filepath = str(path)
+            bpy.ops.render.render(scene=self._scene.name, write_still=True)
+            return _read(path, shape)
+
+
+def _read(path: Path, shape: tuple[int, int]) -> np.ndarray:
+    image = bpy.data.images.load(str(path))
+    try:
+        if tuple(image.size) != shape[::-1]:
+            raise RuntimeError(f"the world was rendered as {tuple(image.size)}, not {shape[::-1]}")
+        values = np.empty(shape[0] * shape[1] * image.channels, np.float32)
+        image.pixels.foreach_get(values)
+    finally:
+        bpy.data.images.remove(image)
+    pixels = values.reshape(*shape, -1)[:, :, :3].astype(np.float64)
+    return np.where(np.isfinite(pixels), np.maximum(pixels, 0.0), 0.0)
+
+
+def _replace_light_paths(tree: bpy.types.NodeTree) -> None:
+    """The camera's ray is to count as one that left a diffuse surface."""
+    for node in [node for node in tree.nodes if node.type == 'LIGHT_PATH']:
+        for output in node.outputs:
+            for socket in [link.to_socket for link in output.links]:
+                value = tree.nodes.new('ShaderNodeValue')
+                value.outputs[0].default_value = LIGHT_PATH.get(output.name, 0.0)
+                tree.links.new(value.outputs[0], socket)
+
+
+@contextmanager
+def _silent_handlers() -> Iterator[None]:
+    """Other add-ons are not told of renders that are none of the user's."""
+    lists = [getattr(bpy.app.handlers, name) for name in _HANDLERS]
+    kept = [list(handlers) for handlers in lists]
+    for handlers in lists:
+        handlers.clear()
+    try:
+        yield
+    finally:
+        for handlers, before in zip(lists, kept):
+            handlers[:] = before
+
+
+def _collection_of(item: bpy.types.ID) -> bpy.types.bpy_prop_collection:
+    for kind, collection in ((bpy.types.Scene, bpy.data.scenes), (bpy.types.World, bpy.data.worlds),
+                             (bpy.types.Object, bpy.data.objects),
+                             (bpy.types.Camera, bpy.data.cameras)):
+        if isinstance(item, kind):
+            return collection
+    return bpy.data.node_groups
