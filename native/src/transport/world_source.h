@@ -11,8 +11,8 @@
 // - No wavelets: a binary tree of equirectangular regions with the exact first moments of their
 //   light. Its branches end where the radiance hardly varies, so that smooth skies are cheap and a
 //   sun of a few pixels is found by every sample that should.
-// - The product is exact for regions above the horizon. It is summed from the smallest of those that
-//   the horizon cuts, which take the cosine's mean over a flat piece.
+// - The product is exact for regions above the horizon. It is summed from the smallest of those
+//   that the horizon cuts, which take the cosine's mean over a flat piece.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
