@@ -21,15 +21,19 @@ SCENES = ("cornell_box", "furnace", "facing_squares", "sphere_interior", "big_ro
           "two_rooms", "open_court", "thin_wall", "instances")
 
 
-def build_scene(name: str) -> Path:
-    """Builds one scene in an empty file and saves it."""
+def build_scene(name: str, folder: Path = FOLDER, density: float = 1.0) -> Path:
+    """Builds one scene in an empty file and saves it in the folder.
+
+    density: cells of all grids along each edge, relative to those of the scenes in this folder.
+    """
+    construction.density = density
     bpy.ops.wm.read_factory_settings(use_empty=True)
     context = bpy.context
     context.scene.name = name
     construction.set_render_settings(context.scene)
     construction.show_vertex_colours(bpy.data.screens)
     importlib.import_module(f"build.{name}").build(context)
-    path = FOLDER / f"{name}.blend"
+    path = folder / f"{name}.blend"
     bpy.context.preferences.filepaths.save_version = 0
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
     return path

@@ -66,6 +66,10 @@ class Shape:
                      [FaceBlock(index[block.corners], block.slot) for block in self.blocks])
 
 
+# Of the cells along each edge of the grids that follow, those that are asked for times this.
+density = 1.0
+
+
 def join(shapes: Sequence[Shape]) -> Shape:
     """All shapes as one; nothing is welded."""
     offsets = np.cumsum([0] + [len(shape.vertices) for shape in shapes])
@@ -76,6 +80,7 @@ def join(shapes: Sequence[Shape]) -> Shape:
 
 def grid(origin: Point, along_u: Point, along_v: Point, cells_u: int, cells_v: int) -> Shape:
     """A parallelogram of quads; its front looks along ``along_u`` x ``along_v``."""
+    cells_u, cells_v = (max(1, round(cells * density)) for cells in (cells_u, cells_v))
     start, edge_u, edge_v = (np.asarray(value, dtype=float)
                              for value in (origin, along_u, along_v))
     u, v = np.meshgrid(np.arange(cells_u + 1) / cells_u, np.arange(cells_v + 1) / cells_v)
