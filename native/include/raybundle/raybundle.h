@@ -189,6 +189,19 @@ RB_API rb_error rb_set_world(rb_scene scene, const float radiance[3]);
 RB_API rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height,
                                    const float* rgb);
 
+/* Adds a light set: a named group of lights whose light a bake also gives by itself. Names differ.
+ * All sets
+ * are baked along the same lines, each solved by itself; only the solver LINE_REUSE can. Id in
+ * *set. */
+RB_API rb_error rb_add_light_set(rb_scene scene, const char* name, int32_t* set);
+
+/* Put a light, the emission of an instance, or the world into a light set, or with RB_NO_LIGHT_SET,
+ * as at first, into none: then it only counts in the light of all. Each is in one set at most. */
+#define RB_NO_LIGHT_SET (-1)
+RB_API rb_error rb_set_light_set(rb_scene scene, int32_t light, int32_t set);
+RB_API rb_error rb_set_instance_light_set(rb_scene scene, int32_t instance, int32_t set);
+RB_API rb_error rb_set_world_light_set(rb_scene scene, int32_t set);
+
 /* ------------------------------------------------------------------------------------------------
  * Bake
  * --------------------------------------------------------------------------------------------- */
@@ -270,6 +283,13 @@ RB_API rb_error rb_get_corner_light(rb_bake bake, int32_t instance, rb_output ou
 /* The same per vertex: the mean of the vertex's corners, weighted by their angle. */
 RB_API rb_error rb_get_vertex_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
                                     size_t count);
+
+/* The same two by the lights of one light set alone. What rb_get_corner_light gives is the sum of
+ * all sets and of what belongs to none. */
+RB_API rb_error rb_get_set_corner_light(rb_bake bake, int32_t set, int32_t instance,
+                                        rb_output output, float* rgb, size_t count);
+RB_API rb_error rb_get_set_vertex_light(rb_bake bake, int32_t set, int32_t instance,
+                                        rb_output output, float* rgb, size_t count);
 
 /* The report of the last successful rb_execute_bake as JSON (UTF-8) in *json; valid until the bake
  * runs again or is released. Keys: docs/c_api.md. */

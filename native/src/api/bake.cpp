@@ -104,6 +104,23 @@ rb_error rb_get_vertex_light(rb_bake bake, int32_t instance, rb_output output, f
     });
 }
 
+rb_error rb_get_set_corner_light(rb_bake bake, int32_t set, int32_t instance, rb_output output,
+                                 float* rgb, size_t count) {
+    return guarded([&] {
+        need(bake, "bake");
+        copyLight(bake->bake.setLight(set, instance).perCorner(output), rgb, count);
+    });
+}
+
+rb_error rb_get_set_vertex_light(rb_bake bake, int32_t set, int32_t instance, rb_output output,
+                                 float* rgb, size_t count) {
+    return guarded([&] {
+        need(bake, "bake");
+        const CornerLight& light = bake->bake.setLight(set, instance);
+        copyLight(bake->bake.instanceLight(instance).perVertex(light, output), rgb, count);
+    });
+}
+
 rb_error rb_get_report(rb_bake bake, const char** json) {
     return guarded([&] {
         need(bake, "bake");

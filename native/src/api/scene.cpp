@@ -257,3 +257,35 @@ rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height, const
         scene->scene.setWorldImage({width, height, vectors<glm::vec3>(rgb, pixels)});
     });
 }
+
+rb_error rb_add_light_set(rb_scene scene, const char* name, int32_t* set) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(set, "set");
+        *set = scene->scene.addLightSet(nameOf(name));
+    });
+}
+
+rb_error rb_set_light_set(rb_scene scene, int32_t light, int32_t set) {
+    return guarded([&] {
+        need(scene, "scene");
+        scene->scene.checkLightSet(set);
+        scene->scene.light(light).lightSet = set;
+    });
+}
+
+rb_error rb_set_instance_light_set(rb_scene scene, int32_t instance, int32_t set) {
+    return guarded([&] {
+        need(scene, "scene");
+        scene->scene.checkLightSet(set);
+        scene->scene.instance(instance).lightSet = set;
+    });
+}
+
+rb_error rb_set_world_light_set(rb_scene scene, int32_t set) {
+    return guarded([&] {
+        need(scene, "scene");
+        scene->scene.checkLightSet(set);
+        scene->scene.worldLightSet = set;
+    });
+}

@@ -16,7 +16,7 @@
 #include "bake/geometry_hash.h"
 #include "patches/reflectance.h"
 #include "reconstruction/reconstruction.h"
-#include "transport/direct_light.h"
+#include "transport/set_light.h"
 
 namespace raybundle {
 namespace {
@@ -60,11 +60,14 @@ float pixelSize(const Patches& patches, int linesPerBundle) {
     return std::max(float(std::sqrt(mean / kPixelsPerPatch)), 2 * patches.radius / kMaxPlanePixels);
 }
 
-// Compares the power that the lights emit with what surfaces absorb and what leaves the scene.
-void balanceEnergy(const Patches& patches, const FirstShot& shot, const Irradiance& irradiance,
-                   const glm::vec3& worldRadiance, const std::vector<float>& exposedShare,
-                   const std::vector<float>& openShare, Report& report) {
-    const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
+// Compares the power that the lights emit with what surfaces absorb and what leaves the scene: adds
+// those of one light set.
+void balanceEnergy(const Patches& patches, const SetLight& light,
+                   const std::vector<float>& exposedShare, const std::vector<float>& openShare,
+                   Report& report) {
+    const FirstShot& shot = light.shot;
+    const Irradiance& irradiance = light.irradiance;
+    const glm::vec3 worldExitance = glm::pi<float>() * light.worldRadiance;
     glm::dvec3 emitted = shot.emitted, absorbed(0.0), escaped = shot.escaped;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         const double exposed = double(exposedShare[side]);
@@ -76,9 +79,9 @@ void balanceEnergy(const Patches& patches, const FirstShot& shot, const Irradian
             exposed *
             power(patches, side, open * (shot.emission[side] + patches.reflectance[side] * total));
     }
-    report.emitted = sum(emitted);
-    report.absorbed = sum(absorbed);
-    report.escaped = sum(escaped);
+    report.emitted += sum(emitted);
+    report.absorbed += sum(absorbed);
+    report.escaped += sum(escaped);
 }
 
 // The share of the lines of the weighted sides that leave the scene, or stay in it, only because
@@ -111,13 +114,16 @@ double errorByWrongExchanges(const Patches& patches, double share) {
     return area > 0 ? share / (1 - reflectance / area * (1 - share)) : 0;
 }
 
-// Whether there is nothing for bundles to carry; says so.
-bool isDark(const Scene& scene, const FirstShot& shot, Report& report) {
-    auto isBlack = [](const glm::vec3& v) { return v == glm::vec3(0.0f); };
-    const bool isEmpty = shot.irradiance.empty();
-    const bool isDark = isBlack(scene.worldRadiance) &&
-                        std::all_of(shot.emission.begin(), shot.emission.end(), isBlack) &&
-                        std::all_of(shot.irradiance.begin(), shot.irradiance.end(), isBlack);
+// Whether there is nothing for bundles to carry; says so, also of single light sets.
+bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
+    const bool isEmpty = lights.front().shot.irradiance.empty();
+    const bool isDark = std::all_of(lights.begin(), lights.end(),
+                                    [](const SetLight& light) { return light.isDark(); });
+    for (const SetLight& light : lights)
+        if (light.set != kNoLightSet && light.isDark())
+            report.warnings.push_back("light set \"" + scene.lightSets[size_t(light.set)] +
+                                      "\": no light of it reaches any surface; its result is "
+                                      "black");
     if (isEmpty)
         report.warnings.push_back("the scene has no faces");
     else if (isDark)
@@ -178,7 +184,7 @@ Bake::Bake() = default;
 Bake::~Bake() = default;
 
 void Bake::run(const Scene& scene) {
-    checkCombination(settings);
+    checkCombination(settings, scene.lightSets.size());
     tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
     arena.execute([&] { runStages(scene); });
 }
@@ -188,43 +194,32 @@ void Bake::runStages(const Scene& scene) {
     {
         Stopwatch total(report.totalSeconds);
         report.warnings = scene.warnings;
+        for (const std::string& name : scene.lightSets) report.lightSets.push_back({name, 0});
         makePatches(scene, report);
 
         const Patches& patches = trace->patches;
-        const DirectLight directLight(scene, patches, trace->visibility, uint32_t(settings.seed));
-        FirstShot shot;
-        {
-            Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
-            shot = firstShot(settings.firstShot,
-                             {directLight, patches, trace->visibility, settings, progress,
-                              trace->touchDistance, trace->linesPerBundle()});
-        }
-        report.shadowRays = shot.rays;
-        report.skipped.push_back(
-            {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
-        report.skipped.push_back(
-            {"shadow rays", "side and source face away from each other", shot.hiddenSides});
-
-        irradiance = Irradiance(patches.sideCount());
+        SetLights lights = shootSources(scene, report);
         std::vector<float> exposed(patches.sideCount(), 1.0f);
-        if (isDark(scene, shot, report)) {
+        if (isDark(scene, lights, report)) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
         } else {
-            const auto transport = makeTransport(
-                settings.solver,
-                {patches, trace->visibility, shot, scene.worldRadiance, trace->surrounding.exposed,
-                 trace->touchDistance, settings, *trace->tracer, trace->counts});
-            irradiance = solveToTarget(scene, shot, *transport, report);
+            std::vector<TransportInput> inputs;
+            for (const SetLight& light : lights)
+                inputs.push_back({patches, trace->visibility, light.shot, light.worldRadiance,
+                                  trace->surrounding.exposed, trace->touchDistance, settings,
+                                  *trace->tracer, trace->counts});
+            const Transports transports = makeTransports(settings.solver, inputs);
+            solveToTarget(scene, lights, transports, report);
             exposed = trace->surrounding.exposed.empty() ? trace->counts.exposedShare()
                                                          : trace->surrounding.exposed;
-            balanceEnergy(patches, shot, irradiance, scene.worldRadiance, exposed,
-                          transport->openShare(), report);
-            report.bundles = transport->bundleCount();
+            for (const SetLight& light : lights)
+                balanceEnergy(patches, light, exposed, transports.front()->openShare(), report);
+            report.bundles = transports.front()->bundleCount();
         }
+        irradiance = sumOf(lights);
 
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
-        light = reconstruct(scene, patches, directLight, irradiance, exposed, settings, progress,
-                            report);
+        light = reconstruct(scene, patches, lights, exposed, settings, progress, report);
     }
     report.patches = trace->patches.count();
     report.lines = trace->tracer->lineCount();
@@ -253,9 +248,34 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     progress.report(RB_STAGE_PATCHES, 1);
 }
 
-// Adds bundles by doubling until the difference of the two halves' estimates meets the target.
-Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transport& transport,
-                               Report& report) {
+// The first shot of each light set, and of what belongs to none.
+SetLights Bake::shootSources(const Scene& scene, Report& report) {
+    Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
+    const Patches& patches = trace->patches;
+    SetLights lights;
+    const int32_t count = int32_t(scene.lightSets.size());
+    for (int32_t set = kNoLightSet; set < count; ++set) {
+        const Progress share = progress.part(lights.size(), size_t(count) + 1);
+        DirectLight direct(scene, patches, trace->visibility, uint32_t(settings.seed), set);
+        FirstShot shot =
+            firstShot(settings.firstShot, {direct, patches, trace->visibility, settings, share,
+                                           trace->touchDistance, trace->linesPerBundle()});
+        report.shadowRays += shot.rays;
+        report.skipped.push_back(
+            {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
+        report.skipped.push_back(
+            {"shadow rays", "side and source face away from each other", shot.hiddenSides});
+        lights.push_back({set, std::move(direct), std::move(shot), scene.worldRadianceOf(set),
+                          Irradiance(patches.sideCount())});
+    }
+    return lights;
+}
+
+// Adds bundles by doubling until the difference of the two halves' estimates meets the target, in
+// the light of all and in that of each light set.
+void Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
+                         Report& report) {
+    Transport& transport = *transports.front();  // traces for all
     const Patches& patches = trace->patches;
     const size_t n = patches.sideCount();
     // Sides whose noise counts: those with a result.
@@ -271,6 +291,7 @@ Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transp
         if (wantedSides[side]) weight[side] = patches.area[side / 2];
     }
 
+    std::vector<double> errors;  // relative: of the light of all, then of each light set
     const uint32_t most = std::max(2u, uint32_t(settings.maxBundles) & ~1u);
     uint32_t wanted = std::max(transport.bundleCount(),
                                std::min(most, (uint32_t(settings.minBundles) + 1) & ~1u));
@@ -283,38 +304,37 @@ Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transp
         Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
         const uint32_t bundles = transport.bundleCount();
         progress.report(RB_STAGE_SOLVE, std::min(1.0, double(bundles) / settings.maxBundles));
-        std::array<Irradiance, 2> half;
-        for (int h = 0; h < 2; ++h)
-            half[h] = transport.irradiance(Half(h), kHalfTolerance * settings.targetError);
-        double noise = 0, signal = 0;
-        for (size_t side = 0; side < n; ++side) {
-            const glm::dvec3 a(half[0].direct[side] + half[0].indirect[side]);
-            const glm::dvec3 b(half[1].direct[side] + half[1].indirect[side]);
-            const double directVariance = double(shot.error[side]) * shot.error[side];
-            noise += weight[side] * (0.25 * glm::dot(a - b, a - b) + 3 * directVariance);
-            signal += weight[side] * 0.25 * glm::dot(a + b, a + b);
-        }
-        const double bias = transport.bias();
-        report.estimatedError = signal > 0 ? std::sqrt(noise / signal + bias * bias) : 0;
+        std::vector<std::array<Irradiance, 2>> halves(lights.size());
+        for (size_t k = 0; k < lights.size(); ++k)
+            for (int h = 0; h < 2; ++h)
+                halves[k][h] =
+                    transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError);
+        errors = relativeNoise(lights, halves, weight, transport.bias());
 
-        if (report.estimatedError <= settings.targetError) break;
+        const auto worst = std::max_element(errors.begin(), errors.end());
+        if (*worst <= settings.targetError) break;
         if (bundles >= most) {
+            const int32_t set = lights[size_t(worst - errors.begin())].set;
             report.warnings.push_back(
-                "max_bundles was reached at " + std::to_string(bundles) +
-                " bundles: the noise is " + std::to_string(100 * report.estimatedError) +
-                " % and not below " + std::to_string(100 * settings.targetError) + " %");
+                "max_bundles was reached at " + std::to_string(bundles) + " bundles: the noise " +
+                (set == kNoLightSet ? "" : "of light set \"" + scene.lightSets[set] + "\" ") +
+                "is " + std::to_string(100 * *worst) + " % and not below " +
+                std::to_string(100 * settings.targetError) + " %");
             break;
         }
         // Double at most; less where the error's slope says that less will do.
-        const double factor =
-            std::pow(report.estimatedError / settings.targetError, 1 / kErrorSlope);
+        const double factor = std::pow(*worst / settings.targetError, 1 / kErrorSlope);
         wanted = std::min(most, (uint32_t(bundles * std::min(2.0, 1.05 * factor)) + 2) & ~1u);
     }
 
     Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
     const float tolerance =
-        float(std::clamp(kFinalShare * report.estimatedError, kLeastTolerance, kMostTolerance));
-    Irradiance irradiance = transport.finish(tolerance, wantedSides, report);
+        float(std::clamp(kFinalShare * errors.front(), kLeastTolerance, kMostTolerance));
+    for (size_t k = 0; k < lights.size(); ++k) {
+        Report unsaid;  // of the lines, which the first has said for all
+        lights[k].irradiance =
+            transports[k]->finish(tolerance, wantedSides, k == 0 ? report : unsaid);
+    }
 
     if (const uint64_t cycles = trace->tracer->cycleCount())
         report.warnings.push_back(std::to_string(cycles) +
@@ -328,18 +348,27 @@ Irradiance Bake::solveToTarget(const Scene& scene, const FirstShot& shot, Transp
             leakedShare(scene, patches, weight, trace->surrounding.open, transport.openShare());
     if (wrong > 0) {
         const double error = errorByWrongExchanges(patches, wrong);
-        report.estimatedError = std::hypot(report.estimatedError, error);
+        for (double& e : errors) e = std::hypot(e, error);
         if (error > settings.targetError)
             report.warnings.push_back("the projector put " + std::to_string(100 * wrong) +
                                       " % of the lines in a wrong order or through surfaces, which "
                                       "more bundles do not mend: the error is about " +
                                       std::to_string(100 * error) + " %");
     }
+    report.estimatedError = errors.front();
+    for (size_t set = 0; set < report.lightSets.size(); ++set)
+        report.lightSets[set].estimatedError = errors[set + 1];
     progress.report(RB_STAGE_SOLVE, 1);
-    return irradiance;
 }
 
 const Patches& Bake::patches() const { return trace->patches; }
+
+const CornerLight& Bake::setLight(int32_t set, int32_t instance) const {
+    const InstanceLight& all = instanceLight(instance);
+    if (set < 0 || size_t(set) >= all.sets.size())
+        throw invalidArgument("the last bake had no light set " + std::to_string(set));
+    return all.sets[size_t(set)];
+}
 
 const InstanceLight& Bake::instanceLight(int32_t instance) const {
     if (!ran) throw Error(RB_ERROR_INVALID_OPERATION, "there is no result before a bake");

@@ -15,7 +15,7 @@
 #include "patches/patches.h"
 #include "reconstruction/instance_light.h"
 #include "scene/scene.h"
-#include "transport/first_shot.h"
+#include "transport/set_light.h"
 #include "transport/transport.h"
 #include "visibility/visibility.h"
 
@@ -43,13 +43,16 @@ class Bake {
 
     // The result of an instance with role BAKE; throws Error if there is none.
     const InstanceLight& instanceLight(int32_t instance) const;
+    // The same by the light of one light set.
+    const CornerLight& setLight(int32_t set, int32_t instance) const;
 
   private:
     struct Trace;
     void runStages(const Scene& scene);
     void makePatches(const Scene& scene, Report& report);
-    Irradiance solveToTarget(const Scene& scene, const FirstShot& shot, Transport& transport,
-                             Report& report);
+    SetLights shootSources(const Scene& scene, Report& report);
+    void solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
+                       Report& report);
 
     std::unique_ptr<Trace> trace;  // of the last run's geometry
     Irradiance irradiance;

@@ -62,7 +62,7 @@ std::string join(const Names& names) {
 
 }  // namespace
 
-void checkCombination(const Settings& settings) {
+void checkCombination(const Settings& settings, size_t lightSetCount) {
     const Solver& solver =
         *std::find_if(std::begin(kSolvers), std::end(kSolvers),
                       [&](const Solver& s) { return settings.solver == s.name; });
@@ -90,6 +90,10 @@ void checkCombination(const Settings& settings) {
     if (settings.thesisLiteral && settings.solver != "MULTIPATH")
         refuse("thesis_literal does not work with solver " + settings.solver,
                "it is a variant of one method", "solver MULTIPATH");
+    if (lightSetCount > 0 && settings.solver != "LINE_REUSE")
+        refuse("solver " + settings.solver + " does not work with light sets",
+               "it moves the light of all sets while it traces and cannot tell them apart",
+               "solver LINE_REUSE");
 }
 
 }  // namespace raybundle

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
+
 #include "bake/error.h"
 #include "raybundle/raybundle.h"
 
@@ -16,13 +18,22 @@ class Progress {
     // Reports the share (0 to 1) of a stage that is done. Throws Error(CANCELLED) if the caller
     // wants to stop.
     void report(rb_stage stage, double fraction) const {
-        if (function && !function(user, stage, fraction))
+        if (function && !function(user, stage, begin + share * fraction))
             throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
+    }
+
+    // For the k-th of n equal parts of what a stage does.
+    Progress part(size_t k, size_t n) const {
+        Progress progress = *this;
+        progress.share = share / double(n);
+        progress.begin = begin + double(k) * progress.share;
+        return progress;
     }
 
   private:
     rb_progress_function function = nullptr;
     void* user = nullptr;
+    double begin = 0, share = 1;
 };
 
 }  // namespace raybundle

@@ -31,7 +31,10 @@ std::string Report::json() const {
     seconds_["bundles"] = seconds[RB_STAGE_BUNDLES];
     seconds_["solve"] = seconds[RB_STAGE_SOLVE];
     seconds_["reconstruction"] = seconds[RB_STAGE_RECONSTRUCTION];
-    ordered_json objects_ = ordered_json::array(), skipped_ = ordered_json::array();
+    ordered_json objects_ = ordered_json::array(), skipped_ = ordered_json::array(),
+                 lightSets_ = ordered_json::array();
+    for (const LightSet& set : lightSets)
+        lightSets_.push_back({{"name", set.name}, {"estimated_error", set.estimatedError}});
     for (const Object& object : objects)
         objects_.push_back(
             {{"name", object.name}, {"corners", object.corners}, {"status", object.status}});
@@ -51,6 +54,7 @@ std::string Report::json() const {
                                    {"escaped", escaped},
                                    {"balance_error", balanceError()}}},
                                  {"peak_memory_bytes", peakMemoryBytes()},
+                                 {"light_sets", lightSets_},
                                  {"objects", objects_},
                                  {"warnings", warnings},
                                  {"skipped", skipped_}};

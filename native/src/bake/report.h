@@ -22,6 +22,10 @@ struct Report {
         std::string what, why;
         uint64_t count = 0;
     };
+    struct LightSet {
+        std::string name;
+        double estimatedError = 0;  // relative noise
+    };
     std::array<double, 5> seconds{};  // per rb_stage
     double totalSeconds = 0;
     size_t patches = 0;
@@ -31,6 +35,7 @@ struct Report {
     uint64_t shadowRays = 0;
     double estimatedError = 0;                      // relative noise
     double emitted = 0, absorbed = 0, escaped = 0;  // W, sum of the channels
+    std::vector<LightSet> lightSets;
     std::vector<Object> objects;
     std::vector<std::string> warnings;
     std::vector<Skip> skipped;

@@ -7,7 +7,7 @@
 
 namespace raybundle {
 
-std::vector<glm::vec3> InstanceLight::perCorner(rb_output output) const {
+std::vector<glm::vec3> CornerLight::perCorner(rb_output output) const {
     std::vector<glm::vec3> radiance(direct.size());
     for (size_t c = 0; c < radiance.size(); ++c) {
         glm::vec3 perArea(0.0f);
@@ -32,8 +32,16 @@ std::vector<glm::vec3> InstanceLight::perCorner(rb_output output) const {
     return radiance;
 }
 
-std::vector<glm::vec3> InstanceLight::perVertex(rb_output output) const {
-    const std::vector<glm::vec3> corners = perCorner(output);
+void CornerLight::add(const CornerLight& other) {
+    for (size_t c = 0; c < direct.size(); ++c) {
+        direct[c] += other.direct[c];
+        indirect[c] += other.indirect[c];
+        exitance[c] += other.exitance[c];
+    }
+}
+
+std::vector<glm::vec3> InstanceLight::perVertex(const CornerLight& light, rb_output output) const {
+    const std::vector<glm::vec3> corners = light.perCorner(output);
     std::vector<glm::vec3> vertices(vertexCount, glm::vec3(0.0f));
     std::vector<float> weights(vertexCount, 0.0f);
     for (size_t c = 0; c < corners.size(); ++c) {

@@ -34,9 +34,9 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
 }
 
 // Light of the sources at corners, for all instances in one go.
-class CornerLight {
+class SourceLight {
   public:
-    CornerLight(const Scene& scene, const Patches& patches, const DirectLight& light,
+    SourceLight(const Scene& scene, const Patches& patches, const DirectLight& light,
                 const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,
                 float targetError, const Progress& progress) {
         for (size_t i = 0; i < ranges.size(); ++i) {
@@ -82,38 +82,68 @@ class CornerLight {
 };
 
 bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side side,
-                 const Irradiance& irradiance) {
+                 const SetLights& lights) {
     double lit[2] = {0, 0};
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p)
         for (uint32_t k = 0; k < 2 * patches.parents[p].patchCount(); ++k) {
             const uint32_t at = 2 * patches.parents[p].firstPatch + k;
-            lit[at % 2] += double(patches.area[at / 2]) *
-                           sum(glm::dvec3(irradiance.direct[at] + irradiance.indirect[at]));
+            glm::dvec3 total(0.0);
+            for (const SetLight& light : lights)
+                total += light.irradiance.direct[at] + light.irradiance.indirect[at];
+            lit[at % 2] += double(patches.area[at / 2]) * sum(total);
         }
     return lit[side] < kInsideOut * lit[1 - side];
+}
+
+// The light of one set on the sides, as it goes into a reconstruction.
+struct SideLight {
+    const Irradiance& irradiance;
+    const Field& emission;  // W/m^2
+    Field exitance;         // emission included, W/m^2
+    Field carried;          // direct light without that of the sources, W/m^2
+};
+
+std::vector<SideLight> sideLights(const Patches& patches, const SetLights& lights) {
+    std::vector<SideLight> result;
+    for (const SetLight& light : lights) {
+        const Irradiance& h = light.irradiance;
+        SideLight out{h, light.direct.emission(), Field(h.direct.size()), Field(h.direct.size())};
+        for (size_t side = 0; side < h.direct.size(); ++side) {
+            out.exitance[side] = out.emission[side] +
+                                 patches.reflectance[side] * (h.direct[side] + h.indirect[side]);
+            out.carried[side] = h.direct[side] - h.gathered[side];
+        }
+        result.push_back(std::move(out));
+    }
+    return result;
+}
+
+// One value per corner from one per node.
+CornerLight cornerLight(const SmoothRegions& regions, const Field& direct, const Field& indirect,
+                        const Field& exitance) {
+    CornerLight light;
+    for (uint32_t node : regions.nodeOf) {
+        light.direct.push_back(direct[node]);
+        light.indirect.push_back(indirect[node]);
+        light.exitance.push_back(exitance[node]);
+    }
+    return light;
 }
 
 }  // namespace
 
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const DirectLight& directLight, const Irradiance& irradiance,
-                                       const std::vector<float>& exposed, const Settings& settings,
-                                       const Progress& progress, Report& report) {
+                                       const SetLights& lights, const std::vector<float>& exposed,
+                                       const Settings& settings, const Progress& progress,
+                                       Report& report) {
     const bool isPoint = settings.reconstruction == "POINT";
-    const size_t sides = patches.sideCount();
-    Field exitance(sides), carried(isPoint ? sides : 0);
-    for (size_t side = 0; side < sides; ++side) {
-        exitance[side] =
-            patches.emission[side] +
-            patches.reflectance[side] * (irradiance.direct[side] + irradiance.indirect[side]);
-        if (isPoint) carried[side] = irradiance.direct[side] - irradiance.gathered[side];
-    }
+    const std::vector<SideLight> onSides = sideLights(patches, lights);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
-    std::optional<CornerLight> cornerLight;
-    if (isPoint) {
-        cornerLight.emplace(scene, patches, directLight, ranges, exposed, settings.targetError,
-                            progress);
-        report.shadowRays += cornerLight->rays();
+    std::vector<SourceLight> atCorners;  // per light
+    for (size_t k = 0; isPoint && k < lights.size(); ++k) {
+        atCorners.emplace_back(scene, patches, lights[k].direct, ranges, exposed,
+                               settings.targetError, progress.part(k, lights.size()));
+        report.shadowRays += atCorners.back().rays();
     }
 
     std::vector<InstanceLight> result(scene.instances.size());
@@ -138,28 +168,36 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         out.cornerAngles = cornerAngles(mesh);
         const SmoothRegions regions =
             smoothRegions(mesh, patches.cells, ranges[i].firstCell, ranges[i].lastCell);
-        std::vector<const Field*> fields{&irradiance.direct, &irradiance.indirect};
-        if (isPoint)
-            fields.insert(fields.end(), {&carried, &patches.emission, &patches.reflectance});
-        else
-            fields.push_back(&exitance);
-        std::vector<Field> nodes = leastSquares(patches, ranges[i], regions, instance.side, exposed,
-                                                settings.regularization, fields);
-        Field& direct = nodes[0];
-        const Field& indirect = nodes[1];
-        if (isPoint) {
-            cornerLight->replaceGathered(i, regions, out.cornerAngles, nodes[2], direct);
-            for (size_t v = 0; v < direct.size(); ++v)
-                nodes[2][v] = nodes[3][v] + nodes[4][v] * (direct[v] + indirect[v]);
+        // Three fields of each light, one after the other; for POINT the reflectance is the last.
+        std::vector<const Field*> fields;
+        for (const SideLight& light : onSides)
+            fields.insert(fields.end(), {&light.irradiance.direct, &light.irradiance.indirect,
+                                         isPoint ? &light.carried : &light.exitance});
+        for (const SideLight& light : onSides)
+            if (isPoint) fields.push_back(&light.emission);
+        if (isPoint) fields.push_back(&patches.reflectance);
+        std::vector<Field> nodes =
+            leastSquares(patches, ranges[i], regions, instance.side, exposed,
+                               settings.regularization, fields);
+        for (size_t k = 0; k < lights.size(); ++k) {
+            Field &direct = nodes[3 * k], &exitance = nodes[3 * k + 2];
+            const Field& indirect = nodes[3 * k + 1];
+            if (isPoint) {
+                atCorners[k].replaceGathered(i, regions, out.cornerAngles, exitance, direct);
+                const Field& emission = nodes[3 * lights.size() + k];
+                const Field& reflectance = nodes.back();
+                for (size_t v = 0; v < direct.size(); ++v)
+                    exitance[v] = emission[v] + reflectance[v] * (direct[v] + indirect[v]);
+            }
+            CornerLight light = cornerLight(regions, direct, indirect, exitance);
+            if (k == 0)
+                static_cast<CornerLight&>(out) = std::move(light);
+            else
+                out.sets.push_back(std::move(light));
         }
-        std::array<Field*, 3> perCorner{&out.direct, &out.indirect, &out.exitance};
-        for (size_t f = 0; f < 3; ++f) {
-            perCorner[f]->resize(mesh.cornerCount());
-            for (size_t c = 0; c < mesh.cornerCount(); ++c)
-                (*perCorner[f])[c] = nodes[f][regions.nodeOf[c]];
-        }
+        for (const CornerLight& light : out.sets) out.add(light);
 
-        if (isInsideOut(patches, ranges[i], instance.side, irradiance)) {
+        if (isInsideOut(patches, ranges[i], instance.side, lights)) {
             report.objects[i].status = "baked; no light on this side";
             report.warnings.push_back("object \"" + instance.name +
                                       "\": the baked sides of its faces get no light but the other "

@@ -19,16 +19,16 @@
 #include "patches/patches.h"
 #include "reconstruction/instance_light.h"
 #include "scene/scene.h"
-#include "transport/direct_light.h"
-#include "transport/transport.h"
+#include "transport/set_light.h"
 
 namespace raybundle {
 
-// Light of every instance; of those that only occlude, empty. exposed: per side, the share of it
-// that nothing covers. Adds the objects, warnings and skips to the report.
+// Light of every instance, by all lights and by each light set; of those that only occlude, empty.
+// exposed: per side, the share of it that nothing covers. Adds the objects, warnings and skips to
+// the report.
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const DirectLight& directLight, const Irradiance& irradiance,
-                                       const std::vector<float>& exposed, const Settings& settings,
-                                       const Progress& progress, Report& report);
+                                       const SetLights& lights, const std::vector<float>& exposed,
+                                       const Settings& settings, const Progress& progress,
+                                       Report& report);
 
 }  // namespace raybundle

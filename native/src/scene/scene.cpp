@@ -158,13 +158,26 @@ void Scene::setWorldImage(WorldImage image) {
     worldImage = std::move(image);
 }
 
+int32_t Scene::addLightSet(std::string name) {
+    if (std::find(lightSets.begin(), lightSets.end(), name) != lightSets.end())
+        throw invalidArgument("there is a " + quoted("light set", name) + " already");
+    lightSets.push_back(std::move(name));
+    return int32_t(lightSets.size()) - 1;
+}
+
 Material& Scene::material(int32_t id) { return checked(materials, id, "material"); }
 Mesh& Scene::mesh(int32_t id) { return checked(meshes, id, "mesh"); }
+Instance& Scene::instance(int32_t id) { return checked(instances, id, "instance"); }
 Light& Scene::light(int32_t id) { return checked(lights, id, "light"); }
 
 void Scene::checkImage(int32_t id) const {
     if (id < 0 || size_t(id) >= images.size())
         throw invalidArgument("there is no image " + std::to_string(id));
+}
+
+void Scene::checkLightSet(int32_t id) const {
+    if (id != kNoLightSet && (id < 0 || size_t(id) >= lightSets.size()))
+        throw invalidArgument("there is no light set " + std::to_string(id));
 }
 
 const Material& Scene::materialOf(const Mesh& mesh, size_t face) const {

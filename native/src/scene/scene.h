@@ -58,6 +58,10 @@ inline uint64_t edgeKey(int32_t a, int32_t b) {
 // The angle of each corner, radians.
 std::vector<float> cornerAngles(const Mesh& mesh);
 
+// A light set is a named group of lights with results of its own. What belongs to none, kNoLightSet,
+// only counts in the light of all.
+constexpr int32_t kNoLightSet = RB_NO_LIGHT_SET;
+
 // A mesh in the world. transform maps object space to world space (the last row is 0 0 0 1).
 struct Instance {
     std::string name;
@@ -65,6 +69,7 @@ struct Instance {
     glm::dmat4 transform{1.0};
     rb_role role = RB_ROLE_BAKE;
     rb_side side = RB_SIDE_FRONT;
+    int32_t lightSet = kNoLightSet;  // of its emission
 };
 
 struct Light {
@@ -85,6 +90,7 @@ struct Light {
     double coneAngle = 0.0;       // full opening, radians
     double coneBlend = 0.0;       // soft share of the cone, 0 to 1
     bool coneDims = false;        // the intensity falls with the cosine to the axis
+    int32_t lightSet = kNoLightSet;
 };
 
 // Radiance of the world by direction, W/(m^2 sr): equirectangular, bottom row first. Cycles' mapping:
@@ -109,13 +115,20 @@ class Scene {
     int32_t addInstance(Instance instance);
     int32_t addLight(Light light);
     void setWorldImage(WorldImage image);
+    int32_t addLightSet(std::string name);
 
     // Checks that an id was given out; `what` names its kind in the message.
     Material& material(int32_t id);
     Mesh& mesh(int32_t id);
     Light& light(int32_t id);
     void checkImage(int32_t id) const;
+    Instance& instance(int32_t id);
+    void checkLightSet(int32_t id) const;  // kNoLightSet is one too
 
+    // The world's part of the light of a set, W/(m^2 sr): all or nothing.
+    glm::vec3 worldRadianceOf(int32_t lightSet) const {
+        return worldLightSet == lightSet ? worldRadiance : glm::vec3(0.0f);
+    }
     const Material& materialOf(const Mesh& mesh, size_t face) const;
 
     std::vector<Image> images;
@@ -123,9 +136,11 @@ class Scene {
     std::vector<Mesh> meshes;
     std::vector<Instance> instances;
     std::vector<Light> lights;
-    glm::vec3 worldRadiance{0.0f};      // W/(m^2 sr), constant
-    WorldImage worldImage;              // what comes on top of it
-    std::vector<std::string> warnings;  // what was changed to make the scene usable
+    glm::vec3 worldRadiance{0.0f};        // W/(m^2 sr), constant
+    WorldImage worldImage;                // what comes on top of it
+    std::vector<std::string> lightSets;   // names
+    int32_t worldLightSet = kNoLightSet;  // of both
+    std::vector<std::string> warnings;    // what was changed to make the scene usable
 };
 
 }  // namespace raybundle

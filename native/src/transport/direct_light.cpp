@@ -41,17 +41,20 @@ constexpr uint32_t kEscapeRays = 16384, kLeastEscapeRays = 1024;
 
 float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
-// Estimate of the scene's mean exitance: all power over the area, times the bounces of the mean
-// reflectance. Only its order of magnitude matters.
-double meanExitance(const Scene& scene, const Patches& patches) {
+// Estimate of the scene's mean exitance by the light of a set: all power over the area, times the
+// bounces of the mean reflectance. Only its order of magnitude matters. emission: of the set, per
+// side.
+double meanExitance(const Scene& scene, const Patches& patches,
+                    const std::vector<glm::vec3>& emission, int32_t lightSet) {
     double emitted = 0, reflectance = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
-        emitted += patches.area[side / 2] * brightest(patches.emission[side]);
+        emitted += patches.area[side / 2] * brightest(emission[side]);
         if (side % 2 == 0)
             reflectance += patches.area[side / 2] * brightest(patches.reflectance[side]);
     }
     const double area = patches.totalArea;
     for (const Light& light : scene.lights) {
+        if (light.lightSet != lightSet) continue;
         const double strength = std::max({light.strength.x, light.strength.y, light.strength.z});
         switch (light.kind) {
             case Light::Kind::POINT:
@@ -66,8 +69,9 @@ double meanExitance(const Scene& scene, const Patches& patches) {
                 break;
         }
     }
-    emitted +=
-        area * glm::pi<double>() * brightest(scene.worldRadiance + scene.worldImage.meanRadiance());
+    glm::vec3 world = scene.worldRadianceOf(lightSet);
+    if (scene.worldLightSet == lightSet) world += scene.worldImage.meanRadiance();
+    emitted += area * glm::pi<double>() * brightest(world);
     return emitted / area / std::max(0.05, 1 - reflectance / area);
 }
 
@@ -96,17 +100,25 @@ struct DirectLight::Block {
 };
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                         uint32_t seed)
-    : patches(patches), visibility(visibility), seed(seed), bundled(patches.sideCount()) {
-    const double brightLimit = kBundledEmission * meanExitance(scene, patches);
+                         uint32_t seed, int32_t lightSet)
+    : patches(patches),
+      visibility(visibility),
+      seed(seed),
+      emitted(patches.emission),
+      bundled(patches.sideCount()) {
+    for (size_t side = 0; side < emitted.size(); ++side) {
+        const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
+        if (scene.instances[instance].lightSet != lightSet) emitted[side] = glm::vec3(0.0f);
+    }
+    const double brightLimit = kBundledEmission * meanExitance(scene, patches, emitted, lightSet);
     std::vector<bool> isSource(patches.sideCount(), false);
     for (size_t side = 0; side < isSource.size(); ++side) {
-        if (brightest(patches.emission[side]) > brightLimit)
+        if (brightest(emitted[side]) > brightLimit)
             isSource[side] = true;
         else
-            bundled[side] = patches.emission[side];
+            bundled[side] = emitted[side];
     }
-    sources = raybundle::lightSources(scene, patches, isSource);
+    sources = raybundle::lightSources(scene, patches, isSource, lightSet);
 }
 
 std::vector<Gathered> DirectLight::gather(size_t count,

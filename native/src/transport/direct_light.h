@@ -10,6 +10,8 @@
 // Differs:
 // - Emission that is not much brighter than the scene's mean exitance is no source here: bundles
 //   carry it without extra noise, and then a furnace is exact.
+// - Each light set has a DirectLight of its own, which knows nothing of the others: its light is
+//   what a scene with no other lights would have, sample for sample.
 #pragma once
 
 #include <atomic>
@@ -51,9 +53,12 @@ struct Gathered {
 
 class DirectLight {
   public:
-    // Everything passed must outlive the object.
+    // The light of a set, or what belongs to none. Everything passed must outlive the object.
     DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                uint32_t seed);
+                uint32_t seed, int32_t lightSet = kNoLightSet);
+
+    // Per side: all emission of the set, W/m^2.
+    const std::vector<glm::vec3>& emission() const { return emitted; }
 
     // Per side: emission that is no source here, for the bundles to carry, W/m^2.
     const std::vector<glm::vec3>& bundledEmission() const { return bundled; }
@@ -89,7 +94,7 @@ class DirectLight {
     const Patches& patches;
     const Visibility& visibility;
     const uint32_t seed;
-    std::vector<glm::vec3> bundled;
+    std::vector<glm::vec3> emitted, bundled;
     std::vector<std::unique_ptr<LightSource>> sources;
 };
 

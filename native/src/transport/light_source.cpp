@@ -257,10 +257,11 @@ class AreaSource : public LightSource {
 }  // namespace
 
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
-                                                       const std::vector<bool>& gatheredSides) {
+                                                       const std::vector<bool>& gatheredSides,
+                                                       int32_t lightSet) {
     std::vector<std::unique_ptr<LightSource>> sources;
     for (const Light& light : scene.lights) {
-        if (light.strength == glm::dvec3(0.0)) continue;
+        if (light.strength == glm::dvec3(0.0) || light.lightSet != lightSet) continue;
         switch (light.kind) {
             case Light::Kind::POINT:
                 sources.push_back(std::make_unique<PointSource>(light, patches.centre));
@@ -275,7 +276,8 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
         }
     }
 
-    if (!scene.worldImage.pixels.empty() && scene.worldImage.meanRadiance() != glm::vec3(0.0f))
+    if (scene.worldLightSet == lightSet && !scene.worldImage.pixels.empty() &&
+        scene.worldImage.meanRadiance() != glm::vec3(0.0f))
         sources.push_back(std::make_unique<WorldSource>(scene.worldImage));
 
     std::map<std::pair<uint32_t, int32_t>, std::vector<uint32_t>>

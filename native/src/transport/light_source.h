@@ -79,10 +79,11 @@ class LightSource {
     virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;
 };
 
-// All sources of the scene whose light the first shot gathers: its lights, the image of its world,
-// and the emissive faces of sides that are marked. `patches` must outlive them.
+// All sources of a light set whose light the first shot gathers: its lights, the image of the world
+// if that is in it, and the emissive faces of sides that are marked. `patches` must outlive them.
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
-                                                       const std::vector<bool>& gatheredSides);
+                                                       const std::vector<bool>& gatheredSides,
+                                                       int32_t lightSet = kNoLightSet);
 
 // Irradiance at a point with a unit normal from a planar polygon of radiance 1 around it, by
 // Lambert's formula after clipping at the horizon; the polygon's side does not matter. m^2 and sr

@@ -3,7 +3,8 @@
 // LINE_REUSE as a transport: while bundles are traced their lines are only counted; light moves
 // when the system on the counts is solved (transport/line_reuse.h). When the counts would pass the
 // memory limit, they are dropped, and further bundles improve the solution one by one
-// (transport/streaming_reuse.h).
+// (transport/streaming_reuse.h). Light sets share the lines: the transport of one traces them, the
+// others follow.
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
@@ -36,6 +37,10 @@ class LineReuseTransport : public Transport {
         for (auto& field : reflected) field.resize(input.patches.sideCount());
     }
 
+    // Shares the lines from here on with a transport of another light, which must not advance by
+    // itself and must live as long.
+    void lead(LineReuseTransport& follower) { carriers.push_back(&follower); }
+
     void advance(uint32_t count, const Progress& progress) override {
         std::vector<TracedBundle> held;
         size_t bytes = 0;
@@ -44,13 +49,16 @@ class LineReuseTransport : public Transport {
             progress.report(RB_STAGE_BUNDLES, double(done) / count);
             // Merging needs room for the old and the new counts.
             if (!streaming[0] && held.empty() && input.counts.bundles > 0 &&
-                2 * input.counts.byteCount() + mostHeld > limit)
-                startStreaming();
+                2 * input.counts.byteCount() + mostHeld > limit) {
+                for (LineReuseTransport* carrier : carriers) carrier->startStreaming();
+                input.counts.dropExchanges();
+            }
             const uint32_t step = std::min(kStep, count - done);
             std::vector<TracedBundle> traced = input.tracer.trace(step);
             done += step;
             if (streaming[0]) {
-                stream(traced);
+                for (LineReuseTransport* carrier : carriers) carrier->stream(traced);
+                input.counts.addTotals(traced);
                 continue;
             }
             for (TracedBundle& bundle : traced) {
@@ -121,7 +129,6 @@ class LineReuseTransport : public Transport {
                                     indirect, first.unshot, input.shot.emission,
                                     glm::pi<float>() * input.worldRadiance);
         }
-        input.counts.dropExchanges();
     }
 
     void stream(const std::vector<TracedBundle>& traced) {
@@ -130,7 +137,6 @@ class LineReuseTransport : public Transport {
                 if (t.bundle.half == half) streaming[half]->add(t.lines);
         };
         tbb::parallel_invoke([&] { advanceHalf(0); }, [&] { advanceHalf(1); });
-        input.counts.addTotals(traced);
     }
 
     Irradiance streamed(Half half) {
@@ -157,12 +163,25 @@ class LineReuseTransport : public Transport {
     std::vector<glm::vec3> reflected[3];  // per half and for both: the last solution
     std::array<std::optional<StreamingReuse>, 2> streaming;  // per half, once the limit is reached
     HandOver first;                                          // while streaming
+    std::vector<LineReuseTransport*> carriers{this};         // all that the traced lines serve
 };
 
 }  // namespace
 
 std::unique_ptr<Transport> lineReuse(const TransportInput& input) {
     return std::make_unique<LineReuseTransport>(input);
+}
+
+Transports lineReuseOfMany(const std::vector<TransportInput>& inputs) {
+    auto leader = std::make_unique<LineReuseTransport>(inputs.front());
+    Transports transports(1);
+    for (size_t k = 1; k < inputs.size(); ++k) {
+        auto follower = std::make_unique<LineReuseTransport>(inputs[k]);
+        leader->lead(*follower);
+        transports.push_back(std::move(follower));
+    }
+    transports.front() = std::move(leader);
+    return transports;
 }
 
 }  // namespace raybundle

@@ -43,4 +43,14 @@ std::unique_ptr<Transport> makeTransport(const std::string& kind, const Transpor
     return row->make(input);
 }
 
+Transports makeTransports(const std::string& kind, const std::vector<TransportInput>& inputs) {
+    if (inputs.size() > 1) {
+        assert(kind == "LINE_REUSE" && "checkCombination refuses light sets for others");
+        return lineReuseOfMany(inputs);
+    }
+    Transports transports;
+    transports.push_back(makeTransport(kind, inputs.front()));
+    return transports;
+}
+
 }  // namespace raybundle

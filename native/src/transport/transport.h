@@ -85,6 +85,10 @@ HandOver handOver(const Patches& patches, const FirstShot& shot, const std::vect
 
 // The transports, one a row of the table.
 std::unique_ptr<Transport> lineReuse(const TransportInput& input);
+// One for each input, which differ in their light alone: the first traces and counts the lines for
+// all of them, and advances them with it.
+using Transports = std::vector<std::unique_ptr<Transport>>;
+Transports lineReuseOfMany(const std::vector<TransportInput>& inputs);
 std::unique_ptr<Transport> multipath(const TransportInput& input);
 std::unique_ptr<Transport> stochasticIteration(const TransportInput& input);
 std::unique_ptr<Transport> randomWalk(const TransportInput& input);
@@ -92,5 +96,9 @@ std::unique_ptr<Transport> randomWalk(const TransportInput& input);
 // A transport by the name of its row. Throws Error(INVALID_ARGUMENT) if it would not converge on
 // this scene.
 std::unique_ptr<Transport> makeTransport(const std::string& kind, const TransportInput& input);
+
+// The same for several lights on the same lines; the first advances all. More than one is for
+// LINE_REUSE alone: no other transport sends two lights along the lines of one trace.
+Transports makeTransports(const std::string& kind, const std::vector<TransportInput>& inputs);
 
 }  // namespace raybundle

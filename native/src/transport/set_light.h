@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "scene/scene.h"
+#include "transport/direct_light.h"
+#include "transport/first_shot.h"
+#include "transport/transport.h"
+
+namespace raybundle {
+
+// The light of one light set on its way through a bake. Light is linear: all sets go along the same
+// lines, each by itself, and the light of all is their sum.
+struct SetLight {
+    int32_t set = kNoLightSet;
+    DirectLight direct;
+    FirstShot shot;
+    glm::vec3 worldRadiance{0.0f};  // W/(m^2 sr)
+    Irradiance irradiance;
+
+    // Whether there is nothing for bundles to carry.
+    bool isDark() const;
+};
+
+// What belongs to no set comes first in a list of lights, then each set in the scene's order.
+using SetLights = std::vector<SetLight>;
+
+// Irradiance by all of them.
+Irradiance sumOf(const SetLights& lights);
+
+// Relative noise of the light of all, then of each set, on sides of such weights: by the difference
+// of two halves' estimates, halves[k] of light k, the first shots' standard errors, and a relative
+// error that both halves have alike.
+std::vector<double> relativeNoise(const SetLights& lights,
+                                  const std::vector<std::array<Irradiance, 2>>& halves,
+                                  const std::vector<float>& weight, double bias);
+
+}  // namespace raybundle
