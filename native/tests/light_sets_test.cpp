@@ -87,7 +87,7 @@ std::vector<glm::vec3> sum(std::vector<glm::vec3> a, const std::vector<glm::vec3
 }
 
 TEST(LightSets, EachIsWhatABakeOfItsLightsAloneGives) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"}) {
+    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
         const auto together = baked(court({}, true), reconstruction);
         const auto first = baked(court({true, false, false}), reconstruction);
         const auto second = baked(court({false, true, false}), reconstruction);

@@ -224,7 +224,7 @@ RB_API void rb_release_bake(rb_bake bake);
  *   float  memory_limit    for the exchanges, in MB (4096)
  *   int    seed, threads   threads 0 = all (0, 0)
  *   float  regularization  of the reconstruction: weight of slope changes across edges (0.02)
- *   string reconstruction  LEAST_SQUARES | POINT
+ *   string reconstruction  LEAST_SQUARES | AREA_AVERAGE | POINT
  *   string solver          LINE_REUSE | MULTIPATH | STOCHASTIC_ITERATION | RANDOM_WALK
  *   string first_shot      GATHER | SHOOT | EXTENDED
  *   string directions      LOW_DISCREPANCY | RANDOM | ADAPTIVE

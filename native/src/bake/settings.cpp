@@ -66,7 +66,7 @@ const std::vector<Choice>& choices() {
          &Settings::projector,
          {"AUTO", "FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL", "PLANE", "PLANES"}},
         {"small_patches", &Settings::smallPatches, {"CENTRE_SAMPLING", "ROULETTE"}},
-        {"reconstruction", &Settings::reconstruction, {"LEAST_SQUARES", "POINT"}},
+        {"reconstruction", &Settings::reconstruction, {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}},
         {"plane_placement",
          &Settings::planePlacement,
          {"SYSTEMATIC", "STRATIFIED", "CLOSE_DISTANCE"}},

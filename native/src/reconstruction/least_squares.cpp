@@ -12,8 +12,6 @@
 namespace raybundle {
 namespace {
 
-// Weight that even a wholly covered patch keeps, so that every node has a value.
-constexpr float kLeastExposure = 1e-5f;
 // Of patches more covered than this, the light of the exposed share is too uncertain to bound
 // others.
 constexpr float kHalfCovered = 0.5f;

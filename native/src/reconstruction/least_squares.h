@@ -31,6 +31,9 @@ struct InstanceRange {
     uint32_t firstParent = 0, lastParent = 0;  // [first, last)
 };
 
+// Weight that even a wholly covered patch keeps, so that every node has a value.
+constexpr float kLeastExposure = 1e-5f;
+
 // exposed: per side, the share of it that counts. Reconstructs several fields (each per side) on
 // one side of an instance. Returns for each field one value per node of the regions, none negative.
 std::vector<std::vector<glm::vec3>> leastSquares(

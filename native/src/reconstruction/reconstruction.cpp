@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/reconstruction.h"
 
+#include "reconstruction/area_average.h"
 #include "reconstruction/corner_receivers.h"
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
@@ -177,7 +178,9 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
             if (isPoint) fields.push_back(&light.emission);
         if (isPoint) fields.push_back(&patches.reflectance);
         std::vector<Field> nodes =
-            leastSquares(patches, ranges[i], regions, instance.side, exposed,
+            settings.reconstruction == "AREA_AVERAGE"
+                ? areaAverage(patches, ranges[i], regions, instance.side, exposed, fields)
+                : leastSquares(patches, ranges[i], regions, instance.side, exposed,
                                settings.regularization, fields);
         for (size_t k = 0; k < lights.size(); ++k) {
             Field &direct = nodes[3 * k], &exitance = nodes[3 * k + 2];

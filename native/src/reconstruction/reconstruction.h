@@ -4,6 +4,8 @@
 //
 // LEAST_SQUARES: the corner values whose interpolation is nearest to the light on the faces
 //   (reconstruction/least_squares.h).
+// AREA_AVERAGE: the mean of the light on the faces around each corner
+//   (reconstruction/area_average.h).
 // POINT: the light at the corners themselves, as Cycles' bake has it. Light of the sources, which
 //   changes within a face, is gathered at each corner; the rest, which is smooth, is that of least
 //   squares there. Corners that another surface covers, where no light arrives, keep the value of
