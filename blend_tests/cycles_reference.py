@@ -86,9 +86,13 @@ def rounds_of_distinct_meshes(objects: Sequence[bpy.types.Object]
     return [list(entry.values()) for entry in rounds]
 
 
-def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int
+def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int,
+                 kind: str = "DIFFUSE", passes: frozenset[str] = frozenset({"DIRECT", "INDIRECT"})
                  ) -> dict[str, np.ndarray]:
-    """Bakes irradiance / pi of the objects; RGB by corner, keyed by the object's name.
+    """Bakes the objects, irradiance / pi by default; RGB by corner, keyed by the object's name.
+
+    kind and passes are type and pass_filter of Blender's bake. "INDIRECT" alone is no reference:
+    without "DIRECT" Cycles (3.4) samples no lights at all, also not after a reflection.
 
     The scene's render settings, the selection and the meshes' active colour attribute change.
     """
@@ -102,7 +106,7 @@ def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int
             target_attribute(item.data)
             item.select_set(True)
         context.view_layer.objects.active = group[0]
-        bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"},
+        bpy.ops.object.bake(type=kind, pass_filter=set(passes),
                             target="VERTEX_COLORS", use_selected_to_active=False,
                             use_clear=True)
         result.update((item.name, corner_values(item.data)) for item in group)

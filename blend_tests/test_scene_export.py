@@ -603,9 +603,40 @@ def test_lights_that_give_no_light(new_light):
     assert export().scene.lights == []
 
 
-def test_spread_is_named(new_light):
+def test_spread(new_light):
     new_light("Narrow", 'AREA', 10.0, spread=1.0)
-    assert any('"Narrow"' in text and "spread" in text for text in export().warnings)
+    assert only_light().spread == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("kind", ['POINT', 'SPOT', 'SUN', 'AREA'])
+def test_light_without_shadows(new_light, kind):
+    light = new_light("Fill", kind, 10.0)
+    assert only_light().casts_shadows
+    # As long as Cycles has its own property, the other one is Eevee's.
+    cycles = light.data.cycles
+    if hasattr(cycles, 'cast_shadow'):
+        light.data.use_shadow = False
+        assert only_light().casts_shadows
+        cycles.cast_shadow = False
+    else:
+        light.data.use_shadow = False
+    assert not only_light().casts_shadows
+
+
+def test_visibility(new_object):
+    item = new_object("Square", SQUARE, [(0, 1, 2, 3)])
+    for flag in ('visible_camera', 'visible_glossy', 'visible_transmission'):
+        setattr(item, flag, False)
+    bpy.context.view_layer.update()
+    instance = export().scene.instances[0]
+    assert instance.stops_direct and instance.exchanges
+    item.visible_shadow = False
+    bpy.context.view_layer.update()
+    assert not export().scene.instances[0].stops_direct
+    item.visible_shadow, item.visible_diffuse = True, False
+    bpy.context.view_layer.update()
+    instance = export().scene.instances[0]
+    assert instance.stops_direct and not instance.exchanges
 
 
 def new_world():

@@ -218,6 +218,7 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
         copies = create_copies(context, {item.target.object: item.subdivided for item in lights})
     else:
         lights = _resolve_shared_meshes(lights, settings, export)
+    lights = [replace(item, light=_exposed(item.light, settings)) for item in lights]
     reports = []
     for item in lights:
         receiver = copies.get(item.target.object, item.target.object)
@@ -228,6 +229,11 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
         reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status))
     _warn_of_clipping(lights, settings, export)
     return reports
+
+
+def _exposed(light: np.ndarray, settings: BakeSettings) -> np.ndarray:
+    light = light * np.float32(2.0 ** settings.exposure)
+    return np.clip(light, 0.0, 1.0) if settings.clamp else light
 
 
 def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
@@ -257,8 +263,10 @@ def _warn_of_clipping(lights: list[TargetLight], settings: BakeSettings, export:
                       ) -> None:
     if settings.data_type != 'BYTE_COLOR':
         return
-    count = sum(len(item.light) for item in lights)
-    clipped = sum(int(np.count_nonzero((item.light > 1.0).any(axis=1))) for item in lights)
-    if clipped:
-        export.warnings.add(f"{clipped} of {count} values are brighter than 1 and cut off: choose "
-                            f"the data type Color to keep them")
+    for item in lights:
+        clipped = np.count_nonzero((item.light > 1.0).any(axis=1)) / max(len(item.light), 1)
+        if clipped:
+            export.warnings.add(
+                f'"{item.target.object.name}": {100.0 * clipped:.3g} % of its values are brighter '
+                f'than 1 and cut off: choose the data type Color to keep them, or lower the '
+                f'exposure')

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -12,6 +13,9 @@ from mathutils import Matrix
 from .image_export import ImagePixels
 from .node_reader import NodeReader, output_node
 from .scene_data import AreaLightData, LightData, PointLightData, SunLightData, Warnings
+
+# The default of a light's Max Bounces, which no path reaches.
+_ALL_BOUNCES = 1024
 
 
 def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: ImagePixels,
@@ -22,7 +26,13 @@ def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: I
     strength = _strength(light, name, images, warnings)
     if not np.any(strength > 0.0):
         return None
-    _warn_of_unread_options(light, name, warnings)
+    _warn_of_unread_options(light_object, warnings)
+    exported = _shape(light, name, matrix_world, strength)
+    return exported and replace(exported, casts_shadows=_casts_shadows(light))
+
+
+def _shape(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray
+           ) -> LightData | None:
     if light.type in ('POINT', 'SPOT'):
         return _point_light(light, name, matrix_world, strength)
     if light.type == 'SUN':
@@ -72,13 +82,34 @@ def _strength(light: bpy.types.Light, name: str, images: ImagePixels, warnings: 
     return strength
 
 
-def _warn_of_unread_options(light: bpy.types.Light, name: str, warnings: Warnings) -> None:
-    cycles = getattr(light, 'cycles', None)
-    # Newer versions have the first, older ones the second.
-    if not getattr(light, 'use_shadow', True) or not getattr(cycles, 'cast_shadow', True):
-        warnings.add(f'light "{name}": it casts shadows, although they are switched off')
-    if light.type == 'AREA' and light.spread < math.pi - 1e-4:
-        warnings.add(f'light "{name}": its spread is not read, it shines with 180 degrees')
+def is_portal(light: bpy.types.Light) -> bool:
+    """Whether the light only shows Cycles where the world shines in."""
+    return getattr(_cycles_settings(light), 'is_portal', False)
+
+
+def _cycles_settings(light: bpy.types.Light) -> bpy.types.PropertyGroup | None:
+    # Of the original: what a script changes in them does not reach the evaluated light.
+    return getattr(light.original, 'cycles', None)
+
+
+def _casts_shadows(light: bpy.types.Light) -> bool:
+    cycles = _cycles_settings(light)
+    # As long as Cycles has its own property, use_shadow is that of Eevee.
+    if hasattr(cycles, 'cast_shadow'):
+        return cycles.cast_shadow
+    return getattr(light, 'use_shadow', True)
+
+
+def _warn_of_unread_options(light_object: bpy.types.Object, warnings: Warnings) -> None:
+    name = light_object.name
+    bounces = getattr(_cycles_settings(light_object.data), 'max_bounces', _ALL_BOUNCES)
+    if bounces < _ALL_BOUNCES:
+        warnings.add(f'light "{name}": its light is reflected without end and not {bounces} times '
+                     f'at most')
+    # From 4.0 on.
+    linking = getattr(light_object, 'light_linking', None)
+    if linking and (linking.receiver_collection or linking.blocker_collection):
+        warnings.add(f'light "{name}": its light linking is not read, it lights all objects')
 
 
 def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray
@@ -123,4 +154,4 @@ def _area_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strengt
         return None
     radiance = area_light_radiance(strength, area, getattr(light, 'normalize', True))
     return AreaLightData(name, np.array(matrix_world.translation), axis_u, axis_v, radiance,
-                         'ELLIPSE' if ellipse else 'RECTANGLE')
+                         'ELLIPSE' if ellipse else 'RECTANGLE', light.spread)

@@ -106,6 +106,9 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_light_cone': (_handle, _int, _floats, _float, _float, ctypes.c_bool),
     'rb_add_sun_light': (_handle, _text, _floats, _floats, _float, _out(_int)),
     'rb_add_area_light': (_handle, _text, _floats, _floats, _floats, _floats, _enum, _out(_int)),
+    'rb_set_light_spread': (_handle, _int, _float),
+    'rb_set_light_shadows': (_handle, _int, ctypes.c_bool),
+    'rb_set_instance_visibility': (_handle, _int, ctypes.c_bool, ctypes.c_bool),
     'rb_set_world': (_handle, _floats),
     'rb_set_world_image': (_handle, _int, _int, _floats),
     'rb_new_bake': (_out(_handle),),
@@ -407,6 +410,17 @@ class Scene(_Handle):
             _as_floats(axis_v), _as_floats(radiance), AREA_SHAPES[shape],
             ctypes.byref(identifier))
         return identifier.value
+
+    def set_light_spread(self, light: int, spread: float) -> None:
+        """spread: full opening in radians, 0 to pi, of an area light."""
+        self._library.rb_set_light_spread(self._pointer, light, spread)
+
+    def set_light_shadows(self, light: int, casts_shadows: bool) -> None:
+        self._library.rb_set_light_shadows(self._pointer, light, casts_shadows)
+
+    def set_instance_visibility(self, instance: int, stops_direct: bool, exchanges: bool) -> None:
+        """Whether it blocks direct light, and whether it takes part in the exchange of light."""
+        self._library.rb_set_instance_visibility(self._pointer, instance, stops_direct, exchanges)
 
     def set_world(self, radiance: np.ndarray) -> None:
         """radiance: (3,) W/(m^2 sr)."""

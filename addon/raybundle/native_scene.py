@@ -21,8 +21,9 @@ def build_native_scene(data: SceneData) -> native.Scene:
         materials.append(identifier)
     meshes = [_add_mesh(scene, mesh) for mesh in data.meshes]
     for instance in data.instances:
-        scene.add_instance(meshes[instance.mesh], instance.name, instance.transform,
-                           instance.role, instance.side)
+        identifier = scene.add_instance(meshes[instance.mesh], instance.name, instance.transform,
+                                        instance.role, instance.side)
+        scene.set_instance_visibility(identifier, instance.stops_direct, instance.exchanges)
     for light in data.lights:
         _add_light(scene, light)
     scene.set_world(data.world)
@@ -51,7 +52,9 @@ def _add_light(scene: native.Scene, light: LightData) -> None:
             scene.set_light_cone(identifier, light.world_to_light, light.cone_angle,
                                  light.cone_blend, light.cone_dims)
     elif isinstance(light, AreaLightData):
-        scene.add_area_light(light.name, light.centre, light.axis_u, light.axis_v, light.radiance,
-                             light.shape)
+        identifier = scene.add_area_light(light.name, light.centre, light.axis_u, light.axis_v,
+                                          light.radiance, light.shape)
+        scene.set_light_spread(identifier, light.spread)
     else:
-        scene.add_sun_light(light.name, light.direction, light.irradiance, light.angle)
+        identifier = scene.add_sun_light(light.name, light.direction, light.irradiance, light.angle)
+    scene.set_light_shadows(identifier, light.casts_shadows)

@@ -309,6 +309,11 @@ class NodeReader:
             return float(self.backfacing)
         if node.type == 'LIGHT_PATH':
             return LIGHT_PATH.get(source.output.name, 0.0)
+        if node.type == 'LIGHT_FALLOFF':
+            if source.output.name != 'Quadratic' or self.value(node.inputs['Smooth'], path):
+                self._warn(node, f"is used as {source.output.name} with Smooth: the light falls "
+                                 f"off with the square of the distance")
+            return self.value(node.inputs['Strength'], path)
         if node.type == 'MATH' and node.operation in _MATH:
             a, b = (self.value(socket, path) for socket in node.inputs[:2])
             result = _MATH[node.operation](a, b)
@@ -324,7 +329,7 @@ class NodeReader:
         self.warnings.add(f'{self.owner}: node "{node.name}" ({node.bl_label}) {what}')
 
 
-_VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'MATH')
+_VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')
 
 
 def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:

@@ -120,6 +120,8 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
         layout.prop(settings, "attribute")
         layout.prop(settings, "domain")
         layout.prop(settings, "data_type")
+        layout.prop(settings, "exposure")
+        layout.prop(settings, "clamp")
         column = layout.column()
         # A subdivided copy has a mesh of its own anyway.
         column.active = settings.topology == 'KEEP'

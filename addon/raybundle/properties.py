@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import bpy
-from bpy.props import (EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty)
+from bpy.props import (BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty,
+                       StringProperty)
 
 enum_scope = (
     ('VISIBLE', "Visible", "Bake all objects that are visible in the viewport and in renders"),
@@ -148,6 +149,13 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     data_type: EnumProperty(
         name="Data Type", description="How values are stored", items=enum_data_type,
         default='FLOAT_COLOR')
+    exposure: FloatProperty(
+        name="Exposure", description="Stops by which the values are made brighter when they are "
+                                     "written; 0 writes the light as it is",
+        default=0.0, min=-32.0, max=32.0, soft_min=-10.0, soft_max=10.0, precision=2, step=10)
+    clamp: BoolProperty(
+        name="Clamp", description="Cut values off at 1 when they are written, after the exposure",
+        default=False)
     topology: EnumProperty(
         name="Topology", description="Whether meshes may be refined for their light",
         items=enum_topology, default='KEEP')
@@ -239,6 +247,8 @@ class BakeSettings:
     attribute: str
     domain: str
     data_type: str
+    exposure: float
+    clamp: bool
     topology: str
     shared_meshes: str
     patch_size: float
@@ -279,6 +289,11 @@ def checked_value(name: str, value: object) -> object:
         if value not in choices:
             raise ValueError(f'{name}: "{value}" is none of {", ".join(choices)}')
         return value
+    if definition.type == 'BOOLEAN':
+        choices = {'0': False, 'false': False, '1': True, 'true': True}
+        if str(value).lower() not in choices:
+            raise ValueError(f'{name}: "{value}" is neither true nor false')
+        return choices[str(value).lower()]
     if definition.type == 'STRING':
         return str(value)
     try:

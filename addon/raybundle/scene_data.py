@@ -7,6 +7,7 @@ Indices (mesh, material, image) are positions in the lists of SceneData.
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -75,6 +76,8 @@ class InstanceData:
     transform: np.ndarray  # (3, 4) float64, object to world
     role: str  # 'BAKE' or 'OCCLUDE'
     side: str  # 'FRONT' or 'BACK'
+    stops_direct: bool = True  # blocks the light of lamps
+    exchanges: bool = True  # sends light to other objects, and blocks what they send
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,7 @@ class PointLightData:
     cone_angle: float = 0.0  # radians, full opening
     cone_blend: float = 0.0  # 0 to 1
     cone_dims: bool = False  # the intensity falls with the cosine to the axis
+    casts_shadows: bool = True
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,7 @@ class SunLightData:
     direction: np.ndarray  # (3,) towards the sun
     irradiance: np.ndarray  # (3,) W/m^2 at normal incidence
     angle: float  # radians, full diameter
+    casts_shadows: bool = True
 
 
 @dataclass(frozen=True)
@@ -106,6 +111,8 @@ class AreaLightData:
     axis_v: np.ndarray  # (3,) m, half axis
     radiance: np.ndarray  # (3,) W/(m^2 sr)
     shape: str  # 'RECTANGLE' or 'ELLIPSE'
+    spread: float = math.pi  # radians, full opening; the power does not depend on it
+    casts_shadows: bool = True
 
 
 LightData = PointLightData | SunLightData | AreaLightData

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
-from .light_export import export_light
+from .light_export import export_light, is_portal
 from .material_export import MaterialExporter
 from .mesh_export import MeshError, export_mesh
 from .scene_data import InstanceData, MeshData, SceneData, Warnings
@@ -148,9 +148,8 @@ class _Exporter:
 
     def _add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         item = instance.object
-        portal = getattr(getattr(item.data, 'cycles', None), 'is_portal', False)
         # Both are ways to say that diffuse surfaces do not see the light.
-        if portal or not item.visible_diffuse:
+        if is_portal(item.data) or not item.visible_diffuse:
             return
         light = export_light(item, instance.matrix_world, self.materials.images,
                              self.result.warnings)
@@ -187,8 +186,15 @@ class _Exporter:
             parent = instance.parent.name if instance.parent else item.name
             self._instance_counts[parent, item.name] += 1
             role = 'OCCLUDE'
+        if original.is_holdout:
+            self.result.warnings.add(f'"{item.name}" is a holdout: Cycles bakes it black, here it '
+                                     f'is an object like others')
+        # Cycles has the flags of the instancer too.
+        shown = (item, instance.parent) if instance.is_instance and instance.parent else (item,)
         self.result.scene.instances.append(
-            InstanceData(mesh, item.name, transform, role, original.raybundle.side))
+            InstanceData(mesh, item.name, transform, role, original.raybundle.side,
+                         stops_direct=all(source.visible_shadow for source in shown),
+                         exchanges=all(source.visible_diffuse for source in shown)))
         if role == 'BAKE':
             index = len(self.result.scene.instances) - 1
             self.result.targets.append(

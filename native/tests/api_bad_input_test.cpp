@@ -39,6 +39,9 @@ TEST(ApiNull, HandlesAreRefusedEverywhere) {
                   "scene");
     expectInvalid(rb_add_point_light(nullptr, "", kOne, kOne, 0, RB_POINT_DISK, &id), "scene");
     expectInvalid(rb_set_light_cone(nullptr, 0, matrix, 1, 0, false), "scene");
+    expectInvalid(rb_set_light_spread(nullptr, 0, 1), "scene");
+    expectInvalid(rb_set_light_shadows(nullptr, 0, false), "scene");
+    expectInvalid(rb_set_instance_visibility(nullptr, 0, true, true), "scene");
     expectInvalid(rb_add_sun_light(nullptr, "", kOne, kOne, 0, &id), "scene");
     expectInvalid(rb_add_area_light(nullptr, "", kOne, kOne, kOne, kOne, RB_AREA_ELLIPSE, &id),
                   "scene");
@@ -226,6 +229,9 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     int32_t sun = -1;
     ASSERT_EQ(rb_add_sun_light(scene, "sol", kOne, kOne, 0, &sun), RB_ERROR_NONE);
     expectInvalid(rb_set_light_cone(scene, sun, matrix, 1, 0, false), "sol");
+    expectInvalid(rb_set_light_spread(scene, sun, 1), "sol");
+    expectInvalid(rb_set_light_shadows(scene, 99, false), "99");
+    expectInvalid(rb_set_instance_visibility(scene, 99, true, true), "99");
 }
 
 TEST_F(Api, UnknownSettingsAndOtherTypesAreRefused) {

@@ -147,6 +147,15 @@ RB_API rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name,
                                 const float transform[12], rb_role role, rb_side side,
                                 int32_t* instance);
 
+/* What an instance is to light. Both are true without it.
+ *   stops_direct   it blocks the light that the first shot gathers: lights and bright emission
+ *   exchanges      it emits and reflects light to other surfaces, and blocks the world and what they
+ *                  reflect; if not, it still receives (and with role RB_ROLE_BAKE has a result)
+ * Emission too dim for the first shot travels with the reflected light; a warning names the
+ * instances for which that makes a difference. */
+RB_API rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops_direct,
+                                           bool exchanges);
+
 typedef enum rb_point_shape {
     RB_POINT_DISK =
         0, /* a disk of the given radius that faces the receiver (Blender's soft falloff) */
@@ -178,6 +187,14 @@ typedef enum rb_area_shape { RB_AREA_RECTANGLE = 0, RB_AREA_ELLIPSE = 1 } rb_are
 RB_API rb_error rb_add_area_light(rb_scene scene, const char* name, const float centre[3],
                                   const float axis_u[3], const float axis_v[3],
                                   const float radiance[3], rb_area_shape shape, int32_t* light);
+
+/* Narrows the light of an area light, as a grid before a softbox does: spread is the full opening in
+ * radians, 0 to pi. The power is kept: the light is brighter along its axis. Without it: pi. */
+RB_API rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread);
+
+/* Whether surfaces stop the light of a light (they do unless this says no). Where they do not, every
+ * surface that faces the light gets it; the energy balance then takes what arrives for emitted. */
+RB_API rb_error rb_set_light_shadows(rb_scene scene, int32_t light, bool casts_shadows);
 
 /* Sets the constant radiance (RGB) of the world around the scene; black by default. */
 RB_API rb_error rb_set_world(rb_scene scene, const float radiance[3]);

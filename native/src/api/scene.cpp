@@ -157,6 +157,16 @@ rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name, const f
     });
 }
 
+rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops_direct,
+                                    bool exchanges) {
+    return guarded([&] {
+        need(scene, "scene");
+        Instance& target = scene->scene.instance(instance);
+        target.stopsDirect = stops_direct;
+        target.exchanges = exchanges;
+    });
+}
+
 rb_error rb_add_point_light(rb_scene scene, const char* name, const float position[3],
                             const float intensity[3], float radius, rb_point_shape shape,
                             int32_t* light) {
@@ -236,6 +246,26 @@ rb_error rb_add_area_light(rb_scene scene, const char* name, const float centre[
         made.strength = vec3(radiance);
         made.areaShape = shape;
         *light = scene->scene.addLight(std::move(made));
+    });
+}
+
+rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread) {
+    return guarded([&] {
+        need(scene, "scene");
+        Light& target = scene->scene.light(light);
+        if (target.kind != Light::Kind::AREA)
+            throw invalidArgument("light \"" + target.name + "\" is not an area light");
+        // In float pi may come out a little larger.
+        if (!(spread >= 0 && spread <= glm::pi<float>() * 1.000001f))
+            throw invalidArgument("light \"" + target.name + "\": spread out of range");
+        target.spread = double(spread);
+    });
+}
+
+rb_error rb_set_light_shadows(rb_scene scene, int32_t light, bool casts_shadows) {
+    return guarded([&] {
+        need(scene, "scene");
+        scene->scene.light(light).castsShadows = casts_shadows;
     });
 }
 

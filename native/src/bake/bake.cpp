@@ -72,6 +72,10 @@ void balanceEnergy(const Patches& patches, const SetLight& light,
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         const double exposed = double(exposedShare[side]);
         const float open = openShare[side];
+        if (!patches.parentAt(uint32_t(side)).exchanges) {
+            absorbed += exposed * power(patches, side, irradiance.gathered[side]);
+            continue;
+        }
         const glm::vec3 total = irradiance.direct[side] + irradiance.indirect[side];
         emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
         absorbed += exposed * power(patches, side, (1.0f - patches.reflectance[side]) * total);
@@ -114,6 +118,27 @@ double errorByWrongExchanges(const Patches& patches, double share) {
     return area > 0 ? share / (1 - reflectance / area * (1 - share)) : 0;
 }
 
+// Names the instances whose visibility is only approximated.
+void warnOfVisibility(const Scene& scene, const SetLights& lights, const Settings& settings,
+                      Report& report) {
+    const bool hasDimEmission =
+        std::any_of(lights.begin(), lights.end(), [](const SetLight& light) {
+            return std::any_of(light.shot.emission.begin(), light.shot.emission.end(),
+                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); });
+        });
+    for (const Instance& instance : scene.instances) {
+        const std::string object = "object \"" + instance.name + "\": ";
+        if (hasDimEmission && instance.stopsDirect != instance.exchanges)
+            report.warnings.push_back(object +
+                                      "it blocks the light of dim emission as it blocks that of "
+                                      "the world and not as it blocks that of lights");
+        if (!instance.exchanges && instance.role == RB_ROLE_BAKE && settings.solver != "LINE_REUSE")
+            report.warnings.push_back(
+                object + "it takes no part in the exchange of light, so that " + settings.solver +
+                " finds no light of the world and of " + "other surfaces on it; LINE_REUSE does");
+    }
+}
+
 // Whether there is nothing for bundles to carry; says so, also of single light sets.
 bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
     const bool isEmpty = lights.front().shot.irradiance.empty();
@@ -139,6 +164,10 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
 struct Bake::Trace {
     Trace(uint64_t hash, Patches made, const Settings& settings)
         : hash(hash), patches(std::move(made)), visibility(patches), counts(patches.sideCount()) {
+        for (const Parent& parent : patches.parents)
+            if (parent.stopsDirect != parent.exchanges && !directVisibility)
+                directVisibility =
+                    std::make_unique<const Visibility>(patches, Blockers::STOPPING_DIRECT);
         touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.size);
         const ProjectorInput input{patches,
                                    visibility,
@@ -175,7 +204,8 @@ struct Bake::Trace {
     Patches patches;
     float touchDistance = 0;  // surfaces not further apart touch, metres
     const Visibility visibility;
-    Surroundings surrounding;  // empty: as the counts have it
+    std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
+    Surroundings surrounding;                            // empty: as the counts have it
     LineCounts counts;
     std::unique_ptr<BundleTracer> tracer;
 };
@@ -199,6 +229,7 @@ void Bake::runStages(const Scene& scene) {
 
         const Patches& patches = trace->patches;
         SetLights lights = shootSources(scene, report);
+        warnOfVisibility(scene, lights, settings, report);
         std::vector<float> exposed(patches.sideCount(), 1.0f);
         if (isDark(scene, lights, report)) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
@@ -252,14 +283,16 @@ void Bake::makePatches(const Scene& scene, Report& report) {
 SetLights Bake::shootSources(const Scene& scene, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
     const Patches& patches = trace->patches;
+    const Visibility& visibility =
+        trace->directVisibility ? *trace->directVisibility : trace->visibility;
     SetLights lights;
     const int32_t count = int32_t(scene.lightSets.size());
     for (int32_t set = kNoLightSet; set < count; ++set) {
         const Progress share = progress.part(lights.size(), size_t(count) + 1);
-        DirectLight direct(scene, patches, trace->visibility, uint32_t(settings.seed), set);
-        FirstShot shot =
-            firstShot(settings.firstShot, {direct, patches, trace->visibility, settings, share,
-                                           trace->touchDistance, trace->linesPerBundle()});
+        DirectLight direct(scene, patches, visibility, uint32_t(settings.seed), set);
+        FirstShot shot = firstShot(
+            settings.firstShot, {direct, patches, visibility, settings, share, trace->touchDistance,
+                                 trace->linesPerBundle(), &trace->visibility});
         report.shadowRays += shot.rays;
         report.skipped.push_back(
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});

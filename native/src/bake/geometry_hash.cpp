@@ -52,6 +52,8 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
     for (const Instance& instance : scene.instances) {
         hasher.add(&instance.mesh, sizeof(instance.mesh));
         hasher.add(&instance.transform, sizeof(instance.transform));
+        const uint8_t visibility = uint8_t(instance.stopsDirect | instance.exchanges << 1);
+        hasher.add(&visibility, sizeof(visibility));
     }
     hasher.add(&settings.patchSize, sizeof(float));
     for (int value : {settings.maxPatches, settings.linesPerBundle, settings.seed,

@@ -38,6 +38,7 @@ class Rasteriser {
     template <class Visit>
     void forEachFragment(const Visit& visit) {
         for (const Parent& parent : patches.parents) {
+            if (!parent.exchanges) continue;
             if (smallPatches == SmallPatches::ROULETTE)
                 fillPatches(parent, visit);
             else

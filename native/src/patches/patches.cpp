@@ -112,6 +112,10 @@ class Subdivision {
                 if (!cutFace(uint32_t(i), int32_t(f), size)) ++degenerate;
             for (size_t p = firstParent; p < patches.parents.size(); ++p)
                 patches.parents[p].isSolid = closed[size_t(patches.parents[p].face)];
+            for (size_t p = firstParent; p < patches.parents.size(); ++p) {
+                patches.parents[p].stopsDirect = scene.instances[i].stopsDirect;
+                patches.parents[p].exchanges = scene.instances[i].exchanges;
+            }
             patches.degenerateFaces += degenerate;
             if (degenerate)
                 patches.warnings.push_back("object \"" + scene.instances[i].name +

@@ -30,7 +30,9 @@ struct Parent {
     uint32_t firstPatch = 0;
     uint16_t countA = 1, countB = 1;  // grid along a and b; equal for triangles
     bool isTriangle = true;
-    bool isSolid = false;   // part of a surface that encloses a volume
+    bool isSolid = false;  // part of a surface that encloses a volume
+    // As the instance has it.
+    bool stopsDirect = true, exchanges = true;
     uint32_t instance = 0;  // into Scene::instances
     int32_t face = 0;       // of the instance's mesh
     // The mesh triangle or quad that the parent is part of, for interpolation between its corners:
@@ -89,6 +91,7 @@ struct Patches {
         const glm::vec3& front = parents[parentOf[side / 2]].normal;
         return side % 2 ? -front : front;
     }
+    const Parent& parentAt(uint32_t side) const { return parents[parentOf[side / 2]]; }
     // The point (u, v) in [0, 1]^2 of a patch, relative to centre.
     glm::vec3 point(uint32_t patch, glm::vec2 uv) const;
     // The patch of a parent at a point in its plane.

@@ -167,8 +167,8 @@ int32_t Scene::addLightSet(std::string name) {
 
 Material& Scene::material(int32_t id) { return checked(materials, id, "material"); }
 Mesh& Scene::mesh(int32_t id) { return checked(meshes, id, "mesh"); }
-Instance& Scene::instance(int32_t id) { return checked(instances, id, "instance"); }
 Light& Scene::light(int32_t id) { return checked(lights, id, "light"); }
+Instance& Scene::instance(int32_t id) { return checked(instances, id, "instance"); }
 
 void Scene::checkImage(int32_t id) const {
     if (id < 0 || size_t(id) >= images.size())

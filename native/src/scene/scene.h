@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <glm/gtc/constants.hpp>
 #include <string>
 #include <vector>
 
@@ -70,6 +71,8 @@ struct Instance {
     rb_role role = RB_ROLE_BAKE;
     rb_side side = RB_SIDE_FRONT;
     int32_t lightSet = kNoLightSet;  // of its emission
+    bool stopsDirect = true;         // blocks the light of the sources
+    bool exchanges = true;           // sends light to other surfaces, and blocks what they send
 };
 
 struct Light {
@@ -85,11 +88,13 @@ struct Light {
     double angle = 0.0;                   // SUN: full angular diameter, radians
     glm::dvec3 axisU{0.0}, axisV{0.0};    // AREA: half extents; shines towards cross(axisU, axisV)
     rb_area_shape areaShape = RB_AREA_RECTANGLE;
-    bool hasCone = false;         // POINT with a spot's cone
-    glm::dmat3 worldToCone{1.0};  // into the space where the cone looks along -Z
-    double coneAngle = 0.0;       // full opening, radians
-    double coneBlend = 0.0;       // soft share of the cone, 0 to 1
-    bool coneDims = false;        // the intensity falls with the cosine to the axis
+    double spread = glm::pi<double>();  // AREA: full opening, radians; the power is kept
+    bool castsShadows = true;           // false: nothing stops its light
+    bool hasCone = false;               // POINT with a spot's cone
+    glm::dmat3 worldToCone{1.0};        // into the space where the cone looks along -Z
+    double coneAngle = 0.0;             // full opening, radians
+    double coneBlend = 0.0;             // soft share of the cone, 0 to 1
+    bool coneDims = false;              // the intensity falls with the cosine to the axis
     int32_t lightSet = kNoLightSet;
 };
 

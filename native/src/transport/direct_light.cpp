@@ -113,6 +113,7 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
     const double brightLimit = kBundledEmission * meanExitance(scene, patches, emitted, lightSet);
     std::vector<bool> isSource(patches.sideCount(), false);
     for (size_t side = 0; side < isSource.size(); ++side) {
+        if (!patches.parentAt(uint32_t(side)).exchanges) continue;
         if (brightest(emitted[side]) > brightLimit)
             isSource[side] = true;
         else
@@ -171,6 +172,9 @@ Gathered DirectLight::gather(const Receiver& receiver, float tolerance, Seen& se
     const std::vector<float> weights = unblockedWeights(receiver);
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
     for (size_t k = 0; k < sources.size(); ++k) {
+        if (receiver.passingOnly && sources[k]->castsShadows &&
+            patches.parentAt(receiver.side).stopsDirect)
+            continue;
         const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
         gatherFrom(k, receiver,
                    share < kSmallShare    ? kFewSamples
@@ -272,6 +276,10 @@ DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t 
         ++block.count;
         if (brightest(sample.irradiance) <= 0) continue;
         block.open += sample.irradiance;
+        if (!source.castsShadows) {
+            block.visible += sample.irradiance;
+            continue;
+        }
         ++sum.rays;
         if (!visibility.isBlocked(receiver.side, point, sample.direction, sample.distance))
             block.visible += sample.irradiance;
@@ -308,8 +316,8 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
         if (!closed && (brightest(all.open) <= 0 || brightest(all.visible) > 0))
             closed = closedMean(source, receiver, tolerance, closedError);
         // No sample faced the receiver: few of them may, beside a source of many faces.
-        if (brightest(all.open) <= 0 && closed && brightest(*closed) > 0 &&
-            all.count < source.mostSamples()) {
+        if (brightest(all.open) <= 0 && all.count < source.mostSamples() &&
+            (source.isNarrow || (closed && brightest(*closed) > 0))) {
             next = 4 * all.count;
             continue;
         }
@@ -341,8 +349,17 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
     }
     if (closed && all.visible == all.open) ++sum.unblocked;
     sum.irradiance += all.estimate(closed);
-    if (brightest(source.power()) <= 0) sum.unpowered += all.estimate(closed);
+    // The light that a surface gets without stopping it comes on top of the source's power.
+    if (brightest(source.power()) <= 0 || !source.castsShadows ||
+        !patches.parentAt(receiver.side).stopsDirect)
+        sum.unpowered += all.estimate(closed);
     sum.variance += variance + closedError * closedError;
+}
+
+bool DirectLight::hasPassingLight(uint32_t side) const {
+    if (!patches.parentAt(side).stopsDirect) return !sources.empty();
+    return std::any_of(sources.begin(), sources.end(),
+                       [](const auto& source) { return !source->castsShadows; });
 }
 
 glm::vec3 DirectLight::position(const Receiver& receiver, glm::vec2 uv) const {
@@ -362,7 +379,7 @@ glm::dvec3 DirectLight::escapedPower() const {
     const uint32_t rays = std::max(kLeastEscapeRays, kEscapeRays / uint32_t(sources.size()));
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::vec3 power = sources[k]->power();
-        if (brightest(power) <= 0) continue;
+        if (brightest(power) <= 0 || !sources[k]->castsShadows) continue;
         tbb::enumerable_thread_specific<glm::dvec3> missed(glm::dvec3(0.0));
         tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {

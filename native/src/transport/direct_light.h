@@ -39,6 +39,8 @@ struct Receiver {
     glm::vec3 normal{0.0f};          // unit; a point may have a shading normal
     std::optional<glm::vec3> point;  // relative to Patches::centre
     uint32_t seed = 0;               // of its samples
+    // Only the light that lines which end at the first surface do not bring it.
+    bool passingOnly = false;
 };
 
 // What one receiver got.
@@ -71,7 +73,10 @@ class DirectLight {
                                  float targetError,
                                  const std::function<void(double)>& progress) const;
 
-    // Power of the sources that meets no surface, W.
+    // Whether lines that end at the first surface leave out some of the light of a side's sources.
+    bool hasPassingLight(uint32_t side) const;
+
+    // Power of the sources that meets no surface, W; of those that have one.
     glm::dvec3 escapedPower() const;
 
   private:

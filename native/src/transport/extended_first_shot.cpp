@@ -74,8 +74,9 @@ LineEnd castFrom(uint32_t side, const FirstShotInput& input, std::mt19937_64& ra
         const glm::vec4 u = uniformPoint(random);
         const glm::vec3 direction = cosineDirection(normal, {u.z, u.w});
         float distance = 0;
-        const auto met = input.visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}),
-                                                   direction, &distance);
+        const Visibility& visibility = input.exchange ? *input.exchange : input.visibility;
+        const auto met =
+            visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}), direction, &distance);
         if (!met) return {LineEnd::kSky};
         if (!isCovered(patches, side, *met, direction, distance, input.touchDistance))
             return {*met};
@@ -111,7 +112,8 @@ FirstShot extendedFirstShot(const FirstShotInput& input) {
     for (size_t side = 0; side < n; ++side) {
         const glm::dvec3& received = sources.received[side];
         shot.irradiance[side] = glm::vec3(received / double(patches.area[side / 2]));
-        unshot[side] = glm::dvec3(patches.reflectance[side]) * received;
+        if (patches.parentAt(uint32_t(side)).exchanges)
+            unshot[side] = glm::dvec3(patches.reflectance[side]) * received;
         arrived += received;
     }
     const glm::dvec3 reflectance = glm::min(meanReflectance(patches), glm::dvec3(kMostReflectance));

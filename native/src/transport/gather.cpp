@@ -36,7 +36,8 @@ FirstShot gather(const FirstShotInput& input) {
         shot.unblockedSides += results[side].unblocked;
         shot.hiddenSides += results[side].hidden;
     }
-    for (const auto& source : light.lightSources()) shot.emitted += glm::dvec3(source->power());
+    for (const auto& source : light.lightSources())
+        if (source->castsShadows) shot.emitted += glm::dvec3(source->power());
     shot.escaped = light.escapedPower();
     input.progress.report(RB_STAGE_FIRST_SHOT, 1);
     return shot;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 
+#include "transport/area_spread.h"
 #include "transport/mesh_source.h"
 #include "transport/sphere_sampling.h"
 #include "transport/spot_cone.h"
@@ -201,22 +202,47 @@ class AreaSource : public LightSource {
           u(light.axisU),
           v(light.axisV),
           radiance(light.strength),
-          isEllipse(light.areaShape == RB_AREA_ELLIPSE) {
+          isEllipse(light.areaShape == RB_AREA_ELLIPSE),
+          spread(light.spread) {
         const glm::vec3 n = glm::cross(u, v);
         area = 4 * glm::length(n);
         normal = area > 0 ? glm::normalize(n) : glm::vec3(0.0f);
         if (isEllipse) area *= glm::quarter_pi<float>();
+        isNarrow = !spread.isWhole();
     }
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override {
-        return surfaceSample(point, receiver, onSurface(uv), normal, radiance, area);
+        if (spread.isWhole())
+            return surfaceSample(point, receiver, onSurface(uv), normal, radiance, area);
+        const Part part = partSeenFrom(point);
+        if (!(part.area > 0)) return {};
+        if (part.isCone) {
+            // The light fills the cone of directions (but for the rim of an ellipse).
+            LightSample sample;
+            sample.direction = -spread.emit(normal, uv);
+            const float cosine = -glm::dot(normal, sample.direction);
+            sample.distance = glm::dot(point - position, normal) / cosine;
+            const glm::vec2 d = inPlane(point + sample.distance * sample.direction);
+            if (isEllipse && glm::dot(d, d) > 1) return {};
+            sample.irradiance = radiance * (glm::pi<float>() / cosine *
+                                            std::max(0.0f, glm::dot(receiver, sample.direction)));
+            return sample;
+        }
+        // Else the part of the surface whose light reaches the point, or rather its bounds.
+        const glm::vec2 d =
+            part.isAll && isEllipse ? onDisk(uv) : part.low + uv * (part.high - part.low);
+        if (isEllipse && glm::dot(d, d) > 1) return {};
+        LightSample sample = surfaceSample(point, receiver, position + d.x * u + d.y * v, normal,
+                                           radiance, part.area);
+        sample.irradiance *= spread.factor(-glm::dot(normal, sample.direction));
+        return sample;
     }
 
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& receiver) const override {
         if (glm::dot(point - position, normal) <= 0) return glm::vec3(0.0f);
-        if (isEllipse) return std::nullopt;
+        if (isEllipse || !spread.isWhole()) return std::nullopt;
         const glm::dvec3 p(position), du(u), dv(v);
         const glm::dvec3 corners[4] = {p - du - dv, p + du - dv, p + du + dv, p - du + dv};
         return radiance * float(polygonIrradiance(point, receiver, corners, 4));
@@ -224,7 +250,11 @@ class AreaSource : public LightSource {
 
     bool isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
                       float radius) const override {
-        return glm::dot(point - position, normal) < -radius ||
+        const float height = glm::dot(point - position, normal);
+        const float across = glm::length(point - position - height * normal);
+        return height < -radius ||
+               (!spread.isWhole() && across > (height + radius) * spread.tangent() + radius +
+                                                  glm::length(u) + glm::length(v)) ||
                glm::dot(receiver, position - point) < -(radius + glm::length(u) + glm::length(v));
     }
 
@@ -237,7 +267,7 @@ class AreaSource : public LightSource {
     EmittedRay emit(const glm::vec4& r, float) const override {
         EmittedRay ray;
         ray.origin = onSurface({r.x, r.y});
-        ray.direction = cosineDirection(normal, {r.z, r.w});
+        ray.direction = spread.emit(normal, {r.z, r.w});
         ray.normal = normal;
         return ray;
     }
@@ -248,8 +278,38 @@ class AreaSource : public LightSource {
         return position + d.x * u + d.y * v;
     }
 
+    // Of the light's surface, in shares of u and v from -1 to 1.
+    struct Part {
+        glm::vec2 low, high;
+        float area;  // m^2
+        bool isAll, isCone;
+    };
+
+    // The foot of a point in the plane of the light, in shares of u and v.
+    glm::vec2 inPlane(const glm::vec3& point) const {
+        const glm::vec3 d = point - position, n = glm::cross(u, v);
+        return glm::vec2(glm::dot(glm::cross(d, v), n), glm::dot(glm::cross(u, d), n)) /
+               glm::dot(n, n);
+    }
+
+    // Bounds of the points within the spread of their light from a point.
+    Part partSeenFrom(const glm::vec3& point) const {
+        const float radius = std::max(0.0f, glm::dot(point - position, normal)) * spread.tangent();
+        const float cross = glm::length(glm::cross(u, v));
+        const glm::vec2 foot = inPlane(point);
+        const glm::vec2 reach = radius / cross * glm::vec2(glm::length(v), glm::length(u));
+        Part part{glm::clamp(foot - reach, -1.0f, 1.0f), glm::clamp(foot + reach, -1.0f, 1.0f), 0,
+                  false, false};
+        part.isAll = part.low == glm::vec2(-1) && part.high == glm::vec2(1);
+        part.isCone = part.low == foot - reach && part.high == foot + reach;
+        const glm::vec2 size = part.high - part.low;
+        part.area = part.isAll ? area : size.x * size.y * cross;
+        return part;
+    }
+
     const glm::vec3 position, u, v, radiance;
     const bool isEllipse;
+    const AreaSpread spread;
     glm::vec3 normal;
     float area;
 };
@@ -261,6 +321,7 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
                                                        int32_t lightSet) {
     std::vector<std::unique_ptr<LightSource>> sources;
     for (const Light& light : scene.lights) {
+        const size_t before = sources.size();
         if (light.strength == glm::dvec3(0.0) || light.lightSet != lightSet) continue;
         switch (light.kind) {
             case Light::Kind::POINT:
@@ -274,6 +335,7 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
                     sources.push_back(std::make_unique<AreaSource>(light, patches.centre));
                 break;
         }
+        if (sources.size() > before) sources.back()->castsShadows = light.castsShadows;
     }
 
     if (scene.worldLightSet == lightSet && !scene.worldImage.pixels.empty() &&

@@ -74,6 +74,11 @@ class LightSource {
     // Patches::centre.
     virtual glm::vec3 shootingPower(float /*sceneRadius*/) const { return power(); }
 
+    // Whether surfaces stop its light. If not, it brings more than power() in all.
+    bool castsShadows = true;
+    // Whether many samples may miss it although it is seen.
+    bool isNarrow = false;
+
     // A ray of the source's light into such a scene; u uniform in [0, 1)^4. Not called when
     // shootingPower() is zero.
     virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;

@@ -11,6 +11,7 @@
 //   exactly, in each channel.
 // - The number of lines is doubled until the relative error, weighted by area, meets the target;
 //   the thesis tells the user to look.
+// - Light that surfaces do not stop is gathered (transport/direct_light.h): lines end at the first.
 // - The thesis has emissive patches only. Suns shoot parallel lines from a disk that covers the
 //   scene: most of them may miss it. A lamp's disk that turns to each receiver shoots the lines
 //   that each receiver would see it along (transport/light_source.cpp).
@@ -59,6 +60,29 @@ double relativeError(const Patches& patches, const LocalLines& sums, double line
     return signal > 0 ? std::sqrt(noise / signal) : INFINITY;
 }
 
+// Gathers what no line that ends at the first surface can bring.
+void addPassingLight(const FirstShotInput& input, SourceShot& shot) {
+    std::vector<uint32_t> sides;
+    for (uint32_t side = 0; side < input.patches.sideCount(); ++side)
+        if (input.light.hasPassingLight(side)) sides.push_back(side);
+    if (sides.empty()) return;
+    const std::vector<Gathered> results = input.light.gather(
+        sides.size(),
+        [&](size_t k) {
+            Receiver receiver{sides[k], input.patches.normal(sides[k]), std::nullopt, sides[k]};
+            receiver.passingOnly = true;
+            return receiver;
+        },
+        input.settings.targetError, [&](double) { input.progress.report(RB_STAGE_FIRST_SHOT, 0); });
+    for (size_t k = 0; k < sides.size(); ++k) {
+        const double area = double(input.patches.area[sides[k] / 2]);
+        shot.received[sides[k]] += area * glm::dvec3(results[k].irradiance);
+        shot.variance[sides[k]] += glm::dvec3(area * area * double(results[k].variance));
+        shot.emitted += area * glm::dvec3(results[k].irradiance);
+        shot.lines += results[k].rays;
+    }
+}
+
 }  // namespace
 
 SourceShot shootSources(const FirstShotInput& input, uint64_t lines) {
@@ -67,12 +91,14 @@ SourceShot shootSources(const FirstShotInput& input, uint64_t lines) {
     std::vector<glm::dvec3> power;
     double total = 0;
     for (const auto& source : sources) {
-        power.emplace_back(source->shootingPower(patches.radius));
+        power.emplace_back(source->castsShadows ? source->shootingPower(patches.radius)
+                                                : glm::vec3(0.0f));
         total += sum(power.back());
     }
     SourceShot shot;
     shot.received.resize(patches.sideCount());
     shot.variance.resize(patches.sideCount());
+    addPassingLight(input, shot);
     if (!(total > 0)) return shot;
 
     const uint32_t seed = uint32_t(input.settings.seed);
@@ -108,8 +134,8 @@ SourceShot shootSources(const FirstShotInput& input, uint64_t lines) {
 
     const double n = double(done);
     for (size_t side = 0; side < patches.sideCount(); ++side) {
-        shot.received[side] = sums.received[side] / n;
-        shot.variance[side] = sums.variance[side] / (n * n);
+        shot.received[side] += sums.received[side] / n;
+        shot.variance[side] += sums.variance[side] / (n * n);
     }
     for (size_t k = 0; k < sources.size(); ++k) {
         shot.emitted += sums.arrived[k] / n;
@@ -118,7 +144,7 @@ SourceShot shootSources(const FirstShotInput& input, uint64_t lines) {
         shot.escaped += sums.missed[k] / n;
     }
     shot.powerPerLine = total / n;
-    shot.lines = sums.lines;
+    shot.lines += sums.lines;
     return shot;
 }
 

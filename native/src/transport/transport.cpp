@@ -30,6 +30,7 @@ HandOver handOver(const Patches& patches, const FirstShot& shot,
         const float concentrated = exposed[i] > 0 ? 1 / exposed[i] : 0;
         light.gathered[i] = concentrated * shot.irradiance[i];
         if (!shot.indirect.empty()) light.indirect[i] = concentrated * shot.indirect[i];
+        if (!patches.parentAt(uint32_t(i)).exchanges) continue;
         light.unshot[i] = shot.unshot.empty() ? patches.reflectance[i] * light.gathered[i]
                                               : concentrated * shot.unshot[i];
     }

@@ -36,7 +36,7 @@ struct Visibility::Embree {
     }
 };
 
-Visibility::Visibility(const Patches& patches)
+Visibility::Visibility(const Patches& patches, Blockers blockers)
     : patches(patches),
       surfaceOffset(kRelativeOffset * patches.radius),
       embree(std::make_unique<Embree>()) {
@@ -46,7 +46,11 @@ Visibility::Visibility(const Patches& patches)
     // Robust: rays must not slip between neighbouring triangles.
     rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
 
+    auto blocks = [&](const Parent& parent) {
+        return blockers == Blockers::EXCHANGING ? parent.exchanges : parent.stopsDirect;
+    };
     for (size_t i = 0; i < patches.parents.size(); ++i) {
+        if (!blocks(patches.parents[i])) continue;
         embree->parentOfTriangle.push_back(uint32_t(i));
         if (!patches.parents[i].isTriangle) embree->parentOfTriangle.push_back(uint32_t(i));
     }
@@ -61,6 +65,7 @@ Visibility::Visibility(const Patches& patches)
         if (!vertices || !indices) fail(rtcGetDeviceError(embree->device), "no memory");
         std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
         for (const Parent& parent : patches.parents) {
+            if (!blocks(parent)) continue;
             const auto& v = parent.vertex;
             for (uint32_t index : {v[0], v[1], v[2]}) *indices++ = index;
             if (!parent.isTriangle)

@@ -20,10 +20,13 @@ struct LineHit {
     uint32_t side;  // that faces against the direction
 };
 
+// Which surfaces block: those that light is exchanged with, or those that stop direct light.
+enum class Blockers { EXCHANGING, STOPPING_DIRECT };
+
 class Visibility {
   public:
-    // Builds the acceleration structure over the parents. `patches` must outlive it.
-    explicit Visibility(const Patches& patches);
+    // Builds the acceleration structure over the parents that block. `patches` must outlive it.
+    explicit Visibility(const Patches& patches, Blockers blockers = Blockers::EXCHANGING);
     ~Visibility();
 
     // Whether something lies between a point on a side of a patch (relative to Patches::centre) and
