@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -18,6 +18,7 @@ from . import bake_cache, native
 from .bake_report import BakeError, BakeReport, ObjectReport
 from .color_attribute import name_is_free, write_light
 from .corner_map import CornerMap, grouped_mean
+from .light_sets import LightSet, read_light_sets
 from .mesh_export import read
 from .native import ErrorCode, Progress, RaybundleError
 from .native_scene import build_native_scene
@@ -34,6 +35,7 @@ class TargetLight:
     target: BakeTarget
     light: np.ndarray  # (corners or vertices, 3), by settings.domain
     subdivided: SubdividedMesh | None
+    set_lights: dict[str, np.ndarray] = field(default_factory=dict)  # likewise, by attribute
 
 
 def bake(context: bpy.types.Context, progress: Progress | None = None,
@@ -53,9 +55,10 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
     native.load()
 
     with _object_mode(context):
-        _check(scene, settings)
+        light_sets = read_light_sets(scene, settings.attribute)
+        _check(scene, settings, light_sets)
         report_progress('export', 0.0)
-        export, subdivided = _export(context, settings)
+        export, subdivided = _export(context, settings, light_sets)
         with build_native_scene(export.scene) as native_scene:
             export_seconds = time.perf_counter() - started
             native_bake = bake_cache.get_or_create(scene)
@@ -64,10 +67,12 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
 
         report_progress('write_back', 0.0)
         write_started = time.perf_counter()
-        lights = _read_results(native_bake, export, subdivided, settings)
+        lights = _read_results(native_bake, export, subdivided, settings, light_sets)
         native_report = native_bake.report()
         objects = _write(context, lights, settings, export, native_report)
         report = BakeReport.from_native(native_report)
+        for entry, light_set in zip(report.light_sets, light_sets):
+            entry['attribute'] = light_set.attribute
         report.objects = objects + [ObjectReport(name, 0, status)
                                     for name, status in export.statuses.items()]
         report.warnings = list(dict.fromkeys([*export.warnings, *report.warnings]))
@@ -103,7 +108,7 @@ def _object_mode(context: bpy.types.Context) -> Iterator[None]:
             bpy.ops.object.mode_set(mode='EDIT')
 
 
-def _check(scene: bpy.types.Scene, settings: BakeSettings) -> None:
+def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[LightSet]) -> None:
     if not settings.attribute:
         raise BakeError("The attribute needs a name")
     for item in scene.objects:
@@ -111,9 +116,10 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings) -> None:
             continue
         if item.data.is_editmode:
             raise BakeError(f'"{item.name}" is in Edit Mode: leave it before baking')
-        if not name_is_free(item.data, settings.attribute):
-            raise BakeError(f'"{item.name}" has another attribute of the name '
-                            f'"{settings.attribute}", which is no colour: choose another name')
+        for name in (settings.attribute, *(light_set.attribute for light_set in light_sets)):
+            if not name_is_free(item.data, name):
+                raise BakeError(f'"{item.name}" has another attribute of the name '
+                                f'"{name}", which is no colour: choose another name')
 
 
 # --------------------------------------------------------------------------------------------------
@@ -121,7 +127,7 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings) -> None:
 # --------------------------------------------------------------------------------------------------
 
 
-def _export(context: bpy.types.Context, settings: BakeSettings
+def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list[LightSet]
             ) -> tuple[SceneExport, dict[int, SubdividedMesh]]:
     """The exported scene and, for topology 'SUBDIVIDE', the finer mesh by target's instance."""
     refine = settings.topology == 'SUBDIVIDE'
@@ -133,7 +139,7 @@ def _export(context: bpy.types.Context, settings: BakeSettings
             selected |= {original for original, copy in find_copies(context.scene).items()
                          if copy in selected}
     with originals_shown(context.scene) if refine else nullcontext():
-        export = export_scene(context, selected)
+        export = export_scene(context, selected, light_sets)
     _leave_out_unwritable(export, settings)
     if not export.targets:
         reasons = "; ".join(f'"{name}" {status}' for name, status in export.statuses.items())
@@ -186,23 +192,28 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
 
 
 def _read_results(native_bake: native.Bake, export: SceneExport,
-                  subdivided: dict[int, SubdividedMesh], settings: BakeSettings
-                  ) -> list[TargetLight]:
+                  subdivided: dict[int, SubdividedMesh], settings: BakeSettings,
+                  light_sets: list[LightSet]) -> list[TargetLight]:
     results = []
     for target in export.targets:
         mesh = export.scene.meshes[export.scene.instances[target.instance].mesh]
         finer = subdivided.get(target.instance)
         corner_map = target.corner_map if finer is None else CornerMap(mesh.corner_count)
-        if settings.domain == 'POINT' and corner_map.is_identity:
-            light = native_bake.vertex_light(target.instance, settings.output, len(mesh.vertices))
-        else:
+
+        def read_light(light_set: int | None = None) -> np.ndarray:
+            if settings.domain == 'POINT' and corner_map.is_identity:
+                return native_bake.vertex_light(target.instance, settings.output,
+                                                len(mesh.vertices), light_set)
             light = corner_map.to_original(native_bake.corner_light(
-                target.instance, settings.output, mesh.corner_count))
+                target.instance, settings.output, mesh.corner_count, light_set))
             if settings.domain == 'POINT':
                 original = target.object.data
                 light = grouped_mean(light, read(original.loops, 'vertex_index', np.int32),
                                      len(original.vertices))
-        results.append(TargetLight(target, light, finer))
+            return light
+
+        results.append(TargetLight(target, read_light(), finer, {
+            light_set.attribute: read_light(index) for index, light_set in enumerate(light_sets)}))
     return results
 
 
@@ -222,8 +233,9 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
     reports = []
     for item in lights:
         receiver = copies.get(item.target.object, item.target.object)
-        write_light(receiver.data, settings.attribute, settings.data_type, settings.domain,
-                    item.light)
+        # The last one is shown: the light of all.
+        for name, light in {**item.set_lights, settings.attribute: item.light}.items():
+            write_light(receiver.data, name, settings.data_type, settings.domain, light)
         # The native library lists its objects by instance.
         status = native_report['objects'][item.target.instance]['status']
         reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status))
@@ -246,7 +258,9 @@ def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
     for mesh, group in groups.items():
         if len(group) > 1 and settings.shared_meshes == 'AVERAGE':
             mean = np.mean([item.light for item in group], axis=0)
-            group = [replace(item, light=mean) for item in group]
+            set_means = {name: np.mean([item.set_lights[name] for item in group], axis=0)
+                         for name in group[0].set_lights}
+            group = [replace(item, light=mean, set_lights=set_means) for item in group]
             export.warnings.add(f'mesh "{mesh.name}" shows the mean light of its '
                                 f'{len(group)} objects')
         elif len(group) > 1:

@@ -29,6 +29,7 @@ class BakeReport:
     estimated_error: float = 0.0  # relative
     energy: dict[str, float] = field(default_factory=dict)  # W; balance_error is relative
     peak_memory_bytes: int = 0
+    light_sets: list[dict] = field(default_factory=list)  # name, attribute, estimated_error
     objects: list[ObjectReport] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     skipped: list[dict] = field(default_factory=list)  # what, why, count
@@ -37,7 +38,8 @@ class BakeReport:
     def from_native(cls, values: dict) -> BakeReport:
         report = cls()
         for name in ('seconds', 'patches', 'bundles', 'lines', 'exchanges', 'shadow_rays',
-                     'estimated_error', 'energy', 'peak_memory_bytes', 'warnings', 'skipped'):
+                     'estimated_error', 'energy', 'peak_memory_bytes', 'light_sets', 'warnings',
+                     'skipped'):
             if name in values:
                 setattr(report, name, values[name])
         return report

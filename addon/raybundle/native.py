@@ -111,6 +111,10 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_instance_visibility': (_handle, _int, ctypes.c_bool, ctypes.c_bool),
     'rb_set_world': (_handle, _floats),
     'rb_set_world_image': (_handle, _int, _int, _floats),
+    'rb_add_light_set': (_handle, _text, _out(_int)),
+    'rb_set_light_set': (_handle, _int, _int),
+    'rb_set_instance_light_set': (_handle, _int, _int),
+    'rb_set_world_light_set': (_handle, _int),
     'rb_new_bake': (_out(_handle),),
     'rb_set_bake_int': (_handle, _text, _int),
     'rb_set_bake_float': (_handle, _text, _float),
@@ -122,6 +126,8 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_execute_bake': (_handle, _handle),
     'rb_get_corner_light': (_handle, _int, _enum, _floats, _size),
     'rb_get_vertex_light': (_handle, _int, _enum, _floats, _size),
+    'rb_get_set_corner_light': (_handle, _int, _int, _enum, _floats, _size),
+    'rb_get_set_vertex_light': (_handle, _int, _int, _enum, _floats, _size),
     'rb_get_report': (_handle, _out(_text)),
     'rb_new_subdivision': (_floats, _size, _ints, _size, _ints, _size, _float, _out(_handle)),
     'rb_get_subdivision_size': (_handle, _out(_size), _out(_size)),
@@ -434,6 +440,21 @@ class Scene(_Handle):
         self._library.rb_set_world_image(
             self._pointer, pixels.shape[1], pixels.shape[0], _as_floats(pixels))
 
+    def add_light_set(self, name: str) -> int:
+        identifier = _int()
+        self._library.rb_add_light_set(self._pointer, name.encode(), ctypes.byref(identifier))
+        return identifier.value
+
+    def set_light_set(self, light: int, light_set: int) -> None:
+        self._library.rb_set_light_set(self._pointer, light, light_set)
+
+    def set_instance_light_set(self, instance: int, light_set: int) -> None:
+        """The set that the instance's emission belongs to."""
+        self._library.rb_set_instance_light_set(self._pointer, instance, light_set)
+
+    def set_world_light_set(self, light_set: int) -> None:
+        self._library.rb_set_world_light_set(self._pointer, light_set)
+
 
 # --------------------------------------------------------------------------------------------------
 # Bake
@@ -500,18 +521,26 @@ class Bake(_Handle):
         if raised:
             raise raised[0]
 
-    def corner_light(self, instance: int, output: str, count: int) -> np.ndarray:
-        """(count, 3) float32, in the order of the mesh's corners."""
+    def corner_light(self, instance: int, output: str, count: int, light_set: int | None = None
+                     ) -> np.ndarray:
+        """(count, 3) float32, in the order of the mesh's corners; by all lights or by a set."""
         light = np.empty((count, 3), np.float32)
-        self._library.rb_get_corner_light(
-            self._pointer, instance, OUTPUTS[output], _as_floats(light), count)
+        arguments = (instance, OUTPUTS[output], _as_floats(light), count)
+        if light_set is None:
+            self._library.rb_get_corner_light(self._pointer, *arguments)
+        else:
+            self._library.rb_get_set_corner_light(self._pointer, light_set, *arguments)
         return light
 
-    def vertex_light(self, instance: int, output: str, count: int) -> np.ndarray:
-        """(count, 3) float32, in the order of the mesh's vertices."""
+    def vertex_light(self, instance: int, output: str, count: int, light_set: int | None = None
+                     ) -> np.ndarray:
+        """(count, 3) float32, in the order of the mesh's vertices; by all lights or by a set."""
         light = np.empty((count, 3), np.float32)
-        self._library.rb_get_vertex_light(
-            self._pointer, instance, OUTPUTS[output], _as_floats(light), count)
+        arguments = (instance, OUTPUTS[output], _as_floats(light), count)
+        if light_set is None:
+            self._library.rb_get_vertex_light(self._pointer, *arguments)
+        else:
+            self._library.rb_get_set_vertex_light(self._pointer, light_set, *arguments)
         return light
 
     def report(self) -> dict:

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from . import native
-from .scene_data import AreaLightData, LightData, MeshData, PointLightData, SceneData
+from .scene_data import (AreaLightData, LightData, LightSetData, MeshData, PointLightData,
+                         SceneData)
 
 
 def build_native_scene(data: SceneData) -> native.Scene:
-    """Instance ids are positions in data.instances. The caller closes the scene."""
+    """Ids of instances and lights are positions in data's lists. The caller closes the scene."""
     scene = native.Scene()
     images = [scene.add_image(image.name, image.pixels, image.extension) for image in data.images]
     materials = []
@@ -29,6 +30,8 @@ def build_native_scene(data: SceneData) -> native.Scene:
     scene.set_world(data.world)
     if data.world_image is not None:
         scene.set_world_image(data.world_image)
+    for light_set in data.light_sets:
+        _add_light_set(scene, light_set)
     return scene
 
 
@@ -58,3 +61,13 @@ def _add_light(scene: native.Scene, light: LightData) -> None:
     else:
         identifier = scene.add_sun_light(light.name, light.direction, light.irradiance, light.angle)
     scene.set_light_shadows(identifier, light.casts_shadows)
+
+
+def _add_light_set(scene: native.Scene, light_set: LightSetData) -> None:
+    identifier = scene.add_light_set(light_set.name)
+    for light in light_set.lights:
+        scene.set_light_set(light, identifier)
+    for instance in light_set.instances:
+        scene.set_instance_light_set(instance, identifier)
+    if light_set.world:
+        scene.set_world_light_set(identifier)

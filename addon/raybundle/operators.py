@@ -6,6 +6,7 @@ import bpy
 from . import bake_cache, color_attribute, viewport_preview
 from .bake import bake
 from .bake_report import BakeError
+from .light_sets import written_attributes
 from .native import ErrorCode, RaybundleError
 from .subdivided_copy import remove_copies
 
@@ -74,7 +75,7 @@ class RAYBUNDLE_OT_relight(bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_clear(bpy.types.Operator):
-    """Remove the baked attribute and the subdivided copies, and free the kept lines"""
+    """Remove the baked attributes and the subdivided copies, and free the kept lines"""
     bl_idname = "raybundle.clear"
     bl_label = "Clear Bake"
     bl_options = {'REGISTER', 'UNDO'}
@@ -89,10 +90,53 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
         meshes = {item.data for item in scene.objects
                   if item.type == 'MESH' and item.data.library is None}
         cleared = sum(color_attribute.clear(mesh, scene.raybundle.attribute) for mesh in meshes)
+        for name in written_attributes(scene):
+            for mesh in meshes:
+                color_attribute.clear(mesh, name)
         scene.raybundle.report = ""
         bake_cache.discard(scene)
         self.report({'INFO'}, f'Attribute "{scene.raybundle.attribute}" removed from {cleared} '
                               f'meshes, {copies} subdivided copies removed')
+        return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_light_set_add(bpy.types.Operator):
+    """Add a light set: a group of lights that is baked into an attribute of its own"""
+    bl_idname = "raybundle.light_set_add"
+    bl_label = "Add Light Set"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+    def execute(self, context):
+        settings = context.scene.raybundle
+        names = {item.name for item in settings.light_sets}
+        number = 1
+        while f"Set {number}" in names:
+            number += 1
+        settings.light_sets.add().name = f"Set {number}"
+        settings.light_set_index = len(settings.light_sets) - 1
+        return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_light_set_remove(bpy.types.Operator):
+    """Remove the light set that is shown; what was baked of it stays until Clear"""
+    bl_idname = "raybundle.light_set_remove"
+    bl_label = "Remove Light Set"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        settings = context.scene.raybundle if context.scene is not None else None
+        return settings is not None and settings.light_set_index < len(settings.light_sets)
+
+    def execute(self, context):
+        settings = context.scene.raybundle
+        settings.light_sets.remove(settings.light_set_index)
+        settings.light_set_index = max(0, min(settings.light_set_index,
+                                              len(settings.light_sets) - 1))
         return {'FINISHED'}
 
 
@@ -119,6 +163,8 @@ classes = (
     RAYBUNDLE_OT_bake,
     RAYBUNDLE_OT_relight,
     RAYBUNDLE_OT_clear,
+    RAYBUNDLE_OT_light_set_add,
+    RAYBUNDLE_OT_light_set_remove,
     RAYBUNDLE_OT_preview,
 )
 

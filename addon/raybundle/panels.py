@@ -5,6 +5,8 @@ import json
 
 import bpy
 
+from .light_sets import attribute_of
+
 
 def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
     """The panel's layout with labels beside the values, and no dots for keyframes."""
@@ -128,6 +130,37 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
         column.prop(settings, "shared_meshes")
 
 
+class RAYBUNDLE_UL_light_sets(bpy.types.UIList):
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property):
+        row = layout.row(align=True)
+        row.prop(item, "enabled", text="")
+        row.prop(item, "name", text="", emboss=False)
+
+
+class RAYBUNDLE_PT_light_sets(RaybundleRenderPanel, bpy.types.Panel):
+    bl_label = "Light Sets"
+    bl_parent_id = "RAYBUNDLE_PT_render"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout = property_layout(self)
+        settings = context.scene.raybundle
+        row = layout.row()
+        row.template_list("RAYBUNDLE_UL_light_sets", "", settings, "light_sets", settings,
+                          "light_set_index", rows=3)
+        column = row.column(align=True)
+        column.operator("raybundle.light_set_add", text="", icon='ADD')
+        column.operator("raybundle.light_set_remove", text="", icon='REMOVE')
+        if settings.light_set_index < len(settings.light_sets):
+            item = settings.light_sets[settings.light_set_index]
+            layout.prop(item, "collection")
+            layout.prop(item, "world")
+            layout.prop(item, "attribute")
+            if not item.attribute:
+                layout.label(text=f'Attribute "{attribute_of(item, settings.attribute)}"',
+                             icon='BLANK1')
+
+
 class RAYBUNDLE_PT_object(bpy.types.Panel):
     bl_label = "Raybundle"
     bl_space_type = 'PROPERTIES'
@@ -171,6 +204,8 @@ classes = (
     RAYBUNDLE_PT_limits,
     RAYBUNDLE_PT_method,
     RAYBUNDLE_PT_output,
+    RAYBUNDLE_UL_light_sets,
+    RAYBUNDLE_PT_light_sets,
     RAYBUNDLE_PT_object,
     RAYBUNDLE_PT_sidebar,
 )

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import bpy
-from bpy.props import (BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty,
-                       StringProperty)
+from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty,
+                       PointerProperty, StringProperty)
 
 enum_scope = (
     ('VISIBLE', "Visible", "Bake all objects that are visible in the viewport and in renders"),
@@ -110,6 +110,9 @@ enum_small_patches = (
 enum_reconstruction = (
     ('LEAST_SQUARES', "Least Squares",
      "Vertex values whose interpolation over the faces is nearest to the light on the surface"),
+    ('AREA_AVERAGE', "Area Average",
+     "The mean of the light on the faces around each vertex: never too bright or too dark, but "
+     "blurred"),
     ('POINT', "Point", "The light at the vertices themselves, as Cycles bakes it"),
 )
 
@@ -128,6 +131,22 @@ enum_side = (
 
 def _is_mesh_object(_self: bpy.types.PropertyGroup, item: bpy.types.Object) -> bool:
     return item.type == 'MESH'
+
+
+class RaybundleLightSet(bpy.types.PropertyGroup):
+    name: StringProperty(name="Name", description="Name of the light set")
+    enabled: BoolProperty(
+        name="Enabled", description="Bake the set into an attribute of its own", default=True)
+    collection: PointerProperty(
+        name="Collection",
+        description="Its lights and emissive objects, those of its children included, are the set",
+        type=bpy.types.Collection)
+    world: BoolProperty(
+        name="World", description="The light of the world belongs to the set", default=False)
+    attribute: StringProperty(
+        name="Attribute",
+        description="Name of the colour attribute that the set's light is written to; empty is "
+                    "that of the scene and the name of the set")
 
 
 class RaybundleSceneSettings(bpy.types.PropertyGroup):
@@ -221,6 +240,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     threads: IntProperty(
         name="Threads", description="Processor threads to use; 0 is all", default=0, min=0,
         soft_max=64, max=1024)
+    light_sets: CollectionProperty(
+        name="Light Sets",
+        description="Groups of lights that are baked into attributes of their own along the same "
+                    "lines", type=RaybundleLightSet)
+    light_set_index: IntProperty(name="Light Set", description="The light set that is shown")
     report: StringProperty(
         name="Report", description="The report of the last bake, as JSON")
 
@@ -307,6 +331,7 @@ def checked_value(name: str, value: object) -> object:
 
 
 classes = (
+    RaybundleLightSet,
     RaybundleSceneSettings,
     RaybundleObjectSettings,
 )

@@ -119,6 +119,15 @@ LightData = PointLightData | SunLightData | AreaLightData
 
 
 @dataclass
+class LightSetData:
+    """A named group of lights: positions in the lists of SceneData."""
+    name: str
+    world: bool = False
+    lights: list[int] = field(default_factory=list)
+    instances: list[int] = field(default_factory=list)
+
+
+@dataclass
 class SceneData:
     images: list[ImageData] = field(default_factory=list)
     materials: list[MaterialData] = field(default_factory=list)
@@ -128,6 +137,12 @@ class SceneData:
     world: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr)
     # (height, width, 3) W/(m^2 sr) on top of it, equirectangular as in Cycles, bottom row first
     world_image: np.ndarray | None = None
+    light_sets: list[LightSetData] = field(default_factory=list)
+
+    def emits(self, instance: int) -> bool:
+        """Whether an instance has a material that emits light."""
+        used = np.unique(self.meshes[self.instances[instance].mesh].face_materials)
+        return any(np.any(self.materials[index].emission > 0.0) for index in used)
 
     def diagonal(self) -> float:
         """Of the bounding box of all instances in the world, m."""

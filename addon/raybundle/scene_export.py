@@ -7,7 +7,7 @@ The viewport's evaluation is used (Python has no other), filtered by what render
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import bpy
@@ -15,6 +15,7 @@ import numpy as np
 
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
 from .light_export import export_light, is_portal
+from .light_sets import LightSet, LightSetMembers
 from .material_export import MaterialExporter
 from .mesh_export import MeshError, export_mesh
 from .scene_data import InstanceData, MeshData, SceneData, Warnings
@@ -42,13 +43,13 @@ class SceneExport:
     warnings: Warnings = field(default_factory=Warnings)
 
 
-def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None
-                 ) -> SceneExport:
+def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None,
+                 light_sets: Sequence[LightSet] = ()) -> SceneExport:
     """selected: the objects to bake, None for all. The original data is as before on return."""
     changed = _meshes_with_changed_topology(context, selected)
     try:
         with ElementCodes(changed):
-            return _Exporter(context, selected).export()
+            return _Exporter(context, selected, light_sets).export()
     finally:
         if changed:
             # Evaluate once more, so that nothing that is evaluated still has the codes.
@@ -115,11 +116,13 @@ class _Exporter:
     """One walk over the evaluated scene."""
 
     def __init__(self, context: bpy.types.Context,
-                 selected: Collection[bpy.types.Object] | None) -> None:
+                 selected: Collection[bpy.types.Object] | None,
+                 light_sets: Sequence[LightSet]) -> None:
         self.context = context
         self.selected = selected
         self.result = SceneExport()
         self.materials = MaterialExporter(self.result.scene, self.result.warnings)
+        self.members = LightSetMembers(list(light_sets), self.result.scene)
         self._meshes: dict[tuple, int | MeshError] = {}
         self._mesh_digests: dict[bytes, int] = {}
         self._instance_counts: Counter[tuple[str, str]] = Counter()
@@ -139,6 +142,7 @@ class _Exporter:
         world = export_world(self.context.scene, self.materials.images, self.result.warnings)
         scene.world, scene.world_image = world.radiance, world.image
         scene.lights.extend(world.suns)
+        self.members.add_world_lights(len(world.suns))
         for (parent, name), count in self._instance_counts.items():
             label = name if parent == name else f"{parent} / {name}"
             plural = "s" if count > 1 else ""
@@ -155,6 +159,7 @@ class _Exporter:
                              self.result.warnings)
         if light is not None:
             self.result.scene.lights.append(light)
+            self.members.add_light(instance)
 
     def _add_geometry(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         item = instance.object
@@ -195,6 +200,7 @@ class _Exporter:
             InstanceData(mesh, item.name, transform, role, original.raybundle.side,
                          stops_direct=all(source.visible_shadow for source in shown),
                          exchanges=all(source.visible_diffuse for source in shown)))
+        self.members.add_instance(instance)
         if role == 'BAKE':
             index = len(self.result.scene.instances) - 1
             self.result.targets.append(
