@@ -169,15 +169,17 @@ struct Bake::Trace {
                 directVisibility =
                     std::make_unique<const Visibility>(patches, Blockers::STOPPING_DIRECT);
         touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.size);
-        const ProjectorInput input{patches,
-                                   visibility,
-                                   pixelSize(patches, settings.linesPerBundle),
-                                   touchDistance,
-                                   settings.smallPatchesKind(),
-                                   settings.planeCount,
-                                   settings.planePlacementKind(),
-                                   settings.planeCoherence != 0,
-                                   settings.linesPerBundle == 1};
+        ProjectorInput input{patches,
+                             visibility,
+                             pixelSize(patches, settings.linesPerBundle),
+                             touchDistance,
+                             settings.smallPatchesKind(),
+                             settings.planeCount,
+                             settings.planePlacementKind(),
+                             settings.planeCoherence != 0,
+                             settings.linesPerBundle == 1,
+                             {}};
+        if (settings.hasLineWindows()) followDetail(input);
         tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                                 uint32_t(settings.seed));
         // Only line reuse on exact projection sees what lies against what while it traces.
@@ -188,6 +190,15 @@ struct Bake::Trace {
             if (input.singleLine) exact.pixelSize = pixelSize(patches, 0);
             surrounding = surroundings(exact, uint32_t(settings.seed));
         }
+    }
+
+    // Gives small patches windows of finer pixels.
+    void followDetail(ProjectorInput& input) {
+        LineDensity density = densityByDetail(patches, input.pixelSize, kPixelsPerPatch,
+                                              2 * patches.radius / kMaxPlanePixels);
+        input.pixelSize = density.pixelSize;
+        input.windows = std::move(density.windows);
+        windowOf = std::move(density.windowOf);
     }
 
     // Whether all traced lines are in the counts: not after a cancel on the way, and not where a
@@ -206,6 +217,7 @@ struct Bake::Trace {
     const Visibility visibility;
     std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
     Surroundings surrounding;                            // empty: as the counts have it
+    std::vector<int32_t> windowOf;                       // per parent: see LineDensity
     LineCounts counts;
     std::unique_ptr<BundleTracer> tracer;
 };

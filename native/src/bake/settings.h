@@ -45,6 +45,11 @@ struct Settings {
         return smallPatches == "ROULETTE" ? SmallPatches::ROULETTE : SmallPatches::CENTRE_SAMPLING;
     }
     PlanePlacement planePlacementKind() const;
+    // Whether lines may be denser where patches are small.
+    bool hasLineWindows() const {
+        return solver == "LINE_REUSE" && isProjectionExact() && linesPerBundle == 0 &&
+               maxBundles <= kMostWindowBundles;
+    }
     // Whether the projector sees all surfaces along a line.
     bool isProjectionExact() const {
         return (projector == "AUTO" || projector == "FRAGMENT_LISTS") &&

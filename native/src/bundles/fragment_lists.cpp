@@ -18,19 +18,25 @@ uint32_t depthOf(uint64_t key) { return uint32_t(key >> 32); }
 }  // namespace
 
 FragmentLists::FragmentLists(const Patches& patches, float pixelSize, float touchDistance,
-                             SmallPatches smallPatches)
+                             SmallPatches smallPatches, std::vector<LineWindow> windows)
     : contacts(patches, touchDistance),
       hasLeaks(smallPatches == SmallPatches::ROULETTE),
-      rasteriser(patches, pixelSize, smallPatches) {}
+      rasteriser(patches, pixelSize, smallPatches, std::move(windows)) {}
 
 std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input) {
     return std::make_unique<FragmentLists>(input.patches, input.pixelSize, input.touchDistance,
-                                           input.smallPatches);
+                                           input.smallPatches, input.windows);
 }
 
 void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
     rasteriser.begin(bundle);
     contacts.begin(bundle.direction);
+    projectView(out);
+    for (size_t window = 0; window < rasteriser.windowCount(); ++window)
+        if (rasteriser.lookThrough(window)) projectView(out);
+}
+
+void FragmentLists::projectView(BundleLines& out) {
     fragments.clear();
     begin.assign(rasteriser.pixelCount() + 1, 0);
     const double depthLow = rasteriser.depthLow();
@@ -42,6 +48,9 @@ void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
     });
     sortIntoLists();
     pairLists(out);
+    if (rasteriser.windowCount() > 0)
+        out.densities.push_back(
+            {rasteriser.lineWeight(), out.exchanges.size(), out.sky.size(), out.touching.size()});
 }
 
 void FragmentLists::sortIntoLists() {

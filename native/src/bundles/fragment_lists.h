@@ -30,7 +30,8 @@ class FragmentLists : public Projector {
     // pixelSize: edge of a pixel in metres, the same for every bundle. touchDistance: two surfaces
     // not further apart than this touch, metres. `patches` must outlive it.
     FragmentLists(const Patches& patches, float pixelSize, float touchDistance,
-                  SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING);
+                  SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING,
+                  std::vector<LineWindow> windows = {});
 
     void project(const Bundle& bundle, BundleLines& out) override;
 
@@ -41,6 +42,8 @@ class FragmentLists : public Projector {
         uint32_t side;   // the side that faces against the direction
     };
 
+    // The view that the rasteriser has turned to.
+    void projectView(BundleLines& out);
     void sortIntoLists();
     // How much deeper b lies than a, metres.
     double along(uint64_t a, uint64_t b) const;

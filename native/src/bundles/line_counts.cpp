@@ -35,7 +35,7 @@ LineCounts::LineCounts(size_t sideCount)
 
 size_t LineCounts::byteCount() const {
     return rows.back() * sizeof(LineCount) + rows.size() * sizeof(size_t) +
-           sideCount() * (2 * sizeof(sky[0]) + sizeof(touching[0]));
+           sideCount() * (2 * sizeof(sky[0]) + sizeof(touching[0])) + met.size() * sizeof(met[0]);
 }
 
 std::vector<float> LineCounts::exposedShare() const {
@@ -50,16 +50,36 @@ std::vector<float> LineCounts::exposedShare() const {
 void LineCounts::addTotals(const std::vector<TracedBundle>& traced) {
     for (const TracedBundle& t : traced) {
         const uint32_t half = t.bundle.half;
-        for (const Exchange& e : t.lines.exchanges) {
-            total[e.i][half] += e.lines;
-            total[e.j][half] += e.lines;
-        }
-        for (uint32_t side : t.lines.sky) {
-            ++sky[side][half];
-            ++total[side][half];
-        }
-        for (uint32_t side : t.lines.touching) ++touching[side];
+        t.lines.forEachExchange([&](const Exchange& e, uint32_t weight) {
+            total[e.i][half] += e.lines * weight;
+            total[e.j][half] += e.lines * weight;
+        });
+        t.lines.forEachSky([&](uint32_t side, uint32_t weight) {
+            sky[side][half] += weight;
+            total[side][half] += weight;
+        });
+        t.lines.forEachTouching([&](uint32_t side, uint32_t weight) { touching[side] += weight; });
     }
+    countMet(traced);
+}
+
+void LineCounts::countMet(const std::vector<TracedBundle>& traced) {
+    for (const TracedBundle& t : traced) {
+        if (t.lines.densities.empty()) continue;
+        met.resize(sideCount(), 0);
+        for (const Exchange& e : t.lines.exchanges) {
+            met[e.i] += e.lines;
+            met[e.j] += e.lines;
+        }
+        for (uint32_t side : t.lines.sky) ++met[side];
+        for (uint32_t side : t.lines.touching) ++met[side];
+    }
+}
+
+double LineCounts::linesMet(uint32_t side) const {
+    const double counted = double(total[side][0]) + double(total[side][1]);
+    if (met.empty() || counted == 0) return counted;
+    return double(met[side]) * counted / (counted + double(touching[side]));
 }
 
 void LineCounts::dropExchanges() {
@@ -70,9 +90,12 @@ void LineCounts::dropExchanges() {
 void LineCounts::add(const std::vector<TracedBundle>& bundles) {
     const size_t n = sideCount();
     for (const TracedBundle& traced : bundles) {
-        for (uint32_t side : traced.lines.sky) ++sky[side][traced.bundle.half];
-        for (uint32_t side : traced.lines.touching) ++touching[side];
+        traced.lines.forEachSky(
+            [&](uint32_t side, uint32_t weight) { sky[side][traced.bundle.half] += weight; });
+        traced.lines.forEachTouching(
+            [&](uint32_t side, uint32_t weight) { touching[side] += weight; });
     }
+    countMet(bundles);
     this->bundles += uint32_t(bundles.size());
 
     // Sort the directed exchanges by block, stably in the order of the bundles.
@@ -104,10 +127,10 @@ void LineCounts::add(const std::vector<TracedBundle>& bundles) {
             keys[at] = uint64_t(partner) << 32 | half | count;
             rowOf[at] = uint8_t(row & ((1u << kBlockBits) - 1));
         };
-        for (const Exchange& e : bundles[b].lines.exchanges) {
-            put(e.i, e.j, e.lines);
-            put(e.j, e.i, e.lines);
-        }
+        bundles[b].lines.forEachExchange([&](const Exchange& e, uint32_t weight) {
+            put(e.i, e.j, e.lines * weight);
+            put(e.j, e.i, e.lines * weight);
+        });
     });
 
     // In each block: group by row, sort each row, merge equal partners with the row's old entries.

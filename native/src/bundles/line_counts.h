@@ -7,7 +7,8 @@
 // Differs from the thesis: lines that leave the scene count in m_i. The two
 // independent halves of the bundles are counted apart for the error estimate. Counts are integers
 // and are merged before any floating-point work, so that the result does not depend on the number
-// of threads.
+// of threads. Where lines have several densities (bundles/line_windows.h), counts are in lines of
+// the finest one.
 #pragma once
 
 #include <array>
@@ -50,13 +51,24 @@ class LineCounts {
     // lines.
     std::vector<float> exposedShare() const;
 
+    // Lines of a side that ended on others or left the scene, each counted once whatever its
+    // density: how much the counts of that side can be trusted.
+    double linesMet(uint32_t side) const;
+    // The same with those that ended where it is covered.
+    uint32_t linesMetInAll(uint32_t side) const {
+        return met.empty() ? total[side][0] + total[side][1] + touching[side] : met[side];
+    }
+
     std::vector<std::array<uint32_t, 2>> sky;    // per side and half: lines that leave the scene
     std::vector<std::array<uint32_t, 2>> total;  // per side and half: m_i
     std::vector<uint32_t> touching;              // per side: lines that end where it is covered
     uint32_t bundles = 0;                        // whose lines are in
 
   private:
-    std::vector<size_t> rows;  // per side, into entries; one more at the end
+    void countMet(const std::vector<TracedBundle>& traced);
+
+    std::vector<uint32_t> met;  // per side: linesMetInAll, if lines have several densities
+    std::vector<size_t> rows;   // per side, into entries; one more at the end
     std::unique_ptr<LineCount[]> entries;
 };
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bundles/directions.h"
+#include "bundles/line_windows.h"
 #include "patches/patches.h"
 #include "visibility/visibility.h"
 
@@ -29,14 +30,45 @@ struct BundleLines {
     std::vector<Exchange> exchanges;  // equal pairs may occur several times
     std::vector<uint32_t> sky;        // sides from which a line leaves the scene, once per line
     std::vector<uint32_t>
-        touching;             // sides that lie against another one, once per line; no exchange
+        touching;  // sides that lie against another one, once per line; no exchange
+    // Lines of one density after the other: how many of the finest lines one stands for, and where
+    // they end in the lists above. Empty: each stands for itself.
+    struct Density {
+        uint32_t weight;
+        size_t exchanges, sky, touching;
+    };
+    std::vector<Density> densities;
     uint64_t lines = 0;       // that meet the scene
     uint64_t disordered = 0;  // exchanges between sides whose order in depth is wrong (painters)
     uint64_t cycles = 0;      // of patches that cover each other, broken anywhere (Newell)
 
+    // Calls visit(entry, weight) for all entries of a list.
+    template <class Visit>
+    void forEachExchange(const Visit& visit) const {
+        forEach(exchanges, &Density::exchanges, visit);
+    }
+    template <class Visit>
+    void forEachSky(const Visit& visit) const {
+        forEach(sky, &Density::sky, visit);
+    }
+    template <class Visit>
+    void forEachTouching(const Visit& visit) const {
+        forEach(touching, &Density::touching, visit);
+    }
+
     size_t byteCount() const {
         return exchanges.size() * sizeof(Exchange) +
                (sky.size() + touching.size()) * sizeof(uint32_t);
+    }
+
+  private:
+    template <class Entry, class Visit>
+    void forEach(const std::vector<Entry>& list, size_t Density::*end, const Visit& visit) const {
+        if (densities.empty())
+            for (const Entry& entry : list) visit(entry, 1u);
+        size_t k = 0;
+        for (const Density& density : densities)
+            for (; k < density.*end; ++k) visit(list[k], density.weight);
     }
 };
 
@@ -62,7 +94,8 @@ struct ProjectorInput {
     PlanePlacement planePlacement = PlanePlacement::SYSTEMATIC;
     // PLANES: false makes the depth buffers of each plane anew, to measure what coherence saves.
     bool planeCoherence = true;
-    bool singleLine = false;  // a bundle is one line through the whole scene
+    bool singleLine = false;               // a bundle is one line through the whole scene
+    std::vector<LineWindow> windows = {};  // of FRAGMENT_LISTS with CENTRE_SAMPLING
 };
 
 // The projectors, one a row of the table.

@@ -3,8 +3,15 @@
 
 namespace raybundle {
 
-Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches)
-    : patches(patches), pixelSize(pixelSize), smallPatches(smallPatches) {}
+Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches,
+                       std::vector<LineWindow> windows)
+    : patches(patches),
+      pixelSize(pixelSize),
+      smallPatches(smallPatches),
+      windows(std::move(windows)) {
+    for (const LineWindow& window : this->windows)
+        finestLevel = std::max(finestLevel, window.level);
+}
 
 void Rasteriser::begin(const Bundle& bundle) {
     frame = bundle;
@@ -23,14 +30,71 @@ void Rasteriser::begin(const Bundle& bundle) {
         projected[v] = glm::dvec2(q);
         depth[v] = q.z;
     }
-    // Move the window to the scene by whole pixels, so that its corner does not undo the random
+    // Move the view to the scene by whole pixels, so that its corner does not undo the random
     // shift.
+    level = 0;
+    zoom = 1;
     corner = glm::floor(glm::dvec2(low)) - bundle.shift;
     width = int(high.x - corner.x) + 2;  // a pixel more than needed, for the rounding to float
     height = int(high.y - corner.y) + 2;
     lowest = low.z;
     highest = high.z;
-    for (glm::dvec2& q : projected) q -= corner;
+    if (windows.empty()) return;
+
+    bounds.resize(patches.parents.size());
+    for (size_t i = 0; i < bounds.size(); ++i) {
+        const Parent& parent = patches.parents[i];
+        Rectangle r{projected[parent.vertex[0]], projected[parent.vertex[0]]};
+        for (int k = 1; k < (parent.isTriangle ? 3 : 4); ++k) {
+            r.low = glm::min(r.low, projected[parent.vertex[k]]);
+            r.high = glm::max(r.high, projected[parent.vertex[k]]);
+        }
+        bounds[i] = r;
+    }
+    // The shadows of the boxes do not depend on the shift, or lines near their borders would not be
+    // uniform.
+    openings.clear();
+    for (const LineWindow& window : windows) {
+        const glm::dvec3 middle(0.5f * (window.low + window.high));
+        const glm::dvec3 half(0.5f * (window.high - window.low));
+        const glm::dvec2 at(glm::dot(middle, frame.right), glm::dot(middle, frame.up));
+        const glm::dvec2 reach(glm::dot(half, glm::abs(frame.right)),
+                               glm::dot(half, glm::abs(frame.up)));
+        openings.push_back({(at - reach) * perPixel, (at + reach) * perPixel});
+    }
+    findTaken(windows.size());
+}
+
+bool Rasteriser::lookThrough(size_t window) {
+    level = windows[window].level;
+    zoom = std::ldexp(1.0, level);
+    // The grid is shifted by the same length as the whole scene's: uniformly over its pixel too.
+    const glm::dvec2 shift = glm::fract(frame.shift * zoom);
+    // Pixels whose centres are in the opening.
+    const glm::dvec2 first = glm::ceil(openings[window].low * zoom + shift - 0.5);
+    const glm::dvec2 last = glm::ceil(openings[window].high * zoom + shift - 0.5);
+    corner = first - shift;
+    width = int(last.x - first.x);
+    height = int(last.y - first.y);
+    if (width <= 0 || height <= 0) return false;
+    findTaken(window);
+    return true;
+}
+
+void Rasteriser::findTaken(size_t window) {
+    taken.clear();
+    for (size_t k = 0; k < windows.size(); ++k) {
+        const bool isFiner = windows[k].level > level || (windows[k].level == level && k < window);
+        if (k == window || !isFiner) continue;
+        const glm::dvec2 first = glm::ceil(openings[k].low * zoom - corner - 0.5);
+        const glm::dvec2 last = glm::ceil(openings[k].high * zoom - corner - 0.5);
+        const int x0 = int(std::max(0.0, first.x)), x1 = int(std::min(double(width), last.x));
+        const int y0 = int(std::max(0.0, first.y)), y1 = int(std::min(double(height), last.y));
+        if (x0 >= x1 || y0 >= y1) continue;
+        taken.resize(pixelCount(), 0);
+        for (int y = y0; y < y1; ++y)
+            std::fill_n(taken.begin() + ptrdiff_t(y) * width + x0, x1 - x0, uint8_t(1));
+    }
 }
 
 bool Rasteriser::findPlane(const Parent& parent, DepthPlane& plane) const {
@@ -39,8 +103,9 @@ bool Rasteriser::findPlane(const Parent& parent, DepthPlane& plane) const {
     const glm::dvec3 normal = glm::cross(glm::dvec3(parent.a), glm::dvec3(parent.b));
     const double slant = glm::dot(normal, frame.direction);
     if (slant == 0) return false;
-    plane.dzdx = -glm::dot(normal, frame.right) / slant * double(pixelSize);
-    plane.dzdy = -glm::dot(normal, frame.up) / slant * double(pixelSize);
+    const double size = double(pixelSize) / zoom;
+    plane.dzdx = -glm::dot(normal, frame.right) / slant * size;
+    plane.dzdy = -glm::dot(normal, frame.up) / slant * size;
     plane.z0 = glm::dot(normal, glm::dvec3(parent.origin)) / slant + (corner.x + 0.5) * plane.dzdx +
                (corner.y + 0.5) * plane.dzdy;
     return true;

@@ -7,6 +7,10 @@
 // every shape and size, and neighbouring faces never both take or both miss a pixel.
 // ROULETTE: see bundles/roulette.h.
 //
+// With windows (bundles/line_windows.h) the plane is looked at in several views, one after the
+// other: as a whole, and through each window with its finer pixels. Each point of the plane belongs
+// to one view.
+//
 // Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised; the patch
 // follows from the affine coordinates.
 #pragma once
@@ -18,6 +22,7 @@
 #include <limits>
 #include <vector>
 
+#include "bundles/line_windows.h"
 #include "bundles/projector.h"
 #include "bundles/roulette.h"
 #include "patches/patches.h"
@@ -26,27 +31,35 @@ namespace raybundle {
 
 class Rasteriser {
   public:
-    // pixelSize: edge of a pixel in metres. `patches` must outlive it. Keeps its memory from bundle
-    // to bundle.
-    Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches);
+    // pixelSize: edge of a pixel in metres, outside of the windows. `patches` must outlive it.
+    // Keeps its memory from bundle to bundle. ROULETTE has no windows.
+    Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches,
+               std::vector<LineWindow> windows = {});
 
-    // Turns to a bundle: places the window around the projected scene.
+    // Turns to a bundle and to the view of the whole scene.
     void begin(const Bundle& bundle);
 
+    // Turns to the view of a window; false if no pixel is in it.
+    bool lookThrough(size_t window);
+    size_t windowCount() const { return windows.size(); }
+    // How many lines of the finest window a line of the view in hand stands for.
+    uint32_t lineWeight() const { return 1u << (2 * (finestLevel - level)); }
+
     // Calls visit(pixel, depth in metres, side that faces against the direction) for all fragments
-    // of the scene, parent after parent.
+    // in the view, parent after parent.
     template <class Visit>
     void forEachFragment(const Visit& visit) {
-        for (const Parent& parent : patches.parents) {
+        for (size_t i = 0; i < patches.parents.size(); ++i) {
+            const Parent& parent = patches.parents[i];
             if (!parent.exchanges) continue;
             if (smallPatches == SmallPatches::ROULETTE)
                 fillPatches(parent, visit);
-            else
+            else if (level == 0 || isInView(bounds[i]))
                 sampleParent(parent, visit);
         }
     }
 
-    // The window, pixels; a pixel's index is y * width + x.
+    // The view, pixels; a pixel's index is y * width + x.
     size_t pixelCount() const { return size_t(width) * size_t(height); }
     const glm::dvec3& direction() const { return frame.direction; }
     // Depths along the direction that hold the scene, metres.
@@ -60,7 +73,7 @@ class Rasteriser {
     template <class Visit>
     void fillPatches(const Parent& parent, const Visit& visit);
 
-    // Depth over the window, metres: at the centre of pixel (0, 0) and its change per pixel.
+    // Depth over the view, metres: at the centre of pixel (0, 0) and its change per pixel.
     struct DepthPlane {
         double z0, dzdx, dzdy;
         double at(glm::dvec2 p) const { return z0 + (p.x - 0.5) * dzdx + (p.y - 0.5) * dzdy; }
@@ -68,15 +81,35 @@ class Rasteriser {
     // Of a parent; false where it is seen edge-on.
     bool findPlane(const Parent& parent, DepthPlane& plane) const;
 
+    // On the plane, in pixels of the whole scene's view, before the shift.
+    struct Rectangle {
+        glm::dvec2 low, high;
+    };
+    // A vertex in the view, pixels. The same for all parents that have it.
+    glm::dvec2 inView(uint32_t vertex) const { return projected[vertex] * zoom - corner; }
+    bool isInView(const Rectangle& r) const {
+        return r.high.x * zoom > corner.x && r.low.x * zoom < corner.x + width &&
+               r.high.y * zoom > corner.y && r.low.y * zoom < corner.y + height;
+    }
+    // Marks the pixels that belong to finer windows; of windows as fine, to the first.
+    void findTaken(size_t window);
+
     const Patches& patches;
     const float pixelSize;
     const SmallPatches smallPatches;
+    const std::vector<LineWindow> windows;
+    int finestLevel = 0;
 
     Bundle frame{};                           // the bundle in hand
-    glm::dvec2 corner{0.0};                   // of the window, pixels
-    int width = 0, height = 0;                // of the window, pixels
+    int level = 0;                            // of the view
+    double zoom = 1;                          // 2^level
+    glm::dvec2 corner{0.0};                   // of the view, its pixels
+    int width = 0, height = 0;                // of the view, its pixels
     double lowest = 0, highest = 0;           // depth, metres
-    std::vector<glm::dvec2> projected;        // per vertex: in the window, pixels
+    std::vector<glm::dvec2> projected;        // per vertex: on the plane
+    std::vector<Rectangle> bounds;            // per parent, if there are windows
+    std::vector<Rectangle> openings;          // per window: what of the plane is in it
+    std::vector<uint8_t> taken;               // per pixel of the view; empty: none
     std::vector<double> depth;                // per vertex, metres
     std::vector<double> spanLeft, spanRight;  // per row of a parent, pixels
     Roulette roulette;
@@ -90,14 +123,15 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
     double yMin = std::numeric_limits<double>::max(), yMax = -yMin;
     double zMin = std::numeric_limits<double>::max(), zMax = -zMin;
     for (int k = 0; k < sides; ++k) {
-        q[k] = projected[parent.vertex[k]];
+        q[k] = inView(parent.vertex[k]);
         yMin = std::min(yMin, q[k].y);
         yMax = std::max(yMax, q[k].y);
         zMin = std::min(zMin, depth[parent.vertex[k]]);
         zMax = std::max(zMax, depth[parent.vertex[k]]);
     }
     // Row y belongs to the parent if its centre y + 0.5 lies in [yMin, yMax).
-    const int row0 = int(std::ceil(yMin - 0.5)), row1 = int(std::ceil(yMax - 0.5));
+    const int row0 = std::max(0, int(std::ceil(yMin - 0.5)));
+    const int row1 = std::min(height, int(std::ceil(yMax - 0.5)));
     if (row0 >= row1) return;
     const glm::dvec2 ea = q[1] - q[0], eb = q[sides - 1] - q[0];
     const double det = ea.x * eb.y - ea.y * eb.x;
@@ -111,7 +145,8 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
         glm::dvec2 lower = q[k], upper = q[(k + 1) % sides];
         const bool rising = lower.y < upper.y;
         if (!rising) std::swap(lower, upper);
-        const int first = int(std::ceil(lower.y - 0.5)), last = int(std::ceil(upper.y - 0.5));
+        const int first = std::max(row0, int(std::ceil(lower.y - 0.5)));
+        const int last = std::min(row1, int(std::ceil(upper.y - 0.5)));
         if (first >= last) continue;
         const double slope = (upper.x - lower.x) / (upper.y - lower.y);
         std::vector<double>& bound = rising == (det > 0) ? spanRight : spanLeft;
@@ -138,6 +173,7 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
             const double z = std::clamp(plane.z0 + x * plane.dzdx + y * plane.dzdy, zMin, zMax);
             const uint32_t patch = parent.firstPatch + parent.patchAt(s, t);
             const uint32_t pixel = uint32_t(y) * uint32_t(width) + uint32_t(x);
+            if (!taken.empty() && taken[pixel]) continue;
             visit(pixel, z, 2 * patch + facing);
         }
     }
@@ -146,9 +182,9 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
 template <class Visit>
 void Rasteriser::fillPatches(const Parent& parent, const Visit& visit) {
     const int sides = parent.isTriangle ? 3 : 4;
-    const glm::dvec2 q0 = projected[parent.vertex[0]];
-    const glm::dvec2 ea = projected[parent.vertex[1]] - q0;
-    const glm::dvec2 eb = projected[parent.vertex[size_t(sides) - 1]] - q0;
+    const glm::dvec2 q0 = inView(parent.vertex[0]);
+    const glm::dvec2 ea = inView(parent.vertex[1]) - q0;
+    const glm::dvec2 eb = inView(parent.vertex[size_t(sides) - 1]) - q0;
     const double det = ea.x * eb.y - ea.y * eb.x;
     DepthPlane plane;
     if (det == 0 || !findPlane(parent, plane)) return;

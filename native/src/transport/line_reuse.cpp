@@ -206,15 +206,12 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
 size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minLines, uint32_t seed,
                                      const std::vector<bool>& wanted, const Field& reflected,
                                      Irradiance& irradiance) const {
-    auto linesAt = [&](uint32_t side) {
-        return float(counts.total[side][0] + counts.total[side][1]);
-    };
+    auto linesAt = [&](uint32_t side) { return float(counts.linesMet(side)); };
     // In hand: the starved sides that are wanted, later those that their rays meet too.
     std::vector<uint32_t> starved;
     std::vector<bool> isOther(counts.sideCount());  // starved, not in hand yet
     for (uint32_t i = 0; i < counts.sideCount(); ++i) {
-        const bool isStarved =
-            counts.total[i][0] + counts.total[i][1] + counts.touching[i] < minLines;
+        const bool isStarved = counts.linesMetInAll(i) < minLines;
         if (isStarved && wanted[i])
             starved.push_back(i);
         else

@@ -60,15 +60,15 @@ void StreamingReuse::add(const BundleLines& bundle) {
         directSum[to] += lineCount * glm::dvec3(emission[from]);
         arriving[to] += lineCount * glm::dvec3(exitance[from]);
     };
-    for (const Exchange& x : bundle.exchanges) {
-        send(x.i, x.j, x.lines);
-        send(x.j, x.i, x.lines);
-    }
-    for (uint32_t side : bundle.sky) {
-        meet(side, 1);
-        weight[side] += newest;
-        directSum[side] += worldExitance;
-    }
+    bundle.forEachExchange([&](const Exchange& x, double density) {
+        send(x.i, x.j, x.lines * density);
+        send(x.j, x.i, x.lines * density);
+    });
+    bundle.forEachSky([&](uint32_t side, double density) {
+        meet(side, density);
+        weight[side] += newest * density;
+        directSum[side] += density * worldExitance;
+    });
     for (uint32_t side : met) {
         indirectSum[side] += newest * arriving[side];
         exitance[side] = source[side] + patches.reflectance[side] * (direct(side) + indirect(side));
