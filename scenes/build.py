@@ -18,7 +18,7 @@ if str(FOLDER) not in sys.path:
 construction = importlib.import_module("build.construction")
 
 SCENES = ("cornell_box", "furnace", "facing_squares", "sphere_interior", "big_room", "office",
-          "two_rooms", "open_court", "thin_wall", "instances")
+          "two_rooms", "open_court", "thin_wall", "instances", "house_on_plain", "laid_table")
 
 
 def build_scene(name: str, folder: Path = FOLDER, density: float = 1.0) -> Path:
