@@ -8,6 +8,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "bake/error.h"
+#include "patches/patch_size.h"
 #include "test_scenes.h"
 
 namespace raybundle {
@@ -221,6 +222,42 @@ TEST(Patches, AScenesDistanceFromTheOriginDoesNotMatter) {
         ASSERT_NEAR(far.area[p], near.area[p], 1e-6f * near.area[p]);
         ASSERT_LT(glm::distance(far.point(p, {0.5f, 0.5f}), near.point(p, {0.5f, 0.5f})), 1e-5f);
     }
+}
+
+TEST(PatchSize, TinyGroupsInAVastSceneGetTheirOwn) {
+    auto cube = [](const glm::dvec3& at, double edge) {
+        Extent extent;
+        extent.add(at);
+        extent.add(at + edge);
+        return extent;
+    };
+    // A plain, a house with a chair in it, another house 200 m off, and a tree of 3 m by itself.
+    std::vector<Extent> objects(1);
+    objects[0].add({-500, -500, 0});
+    objects[0].add({500, 500, 0});
+    for (const Extent& extent :
+         {cube({0, 0, 0}, 8), cube({2, 2, 0}, 1), cube({200, 0, 0}, 8), cube({0, 300, 0}, 3)})
+        objects.push_back(extent);
+    const std::vector<double> sizes = automaticPatchSizes(objects);
+    const double plain = objects[0].diagonal() / 64, house = objects[1].diagonal() / 64;
+    EXPECT_NEAR(sizes[0], plain, 1e-3 * plain);
+    EXPECT_GE(sizes[1], house);
+    EXPECT_LT(sizes[1], 2 * house);
+    EXPECT_EQ(sizes[2], sizes[1]) << "a chair that is no more than tiny in its house";
+    EXPECT_EQ(sizes[3], sizes[1]);
+    EXPECT_NEAR(sizes[4], objects[4].diagonal() / 64, 1e-9);
+}
+
+TEST(PatchSize, ObjectsOfASceneOfTheirSizeHaveOneSize) {
+    std::vector<Extent> objects(3);
+    objects[0].add({0, 0, 0});
+    objects[0].add({6, 5, 3});
+    objects[1].add({1, 1, 0});
+    objects[1].add({2, 2, 1});
+    objects[2].add({4, 1, 0});
+    objects[2].add({4.4, 1.4, 0.5});
+    const double wanted = objects[0].diagonal() / 64;
+    for (double size : automaticPatchSizes(objects)) EXPECT_EQ(size, wanted);
 }
 
 TEST(Reflectance, AnImageOfACheckerAveragesExactly) {

@@ -14,6 +14,7 @@
 
 #include "bake/combination.h"
 #include "bake/geometry_hash.h"
+#include "bake/window_noise.h"
 #include "patches/reflectance.h"
 #include "reconstruction/reconstruction.h"
 #include "transport/set_light.h"
@@ -32,6 +33,8 @@ constexpr float kTouchOfPatch = 0.02f;
 constexpr double kErrorSlope = 0.65;
 // Relative residual of the last solve: a share of the noise, within these bounds.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
+// The lines' noise on the patches of any one window may be this many times the target.
+constexpr double kWindowTargets = 2;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 
 class Stopwatch {
@@ -168,7 +171,7 @@ struct Bake::Trace {
             if (parent.stopsDirect != parent.exchanges && !directVisibility)
                 directVisibility =
                     std::make_unique<const Visibility>(patches, Blockers::STOPPING_DIRECT);
-        touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.size);
+        touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.finest);
         ProjectorInput input{patches,
                              visibility,
                              pixelSize(patches, settings.linesPerBundle),
@@ -357,18 +360,22 @@ void Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports
         errors = relativeNoise(lights, halves, weight, transport.bias());
 
         const auto worst = std::max_element(errors.begin(), errors.end());
-        if (*worst <= settings.targetError) break;
+        const double onSmall = worstWindowNoise(patches, trace->windowOf, halves, weight);
+        const double excess = std::max(*worst, onSmall / kWindowTargets) / settings.targetError;
+        if (excess <= 1) break;
         if (bundles >= most) {
             const int32_t set = lights[size_t(worst - errors.begin())].set;
             report.warnings.push_back(
                 "max_bundles was reached at " + std::to_string(bundles) + " bundles: the noise " +
                 (set == kNoLightSet ? "" : "of light set \"" + scene.lightSets[set] + "\" ") +
-                "is " + std::to_string(100 * *worst) + " % and not below " +
-                std::to_string(100 * settings.targetError) + " %");
+                "is " + std::to_string(100 * *worst) + " %" +
+                (onSmall > *worst ? ", on small patches " + std::to_string(100 * onSmall) + " %,"
+                                  : "") +
+                " and not below " + std::to_string(100 * settings.targetError) + " %");
             break;
         }
         // Double at most; less where the error's slope says that less will do.
-        const double factor = std::pow(*worst / settings.targetError, 1 / kErrorSlope);
+        const double factor = std::pow(excess, 1 / kErrorSlope);
         wanted = std::min(most, (uint32_t(bundles * std::min(2.0, 1.05 * factor)) + 2) & ~1u);
     }
 

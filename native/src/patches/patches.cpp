@@ -7,6 +7,7 @@
 
 #include "bake/error.h"
 #include "patches/coincidence.h"
+#include "patches/patch_size.h"
 #include "patches/reflectance.h"
 #include "scene/triangulation.h"
 
@@ -84,17 +85,19 @@ class Subdivision {
     void placeInstances() {
         std::vector<glm::dvec3> world;
         glm::dvec3 low(INFINITY), high(-INFINITY);
-        for (const Instance& instance : scene.instances) {
+        extents.resize(scene.instances.size());
+        for (size_t i = 0; i < scene.instances.size(); ++i) {
+            const Instance& instance = scene.instances[i];
             firstVertex.push_back(world.size());
             for (const glm::vec3& vertex : scene.meshes[instance.mesh].vertices) {
                 world.push_back(glm::dvec3(instance.transform * glm::dvec4(vertex, 1.0)));
+                extents[i].add(world.back());
                 low = glm::min(low, world.back());
                 high = glm::max(high, world.back());
             }
         }
         if (world.empty()) return;
         patches.centre = 0.5 * (low + high);
-        diagonal = glm::length(high - low);
         patches.vertices.reserve(world.size());
         for (const glm::dvec3& vertex : world) {
             patches.vertices.push_back(glm::vec3(vertex - patches.centre));
@@ -102,14 +105,15 @@ class Subdivision {
         }
     }
 
-    void cutFaces(double size) {
+    // sizes: edge of a patch of each instance, metres.
+    void cutFaces(const std::vector<double>& sizes) {
         for (size_t i = 0; i < scene.instances.size(); ++i) {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
             const std::vector<bool> closed = closedFaces(mesh);
             const size_t firstParent = patches.parents.size();
             size_t degenerate = 0;
             for (size_t f = 0; f < mesh.faceCount(); ++f)
-                if (!cutFace(uint32_t(i), int32_t(f), size)) ++degenerate;
+                if (!cutFace(uint32_t(i), int32_t(f), sizes[i])) ++degenerate;
             for (size_t p = firstParent; p < patches.parents.size(); ++p)
                 patches.parents[p].isSolid = closed[size_t(patches.parents[p].face)];
             for (size_t p = firstParent; p < patches.parents.size(); ++p) {
@@ -124,7 +128,7 @@ class Subdivision {
         }
     }
 
-    double diagonal = 0;
+    std::vector<Extent> extents;  // per instance
 
   private:
     using Triangle = std::array<uint32_t, 3>;  // into Patches::vertices
@@ -288,14 +292,20 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     Subdivision subdivision(scene, patches);
     subdivision.placeInstances();
     if (patches.vertices.empty()) return patches;
-    patches.size = patchSize > 0 ? patchSize : float(subdivision.diagonal / 64);
-    if (!(patches.size > 0)) patches.size = 1;
-    subdivision.cutFaces(patches.size);
+    std::vector<double> sizes = patchSize > 0
+                                    ? std::vector<double>(scene.instances.size(), double(patchSize))
+                                    : automaticPatchSizes(subdivision.extents);
+    for (double& size : sizes)
+        if (!(size > 0)) size = 1;
+    patches.size = float(*std::max_element(sizes.begin(), sizes.end()));
+    patches.finest = float(*std::min_element(sizes.begin(), sizes.end()));
+    subdivision.cutFaces(sizes);
 
     // Fit into maxPatches; a parent keeps at least one patch.
     while (numberPatches(patches) > std::max(maxPatches, patches.parents.size())) {
         coarsen(patches, 1.1);
         patches.size *= 1.1f;
+        patches.finest *= 1.1f;
     }
     const size_t count = numberPatches(patches);
     if (count > size_t(1) << 30)

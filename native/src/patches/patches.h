@@ -81,6 +81,7 @@ struct Patches {
     std::vector<glm::vec3> emission;     // per side, W/m^2
     double totalArea = 0;                // of all patches, one side, m^2
     float size = 0;                      // target edge of a patch, metres
+    float finest = 0;                    // the same where it is least (patch_size.h)
     std::vector<std::string> warnings;
     size_t degenerateFaces = 0;  // left out
 
@@ -98,8 +99,8 @@ struct Patches {
     uint32_t patchAt(uint32_t parent, const glm::vec3& point) const;
 };
 
-// Cuts all instances of the scene into patches with edges of about `patchSize` metres (0: a 64th of
-// the scene's diagonal), coarser if there would be more than maxPatches, and gives each its
+// Cuts all instances of the scene into patches with edges of about `patchSize` metres (0: as
+// automaticPatchSizes has it), coarser if there would be more than maxPatches, and gives each its
 // reflectance (mean over its area) and emission.
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches);
 
