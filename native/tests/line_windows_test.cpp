@@ -175,7 +175,7 @@ TEST(LineWindows, DensityFollowsThePatches) {
         const LineWindow& window = density.windows[size_t(density.windowOf[p])];
         const double pixel = std::ldexp(double(density.pixelSize), -window.level);
         const double pixels = double(patches.area[parent.firstPatch]) / (pixel * pixel);
-        EXPECT_GT(pixels, 0.45);
+        EXPECT_GT(pixels, 0.24);
         EXPECT_LT(pixels, 4);
         for (int k = 0; k < 3; ++k) {
             const glm::vec3& v = patches.vertices[parent.vertex[size_t(k)]];

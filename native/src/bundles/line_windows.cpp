@@ -13,15 +13,16 @@ namespace {
 // Patches with fewer pixels than this are starved: 64 bundles give them 4 lines. Where they are at
 // least kLeastStarvedShare of all patches, windows are made.
 constexpr double kStarvedPixels = 1.0 / 8, kLeastStarvedShare = 0.1;
-// A patch belongs into the next level while it has fewer pixels than this.
-constexpr double kFewPixels = 0.5;
+// A patch belongs into the next level while it has fewer pixels than this. A whole window gets
+// finer only for this share of the patches that it was made for.
+constexpr double kFewPixels = 0.25, kLeastFinerShare = 0.2;
 // Pixels of all windows along a direction, in the mean: finer levels are left out beyond it.
 constexpr double kMostWindowPixels = 1 << 17;
 constexpr size_t kMostWindows = 24, kLeastPatches = 64;
 // What a window costs besides its pixels, in pixels: looking whether the parents meet it.
 constexpr double kWindowCost = 500, kParentCost = 1.0 / 32;
-constexpr double kWorthSplitting = 0.75;  // share of the cost that splitting must come below
-constexpr double kAlmostAll = 0.6;        // a window with so much of the one around replaces it
+constexpr double kWorthSplitting = 0.9;  // share of the cost that splitting must come below
+constexpr double kAlmostAll = 0.6;       // a window with so much of the one around replaces it
 constexpr int kBins = 16;
 // The counts' bits: lines of the largest patch in the finest pixels, times the bundles.
 constexpr double kMostUnits = double(1u << 31) / kMostWindowBundles;
@@ -191,7 +192,9 @@ class Planner {
             const Box outerBox{outer.low, outer.high};
             if (box.meanShadow() > kAlmostAll * outerBox.meanShadow()) {
                 const double more = pixelsOf(outerBox, level) - pixelsOf(outerBox, outer.level);
-                if (pixels + more > kMostWindowPixels) return kNoWindow;
+                const bool isWorthIt = double(clustering.patchCount(members)) >=
+                                       kLeastFinerShare * double(madeFor[size_t(around)]);
+                if (!isWorthIt || pixels + more > kMostWindowPixels) return kNoWindow;
                 pixels += more;
                 outer.level = level;
                 return around;
@@ -200,6 +203,7 @@ class Planner {
         if (pixels + pixelsOf(box, level) > kMostWindowPixels) return kNoWindow;
         pixels += pixelsOf(box, level);
         density.windows.push_back({box.low, box.high, level});
+        madeFor.push_back(clustering.patchCount(members));
         const int32_t window = int32_t(density.windows.size()) - 1;
         for (uint32_t m : members) density.windowOf[m] = window;
         return window;
@@ -208,7 +212,8 @@ class Planner {
     const Clustering& clustering;
     const double coarse;  // edge of a pixel outside of all windows, metres
     LineDensity& density;
-    double pixels = 0;  // of all windows
+    std::vector<size_t> madeFor;  // per window: patches
+    double pixels = 0;            // of all windows
 };
 
 }  // namespace
