@@ -21,7 +21,7 @@ constexpr double kMostWindowPixels = 1 << 17;
 constexpr size_t kMostWindows = 24, kLeastPatches = 64;
 // What a window costs besides its pixels, in pixels: looking whether the parents meet it.
 constexpr double kWindowCost = 500, kParentCost = 1.0 / 32;
-constexpr double kWorthSplitting = 0.9;  // share of the cost that splitting must come below
+constexpr double kWorthSplitting = 0.97;  // share of the cost that splitting must come below
 constexpr double kAlmostAll = 0.6;       // a window with so much of the one around replaces it
 constexpr int kBins = 16;
 // The counts' bits: lines of the largest patch in the finest pixels, times the bundles.
