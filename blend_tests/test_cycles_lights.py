@@ -262,7 +262,8 @@ def test_emission_of_one_side(floor, new_object, new_material, flipped, size):
     if not flipped:
         lamp.data.flip_normals()
     lamp.raybundle.role = 'OCCLUDE'
-    ceiling = new_object("Ceiling", *square(SIZE, DIVISIONS), floor.data.materials[0], (0.0, 0.0, 2.6))
+    ceiling = new_object("Ceiling", *square(SIZE, DIVISIONS), floor.data.materials[0],
+                         (0.0, 0.0, 2.6))
     ceiling.data.flip_normals()
     # One of them gets the lamp's light, the other what that one reflects past the lamp.
     # Dark beside the other, it needs less noise than most.

@@ -188,12 +188,13 @@ RB_API rb_error rb_add_area_light(rb_scene scene, const char* name, const float 
                                   const float axis_u[3], const float axis_v[3],
                                   const float radiance[3], rb_area_shape shape, int32_t* light);
 
-/* Narrows the light of an area light, as a grid before a softbox does: spread is the full opening in
- * radians, 0 to pi. The power is kept: the light is brighter along its axis. Without it: pi. */
+/* Narrows the light of an area light, as a grid before a softbox does: spread is the full opening
+ * in radians, 0 to pi. The power is kept: the light is brighter along its axis. Without it: pi. */
 RB_API rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread);
 
-/* Whether surfaces stop the light of a light (they do unless this says no). Where they do not, every
- * surface that faces the light gets it; the energy balance then takes what arrives for emitted. */
+/* Whether surfaces stop the light of a light (they do unless this says no). Where they do not,
+ * every surface that faces the light gets it; the energy balance then takes what arrives for
+ * emitted. */
 RB_API rb_error rb_set_light_shadows(rb_scene scene, int32_t light, bool casts_shadows);
 
 /* Sets the constant radiance (RGB) of the world around the scene; black by default. */
@@ -203,13 +204,11 @@ RB_API rb_error rb_set_world(rb_scene scene, const float radiance[3]);
  * width * height pixels, linear RGB in W/(m^2 sr), bottom row first. Cycles' mapping: the middle
  * column is +X, the one at 3/4 of the width -Y, the top row +Z. Its light comes with the lights',
  * by shadow rays from the receivers. */
-RB_API rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height,
-                                   const float* rgb);
+RB_API rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height, const float* rgb);
 
 /* Adds a light set: a named group of lights whose light a bake also gives by itself. Names differ.
- * All sets
- * are baked along the same lines, each solved by itself; only the solver LINE_REUSE can. Id in
- * *set. */
+ * All sets are baked along the same lines, each solved by itself; only the solver LINE_REUSE can.
+ * Id in *set. */
 RB_API rb_error rb_add_light_set(rb_scene scene, const char* name, int32_t* set);
 
 /* Put a light, the emission of an instance, or the world into a light set, or with RB_NO_LIGHT_SET,

@@ -59,8 +59,8 @@ inline uint64_t edgeKey(int32_t a, int32_t b) {
 // The angle of each corner, radians.
 std::vector<float> cornerAngles(const Mesh& mesh);
 
-// A light set is a named group of lights with results of its own. What belongs to none, kNoLightSet,
-// only counts in the light of all.
+// A light set is a named group of lights with results of its own. What belongs to none,
+// kNoLightSet, only counts in the light of all.
 constexpr int32_t kNoLightSet = RB_NO_LIGHT_SET;
 
 // A mesh in the world. transform maps object space to world space (the last row is 0 0 0 1).
@@ -98,8 +98,9 @@ struct Light {
     int32_t lightSet = kNoLightSet;
 };
 
-// Radiance of the world by direction, W/(m^2 sr): equirectangular, bottom row first. Cycles' mapping:
-// the middle column is +X, the one at 3/4 of the width -Y, the top row +Z. Without pixels: none.
+// Radiance of the world by direction, W/(m^2 sr): equirectangular, bottom row first. Cycles'
+// mapping: the middle column is +X, the one at 3/4 of the width -Y, the top row +Z. Without
+// pixels: none.
 struct WorldImage {
     int width = 0;
     int height = 0;
