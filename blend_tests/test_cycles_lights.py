@@ -268,7 +268,7 @@ def test_emission_of_one_side(floor, new_object, new_material, flipped, size):
     # One of them gets the lamp's light, the other what that one reflects past the lamp.
     # Dark beside the other, it needs less noise than most.
     items = [floor, ceiling]
-    expected = cycles_light(items, samples=900)
+    expected = cycles_light(items, samples=3600)
     means = {name: light.mean() for name, light in expected.items()}
     assert (means["Floor"] > 3 * means["Ceiling"]) != flipped
     assert (means["Ceiling"] > 3 * means["Floor"]) == flipped
