@@ -189,7 +189,9 @@ TEST(BakeOutputs, TheBackIsBakedWhereItIsAskedFor) {
     for (const glm::vec3& v : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
         mean += double(v.x) * kPi / 24;
     EXPECT_NEAR(mean, 4 * kPi / 24 / 0.5, 0.2) << "at the corners it is darker than in the mean";
-    EXPECT_TRUE(reportOf(bake)["warnings"].empty()) << reportOf(bake)["warnings"];
+    // Six faces are too few for its light, which is said; nothing else is.
+    for (const Json& warning : reportOf(bake)["warnings"])
+        EXPECT_TRUE(mentions(warning, "too coarse")) << warning;
 }
 
 TEST(BakeSameness, TheNumberOfThreadsDoesNotMatter) {

@@ -307,6 +307,10 @@ RB_API rb_error rb_get_set_corner_light(rb_bake bake, int32_t set, int32_t insta
 RB_API rb_error rb_get_set_vertex_light(rb_bake bake, int32_t set, int32_t instance,
                                         rb_output output, float* rgb, size_t count);
 
+/* Writes the stated error around each corner of an instance with role RB_ROLE_BAKE to error: count
+ * floats, radiance of LIGHTING (RMS over RGB), from noise, discretisation and mesh together. */
+RB_API rb_error rb_get_corner_error(rb_bake bake, int32_t instance, float* error, size_t count);
+
 /* The report of the last successful rb_execute_bake as JSON (UTF-8) in *json; valid until the bake
  * runs again or is released. Keys: docs/c_api.md. */
 RB_API rb_error rb_get_report(rb_bake bake, const char** json);

@@ -121,6 +121,16 @@ rb_error rb_get_set_vertex_light(rb_bake bake, int32_t set, int32_t instance, rb
     });
 }
 
+rb_error rb_get_corner_error(rb_bake bake, int32_t instance, float* error, size_t count) {
+    return guarded([&] {
+        need(bake, "bake");
+        const std::vector<float>& values = bake->bake.instanceLight(instance).error;
+        needCount(count, values.size(), "count");
+        needArray(error, count, "error");
+        if (count) std::memcpy(error, values.data(), count * sizeof(float));
+    });
+}
+
 rb_error rb_get_report(rb_bake bake, const char** json) {
     return guarded([&] {
         need(bake, "bake");

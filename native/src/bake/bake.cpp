@@ -17,6 +17,7 @@
 #include "bake/window_noise.h"
 #include "patches/reflectance.h"
 #include "reconstruction/reconstruction.h"
+#include "reconstruction/stated_error.h"
 #include "transport/set_light.h"
 
 namespace raybundle {
@@ -29,8 +30,6 @@ constexpr int kMaxPlanePixels = 4096;  // along the scene's diameter
 // Surfaces not further apart than these shares of the scene's radius and of a patch touch.
 constexpr float kTouchOfRadius = 1e-4f;
 constexpr float kTouchOfPatch = 0.02f;
-// The noise falls with the number of bundles to about this power.
-constexpr double kErrorSlope = 0.65;
 // Relative residual of the last solve: a share of the noise, within these bounds.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 // The lines' noise on the patches of any one window may be this many times the target.
@@ -208,6 +207,11 @@ struct Bake::Trace {
     // transport uses lines without counting them.
     bool isWhole() const { return tracer->bundleCount() == counts.bundles; }
 
+    // Per side: the share that nothing covers.
+    std::vector<float> exposedShare() const {
+        return surrounding.exposed.empty() ? counts.exposedShare() : surrounding.exposed;
+    }
+
     // Through the bounding sphere.
     double linesPerBundle() const {
         return glm::pi<double>() * double(patches.radius) * double(patches.radius) /
@@ -245,7 +249,8 @@ void Bake::runStages(const Scene& scene) {
         const Patches& patches = trace->patches;
         SetLights lights = shootSources(scene, report);
         warnOfVisibility(scene, lights, settings, report);
-        std::vector<float> exposed(patches.sideCount(), 1.0f);
+        SideNoise noise(patches.sideCount());
+        exposed.assign(patches.sideCount(), 1.0f);
         if (isDark(scene, lights, report)) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
         } else {
@@ -255,9 +260,8 @@ void Bake::runStages(const Scene& scene) {
                                   trace->surrounding.exposed, trace->touchDistance, settings,
                                   *trace->tracer, trace->counts});
             const Transports transports = makeTransports(settings.solver, inputs);
-            solveToTarget(scene, lights, transports, report);
-            exposed = trace->surrounding.exposed.empty() ? trace->counts.exposedShare()
-                                                         : trace->surrounding.exposed;
+            noise = solveToTarget(scene, lights, transports, report);
+            exposed = trace->exposedShare();
             for (const SetLight& light : lights)
                 balanceEnergy(patches, light, exposed, transports.front()->openShare(), report);
             report.bundles = transports.front()->bundleCount();
@@ -266,6 +270,8 @@ void Bake::runStages(const Scene& scene) {
 
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
         light = reconstruct(scene, patches, lights, exposed, settings, progress, report);
+        stateErrors(scene, patches, instanceRanges(scene, patches), irradiance,
+                    {exposed, noise.ofBundles, noise.direct}, settings.targetError, light, report);
     }
     report.patches = trace->patches.count();
     report.lines = trace->tracer->lineCount();
@@ -321,13 +327,13 @@ SetLights Bake::shootSources(const Scene& scene, Report& report) {
 
 // Adds bundles by doubling until the difference of the two halves' estimates meets the target, in
 // the light of all and in that of each light set.
-void Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
-                         Report& report) {
+SideNoise Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
+                              Report& report) {
     Transport& transport = *transports.front();  // traces for all
     const Patches& patches = trace->patches;
     const size_t n = patches.sideCount();
-    // Sides whose noise counts: those with a result.
-    std::vector<float> weight(n, 0);
+    // Sides whose noise counts: those with a result, by the area that is exposed as far as known.
+    std::vector<float> weight(n, 0), area(n, 0);
     std::vector<bool> wantedSides(n, false);
     bool anyBaked = false;
     for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
@@ -336,8 +342,9 @@ void Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports
             scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
         wantedSides[side] =
             !anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side));
-        if (wantedSides[side]) weight[side] = patches.area[side / 2];
+        if (wantedSides[side]) area[side] = patches.area[side / 2];
     }
+    SetNoise noise(lights, weight);
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     const uint32_t most = std::max(2u, uint32_t(settings.maxBundles) & ~1u);
@@ -357,7 +364,10 @@ void Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports
             for (int h = 0; h < 2; ++h)
                 halves[k][h] =
                     transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError);
-        errors = relativeNoise(lights, halves, weight, transport.bias());
+        const std::vector<float> exposed = trace->exposedShare();
+        for (size_t side = 0; side < n; ++side) weight[side] = area[side] * exposed[side];
+        noise.look(halves, bundles, transport.bias());
+        errors = noise.relative();
 
         const auto worst = std::max_element(errors.begin(), errors.end());
         const double onSmall = worstWindowNoise(patches, trace->windowOf, halves, weight);
@@ -375,7 +385,7 @@ void Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports
             break;
         }
         // Double at most; less where the error's slope says that less will do.
-        const double factor = std::pow(excess, 1 / kErrorSlope);
+        const double factor = std::pow(excess, 1 / kNoiseSlope);
         wanted = std::min(most, (uint32_t(bundles * std::min(2.0, 1.05 * factor)) + 2) & ~1u);
     }
 
@@ -411,6 +421,7 @@ void Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
     progress.report(RB_STAGE_SOLVE, 1);
+    return noise.perSide();
 }
 
 const Patches& Bake::patches() const { return trace->patches; }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/noise.h"
 #include "bake/progress.h"
 #include "bake/report.h"
 #include "bake/settings.h"
@@ -40,6 +41,8 @@ class Bake {
     // Patches of the last run and the light on them, for comparison of methods. Only after a run.
     const Patches& patches() const;
     const Irradiance& patchIrradiance() const { return irradiance; }
+    // Per side: the share of it that nothing covers.
+    const std::vector<float>& exposedShare() const { return exposed; }
 
     // The result of an instance with role BAKE; throws Error if there is none.
     const InstanceLight& instanceLight(int32_t instance) const;
@@ -51,11 +54,12 @@ class Bake {
     void runStages(const Scene& scene);
     void makePatches(const Scene& scene, Report& report);
     SetLights shootSources(const Scene& scene, Report& report);
-    void solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
-                       Report& report);
+    SideNoise solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
+                            Report& report);
 
     std::unique_ptr<Trace> trace;  // of the last run's geometry
     Irradiance irradiance;
+    std::vector<float> exposed;
     std::vector<InstanceLight> light;
     std::string json;
     bool ran = false;

@@ -16,7 +16,18 @@ int64_t peakMemoryBytes() {
     return int64_t(usage.ru_maxrss) * 1024;
 }
 
+nlohmann::ordered_json toJson(const Report::Errors& error) {
+    return {{"noise", error.noise},
+            {"discretisation", error.discretisation},
+            {"mesh", error.mesh},
+            {"total", error.total()}};
+}
+
 }  // namespace
+
+double Report::Errors::total() const {
+    return std::sqrt(noise * noise + discretisation * discretisation + mesh * mesh);
+}
 
 double Report::balanceError() const {
     return emitted > 0 ? std::abs(emitted - absorbed - escaped) / emitted : 0;
@@ -36,8 +47,10 @@ std::string Report::json() const {
     for (const LightSet& set : lightSets)
         lightSets_.push_back({{"name", set.name}, {"estimated_error", set.estimatedError}});
     for (const Object& object : objects)
-        objects_.push_back(
-            {{"name", object.name}, {"corners", object.corners}, {"status", object.status}});
+        objects_.push_back({{"name", object.name},
+                            {"corners", object.corners},
+                            {"status", object.status},
+                            {"error", toJson(object.error)}});
     for (const Skip& skip : skipped)
         if (skip.count > 0)
             skipped_.push_back({{"what", skip.what}, {"why", skip.why}, {"count", skip.count}});
@@ -48,6 +61,7 @@ std::string Report::json() const {
                                  {"exchanges", exchanges},
                                  {"shadow_rays", shadowRays},
                                  {"estimated_error", estimatedError},
+                                 {"error", toJson(error)},
                                  {"energy",
                                   {{"emitted", emitted},
                                    {"absorbed", absorbed},

@@ -13,10 +13,16 @@
 namespace raybundle {
 
 struct Report {
+    // Relative RMS by exposed area; what each covers: reconstruction/stated_error.h.
+    struct Errors {
+        double noise = 0, discretisation = 0, mesh = 0;
+        double total() const;
+    };
     struct Object {
         std::string name;
         size_t corners = 0;
         std::string status;
+        Errors error{};  // relative to the object's own light
     };
     struct Skip {
         std::string what, why;
@@ -33,7 +39,8 @@ struct Report {
     uint64_t lines = 0;
     size_t exchanges = 0;  // merged pairs of patch sides
     uint64_t shadowRays = 0;
-    double estimatedError = 0;                      // relative noise
+    double estimatedError = 0;  // relative noise
+    Errors error;
     double emitted = 0, absorbed = 0, escaped = 0;  // W, sum of the channels
     std::vector<LightSet> lightSets;
     std::vector<Object> objects;

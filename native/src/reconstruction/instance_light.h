@@ -29,6 +29,7 @@ struct InstanceLight : CornerLight {
     size_t vertexCount = 0;
     std::vector<float> cornerAngles;  // radians, weights of the mean at a vertex
     std::vector<CornerLight> sets;    // per light set of the scene
+    std::vector<float> error;         // per corner, W/(m^2 sr), see rb_get_corner_error
 
     // An output of this or of a set, per vertex: the mean of its corners, weighted by their angles.
     std::vector<glm::vec3> perVertex(rb_output output) const { return perVertex(*this, output); }

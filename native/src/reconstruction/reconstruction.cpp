@@ -18,22 +18,6 @@ using Field = std::vector<glm::vec3>;
 
 double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
 
-// Cells and parents are in the order of the instances.
-std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches) {
-    std::vector<InstanceRange> ranges(scene.instances.size());
-    for (uint32_t c = 0; c < patches.cells.size(); ++c) {
-        InstanceRange& range = ranges[patches.cells[c].instance];
-        if (range.lastCell == 0) range.firstCell = c;
-        range.lastCell = c + 1;
-    }
-    for (uint32_t p = 0; p < patches.parents.size(); ++p) {
-        InstanceRange& range = ranges[patches.parents[p].instance];
-        if (range.lastParent == 0) range.firstParent = p;
-        range.lastParent = p + 1;
-    }
-    return ranges;
-}
-
 // Light of the sources at corners, for all instances in one go.
 class SourceLight {
   public:
@@ -133,6 +117,21 @@ CornerLight cornerLight(const SmoothRegions& regions, const Field& direct, const
 
 }  // namespace
 
+std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches) {
+    std::vector<InstanceRange> ranges(scene.instances.size());
+    for (uint32_t c = 0; c < patches.cells.size(); ++c) {
+        InstanceRange& range = ranges[patches.cells[c].instance];
+        if (range.lastCell == 0) range.firstCell = c;
+        range.lastCell = c + 1;
+    }
+    for (uint32_t p = 0; p < patches.parents.size(); ++p) {
+        InstanceRange& range = ranges[patches.parents[p].instance];
+        if (range.lastParent == 0) range.firstParent = p;
+        range.lastParent = p + 1;
+    }
+    return ranges;
+}
+
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
                                        const SetLights& lights, const std::vector<float>& exposed,
                                        const Settings& settings, const Progress& progress,
@@ -157,7 +156,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         const Mesh& mesh = scene.meshes[instance.mesh];
         InstanceLight& out = result[i];
         out.name = instance.name;
-        report.objects[i] = {instance.name, mesh.cornerCount(), "occluder"};
+        report.objects[i] = {instance.name, mesh.cornerCount(), "occluder", {}};
         if (instance.role != RB_ROLE_BAKE) {
             ++occluders;
             continue;

@@ -20,10 +20,14 @@
 #include "bundles/line_counts.h"
 #include "patches/patches.h"
 #include "reconstruction/instance_light.h"
+#include "reconstruction/least_squares.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
 
 namespace raybundle {
+
+// Cells and parents are in the order of the instances.
+std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches);
 
 // Light of every instance, by all lights and by each light set; of those that only occlude, empty.
 // exposed: per side, the share of it that nothing covers. Adds the objects, warnings and skips to

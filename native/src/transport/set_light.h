@@ -31,11 +31,4 @@ using SetLights = std::vector<SetLight>;
 // Irradiance by all of them.
 Irradiance sumOf(const SetLights& lights);
 
-// Relative noise of the light of all, then of each set, on sides of such weights: by the difference
-// of two halves' estimates, halves[k] of light k, the first shots' standard errors, and a relative
-// error that both halves have alike.
-std::vector<double> relativeNoise(const SetLights& lights,
-                                  const std::vector<std::array<Irradiance, 2>>& halves,
-                                  const std::vector<float>& weight, double bias);
-
 }  // namespace raybundle

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Stated errors against true ones: bakes scenes with many seeds and targets and writes one line of
+// JSON per bake. Usage: see kUsage.
+//
+// - True noise: the light per patch side against the mean over all seeds at the least target, which
+//   is as many times the bundles as there are seeds. A bake's own share in that mean is allowed
+//   for.
+// - True surface error: the light interpolated between the corners against that of patches with a
+//   third of the edge, at each of them. The reference is two bakes of independent bundles and
+//   shadow rays; the mean of the product of the two differences is the square of the error without
+//   the reference's own noise.
+// Both by exposed area.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "bake/bake.h"
+#include "bake/error.h"
+#include "scene_file.h"
+
+namespace raybundle::bench {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr char kUsage[] =
+    R"(usage: calibrate SCENE.json ... [options]
+
+  SCENE.json          of blend_tests/export_scene.py
+  --seeds N           bakes with the seeds 1 .. N (20)
+  --targets LIST      comma-separated values of target_error, the least last (0.05,0.02,0.01)
+  --patch-size M      metres, 0 = automatic (0)
+  --finer N           edges of the bake's patches over those of the reference (3)
+  --reference-bundles N   of each half of the reference (400)
+  --out FILE          lines are appended to it (standard output)
+)";
+
+// Seeds that no bake has.
+constexpr int kReferenceSeeds[2] = {1 << 29, 1 << 30};
+// Relative standard error of the direct light of each half of the reference.
+constexpr float kReferenceShotError = 0.01f;
+
+struct Options {
+    std::vector<std::string> scenes;
+    int seeds = 20;
+    std::vector<float> targets{0.05f, 0.02f, 0.01f};
+    float patchSize = 0;
+    int finer = 3, referenceBundles = 400;
+    std::string out;
+};
+
+Options parseOptions(const std::vector<std::string>& arguments) {
+    Options options;
+    for (size_t a = 0; a < arguments.size(); ++a) {
+        const std::string& name = arguments[a];
+        if (name.rfind("--", 0) != 0) {
+            options.scenes.push_back(name);
+            continue;
+        }
+        if (++a == arguments.size()) throw invalidArgument(name + " needs a value");
+        const std::string& value = arguments[a];
+        if (name == "--seeds") {
+            options.seeds = std::stoi(value);
+        } else if (name == "--targets") {
+            options.targets.clear();
+            std::istringstream list(value);
+            for (std::string item; std::getline(list, item, ',');)
+                options.targets.push_back(std::stof(item));
+        } else if (name == "--patch-size") {
+            options.patchSize = std::stof(value);
+        } else if (name == "--finer") {
+            options.finer = std::stoi(value);
+        } else if (name == "--reference-bundles") {
+            options.referenceBundles = std::stoi(value);
+        } else if (name == "--out") {
+            options.out = value;
+        } else {
+            throw invalidArgument("there is no option " + name);
+        }
+    }
+    if (options.scenes.empty()) throw invalidArgument("a scene is needed");
+    return options;
+}
+
+// The baked side of a patch, or none if it has no result.
+std::optional<uint32_t> bakedSide(const Scene& scene, const Patches& patches, uint32_t patch) {
+    const Instance& instance = scene.instances[patches.parents[patches.parentOf[patch]].instance];
+    if (instance.role != RB_ROLE_BAKE) return std::nullopt;
+    return 2 * patch + uint32_t(instance.side);
+}
+
+glm::dvec3 lightAt(const Bake& bake, uint32_t side) {
+    return glm::dvec3(bake.patchIrradiance().direct[side] + bake.patchIrradiance().indirect[side]);
+}
+
+// ------------------------------------------------------------------------------------------------
+// Surface error
+// ------------------------------------------------------------------------------------------------
+
+// A point of a face and the true light around it.
+struct Point {
+    uint32_t instance = 0;
+    std::array<int32_t, 4> corner{};
+    std::array<float, 4> weights{};
+    double area = 0;  // exposed, m^2
+    std::array<glm::dvec3, 2> light;
+};
+
+std::vector<Point> reference(const Scene& scene, float patchSize, const Options& options) {
+    std::vector<Point> points;
+    for (size_t half = 0; half < 2; ++half) {
+        Bake bake;
+        bake.settings.patchSize = patchSize / float(options.finer);
+        bake.settings.maxPatches = 1 << 24;
+        bake.settings.minBundles = bake.settings.maxBundles = options.referenceBundles;
+        bake.settings.targetError = kReferenceShotError;
+        bake.settings.seed = kReferenceSeeds[half];
+        bake.run(scene);
+        const Patches& patches = bake.patches();
+        size_t next = 0;
+        for (uint32_t patch = 0; patch < patches.count(); ++patch) {
+            const auto side = bakedSide(scene, patches, patch);
+            if (!side) continue;
+            if (half == 0) {
+                const Parent& parent = patches.parents[patches.parentOf[patch]];
+                const Cell& cell = patches.cells[parent.cell];
+                Point point;
+                point.instance = parent.instance;
+                point.corner = cell.corner;
+                point.weights = cell.weights(patches.point(
+                    patch, parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f)));
+                point.area = double(patches.area[patch] * bake.exposedShare()[*side]);
+                points.push_back(point);
+            }
+            points[next++].light[half] = lightAt(bake, *side);
+        }
+    }
+    return points;
+}
+
+double surfaceError(const std::vector<Point>& points, const Bake& bake) {
+    double squares = 0, signal = 0;
+    for (const Point& point : points) {
+        const InstanceLight& light = bake.instanceLight(int32_t(point.instance));
+        glm::dvec3 shown(0.0);
+        for (size_t k = 0; k < 4; ++k)
+            if (point.corner[k] >= 0)
+                shown +=
+                    double(point.weights[k]) * glm::dvec3(light.direct[size_t(point.corner[k])] +
+                                                          light.indirect[size_t(point.corner[k])]);
+        squares += point.area * glm::dot(shown - point.light[0], shown - point.light[1]);
+        signal += point.area * glm::dot(point.light[0], point.light[1]);
+    }
+    return signal > 0 ? std::sqrt(std::max(squares, 0.0) / signal) : 0;
+}
+
+// ------------------------------------------------------------------------------------------------
+// Noise
+// ------------------------------------------------------------------------------------------------
+
+struct SideLight {
+    std::vector<glm::vec3> light;  // per patch with a result, W/m^2
+    std::vector<float> area;       // exposed, m^2
+};
+
+SideLight sideLight(const Scene& scene, const Bake& bake) {
+    SideLight result;
+    const Patches& patches = bake.patches();
+    for (uint32_t patch = 0; patch < patches.count(); ++patch)
+        if (const auto side = bakedSide(scene, patches, patch)) {
+            result.light.push_back(glm::vec3(lightAt(bake, *side)));
+            result.area.push_back(patches.area[patch] * bake.exposedShare()[*side]);
+        }
+    return result;
+}
+
+double noise(const SideLight& one, const std::vector<glm::dvec3>& mean) {
+    double squares = 0, signal = 0;
+    for (size_t i = 0; i < mean.size(); ++i) {
+        const glm::dvec3 off = glm::dvec3(one.light[i]) - mean[i];
+        squares += double(one.area[i]) * glm::dot(off, off);
+        signal += double(one.area[i]) * glm::dot(mean[i], mean[i]);
+    }
+    return signal > 0 ? std::sqrt(squares / signal) : 0;
+}
+
+// ------------------------------------------------------------------------------------------------
+
+void calibrate(const std::string& path, const Options& options, std::ostream& out) {
+    const Scene scene = readScene(path);
+    const std::string name = std::filesystem::path(path).stem().string();
+    std::vector<Json> rows;
+    std::vector<SideLight> lights;
+    std::vector<Point> points;
+    for (float target : options.targets)
+        for (int seed = 1; seed <= options.seeds; ++seed) {
+            Bake bake;
+            bake.settings.patchSize = options.patchSize;
+            bake.settings.targetError = target;
+            bake.settings.seed = seed;
+            bake.run(scene);
+            if (points.empty()) points = reference(scene, bake.patches().size, options);
+            const Json report = Json::parse(bake.reportJson());
+            rows.push_back({{"scene", name},
+                            {"target", target},
+                            {"seed", seed},
+                            {"patches", report.at("patches")},
+                            {"bundles", report.at("bundles")},
+                            {"seconds", report.at("seconds")},
+                            {"estimated_error", report.at("estimated_error")},
+                            {"stated", report.at("error")},
+                            {"warnings", report.at("warnings").size()},
+                            {"true", {{"surface", surfaceError(points, bake)}}}});
+            lights.push_back(sideLight(scene, bake));
+        }
+    std::vector<glm::dvec3> mean(lights.back().light.size(), glm::dvec3(0.0));
+    const size_t firstOfLeast = lights.size() - size_t(options.seeds);
+    for (size_t k = firstOfLeast; k < lights.size(); ++k)
+        for (size_t i = 0; i < mean.size(); ++i)
+            mean[i] += glm::dvec3(lights[k].light[i]) / double(options.seeds);
+    for (size_t k = 0; k < rows.size(); ++k) {
+        const double own =
+            k >= firstOfLeast && options.seeds > 1 ? 1 - 1.0 / double(options.seeds) : 1;
+        rows[k]["true"]["noise"] = noise(lights[k], mean) / std::sqrt(own);
+        out << rows[k].dump() << '\n';
+    }
+    out.flush();
+}
+
+}  // namespace
+}  // namespace raybundle::bench
+
+int main(int count, char** values) {
+    using namespace raybundle::bench;
+    try {
+        const std::vector<std::string> arguments(values + 1, values + count);
+        if (arguments.empty() || arguments[0] == "--help") {
+            std::fputs(kUsage, stdout);
+            return 0;
+        }
+        const Options options = parseOptions(arguments);
+        std::ofstream file;
+        if (!options.out.empty()) {
+            file.open(options.out, std::ios::app);
+            if (!file) throw raybundle::invalidArgument("cannot write " + options.out);
+        }
+        for (const std::string& scene : options.scenes)
+            calibrate(scene, options, options.out.empty() ? std::cout : file);
+        return 0;
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "calibrate: %s\n", error.what());
+        return 2;
+    }
+}

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The stated noise: how far the light on the patch sides is from that of infinitely many bundles
+// and shadow rays on the same patches.
+//
+// Source: thesis section 4.3.3 (stated error).
+// Differs:
+// - Two independent halves of the bundles instead of repeated runs: half their difference, joined
+//   with the standard error of the first shot.
+// - The difference of two halves is one sample of few degrees of freedom: bundles err alike on
+//   whole walls. So each look at the halves is averaged with those before, brought to the same
+//   number of bundles; and as long as there are few looks a factor makes up for the chance that
+//   the difference is small, which a stop at the first look that meets the target prefers.
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "transport/set_light.h"
+
+namespace raybundle {
+
+// The noise falls with the number of bundles to about this power.
+constexpr double kNoiseSlope = 0.65;
+
+class Noise {
+  public:
+    // weight: per side, exposed area in m^2 where the light is a result, else 0. directError: per
+    // side, standard error of the first shot, W/m^2. Both must outlive the object.
+    Noise(const std::vector<float>& weight, const std::vector<float>& directError);
+
+    // A look at the halves of so many bundles.
+    void look(const std::array<Irradiance, 2>& half, uint32_t bundles, double bias);
+
+    // As of the last look, relative to the RMS of the light.
+    double relative() const;
+    // Per side: half the difference of the halves, brought to the stated size, W/m^2.
+    std::vector<glm::vec3> perSide() const;
+
+  private:
+    const std::vector<float>& weight;
+    const std::vector<float>& directError;
+    double factor() const;
+
+    std::vector<glm::vec3> difference;  // per side: half that of the halves, W/m^2
+    double bundleNoise = 0;             // relative squares, of the last look
+    double pooled = 0;                  // the same, averaged with the looks before
+    double directNoise = 0, bias = 0, signal = 0;
+    uint32_t bundles = 0, looks = 0;
+};
+
+// Per side.
+struct SideNoise {
+    explicit SideNoise(size_t sides) : ofBundles(sides, glm::vec3(0.0f)), direct(sides, 0.0f) {}
+
+    std::vector<glm::vec3> ofBundles;  // a sample of it, see Noise::perSide, W/m^2
+    std::vector<float> direct;         // standard error of the first shot, W/m^2
+};
+
+// The noise of the light of all, and that of each light set.
+class SetNoise {
+  public:
+    // weight as above. Both must outlive the object.
+    SetNoise(const SetLights& lights, const std::vector<float>& weight);
+    SetNoise(const SetNoise&) = delete;
+
+    // A look at the halves of all lights.
+    void look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles, double bias);
+
+    // As of the last look, relative: of the light of all, then of each light set.
+    std::vector<double> relative() const;
+    // Of the light of all.
+    SideNoise perSide() const;
+
+  private:
+    std::vector<float> directError;  // of the light of all, per side, W/m^2
+    std::vector<Noise> noises;       // of the light of all, then of each light set
+};
+
+}  // namespace raybundle

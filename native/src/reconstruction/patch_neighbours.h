@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "patches/patches.h"
+
+namespace raybundle {
+
+// Two patches with a common edge.
+struct PatchPair {
+    uint32_t first = 0, second = 0;
+};
+
+// The patches of parents [firstParent, lastParent) that meet at an edge, each pair once: within the
+// grid of a parent, and across an edge of two parents of one instance whose grids agree there and
+// whose planes turn by little, so that light goes on smoothly.
+std::vector<PatchPair> neighbouringPatches(const Patches& patches, uint32_t firstParent,
+                                           uint32_t lastParent);
+
+}  // namespace raybundle

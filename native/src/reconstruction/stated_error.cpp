@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/stated_error.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <iomanip>
+#include <optional>
+#include <sstream>
+
+#include "reconstruction/patch_neighbours.h"
+#include "reconstruction/surplus.h"
+
+namespace raybundle {
+namespace {
+
+// A mesh is too coarse where its share of the error is above this, and above so many targets.
+constexpr double kCoarse = 0.05, kCoarseTargets = 2;
+// Objects darker than this share of the mean square light are not worth a finer mesh.
+constexpr double kDark = 0.01;
+// An object of whose area less than this is known takes over the surplus of the others.
+constexpr double kKnownShare = 0.3;
+
+// Squares summed over RGB times exposed area, (W/m^2)^2 m^2.
+struct Squares {
+    double signal = 0, noise = 0, residual = 0;
+    double ripple = 0;  // of the noise: what interpolation between the corners cannot follow
+    double smooth = 0, step = 0, known = 0;  // of the patches whose surplus is known; their signal
+    double knownArea = 0, area = 0, cellArea = 0, patches = 0, cells = 0;
+
+    void add(const Squares& o) {
+        signal += o.signal;
+        noise += o.noise;
+        residual += o.residual;
+        ripple += o.ripple;
+        smooth += o.smooth;
+        step += o.step;
+        known += o.known;
+        knownArea += o.knownArea;
+        area += o.area;
+    }
+    // The residual without the noise in it.
+    double mesh(double noiseScale) const { return std::max(0.0, residual - noiseScale * ripple); }
+    // The surplus over the signal, squares; by chance steps may be below zero.
+    double smoothShare() const { return known > 0 ? smooth / known : 0; }
+    double stepShare() const { return known > 0 ? std::max(step, 0.0) / known : 0; }
+};
+
+std::string inPercent(double share) {
+    std::ostringstream text;
+    text << std::setprecision(2) << 100 * share << " %";
+    return text.str();
+}
+
+std::string inMetres(double length) {
+    std::ostringstream text;
+    text << std::setprecision(2) << length << " m";
+    return text.str();
+}
+
+// Of one instance: adds up the squares, and notes the square of the error at each corner.
+class InstanceErrors {
+  public:
+    InstanceErrors(const Patches& patches, const InstanceRange& range, rb_side side,
+                   const Irradiance& irradiance, const SideErrors& sides,
+                   const InstanceLight& light)
+        : patches(patches),
+          range(range),
+          side(uint32_t(side)),
+          irradiance(irradiance),
+          sides(sides),
+          light(light),
+          surplus(surplusOf(patches, range.firstParent, range.lastParent, side, irradiance,
+                            sides.exposed, sides.directError)) {
+        forEachPatch([&](uint32_t at, double weight, const Cell&, const auto&, double residual,
+                         const Surplus& s) {
+            const double signal = weight * square(lightAt(at));
+            sum.area += weight;
+            sum.signal += signal;
+            sum.noise += weight * noiseAt(at);
+            sum.residual += weight * residual;
+            ++sum.patches;
+            if (!s.isKnown) return;
+            sum.smooth += weight * double(s.smooth);
+            sum.step += weight * double(s.step);
+            sum.known += signal;
+            sum.knownArea += weight;
+        });
+        for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+            // Of the parallelogram of which a triangle is half: the square of about an edge.
+            sum.cellArea += double(glm::length(glm::cross(patches.cells[c].a, patches.cells[c].b)));
+        sum.cells = range.lastCell - range.firstCell;
+        sum.ripple = sum.noise * rippleShare();
+    }
+
+    const Squares& squares() const { return sum; }
+
+    // RMS error around each corner, as radiance, W/(m^2 sr). noiseScale: of the squares.
+    // unknownShare: surplus over signal, squares, where there are too few patches around.
+    std::vector<float> perCorner(size_t corners, double noiseScale, double unknownShare) const {
+        std::vector<double> squares(corners, 0), weights(corners, 0);
+        const double ripple = sum.noise > 0 ? sum.ripple / sum.noise : 0;
+        forEachPatch([&](uint32_t at, double weight, const Cell& cell,
+                         const std::array<float, 4>& w, double residual, const Surplus& s) {
+            const double beyond = s.isKnown ? double(s.smooth + std::max(s.step, 0.0f))
+                                            : unknownShare * square(lightAt(at));
+            const double noise = noiseScale * noiseAt(at);
+            const double mesh = std::max(0.0, residual - ripple * noise);
+            const double error = mesh + noise + beyond;
+            for (int k = 0; k < 4; ++k)
+                if (cell.corner[k] >= 0) {
+                    squares[size_t(cell.corner[k])] += weight * double(w[k]) * error;
+                    weights[size_t(cell.corner[k])] += weight * double(w[k]);
+                }
+        });
+        std::vector<float> result(corners, 0.0f);
+        for (size_t c = 0; c < corners; ++c)
+            if (weights[c] > 0)
+                result[c] = float(std::sqrt(squares[c] / weights[c] / 3) / glm::pi<double>());
+        return result;
+    }
+
+  private:
+    static double square(const glm::vec3& v) { return double(glm::dot(v, v)); }
+    glm::vec3 lightAt(uint32_t at) const { return irradiance.direct[at] + irradiance.indirect[at]; }
+    double noiseAt(uint32_t at) const {
+        if (sides.noise.empty()) return 0;
+        return square(sides.noise[at]) + 3 * double(sides.directError[at] * sides.directError[at]);
+    }
+
+    // The share of the noise that differs from patch to patch, less what the corners can follow.
+    double rippleShare() const {
+        if (sides.noise.empty()) return 0;
+        double rough = 0, all = 0;
+        for (const PatchPair& pair :
+             neighbouringPatches(patches, range.firstParent, range.lastParent)) {
+            const uint32_t a = 2 * pair.first + side, b = 2 * pair.second + side;
+            const double direct =
+                noiseAt(a) - square(sides.noise[a]) + noiseAt(b) - square(sides.noise[b]);
+            rough += 0.5 * (square(sides.noise[a] - sides.noise[b]) + direct);
+            all += 0.5 * (noiseAt(a) + noiseAt(b));
+        }
+        double corners = 0;
+        for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+            corners += patches.cells[c].isTriangle() ? 0.5 : 1.0;
+        const double unfollowed = std::max(0.0, 1 - corners / std::max(1.0, sum.patches));
+        return all > 0 ? std::min(1.0, rough / all) * unfollowed : 0;
+    }
+
+    // body(side, exposed area, cell, corner weights at its middle, square of the residual, surplus)
+    template <class Body>
+    void forEachPatch(const Body& body) const {
+        const uint32_t first = range.firstParent < range.lastParent
+                                   ? patches.parents[range.firstParent].firstPatch
+                                   : 0;
+        for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+            const Parent& parent = patches.parents[p];
+            const Cell& cell = patches.cells[parent.cell];
+            const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
+            for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+                const uint32_t patch = parent.firstPatch + k, at = 2 * patch + side;
+                const double weight = double(patches.area[patch] * sides.exposed[at]);
+                // The mean of the interpolation over the patch is its value in the middle.
+                const auto w = cell.weights(parent.position(parent.pointOn(k, middle)));
+                glm::vec3 shown(0.0f);
+                for (int c = 0; c < 4; ++c)
+                    if (cell.corner[c] >= 0)
+                        shown += w[c] * (light.direct[size_t(cell.corner[c])] +
+                                         light.indirect[size_t(cell.corner[c])]);
+                body(at, weight, cell, w, square(shown - lightAt(at)), surplus[patch - first]);
+            }
+        }
+    }
+
+    const Patches& patches;
+    const InstanceRange& range;
+    const uint32_t side;
+    const Irradiance& irradiance;
+    const SideErrors& sides;
+    const InstanceLight& light;
+    const std::vector<Surplus> surplus;
+    Squares sum;
+};
+
+Report::Errors relative(const Squares& s, double noiseScale, double discretisation) {
+    if (!(s.signal > 0)) return {};
+    return {std::sqrt(noiseScale * s.noise / s.signal), std::sqrt(discretisation),
+            std::sqrt(s.mesh(noiseScale) / s.signal)};
+}
+
+// The edge at which the mesh's error would be `limit`: that of smooth light falls with its square,
+// that of steps with its root.
+double edgeFor(double limit, double smoothShare, double stepShare, double patchEdge) {
+    double low = 0, high = 1e6;
+    for (int k = 0; k < 60; ++k) {
+        const double ratio = std::sqrt(std::max(low, 1e-6) * high);
+        const double error = smoothShare * std::pow(ratio, 4) + stepShare * ratio;
+        (error > limit * limit ? high : low) = ratio;
+    }
+    return low * patchEdge;
+}
+
+void warnOfCoarseMesh(const std::string& name, const Squares& s, double noiseScale, double limit,
+                      double smoothShare, double stepShare, Report& report) {
+    const double mesh = std::sqrt(s.mesh(noiseScale) / s.signal);
+    if (mesh <= limit || s.cells == 0) return;
+    const double faceEdge = std::sqrt(s.cellArea / s.cells);
+    const double patchEdge = std::sqrt(s.area / s.patches);
+    const double edge = std::min(edgeFor(limit, smoothShare, stepShare, patchEdge), 0.5 * faceEdge);
+    report.warnings.push_back(
+        "object \"" + name + "\": its faces, " + inMetres(faceEdge) +
+        " wide in the mean, are too coarse for its light: interpolated over them it is " +
+        inPercent(mesh) + " off. Edges of about " + inMetres(edge) + " would bring that to " +
+        inPercent(limit) +
+        ": subdivide the mesh, or choose the topology SUBDIVIDE with patch_size " +
+        inMetres(0.5 * edge));
+}
+
+}  // namespace
+
+void stateErrors(const Scene& scene, const Patches& patches,
+                 const std::vector<InstanceRange>& ranges, const Irradiance& irradiance,
+                 const SideErrors& sides, float targetError, std::vector<InstanceLight>& light,
+                 Report& report) {
+    std::vector<std::optional<InstanceErrors>> errors(light.size());
+    tbb::parallel_for(size_t(0), light.size(), [&](size_t i) {
+        if (light[i].isBaked)
+            errors[i].emplace(patches, ranges[i], scene.instances[i].side, irradiance, sides,
+                              light[i]);
+    });
+    Squares all;
+    for (const auto& e : errors)
+        if (e) all.add(e->squares());
+    for (InstanceLight& baked : light) baked.error.assign(baked.direct.size(), 0.0f);
+    if (!(all.signal > 0)) return;
+
+    // Also what the halves have in common.
+    const double noiseScale =
+        all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
+    const double limit = std::max(kCoarse, kCoarseTargets * double(targetError));
+    double discretisation = 0;
+    for (size_t i = 0; i < light.size(); ++i) {
+        if (!errors[i]) continue;
+        const Squares& own = errors[i]->squares();
+        const Squares& known = own.knownArea >= kKnownShare * own.area ? own : all;
+        const double smooth = known.smoothShare(), step = known.stepShare();
+        discretisation += (smooth + step) * own.signal / all.signal;
+        report.objects[i].error = relative(own, noiseScale, smooth + step);
+        light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
+        if (own.signal / own.area > kDark * all.signal / all.area)
+            warnOfCoarseMesh(light[i].name, own, noiseScale, limit, smooth, step, report);
+    }
+    report.error = relative(all, noiseScale, discretisation);
+    report.error.noise = report.estimatedError;
+}
+
+}  // namespace raybundle
