@@ -97,10 +97,14 @@ def _print_summary(report: raybundle.BakeReport, out: Path, name: str) -> None:
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
                        if stage != 'total')
     print(f"  seconds: {stages}")
+    print("  stated error: " + ", ".join(f"{part} {100.0 * share:.2g} %"
+                                         for part, share in report.error.items()))
     print(f"  energy balance error: {report.energy['balance_error']:.1e}")
     for item in report.objects:
         if item.status != 'baked':
             print(f"  {item.name}: {item.status}")
+        else:
+            print(f"  {item.name}: error {100.0 * item.error['total']:.2g} %")
     for warning in report.warnings:
         print(f"  warning: {warning}")
     for suffix in ("baked.blend", "png", "json"):

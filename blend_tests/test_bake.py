@@ -23,8 +23,8 @@ SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
 FURNACE_TOLERANCE = 1e-4
 
-REPORT_KEYS = {"seconds", "patches", "bundles", "lines", "exchanges", "estimated_error", "energy",
-               "peak_memory_bytes", "objects", "warnings", "skipped"}
+REPORT_KEYS = {"seconds", "patches", "bundles", "lines", "exchanges", "estimated_error", "error",
+               "energy", "peak_memory_bytes", "objects", "warnings", "skipped"}
 SECONDS_KEYS = {"total", "export", "patches", "first_shot", "bundles", "solve", "reconstruction",
                 "write_back"}
 
@@ -122,6 +122,8 @@ def test_operator_in_background(closed_box):
     report = json.loads(bpy.context.scene.raybundle.report)
     assert REPORT_KEYS <= set(report)
     assert SECONDS_KEYS <= set(report["seconds"])
+    for item in report["objects"]:
+        assert set(item.pop("error")) == set(report["error"])
     assert report["objects"] == [{"name": "Box", "corners": 24, "status": "baked"}]
     assert report["seconds"]["total"] >= report["seconds"]["export"] > 0.0
 
@@ -214,6 +216,44 @@ def test_clear_and_preview(closed_box):
     assert not bake_cache.has_result(bpy.context.scene)
 
 
+@pytest.mark.parametrize("domain, count", [('CORNER', 4), ('POINT', 4)])
+def test_error_attribute(floor_and_lamp, domain, count):
+    mesh = floor_and_lamp.data
+    bake(domain=domain)
+    assert "Radiosity Error" not in mesh.attributes
+    report = bake(domain=domain, write_error=True)
+    attribute = mesh.attributes["Radiosity Error"]
+    assert (attribute.domain, attribute.data_type) == (domain, 'FLOAT')
+    errors = np.empty(count, np.float32)
+    attribute.data.foreach_get('value', errors)
+    # One face below a lamp: in all the error of the corners is that of the report, relative to the
+    # light, which is not far from evenly spread over the corners' shares.
+    light = colors(floor_and_lamp)
+    relative = np.sqrt((errors ** 2).mean() / (light ** 2).mean())
+    assert 0.3 < relative / report.error['total'] < 3.0
+    assert any('"Floor"' in text and "too coarse" in text for text in report.warnings)
+    # It goes when it is not asked for again, and with the light.
+    bake(domain=domain)
+    assert "Radiosity Error" not in mesh.attributes
+    bake(domain=domain, write_error=True)
+    assert bpy.ops.raybundle.clear() == {'FINISHED'}
+    assert "Radiosity Error" not in mesh.attributes
+
+
+def test_error_attribute_of_a_subdivided_copy(floor_and_lamp):
+    bake(domain='POINT', topology='SUBDIVIDE', write_error=True)
+    copies = [item for item in bpy.context.scene.objects
+              if item.raybundle.source == floor_and_lamp]
+    assert len(copies[0].data.attributes["Radiosity Error"].data) == len(copies[0].data.vertices)
+
+
+def test_report_states_the_error(closed_box):
+    report = bake()
+    for error in (report.error, report.objects[0].error):
+        assert set(error) == {'noise', 'discretisation', 'mesh', 'total'}
+        assert max(error.values()) < FURNACE_TOLERANCE
+
+
 def test_same_seed_same_result_for_any_number_of_threads(floor_and_lamp, new_object):
     new_object("Wall", [(1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1)], [(0, 3, 2, 1)])
     results = []
@@ -260,7 +300,9 @@ def test_single_user_copies_have_their_own_light(floor_and_lamp):
     assert any("shared by 2" in text for text in report.warnings)
     # The copy has the same geometry: nothing is traced again.
     report = bake(shared_meshes='SINGLE_USER')
-    assert report.seconds['bundles'] == 0.0 and report.warnings == []
+    assert report.seconds['bundles'] == 0.0
+    # One face is too coarse for a lamp so near, which is said; nothing else is.
+    assert all("too coarse" in text for text in report.warnings)
 
 
 def test_averaged_instances_show_their_mean(floor_and_lamp):

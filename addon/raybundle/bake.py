@@ -14,15 +14,15 @@ from dataclasses import dataclass, field, replace
 import bpy
 import numpy as np
 
-from . import bake_cache, native
+from . import bake_cache, color_attribute, native
 from .bake_report import BakeError, BakeReport, ObjectReport
-from .color_attribute import name_is_free, write_light
 from .corner_map import CornerMap, grouped_mean
 from .light_sets import LightSet, read_light_sets
 from .mesh_export import read
 from .native import ErrorCode, Progress, RaybundleError
 from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings
+from .scene_data import MeshData
 from .scene_export import BakeTarget, SceneExport, export_scene
 from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
                               subdivide)
@@ -34,6 +34,7 @@ class TargetLight:
 
     target: BakeTarget
     light: np.ndarray  # (corners or vertices, 3), by settings.domain
+    error: np.ndarray | None  # (corners or vertices,), likewise; None: not to be written
     subdivided: SubdividedMesh | None
     set_lights: dict[str, np.ndarray] = field(default_factory=dict)  # likewise, by attribute
 
@@ -117,7 +118,7 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[Ligh
         if item.data.is_editmode:
             raise BakeError(f'"{item.name}" is in Edit Mode: leave it before baking')
         for name in (settings.attribute, *(light_set.attribute for light_set in light_sets)):
-            if not name_is_free(item.data, name):
+            if not color_attribute.name_is_free(item.data, name):
                 raise BakeError(f'"{item.name}" has another attribute of the name '
                                 f'"{name}", which is no colour: choose another name')
 
@@ -212,9 +213,26 @@ def _read_results(native_bake: native.Bake, export: SceneExport,
                                      len(original.vertices))
             return light
 
-        results.append(TargetLight(target, read_light(), finer, {
+        error = None
+        if settings.write_error:
+            error = _read_error(native_bake, target, mesh, corner_map, settings.domain)
+        results.append(TargetLight(target, read_light(), error, finer, {
             light_set.attribute: read_light(index) for index, light_set in enumerate(light_sets)}))
     return results
+
+
+def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
+                corner_map: CornerMap, domain: str) -> np.ndarray:
+    """(corners or vertices,), the RMS of what comes together there."""
+    error = native_bake.corner_error(target.instance, mesh.corner_count)
+    squares = corner_map.to_original(np.repeat(error[:, None] ** 2, 3, axis=1))
+    if domain == 'POINT' and corner_map.is_identity:
+        squares = grouped_mean(squares, mesh.corner_vertices, len(mesh.vertices))
+    elif domain == 'POINT':
+        original = target.object.data
+        squares = grouped_mean(squares, read(original.loops, 'vertex_index', np.int32),
+                               len(original.vertices))
+    return np.sqrt(squares[:, 0])
 
 
 # --------------------------------------------------------------------------------------------------
@@ -235,10 +253,17 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
         receiver = copies.get(item.target.object, item.target.object)
         # The last one is shown: the light of all.
         for name, light in {**item.set_lights, settings.attribute: item.light}.items():
-            write_light(receiver.data, name, settings.data_type, settings.domain, light)
+            color_attribute.write_light(receiver.data, name, settings.data_type, settings.domain,
+                                        light)
+        if item.error is None:
+            color_attribute.clear_error(receiver.data, settings.attribute)
+        else:
+            color_attribute.write_error(receiver.data, settings.attribute, settings.domain,
+                                        item.error)
         # The native library lists its objects by instance.
         status = native_report['objects'][item.target.instance]['status']
-        reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status))
+        error = native_report['objects'][item.target.instance]['error']
+        reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status, error))
     _warn_of_clipping(lights, settings, export)
     return reports
 
@@ -260,7 +285,10 @@ def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
             mean = np.mean([item.light for item in group], axis=0)
             set_means = {name: np.mean([item.set_lights[name] for item in group], axis=0)
                          for name in group[0].set_lights}
-            group = [replace(item, light=mean, set_lights=set_means) for item in group]
+            # Of the mean it would be less, as far as errors differ.
+            error = None if group[0].error is None else np.max([item.error for item in group], 0)
+            group = [replace(item, light=mean, error=error, set_lights=set_means)
+                     for item in group]
             export.warnings.add(f'mesh "{mesh.name}" shows the mean light of its '
                                 f'{len(group)} objects')
         elif len(group) > 1:

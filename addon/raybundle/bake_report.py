@@ -16,6 +16,7 @@ class ObjectReport:
     name: str
     corners: int
     status: str  # 'baked', perhaps with a remark, or why not
+    error: dict[str, float] = field(default_factory=dict)  # as BakeReport.error; {}: not baked
 
 
 @dataclass
@@ -27,6 +28,8 @@ class BakeReport:
     exchanges: int = 0
     shadow_rays: int = 0
     estimated_error: float = 0.0  # relative
+    # Relative: noise, discretisation, mesh, total.
+    error: dict[str, float] = field(default_factory=dict)
     energy: dict[str, float] = field(default_factory=dict)  # W; balance_error is relative
     peak_memory_bytes: int = 0
     light_sets: list[dict] = field(default_factory=list)  # name, attribute, estimated_error
@@ -38,8 +41,8 @@ class BakeReport:
     def from_native(cls, values: dict) -> BakeReport:
         report = cls()
         for name in ('seconds', 'patches', 'bundles', 'lines', 'exchanges', 'shadow_rays',
-                     'estimated_error', 'energy', 'peak_memory_bytes', 'light_sets', 'warnings',
-                     'skipped'):
+                     'estimated_error', 'error', 'energy', 'peak_memory_bytes', 'light_sets',
+                     'warnings', 'skipped'):
             if name in values:
                 setattr(report, name, values[name])
         return report
@@ -52,4 +55,5 @@ class BakeReport:
         baked = sum(item.status.startswith('baked') for item in self.objects)
         warnings = f", {len(self.warnings)} warnings" if self.warnings else ""
         return (f"{baked} objects baked in {self.seconds['total']:.2f} s: {self.patches} patches, "
-                f"{self.bundles} bundles, noise {100.0 * self.estimated_error:.2g} %{warnings}")
+                f"{self.bundles} bundles, noise {100.0 * self.estimated_error:.2g} %, error "
+                f"{100.0 * self.error['total']:.2g} %{warnings}")

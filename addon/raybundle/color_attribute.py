@@ -33,6 +33,26 @@ def write_light(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, li
     mesh.update()
 
 
+def error_name(name: str) -> str:
+    """The attribute of the stated error beside the light of this name."""
+    return f"{name} Error"
+
+
+def write_error(mesh: bpy.types.Mesh, name: str, domain: str, error: np.ndarray) -> None:
+    """Write error (n,), n corners or vertices by domain, to the attribute beside the light of this
+    name; an attribute of that name is replaced."""
+    clear_error(mesh, name)
+    attribute = mesh.attributes.new(error_name(name), 'FLOAT', domain)
+    attribute.data.foreach_set('value', np.ascontiguousarray(error, np.float32))
+    mesh.update()
+
+
+def clear_error(mesh: bpy.types.Mesh, name: str) -> None:
+    attribute = mesh.attributes.get(error_name(name))
+    if attribute is not None and attribute.data_type == 'FLOAT':
+        mesh.attributes.remove(attribute)
+
+
 def name_is_free(mesh: bpy.types.Mesh, name: str) -> bool:
     """Whether a colour attribute of this name can be written without losing something else."""
     if name in mesh.color_attributes:
@@ -52,7 +72,8 @@ def activate(mesh: bpy.types.Mesh, name: str) -> bool:
 
 
 def clear(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Remove the attribute; False if there is none."""
+    """Remove the attribute and its error's; False if there is none."""
+    clear_error(mesh, name)
     attribute = mesh.color_attributes.get(name)
     if attribute is None:
         return False

@@ -128,6 +128,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_get_vertex_light': (_handle, _int, _enum, _floats, _size),
     'rb_get_set_corner_light': (_handle, _int, _int, _enum, _floats, _size),
     'rb_get_set_vertex_light': (_handle, _int, _int, _enum, _floats, _size),
+    'rb_get_corner_error': (_handle, _int, _floats, _size),
     'rb_get_report': (_handle, _out(_text)),
     'rb_new_subdivision': (_floats, _size, _ints, _size, _ints, _size, _float, _out(_handle)),
     'rb_get_subdivision_size': (_handle, _out(_size), _out(_size)),
@@ -542,6 +543,12 @@ class Bake(_Handle):
         else:
             self._library.rb_get_set_vertex_light(self._pointer, light_set, *arguments)
         return light
+
+    def corner_error(self, instance: int, count: int) -> np.ndarray:
+        """(count,) float32, in the order of the mesh's corners: stated error of LIGHTING."""
+        error = np.empty(count, np.float32)
+        self._library.rb_get_corner_error(self._pointer, instance, _as_floats(error), count)
+        return error
 
     def report(self) -> dict:
         """The native part of the report of the last successful execution."""

@@ -52,6 +52,11 @@ class RAYBUNDLE_PT_last_bake(RaybundleRenderPanel, bpy.types.Panel):
         report = json.loads(context.scene.raybundle.report)
         column = layout.column(align=True)
         column.label(text=f"Noise: {100.0 * report['estimated_error']:.2g} %")
+        # Reports of earlier releases have none.
+        if error := report.get('error'):
+            column.label(text=f"Patch size: {100.0 * error['discretisation']:.2g} %")
+            column.label(text=f"Mesh: {100.0 * error['mesh']:.2g} %")
+            column.label(text=f"Error: {100.0 * error['total']:.2g} %")
         column.label(text=f"Time: {report['seconds']['total']:.2f} s")
         column.label(text=f"Patches: {report['patches']:,}")
         column.label(text=f"Bundles: {report['bundles']:,}")
@@ -124,6 +129,7 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
         layout.prop(settings, "data_type")
         layout.prop(settings, "exposure")
         layout.prop(settings, "clamp")
+        layout.prop(settings, "write_error")
         column = layout.column()
         # A subdivided copy has a mesh of its own anyway.
         column.active = settings.topology == 'KEEP'

@@ -175,6 +175,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     clamp: BoolProperty(
         name="Clamp", description="Cut values off at 1 when they are written, after the exposure",
         default=False)
+    write_error: BoolProperty(
+        name="Write Error",
+        description="Also write the stated error of the light, as a number per corner or vertex, "
+                    "to an attribute with the name of the light's and \"Error\"",
+        default=False)
     topology: EnumProperty(
         name="Topology", description="Whether meshes may be refined for their light",
         items=enum_topology, default='KEEP')
@@ -273,6 +278,7 @@ class BakeSettings:
     data_type: str
     exposure: float
     clamp: bool
+    write_error: bool
     topology: str
     shared_meshes: str
     patch_size: float
