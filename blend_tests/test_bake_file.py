@@ -38,6 +38,8 @@ def test_writes_blend_picture_and_report(saved_box, tmp_path):
     assert "1 objects baked" in result.stdout and "bundles" in result.stdout
     assert saved_box.read_bytes() == original
     report = json.loads((out / "box.json").read_text())
+    for item in report["objects"]:
+        assert set(item.pop("error")) == set(report["error"])
     assert report["objects"] == [{"name": "Box", "corners": 24, "status": "baked"}]
 
     picture = bpy.data.images.load(str(out / "box.png"))

@@ -181,6 +181,7 @@ TEST_F(Api, ABakeCanBeCancelledAnywhereAndUsedAgain) {
         expectFailure(rb_execute_bake(bake, scene), RB_ERROR_CANCELLED, "cancelled");
         EXPECT_TRUE(progress.cancelled) << at;
         std::vector<float> rgb(72);
+        EXPECT_EQ(rb_get_corner_error(bake, instance, rgb.data(), 24), RB_ERROR_INVALID_OPERATION);
         EXPECT_EQ(rb_get_corner_light(bake, instance, RB_OUTPUT_COMBINED, rgb.data(), 24),
                   RB_ERROR_INVALID_OPERATION)
             << "a cancelled bake has no result";
@@ -189,6 +190,9 @@ TEST_F(Api, ABakeCanBeCancelledAnywhereAndUsedAgain) {
     ASSERT_EQ(rb_set_bake_progress(bake, follow, &progress), RB_ERROR_NONE);
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
     EXPECT_EQ(progress.done, 1);
+    std::vector<float> error(24, -1);
+    EXPECT_EQ(rb_get_corner_error(bake, instance, error.data(), 24), RB_ERROR_NONE);
+    for (float value : error) EXPECT_NEAR(value, 0, 1e-5) << "in a furnace";
     expectFurnace(instance);
     // Without a function again; and the old result stays when a later run is cancelled.
     ASSERT_EQ(rb_set_bake_progress(bake, nullptr, nullptr), RB_ERROR_NONE);
