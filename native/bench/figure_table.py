@@ -24,6 +24,12 @@ SCENES: dict[str, tuple[str, list[str], list[str]]] = {
     'office_up': ('office', ['lamps_up'], ['lamps_down']),
     'big_room': ('big_room', [], []),
     'two_rooms': ('two_rooms', [], []),
+    'facing_squares': ('facing_squares', [], []),
+    'furnace': ('furnace', [], []),
+    'instances': ('instances', [], []),
+    'open_court': ('open_court', [], []),
+    'sphere_interior': ('sphere_interior', [], []),
+    'thin_wall': ('thin_wall', [], []),
 }
 
 ALL, UNLIT, INDIRECT = 'error', 'error_unlit', 'error_indirect'

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs `calibrate` on all scenes, draws stated against true errors and prints their coverage; see
+`calibration`.
+
+    /usr/bin/python3 native/bench/run_calibration.py [OUT_FOLDER] [--draw]
+
+--draw: only draws the results that OUT_FOLDER has.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+sys.dont_write_bytecode = True
+matplotlib.use("svg")
+
+from figure_table import SCENES  # noqa: E402
+from matplotlib import pyplot  # noqa: E402
+from plot import COLORS, MARKERS, STYLE, plain_ticks  # noqa: E402
+from run_figures import ROOT, export  # noqa: E402
+
+CALIBRATE = ROOT / "build/release/native/bench/calibrate"
+# A bake is covered if its true error is at most so many times the stated one.
+COVERING = 1.25
+# Errors below are nothing, as in a furnace: not drawn, and covered.
+NOTHING = 1e-5
+# Title of each diagram -> the stated and the true error that it compares.
+KINDS = {
+    "noise of the light on patches": ('noise', 'noise'),
+    "surface error, all parts": ('total', 'surface'),
+}
+
+
+def calibrate(names: list[str], seeds: int, folder: Path) -> None:
+    results = folder / "calibration.jsonl"
+    results.unlink(missing_ok=True)
+    for name in names:
+        scene = export(name, folder)
+        done = subprocess.run([str(CALIBRATE), str(scene), "--seeds", str(seeds), "--out",
+                               str(results)])
+        if done.returncode != 0:
+            sys.exit(f"calibration: {name} failed")
+        print(f"{name}: done", flush=True)
+
+
+def errors(rows: list[dict], kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) stated and (n,) true errors, relative."""
+    stated, true = KINDS[kind]
+    return (np.array([row['stated'][stated] for row in rows]),
+            np.array([row['true'][true] for row in rows]))
+
+
+def is_covered(stated: np.ndarray, true: np.ndarray) -> np.ndarray:
+    return true <= np.maximum(COVERING * stated, NOTHING)
+
+
+def draw(rows: list[dict], path: Path) -> None:
+    scenes = list(dict.fromkeys(row['scene'] for row in rows))
+    with matplotlib.rc_context(STYLE):
+        picture, axes = pyplot.subplots(
+            1, 3, figsize=(9.0, 3.4), layout='constrained', width_ratios=[1.0, 1.0, 0.4])
+        for axis, kind in zip(axes, KINDS):
+            for k, scene in enumerate(scenes):
+                stated, true = errors([row for row in rows if row['scene'] == scene], kind)
+                shown = stated > NOTHING
+                axis.plot(100 * stated[shown], 100 * true[shown], MARKERS[k % len(MARKERS)],
+                          color=COLORS[k % len(COLORS)], label=scene, markersize=2.5,
+                          markeredgewidth=0.5, fillstyle='none')
+            axis.set_xscale('log')
+            axis.set_yscale('log')
+            low = min(axis.get_xlim()[0], axis.get_ylim()[0])
+            high = max(axis.get_xlim()[1], axis.get_ylim()[1])
+            ends = np.array([low, high])
+            axis.plot(ends, ends, color='0.6', linewidth=0.8)
+            axis.plot(ends, COVERING * ends, color='0.6', linewidth=0.8, linestyle='--')
+            axis.set_xlim(low, high)
+            axis.set_ylim(low, high)
+            for scale in (axis.xaxis, axis.yaxis):
+                plain_ticks(scale)
+            axis.set_xlabel("stated error (%)")
+            axis.set_ylabel("true error (%)")
+            axis.set_title(kind, fontsize=9)
+        axes[2].axis('off')
+        axes[2].legend(*axes[0].get_legend_handles_labels(), loc='center left')
+        picture.savefig(path, metadata={'Date': None})
+        pyplot.close(picture)
+
+
+def print_table(rows: list[dict]) -> None:
+    """Markdown: means over the seeds in per cent, and the share of bakes that are covered."""
+    print("| scene | target | noise: stated, true | covered | discretisation | mesh "
+          "| surface: stated, true | covered |")
+    print("|---|---|---|---|---|---|---|---|")
+    groups: dict[tuple[str, float], list[dict]] = {}
+    for row in rows:
+        groups.setdefault((row['scene'], row['target']), []).append(row)
+    for (scene, target), group in groups.items():
+        cells = [f"`{scene}`", f"{100 * target:.2g} %"]
+        for kind in KINDS:
+            stated, true = errors(group, kind)
+            if kind != next(iter(KINDS)):
+                cells += [f"{100 * np.mean([row['stated'][part] for row in group]):.2f}"
+                          for part in ('discretisation', 'mesh')]
+            cells += [f"{100 * stated.mean():.2f}, {100 * true.mean():.2f}",
+                      f"{is_covered(stated, true).sum()} of {len(group)}"]
+        print("| " + " | ".join(cells) + " |")
+    for kind in KINDS:
+        stated, true = errors(rows, kind)
+        shown = stated > NOTHING
+        print(f"\n{kind}: {100 * is_covered(stated, true).mean():.1f} % of {len(rows)} bakes are "
+              f"covered; true over stated: median {np.median(true[shown] / stated[shown]):.2f}, "
+              f"largest {(true[shown] / stated[shown]).max():.2f}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="calibration", description=__doc__)
+    parser.add_argument("out", nargs="?", type=Path, default=ROOT / "build/calibration",
+                        help="folder of scenes and results")
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--scenes", nargs="+", choices=list(SCENES), default=list(SCENES))
+    parser.add_argument("--draw", action="store_true")
+    parser.add_argument("--images", type=Path, default=ROOT / "docs/images")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    if not arguments.draw:
+        calibrate(arguments.scenes, arguments.seeds, arguments.out)
+    rows = [json.loads(line)
+            for line in (arguments.out / "calibration.jsonl").read_text().splitlines()]
+    draw(rows, arguments.images / "calibration.svg")
+    print_table(rows)
+
+
+if __name__ == "__main__":
+    main()
