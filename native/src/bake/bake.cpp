@@ -227,6 +227,7 @@ struct Bake::Trace {
     std::vector<int32_t> windowOf;                       // per parent: see LineDensity
     LineCounts counts;
     std::unique_ptr<BundleTracer> tracer;
+    Looks looks;  // at the light along its lines
 };
 
 Bake::Bake() = default;
@@ -344,7 +345,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, SetLights& lights, const Trans
             !anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side));
         if (wantedSides[side]) area[side] = patches.area[side / 2];
     }
-    SetNoise noise(lights, weight);
+    SetNoise noise(trace->looks, lights, weight);
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     const uint32_t most = std::max(2u, uint32_t(settings.maxBundles) & ~1u);
@@ -368,6 +369,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, SetLights& lights, const Trans
         for (size_t side = 0; side < n; ++side) weight[side] = area[side] * exposed[side];
         noise.look(halves, bundles, transport.bias());
         errors = noise.relative();
+        trace->looks = noise.looks();
 
         const auto worst = std::max_element(errors.begin(), errors.end());
         const double onSmall = worstWindowNoise(patches, trace->windowOf, halves, weight);

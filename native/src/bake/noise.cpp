@@ -13,12 +13,12 @@ constexpr double kMemory = 0.5;
 
 }  // namespace
 
-Noise::Noise(const std::vector<float>& weight, const std::vector<float>& directError)
-    : weight(weight), directError(directError) {}
+Noise::Noise(const Looks& before, const std::vector<float>& weight,
+             const std::vector<float>& directError)
+    : weight(weight), directError(directError), looked(before.count), before(before) {}
 
 void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double sharedBias) {
     const size_t n = weight.size();
-    ++looks;
     difference.resize(n);
     double squares = 0, direct = 0;
     signal = 0;
@@ -34,19 +34,27 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
     bias = sharedBias;
     bundleNoise = signal > 0 ? squares / signal : 0;
     directNoise = signal > 0 ? direct / signal : 0;
-    // What the looks before foretell for this one.
-    const double before =
-        bundles > 0 ? pooled * std::pow(double(bundles) / count, 2 * kNoiseSlope) : bundleNoise;
-    pooled = kMemory * before + (1 - kMemory) * bundleNoise;
+    if (bundles == 0 && count == before.bundles) {
+        // An earlier bake has seen the same lines.
+        pooled = before.share * bundleNoise;
+    } else {
+        // What the looks before foretell for this one.
+        const double foretold =
+            bundles > 0 ? pooled * std::pow(double(bundles) / count, 2 * kNoiseSlope) : bundleNoise;
+        pooled = kMemory * foretold + (1 - kMemory) * bundleNoise;
+        ++looked;
+    }
     bundles = count;
 }
 
-double Noise::factor() const { return 1 + kSmallSample / (double(looks) * looks); }
+double Noise::factor() const { return 1 + kSmallSample / (double(looked) * looked); }
 
 double Noise::relative() const {
     if (!(signal > 0)) return 0;
     return std::sqrt(factor() * factor() * pooled + directNoise + bias * bias);
 }
+
+Looks Noise::looks() const { return {looked, bundles, bundleNoise > 0 ? pooled / bundleNoise : 1}; }
 
 std::vector<glm::vec3> Noise::perSide() const {
     const float scale = bundleNoise > 0 ? float(factor() * std::sqrt(pooled / bundleNoise)) : 0.0f;
@@ -55,7 +63,7 @@ std::vector<glm::vec3> Noise::perSide() const {
     return result;
 }
 
-SetNoise::SetNoise(const SetLights& lights, const std::vector<float>& weight)
+SetNoise::SetNoise(const Looks& before, const SetLights& lights, const std::vector<float>& weight)
     : directError(weight.size()) {
     for (size_t side = 0; side < directError.size(); ++side) {
         double variance = 0;
@@ -63,8 +71,9 @@ SetNoise::SetNoise(const SetLights& lights, const std::vector<float>& weight)
             variance += double(light.shot.error[side]) * double(light.shot.error[side]);
         directError[side] = float(std::sqrt(variance));
     }
-    noises.emplace_back(weight, directError);
-    for (size_t k = 1; k < lights.size(); ++k) noises.emplace_back(weight, lights[k].shot.error);
+    noises.emplace_back(before, weight, directError);
+    for (size_t k = 1; k < lights.size(); ++k)
+        noises.emplace_back(before, weight, lights[k].shot.error);
 }
 
 void SetNoise::look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles,

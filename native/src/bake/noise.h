@@ -24,17 +24,25 @@ namespace raybundle {
 // The noise falls with the number of bundles to about this power.
 constexpr double kNoiseSlope = 0.65;
 
+// What the looks at the halves of some lines have told, for the next bake with the same lines.
+struct Looks {
+    uint32_t count = 0, bundles = 0;
+    double share = 1;  // of the last look's squares that counts, by the looks before it
+};
+
 class Noise {
   public:
-    // weight: per side, exposed area in m^2 where the light is a result, else 0. directError: per
+    // before: of earlier bakes with these lines. weight: per side, exposed area in m^2 where the light is a result, else 0. directError: per
     // side, standard error of the first shot, W/m^2. Both must outlive the object.
-    Noise(const std::vector<float>& weight, const std::vector<float>& directError);
+    Noise(const Looks& before, const std::vector<float>& weight,
+          const std::vector<float>& directError);
 
     // A look at the halves of so many bundles.
     void look(const std::array<Irradiance, 2>& half, uint32_t bundles, double bias);
 
     // As of the last look, relative to the RMS of the light.
     double relative() const;
+    Looks looks() const;
     // Per side: half the difference of the halves, brought to the stated size, W/m^2.
     std::vector<glm::vec3> perSide() const;
 
@@ -47,7 +55,8 @@ class Noise {
     double bundleNoise = 0;             // relative squares, of the last look
     double pooled = 0;                  // the same, averaged with the looks before
     double directNoise = 0, bias = 0, signal = 0;
-    uint32_t bundles = 0, looks = 0;
+    uint32_t bundles = 0, looked = 0;
+    Looks before;
 };
 
 // Per side.
@@ -61,8 +70,8 @@ struct SideNoise {
 // The noise of the light of all, and that of each light set.
 class SetNoise {
   public:
-    // weight as above. Both must outlive the object.
-    SetNoise(const SetLights& lights, const std::vector<float>& weight);
+    // As above. Lights and weight must outlive the object.
+    SetNoise(const Looks& before, const SetLights& lights, const std::vector<float>& weight);
     SetNoise(const SetNoise&) = delete;
 
     // A look at the halves of all lights.
@@ -71,6 +80,7 @@ class SetNoise {
     // As of the last look, relative: of the light of all, then of each light set.
     std::vector<double> relative() const;
     // Of the light of all.
+    Looks looks() const { return noises.front().looks(); }
     SideNoise perSide() const;
 
   private:
