@@ -111,6 +111,11 @@ TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_image(scene, material, bad, kOne),
                       "image " + std::to_string(bad));
+        expectInvalid(rb_set_material_emission_image(scene, material, bad, kGlow),
+                      "image " + std::to_string(bad));
+        expectInvalid(rb_set_material_opacity_image(scene, material, bad),
+                      "image " + std::to_string(bad));
+        expectInvalid(rb_set_material_opacity(scene, bad, 0.5f), "material " + std::to_string(bad));
         expectInvalid(rb_set_material_corner_colors(scene, bad, kOne),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_mesh_uvs(scene, bad, kVertices, 24), "mesh " + std::to_string(bad));

@@ -103,6 +103,19 @@ RB_API rb_error rb_set_material_image(rb_scene scene, int32_t material, int32_t 
 RB_API rb_error rb_set_material_corner_colors(rb_scene scene, int32_t material,
                                               const float weight[3]);
 
+/* Likewise for the emission: adds weight (six floats, W/m^2: RGB of the front side, then of the back
+ * side) times the image, or times the corner colours, averaged over each patch. */
+RB_API rb_error rb_set_material_emission_image(rb_scene scene, int32_t material, int32_t image,
+                                               const float weight[6]);
+RB_API rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t material,
+                                                       const float weight[6]);
+
+/* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.
+ * Reflectance and emission remain those of the whole surface, so reflectance is at most the
+ * opacity. An image multiplies it (the mean of its channels), averaged over each patch. */
+RB_API rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity);
+RB_API rb_error rb_set_material_opacity_image(rb_scene scene, int32_t material, int32_t image);
+
 /* Adds a mesh of planar or nearly planar n-gons, which may be concave.
  *   vertices         3 * vertex_count floats, object space, metres
  *   corner_vertices  corner_count vertex indices, face after face

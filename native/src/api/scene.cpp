@@ -70,6 +70,50 @@ rb_error rb_set_material_corner_colors(rb_scene scene, int32_t material, const f
     });
 }
 
+rb_error rb_set_material_emission_image(rb_scene scene, int32_t material, int32_t image,
+                                        const float weight[6]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(weight, "weight");
+        needFinite(weight, 6, "weight");
+        Material& target = scene->scene.material(material);
+        scene->scene.checkImage(image);
+        target.emissionImage = image;
+        target.emissionImageWeight = {vec3(weight), vec3(weight + 3)};
+    });
+}
+
+rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t material,
+                                                const float weight[6]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(weight, "weight");
+        needFinite(weight, 6, "weight");
+        Material& target = scene->scene.material(material);
+        target.emissionUsesCornerColors = true;
+        target.emissionColorWeight = {vec3(weight), vec3(weight + 3)};
+    });
+}
+
+rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity) {
+    return guarded([&] {
+        need(scene, "scene");
+        Material& target = scene->scene.material(material);
+        if (!(opacity >= 0 && opacity <= 1))
+            throw invalidArgument("material \"" + target.name + "\": opacity must be 0 to 1");
+        target.opacity = opacity;
+    });
+}
+
+rb_error rb_set_material_opacity_image(rb_scene scene, int32_t material, int32_t image) {
+    return guarded([&] {
+        need(scene, "scene");
+        Material& target = scene->scene.material(material);
+        scene->scene.checkImage(image);
+        target.opacityImage = image;
+    });
+}
+
 rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices, size_t vertex_count,
                      const int32_t* corner_vertices, size_t corner_count,
                      const int32_t* face_offsets, size_t face_count, const int32_t* face_materials,

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bake/geometry_hash.h"
 
+#include <algorithm>
 #include <cstring>
 #include <vector>
+
+#include "patches/reflectance.h"
 
 namespace raybundle {
 namespace {
@@ -40,6 +43,24 @@ class Hasher {
     uint64_t state = 0x9e3779b97f4a7c15ull;
 };
 
+// What decides which lines pass through surfaces; nothing where all are opaque.
+void addOpacity(const Scene& scene, Hasher& hasher) {
+    if (std::all_of(scene.materials.begin(), scene.materials.end(),
+                    [](const Material& material) { return material.isOpaque(); }))
+        return;
+    for (const Material& material : scene.materials) {
+        const bool isEmpty = isEmptySpace(material);
+        hasher.add(&material.opacity, sizeof(float));
+        hasher.add(&isEmpty, sizeof(bool));
+        if (material.opacityImage >= 0)
+            hasher.add(scene.images[size_t(material.opacityImage)].pixels);
+    }
+    for (const Mesh& mesh : scene.meshes) {
+        hasher.add(mesh.faceMaterials);
+        hasher.add(mesh.uvs);
+    }
+}
+
 }  // namespace
 
 uint64_t geometryHash(const Scene& scene, const Settings& settings) {
@@ -49,6 +70,7 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
         hasher.add(mesh.cornerVertices);
         hasher.add(mesh.faceOffsets);
     }
+    addOpacity(scene, hasher);
     for (const Instance& instance : scene.instances) {
         hasher.add(&instance.mesh, sizeof(instance.mesh));
         hasher.add(&instance.transform, sizeof(instance.transform));

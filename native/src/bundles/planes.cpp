@@ -2,7 +2,6 @@
 #include "bundles/planes.h"
 
 #include <cmath>
-#include <cstring>
 
 namespace raybundle {
 namespace {
@@ -23,27 +22,7 @@ constexpr size_t kDensityBins = 256;
 uint32_t sideOf(uint64_t key) { return uint32_t(key); }
 uint32_t depthOf(uint64_t key) { return uint32_t(key >> 32); }
 
-// Mixes the bits of a counter (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number
-// Generators", 2014).
-uint64_t mix(uint64_t x) {
-    x += 0x9e3779b97f4a7c15ull;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-    return x ^ (x >> 31);
-}
-
 double unit(uint64_t hash) { return double(hash >> 11) * 0x1p-53; }
-
-// Random for each bundle, and the same whoever projects it.
-uint64_t seedOf(const Bundle& bundle) {
-    uint64_t seed = mix(uint64_t(bundle.half) << 32 | bundle.index);
-    for (double x : {bundle.shift.x, bundle.shift.y}) {
-        uint64_t bits;
-        std::memcpy(&bits, &x, sizeof(bits));
-        seed = mix(seed ^ bits);
-    }
-    return seed;
-}
 
 }  // namespace
 
@@ -79,7 +58,7 @@ class Planes::Runs {
     };
 
     void finish(Run run, uint32_t firstPlane) {
-        const uint64_t hash = mix(seed ^ mix(uint64_t(run.pixel) << 32 | firstPlane));
+        const uint64_t hash = mixBits(seed ^ mixBits(uint64_t(run.pixel) << 32 | firstPlane));
         const uint32_t lines = uint32_t(std::min(run.lines, kMostLines) + unit(hash));
         if (lines == 0) return;
         if (run.i > run.j) std::swap(run.i, run.j);
@@ -123,10 +102,10 @@ void Planes::project(const Bundle& bundle, BundleLines& out) {
     depthSteps = kRange / ((1 + 2 * kMargin) * depth);
     zoneSteps = uint64_t(std::min(contacts.zone() * depthSteps, kRange));
 
-    const uint64_t seed = seedOf(bundle);
+    const uint64_t seed = lineName(bundle);
     if (input.planePlacement == PlanePlacement::CLOSE_DISTANCE) measureDensity();
     placePlanes(seed);
-    Runs runs(mix(seed), planeCount, out);
+    Runs runs(mixBits(seed), planeCount, out);
     if (input.planeCoherence)
         sweep(runs);
     else
@@ -152,7 +131,7 @@ void Planes::measureDensity() {
 void Planes::placePlanes(uint64_t seed) {
     for (uint32_t k = 0; k < planeCount; ++k) {
         const bool isStratified = input.planePlacement == PlanePlacement::STRATIFIED;
-        const double offset = unit(mix(seed + (isStratified ? k : 0)));
+        const double offset = unit(mixBits(seed + (isStratified ? k : 0)));
         const double depth = density.depthAt((k + offset) / planeCount) * kRange;
         planes[k] = uint32_t(std::min(std::ceil(depth), kRange - 1));
     }

@@ -15,6 +15,7 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
 
 void Rasteriser::begin(const Bundle& bundle) {
     frame = bundle;
+    if (!patches.opacity.empty()) line = lineName(bundle);
     if (smallPatches == SmallPatches::ROULETTE) roulette.begin(bundle);
     const size_t n = patches.vertices.size();
     projected.resize(n);
@@ -68,6 +69,8 @@ void Rasteriser::begin(const Bundle& bundle) {
 bool Rasteriser::lookThrough(size_t window) {
     level = windows[window].level;
     zoom = std::ldexp(1.0, level);
+    // Other lines than those of the same pixels in other views.
+    if (!patches.opacity.empty()) line = lineName(frame) + mixBits(window + 1);
     // The grid is shifted by the same length as the whole scene's: uniformly over its pixel too.
     const glm::dvec2 shift = glm::fract(frame.shift * zoom);
     // Pixels whose centres are in the opening.

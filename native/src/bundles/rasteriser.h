@@ -25,6 +25,7 @@
 #include "bundles/line_windows.h"
 #include "bundles/projector.h"
 #include "bundles/roulette.h"
+#include "patches/opacity.h"
 #include "patches/patches.h"
 
 namespace raybundle {
@@ -46,17 +47,13 @@ class Rasteriser {
     uint32_t lineWeight() const { return 1u << (2 * (finestLevel - level)); }
 
     // Calls visit(pixel, depth in metres, side that faces against the direction) for all fragments
-    // in the view, parent after parent.
+    // in the view, parent after parent. Where a patch lets a line through, there is none.
     template <class Visit>
     void forEachFragment(const Visit& visit) {
-        for (size_t i = 0; i < patches.parents.size(); ++i) {
-            const Parent& parent = patches.parents[i];
-            if (!parent.exchanges) continue;
-            if (smallPatches == SmallPatches::ROULETTE)
-                fillPatches(parent, visit);
-            else if (level == 0 || isInView(bounds[i]))
-                sampleParent(parent, visit);
-        }
+        if (patches.opacity.empty()) return forEachCovered(visit);
+        forEachCovered([&](uint32_t pixel, double z, uint32_t side) {
+            if (stops(patches, side / 2, line + pixel)) visit(pixel, z, side);
+        });
     }
 
     // The view, pixels; a pixel's index is y * width + x.
@@ -67,6 +64,18 @@ class Rasteriser {
     double depthHigh() const { return highest; }
 
   private:
+    // As if all patches were opaque.
+    template <class Visit>
+    void forEachCovered(const Visit& visit) {
+        for (size_t i = 0; i < patches.parents.size(); ++i) {
+            const Parent& parent = patches.parents[i];
+            if (!parent.exchanges) continue;
+            if (smallPatches == SmallPatches::ROULETTE)
+                fillPatches(parent, visit);
+            else if (level == 0 || isInView(bounds[i]))
+                sampleParent(parent, visit);
+        }
+    }
     template <class Visit>
     void sampleParent(const Parent& parent, const Visit& visit);
     // Patch by patch, for ROULETTE.
@@ -101,6 +110,7 @@ class Rasteriser {
     int finestLevel = 0;
 
     Bundle frame{};                           // the bundle in hand
+    uint64_t line = 0;                        // lineName of the bundle and the view
     int level = 0;                            // of the view
     double zoom = 1;                          // 2^level
     glm::dvec2 corner{0.0};                   // of the view, its pixels

@@ -322,6 +322,7 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
                   parent.area() / parent.patchCount());
         patches.totalArea += parent.area();
     }
+    assignOpacity(scene, patches);
     assignMaterials(scene, patches);
     return patches;
 }

@@ -75,8 +75,12 @@ struct Patches {
     std::vector<glm::vec3> vertices;  // metres, relative to centre
     std::vector<Parent> parents;
     std::vector<Cell> cells;
-    std::vector<uint32_t> parentOf;      // per patch
-    std::vector<float> area;             // per patch, m^2
+    std::vector<uint32_t> parentOf;  // per patch
+    // Per patch, m^2. Of a patch that lets light through only the opaque share counts, as if it had
+    // many small holes: a global line meets that share of it, and reflectance and emission are those
+    // of what is left between the holes.
+    std::vector<float> area;
+    std::vector<float> opacity;          // per patch; empty where all are opaque
     std::vector<glm::vec3> reflectance;  // per side
     std::vector<glm::vec3> emission;     // per side, W/m^2
     double totalArea = 0;                // of all patches, one side, m^2
@@ -86,6 +90,8 @@ struct Patches {
     size_t degenerateFaces = 0;  // left out
 
     size_t count() const { return area.size(); }
+    // Share of the light that a patch stops.
+    float opacityOf(uint32_t patch) const { return opacity.empty() ? 1.0f : opacity[patch]; }
     size_t sideCount() const { return 2 * area.size(); }
     // Unit normal of a side.
     glm::vec3 normal(uint32_t side) const {
@@ -101,7 +107,7 @@ struct Patches {
 
 // Cuts all instances of the scene into patches with edges of about `patchSize` metres (0: as
 // automaticPatchSizes has it), coarser if there would be more than maxPatches, and gives each its
-// reflectance (mean over its area) and emission.
+// reflectance, emission and opacity (means over its area).
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches);
 
 }  // namespace raybundle

@@ -35,9 +35,22 @@ glm::vec3 lookup(const Image& image, glm::vec2 uv) {
            fy * ((1 - fx) * texel(image, x0, y0 + 1) + fx * texel(image, x0 + 1, y0 + 1));
 }
 
-// Mean of the image and of the corner colours over a patch, as far as the material uses them.
-glm::vec3 varyingReflectance(const Scene& scene, const Patches& patches, const Mesh& mesh,
-                             const Material& material, uint32_t patch) {
+bool hasImage(const Mesh& mesh, int image) { return image >= 0 && !mesh.uvs.empty(); }
+
+// Means over a patch of what a material's images and corner colours add or multiply.
+struct Varying {
+    glm::vec3 reflectance{0.0f};
+    std::array<glm::vec3, 2> emission{glm::vec3(0.0f), glm::vec3(0.0f)};
+    float opacity = 1;
+};
+
+bool varies(const Mesh& mesh, const Material& m) {
+    return hasImage(mesh, m.image) || hasImage(mesh, m.emissionImage) ||
+           ((m.usesCornerColors || m.emissionUsesCornerColors) && !mesh.cornerColors.empty());
+}
+
+Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mesh,
+                     const Material& material, uint32_t patch) {
     const Parent& parent = patches.parents[patches.parentOf[patch]];
     const Cell& cell = patches.cells[parent.cell];
     auto interpolate = [&](const auto& values, glm::vec3 point) {
@@ -46,12 +59,12 @@ glm::vec3 varyingReflectance(const Scene& scene, const Patches& patches, const M
                    w[2] * values[cell.corner[2]];
         return cell.isTriangle() ? sum : sum + w[3] * values[cell.corner[3]];
     };
-    const bool hasImage = material.image >= 0 && !mesh.uvs.empty();
-    const bool hasColors = material.usesCornerColors && !mesh.cornerColors.empty();
+    const bool hasColors = !mesh.cornerColors.empty();
 
     int samples = kMinSamples;
-    if (hasImage) {
-        const Image& image = scene.images[material.image];
+    for (int index : {material.image, material.emissionImage, material.opacityImage}) {
+        if (!hasImage(mesh, index)) continue;
+        const Image& image = scene.images[size_t(index)];
         glm::vec2 low(INFINITY), high(-INFINITY);
         for (glm::vec2 uv : {glm::vec2(0.01f), glm::vec2(0.98f, 0.01f), glm::vec2(0.01f, 0.98f)}) {
             const glm::vec2 at = interpolate(mesh.uvs, patches.point(patch, uv));
@@ -59,8 +72,7 @@ glm::vec3 varyingReflectance(const Scene& scene, const Patches& patches, const M
             high = glm::max(high, at);
         }
         const glm::vec2 pixels = (high - low) * glm::vec2(image.width, image.height);
-        samples =
-            int(std::clamp(std::max(pixels.x, pixels.y), float(kMinSamples), float(kMaxSamples)));
+        samples = int(std::clamp(std::max(pixels.x, pixels.y), float(samples), float(kMaxSamples)));
     }
     // A patch is sampled at the centroids of its own regular grid, so that linear colours are
     // exact.
@@ -68,18 +80,71 @@ glm::vec3 varyingReflectance(const Scene& scene, const Patches& patches, const M
     grid.isTriangle = parent.isTriangle;
     grid.countA = grid.countB = uint16_t(samples);
     const glm::vec2 centroid = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
-    glm::vec3 sum(0.0f);
+    glm::vec3 image(0.0f), emissionImage(0.0f), color(0.0f);
+    float opacity = 0;
     for (uint32_t k = 0; k < grid.patchCount(); ++k) {
         const glm::vec3 point = patches.point(patch, grid.pointOn(k, centroid));
-        if (hasImage)
-            sum += material.imageWeight *
-                   lookup(scene.images[material.image], interpolate(mesh.uvs, point));
-        if (hasColors) sum += material.cornerColorWeight * interpolate(mesh.cornerColors, point);
+        auto at = [&](int index) {
+            return lookup(scene.images[size_t(index)], interpolate(mesh.uvs, point));
+        };
+        if (hasImage(mesh, material.image)) image += at(material.image);
+        if (hasImage(mesh, material.emissionImage)) emissionImage += at(material.emissionImage);
+        if (hasImage(mesh, material.opacityImage))
+            opacity += glm::dot(at(material.opacityImage), glm::vec3(1.0f / 3));
+        if (hasColors) color += interpolate(mesh.cornerColors, point);
     }
-    return sum / float(samples * samples);
+    const float perSample = 1 / float(grid.patchCount());
+    Varying means;
+    means.reflectance = perSample * material.imageWeight * image;
+    if (material.usesCornerColors)
+        means.reflectance += perSample * material.cornerColorWeight * color;
+    for (size_t side = 0; side < 2; ++side) {
+        means.emission[side] = perSample * material.emissionImageWeight[side] * emissionImage;
+        if (material.emissionUsesCornerColors)
+            means.emission[side] += perSample * material.emissionColorWeight[side] * color;
+    }
+    if (hasImage(mesh, material.opacityImage)) means.opacity = perSample * opacity;
+    return means;
 }
 
 }  // namespace
+
+bool isEmptySpace(const Material& m) {
+    constexpr glm::vec3 kBlack(0.0f);
+    return m.reflectance[0] == kBlack && m.reflectance[1] == kBlack && m.emission[0] == kBlack &&
+           m.emission[1] == kBlack && m.image < 0 && m.emissionImage < 0 && !m.usesCornerColors &&
+           !m.emissionUsesCornerColors;
+}
+
+void assignOpacity(const Scene& scene, Patches& patches) {
+    // What reflects or shines but stops no light would never be met by a line: it stops so much.
+    constexpr float kLeastOpacity = 1.0f / 64;
+    // Keeps areas above zero, by which much is divided.
+    constexpr float kLeastArea = 1e-4f;
+    auto materialOf = [&](const Parent& parent) -> const Material& {
+        return scene.materialOf(scene.meshes[scene.instances[parent.instance].mesh], parent.face);
+    };
+    if (std::all_of(patches.parents.begin(), patches.parents.end(),
+                    [&](const Parent& parent) { return materialOf(parent).isOpaque(); }))
+        return;
+    patches.opacity.assign(patches.count(), 1.0f);
+    tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
+        Parent& parent = patches.parents[i];
+        const Material& material = materialOf(parent);
+        if (material.isOpaque()) return;
+        const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
+        const float least = isEmptySpace(material) ? 0.0f : kLeastOpacity;
+        // Light gets in.
+        parent.isSolid = false;
+        for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
+            float opacity = material.opacity;
+            if (hasImage(mesh, material.opacityImage))
+                opacity *= varyingMeans(scene, patches, mesh, material, p).opacity;
+            patches.opacity[p] = std::clamp(opacity, least, 1.0f);
+            patches.area[p] *= std::max(patches.opacity[p], kLeastArea);
+        }
+    });
+}
 
 void assignMaterials(const Scene& scene, Patches& patches) {
     patches.reflectance.resize(patches.sideCount());
@@ -88,15 +153,20 @@ void assignMaterials(const Scene& scene, Patches& patches) {
         const Parent& parent = patches.parents[i];
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
         const Material& material = scene.materialOf(mesh, parent.face);
-        const bool varies = (material.image >= 0 && !mesh.uvs.empty()) ||
-                            (material.usesCornerColors && !mesh.cornerColors.empty());
+        const bool isVarying = varies(mesh, material);
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
-            const glm::vec3 varying =
-                varies ? varyingReflectance(scene, patches, mesh, material, p) : glm::vec3(0.0f);
-            for (int side = 0; side < 2; ++side) {
+            Varying varying;
+            if (isVarying) varying = varyingMeans(scene, patches, mesh, material, p);
+            // The material's values are of the whole patch, a patch's of its opaque share.
+            const float opacity = patches.opacityOf(p);
+            const float scale = opacity > 0 ? 1 / opacity : 0.0f;
+            for (size_t side = 0; side < 2; ++side) {
                 patches.reflectance[2 * p + side] =
-                    glm::clamp(material.reflectance[side] + varying, 0.0f, kMaxReflectance);
-                patches.emission[2 * p + side] = material.emission[side];
+                    glm::clamp(scale * (material.reflectance[side] + varying.reflectance), 0.0f,
+                               kMaxReflectance);
+                patches.emission[2 * p + side] =
+                    scale *
+                    glm::max(material.emission[side] + varying.emission[side], glm::vec3(0.0f));
             }
         }
     });

@@ -6,6 +6,13 @@
 
 namespace raybundle {
 
+// Whether a material reflects nothing and shines nowhere.
+bool isEmptySpace(const Material& material);
+
+// Gives every patch its opacity, averaged likewise, and takes the share that lets light through off
+// its area. Once, before assignMaterials; lines depend on it.
+void assignOpacity(const Scene& scene, Patches& patches);
+
 // Gives every side of every patch its reflectance and emission. Images and corner colours are
 // averaged over the area of the patch: a lookup at one point would alias.
 void assignMaterials(const Scene& scene, Patches& patches);

@@ -83,9 +83,9 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
 // The light of one set on the sides, as it goes into a reconstruction.
 struct SideLight {
     const Irradiance& irradiance;
-    const Field& emission;  // W/m^2
-    Field exitance;         // emission included, W/m^2
-    Field carried;          // direct light without that of the sources, W/m^2
+    Field emission;  // W/m^2
+    Field exitance;  // emission included, W/m^2
+    Field carried;   // direct light without that of the sources, W/m^2
 };
 
 std::vector<SideLight> sideLights(const Patches& patches, const SetLights& lights) {
@@ -94,8 +94,11 @@ std::vector<SideLight> sideLights(const Patches& patches, const SetLights& light
         const Irradiance& h = light.irradiance;
         SideLight out{h, light.direct.emission(), Field(h.direct.size()), Field(h.direct.size())};
         for (size_t side = 0; side < h.direct.size(); ++side) {
-            out.exitance[side] = out.emission[side] +
-                                 patches.reflectance[side] * (h.direct[side] + h.indirect[side]);
+            // Of the whole patch, what lets light through included.
+            const float opacity = patches.opacityOf(uint32_t(side / 2));
+            out.emission[side] *= opacity;
+            out.exitance[side] = out.emission[side] + opacity * patches.reflectance[side] *
+                                                          (h.direct[side] + h.indirect[side]);
             out.carried[side] = h.direct[side] - h.gathered[side];
         }
         result.push_back(std::move(out));
@@ -138,6 +141,10 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                                        Report& report) {
     const bool isPoint = settings.reconstruction == "POINT";
     const std::vector<SideLight> onSides = sideLights(patches, lights);
+    // Of the whole patch, what lets light through included.
+    Field reflectance = patches.reflectance;
+    for (size_t side = 0; side < reflectance.size(); ++side)
+        reflectance[side] *= patches.opacityOf(uint32_t(side / 2));
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
     std::vector<SourceLight> atCorners;  // per light
     for (size_t k = 0; isPoint && k < lights.size(); ++k) {
@@ -175,7 +182,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                                          isPoint ? &light.carried : &light.exitance});
         for (const SideLight& light : onSides)
             if (isPoint) fields.push_back(&light.emission);
-        if (isPoint) fields.push_back(&patches.reflectance);
+        if (isPoint) fields.push_back(&reflectance);
         std::vector<Field> nodes =
             settings.reconstruction == "AREA_AVERAGE"
                 ? areaAverage(patches, ranges[i], regions, instance.side, exposed, fields)
@@ -187,9 +194,9 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
             if (isPoint) {
                 atCorners[k].replaceGathered(i, regions, out.cornerAngles, exitance, direct);
                 const Field& emission = nodes[3 * lights.size() + k];
-                const Field& reflectance = nodes.back();
+                const Field& reflectances = nodes.back();
                 for (size_t v = 0; v < direct.size(); ++v)
-                    exitance[v] = emission[v] + reflectance[v] * (direct[v] + indirect[v]);
+                    exitance[v] = emission[v] + reflectances[v] * (direct[v] + indirect[v]);
             }
             CornerLight light = cornerLight(regions, direct, indirect, exitance);
             if (k == 0)

@@ -32,6 +32,17 @@ struct Material {
     glm::vec3 imageWeight{0.0f};
     bool usesCornerColors = false;
     glm::vec3 cornerColorWeight{0.0f};
+    // Likewise added to the emissions, with a weight for each side.
+    int emissionImage = -1;
+    std::array<glm::vec3, 2> emissionImageWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
+    bool emissionUsesCornerColors = false;
+    std::array<glm::vec3, 2> emissionColorWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
+    // Share of the light that does not pass straight through, and an image (its mean channel) that
+    // multiplies it. Reflectance and emission are those of the whole, what passes through included.
+    float opacity = 1;
+    int opacityImage = -1;
+
+    bool isOpaque() const { return opacity >= 1 && opacityImage < 0; }
 };
 
 // N-gons over shared vertices, in object space. A corner is a position in cornerVertices; face f

@@ -105,7 +105,8 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
       visibility(visibility),
       seed(seed),
       emitted(patches.emission),
-      bundled(patches.sideCount()) {
+      bundled(patches.sideCount()),
+      gathered(patches.sideCount()) {
     for (size_t side = 0; side < emitted.size(); ++side) {
         const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
         if (scene.instances[instance].lightSet != lightSet) emitted[side] = glm::vec3(0.0f);
@@ -114,12 +115,14 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
     std::vector<bool> isSource(patches.sideCount(), false);
     for (size_t side = 0; side < isSource.size(); ++side) {
         if (!patches.parentAt(uint32_t(side)).exchanges) continue;
-        if (brightest(emitted[side]) > brightLimit)
+        if (brightest(emitted[side]) > brightLimit) {
             isSource[side] = true;
-        else
+            gathered[side] = patches.opacityOf(uint32_t(side / 2)) * emitted[side];
+        } else {
             bundled[side] = emitted[side];
+        }
     }
-    sources = raybundle::lightSources(scene, patches, isSource, lightSet);
+    sources = raybundle::lightSources(scene, patches, isSource, gathered, lightSet);
 }
 
 std::vector<Gathered> DirectLight::gather(size_t count,
@@ -281,8 +284,9 @@ DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t 
             continue;
         }
         ++sum.rays;
-        if (!visibility.isBlocked(receiver.side, point, sample.direction, sample.distance))
-            block.visible += sample.irradiance;
+        block.visible +=
+            sample.irradiance *
+            visibility.visibleShare(receiver.side, point, sample.direction, sample.distance);
     }
     return block;
 }
@@ -385,10 +389,11 @@ glm::dvec3 DirectLight::escapedPower() const {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
                 const EmittedRay ray =
                     sources[k]->emit(sobolPoint(i, hash(seed, uint32_t(k))), patches.radius);
-                const bool isFree =
-                    ray.side ? !visibility.isBlocked(*ray.side, ray.origin, ray.direction, INFINITY)
-                             : visibility.isFree(ray.start(visibility.offset()), ray.direction);
-                if (isFree) missed.local() += glm::dvec3(ray.weight);
+                const float share =
+                    ray.side
+                        ? visibility.visibleShare(*ray.side, ray.origin, ray.direction, INFINITY)
+                        : visibility.escapingShare(ray.start(visibility.offset()), ray.direction);
+                missed.local() += double(share) * glm::dvec3(ray.weight);
             }
         });
         glm::dvec3 sum(0.0);

@@ -100,6 +100,7 @@ class DirectLight {
     const Visibility& visibility;
     const uint32_t seed;
     std::vector<glm::vec3> emitted, bundled;
+    std::vector<glm::vec3> gathered;  // per side: emission of sources, W/m^2 of the whole patch
     std::vector<std::unique_ptr<LightSource>> sources;
 };
 

@@ -318,6 +318,7 @@ class AreaSource : public LightSource {
 
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
                                                        const std::vector<bool>& gatheredSides,
+                                                       const std::vector<glm::vec3>& emission,
                                                        int32_t lightSet) {
     std::vector<std::unique_ptr<LightSource>> sources;
     for (const Light& light : scene.lights) {
@@ -346,17 +347,27 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
         groups;  // by instance and material
     for (size_t p = 0; p < patches.parents.size(); ++p) {
         const Parent& parent = patches.parents[p];
-        if (!gatheredSides[2 * parent.firstPatch] && !gatheredSides[2 * parent.firstPatch + 1])
+        const auto first = gatheredSides.begin() + 2 * int64_t(parent.firstPatch);
+        if (std::none_of(first, first + 2 * int64_t(parent.patchCount()),
+                         [](bool isGathered) { return isGathered; }))
             continue;
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
         groups[{parent.instance, mesh.faceMaterials[parent.face]}].push_back(uint32_t(p));
     }
     for (auto& [key, parents] : groups) {
-        const uint32_t side = 2 * patches.parents[parents.front()].firstPatch;
-        std::array<glm::vec3, 2> emission{glm::vec3(0.0f), glm::vec3(0.0f)};
-        for (int k = 0; k < 2; ++k)
-            if (gatheredSides[side + k]) emission[k] = patches.emission[side + k];
-        sources.push_back(std::make_unique<MeshSource>(patches, std::move(parents), emission));
+        std::array<glm::vec3, 2> most{glm::vec3(0.0f), glm::vec3(0.0f)};
+        const uint32_t first = 2 * patches.parents[parents.front()].firstPatch;
+        bool varies = false;
+        for (uint32_t p : parents) {
+            const Parent& parent = patches.parents[p];
+            for (uint32_t k = 0; k < 2 * parent.patchCount(); ++k) {
+                const uint32_t side = 2 * parent.firstPatch + k;
+                most[k % 2] = glm::max(most[k % 2], emission[side]);
+                varies = varies || emission[side] != emission[first + k % 2];
+            }
+        }
+        sources.push_back(std::make_unique<MeshSource>(patches, std::move(parents), most,
+                                                       varies ? &emission : nullptr));
     }
     return sources;
 }

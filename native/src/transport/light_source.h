@@ -85,9 +85,12 @@ class LightSource {
 };
 
 // All sources of a light set whose light the first shot gathers: its lights, the image of the world
-// if that is in it, and the emissive faces of sides that are marked. `patches` must outlive them.
+// if that is in it, and the emissive faces of sides that are marked, whose emission per side of all
+// patches (W/m^2 of the whole patch, 0 where not marked) is given. All that is passed must outlive
+// them.
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
                                                        const std::vector<bool>& gatheredSides,
+                                                       const std::vector<glm::vec3>& emission,
                                                        int32_t lightSet = kNoLightSet);
 
 // Irradiance at a point with a unit normal from a planar polygon of radiance 1 around it, by

@@ -48,13 +48,42 @@ double polygonIrradiance(const glm::dvec3& point, const glm::dvec3& normal,
 }
 
 MeshSource::MeshSource(const Patches& patches, std::vector<uint32_t> parents,
-                       const std::array<glm::vec3, 2>& emission)
-    : patches(patches), parents(std::move(parents)), emission(emission) {
+                       const std::array<glm::vec3, 2>& emission,
+                       const std::vector<glm::vec3>* sideEmission)
+    : patches(patches),
+      parents(std::move(parents)),
+      emission(emission),
+      sideEmission(sideEmission) {
     for (uint32_t parent : this->parents) {
         total += patches.parents[parent].area();
         areaUpTo.push_back(total);
     }
+    totalPower = float(total) * (emission[0] + emission[1]);
+    if (sideEmission) chooseByPower();
     boundSource();
+}
+
+void MeshSource::chooseByPower() {
+    double sum = 0;
+    totalPower = glm::vec3(0.0f);
+    for (uint32_t index : parents) {
+        const Parent& parent = patches.parents[index];
+        const float area = parent.area() / float(parent.patchCount());
+        for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
+            for (int k = 0; k < 2; ++k) {
+                const glm::vec3 power = area * emissionOf(p, k);
+                if (!(strength(power) > 0)) continue;
+                totalPower += power;
+                shining.push_back(2 * p + uint32_t(k));
+                powerUpTo.push_back(sum += double(strength(power)));
+            }
+        }
+    }
+}
+
+// Of the front (k = 0) or the back of a patch, W/m^2.
+glm::vec3 MeshSource::emissionOf(uint32_t patch, int k) const {
+    return sideEmission ? (*sideEmission)[2 * patch + uint32_t(k)] : emission[size_t(k)];
 }
 
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
@@ -62,12 +91,12 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     const SurfacePoint on = onSurface(uv);
     const bool front = glm::dot(point - on.position, on.normal) > 0;
     return surfaceSample(point, receiver, on.position, front ? on.normal : -on.normal,
-                         emission[front ? 0 : 1] / glm::pi<float>(), float(total));
+                         emissionOf(on.side / 2, front ? 0 : 1) / glm::pi<float>(), on.area);
 }
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
                                                 const glm::vec3& receiver) const {
-    if (parents.size() > kMaxPolygons) return std::nullopt;
+    if (sideEmission || parents.size() > kMaxPolygons) return std::nullopt;
     if (const auto whole = outlineIrradiance(point, receiver)) return *whole;
     glm::vec3 sum(0.0f);
     for (uint32_t index : parents) {
@@ -93,15 +122,30 @@ bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
 
 EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     // Choose the side by its share of the power.
-    const float share0 = strength(emission[0]) / (strength(emission[0]) + strength(emission[1]));
-    const bool front = r.x < share0;
-    const float u = front ? r.x / share0 : (r.x - share0) / (1 - share0);
-    const SurfacePoint on = onSurface({std::min(u, 0.9999999f), r.y});
+    SurfacePoint on{};
+    bool front;
+    if (sideEmission) {
+        on = onSurface({r.x, r.y});
+        front = on.side % 2 == 0;
+    } else {
+        const float share0 =
+            strength(emission[0]) / (strength(emission[0]) + strength(emission[1]));
+        front = r.x < share0;
+        const float u = front ? r.x / share0 : (r.x - share0) / (1 - share0);
+        on = onSurface({std::min(u, 0.9999999f), r.y});
+    }
     EmittedRay ray;
+    // Power is shared out by the sum of the channels.
+    if (sideEmission) {
+        const glm::vec3& own = (*sideEmission)[on.side];
+        for (int c = 0; c < 3; ++c)
+            if (totalPower[c] > 0)
+                ray.weight[c] = own[c] / strength(own) * (strength(totalPower) / totalPower[c]);
+    }
     ray.origin = on.position;
     ray.normal = front ? on.normal : -on.normal;
     ray.direction = cosineDirection(ray.normal, {r.z, r.w});
-    ray.side = 2 * patches.patchAt(on.parent, on.position) + (front ? 0 : 1);
+    ray.side = on.side / 2 * 2 + (front ? 0 : 1);
     return ray;
 }
 
@@ -166,8 +210,26 @@ void MeshSource::boundSource() {
     if (isPlanar && parents.size() <= kMaxPolygons) findOutline();
 }
 
-// A point uniform by area and the front's normal there.
+// A point, uniform by area or chosen by power, and the front's normal there.
 MeshSource::SurfacePoint MeshSource::onSurface(glm::vec2 uv) const {
+    if (!sideEmission) return onParents(uv);
+    if (shining.empty()) return {};
+    const double at = double(uv.x) * powerUpTo.back();
+    const size_t k = std::min<size_t>(
+        size_t(std::upper_bound(powerUpTo.begin(), powerUpTo.end(), at) - powerUpTo.begin()),
+        shining.size() - 1);
+    const double before = k ? powerUpTo[k - 1] : 0, own = powerUpTo[k] - before;
+    const uint32_t patch = shining[k] / 2;
+    const Parent& parent = patches.parents[patches.parentOf[patch]];
+    const glm::vec2 within(float(std::clamp((at - before) / own, 0.0, 1.0)), uv.y);
+    const float area = parent.area() / float(parent.patchCount());
+    // The patch may be chosen for either side.
+    const float share = strength(emissionOf(patch, 0) + emissionOf(patch, 1)) * area;
+    return {patches.point(patch, within), parent.normal, shining[k],
+            float(double(area) * powerUpTo.back() / double(share))};
+}
+
+MeshSource::SurfacePoint MeshSource::onParents(glm::vec2 uv) const {
     const double at = uv.x * total;
     const size_t k = std::min<size_t>(
         size_t(std::upper_bound(areaUpTo.begin(), areaUpTo.end(), at) - areaUpTo.begin()),
@@ -179,7 +241,8 @@ MeshSource::SurfacePoint MeshSource::onSurface(glm::vec2 uv) const {
         s = 1 - s;
         t = 1 - t;
     }
-    return {parent.position({s, t}), parent.normal, parents[k]};
+    const glm::vec3 position = parent.position({s, t});
+    return {position, parent.normal, 2 * patches.patchAt(parents[k], position), float(total)};
 }
 
 }  // namespace raybundle

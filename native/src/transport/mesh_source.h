@@ -10,13 +10,16 @@
 
 namespace raybundle {
 
-// The emissive faces of one object and material.
+// The emissive faces of one object and material. Where emission or opacity varies between patches,
+// points are chosen by the power of patches and there is no closed form.
 class MeshSource : public LightSource {
   public:
     // parents: into Patches::parents; emission: of their front and back, W/m^2. `patches` must
-    // outlive it.
+    // outlive it. Where they vary, sideEmission holds the emission per side of all patches, W/m^2 of
+    // the whole patch, and must outlive it too.
     MeshSource(const Patches& patches, std::vector<uint32_t> parents,
-               const std::array<glm::vec3, 2>& emission);
+               const std::array<glm::vec3, 2>& emission,
+               const std::vector<glm::vec3>* sideEmission = nullptr);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override;
@@ -27,7 +30,7 @@ class MeshSource : public LightSource {
     float distance(const glm::vec3& point) const override {
         return glm::length(centre - point) - extent;
     }
-    glm::vec3 power() const override { return float(total) * (emission[0] + emission[1]); }
+    glm::vec3 power() const override { return totalPower; }
     EmittedRay emit(const glm::vec4& u, float sceneRadius) const override;
 
   private:
@@ -37,15 +40,23 @@ class MeshSource : public LightSource {
     void findOutline();
     struct SurfacePoint {
         glm::vec3 position, normal;
-        uint32_t parent;
+        uint32_t side;  // of the patch; where points are not chosen by power, the front
+        float area;     // over the probability of the point: m^2 that it stands for
     };
     SurfacePoint onSurface(glm::vec2 uv) const;
+    SurfacePoint onParents(glm::vec2 uv) const;
+    glm::vec3 emissionOf(uint32_t patch, int k) const;
+    void chooseByPower();
 
     const Patches& patches;
     const std::vector<uint32_t> parents;
-    const std::array<glm::vec3, 2> emission;  // W/m^2, front and back
-    std::vector<double> areaUpTo;             // per parent, cumulative, m^2
-    double total = 0;                         // m^2
+    const std::array<glm::vec3, 2> emission;  // W/m^2, front and back; most where it varies
+    const std::vector<glm::vec3>* const sideEmission;  // where it varies
+    std::vector<uint32_t> shining;                     // sides, where it varies
+    std::vector<double> powerUpTo;                     // of them, cumulative, W
+    glm::vec3 totalPower{0.0f};                        // W
+    std::vector<double> areaUpTo;                      // per parent, cumulative, m^2
+    double total = 0;                                  // m^2
     glm::vec3 centre{0.0f}, planeNormal{0.0f};
     float extent = 0;  // radius of a sphere around centre, metres
     bool isPlanar = false;

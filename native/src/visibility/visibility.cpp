@@ -11,6 +11,7 @@
 
 #include "bake/error.h"
 #include "patches/coincidence.h"
+#include "patches/opacity.h"
 
 namespace raybundle {
 namespace {
@@ -84,11 +85,35 @@ Visibility::~Visibility() = default;
 
 namespace {
 
-// What the filter below needs to know of the ray; starts with Embree's own part.
-struct Start {
-    RTCIntersectContext context;
+// How a ray passes what lets light through: in part, or by chance.
+struct Passage {
     const Patches* patches;
     const uint32_t* parentOfTriangle;
+    std::optional<uint64_t> line;  // its name, where it passes by chance
+    float share = 1;               // that has come through, where it passes in part
+    // Parents that have taken their part: a ray along the diagonal of a quad meets both of its
+    // triangles, and Embree may offer a hit twice.
+    std::vector<uint32_t> passed;
+
+    // Whether the ray goes on through a parent that it meets at a point.
+    bool goesOn(uint32_t parent, const glm::vec3& point) {
+        if (patches->opacity.empty()) return false;
+        const uint32_t patch = patches->patchAt(parent, point);
+        const float opacity = patches->opacity[patch];
+        if (opacity >= 1) return false;
+        if (line) return !stops(*patches, patch, *line);
+        if (std::find(passed.begin(), passed.end(), parent) == passed.end()) {
+            passed.push_back(parent);
+            share *= 1 - opacity;
+        }
+        return share > 0;
+    }
+};
+
+// What the filters need to know of a ray; starts with Embree's own part.
+struct Start {
+    RTCIntersectContext context;
+    Passage passage;
     uint32_t parent;
     bool isFront;      // the ray leaves the front of the parent
     glm::vec3 normal;  // of the side
@@ -96,26 +121,42 @@ struct Start {
 };
 
 // Lets a ray pass the surface that it starts on, and what coincides with it on its other side.
-void passStart(const RTCFilterFunctionNArguments* args) {
-    const Start& start = *reinterpret_cast<const Start*>(args->context);
-    const uint32_t other = start.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
-    if (other == start.parent) {
-        args->valid[0] = 0;
-        return;
-    }
-    const glm::vec3 direction(RTCRayN_dir_x(args->ray, args->N, 0),
-                              RTCRayN_dir_y(args->ray, args->N, 0),
-                              RTCRayN_dir_z(args->ray, args->N, 0));
-    const float height = RTCRayN_tfar(args->ray, args->N, 0) * glm::dot(direction, start.normal);
-    if (height > start.zone) return;
-    const Parent& a = start.patches->parents[start.parent];
-    const Parent& b = start.patches->parents[other];
+bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction, float distance) {
+    if (other == start.parent) return true;
+    const float height = distance * glm::dot(direction, start.normal);
+    if (height > start.zone) return false;
+    const Patches& patches = *start.passage.patches;
+    const Parent& a = patches.parents[start.parent];
+    const Parent& b = patches.parents[other];
     const float turn = glm::dot(glm::cross(b.a, b.b), direction);
     // Faces of one object that the ray crosses the same way lie beside its start; of others, those
     // that coincide with it may lie behind it.
     const bool alike = a.instance == b.instance && (turn > 0) == start.isFront;
-    if (alike || (areParallel(a, b) &&
-                  !comesBefore(*start.patches, start.parent, !start.isFront, other, turn < 0)))
+    return alike || (areParallel(a, b) &&
+                     !comesBefore(patches, start.parent, !start.isFront, other, turn < 0));
+}
+
+struct Hit {
+    explicit Hit(const RTCFilterFunctionNArguments* args)
+        : direction(RTCRayN_dir_x(args->ray, args->N, 0), RTCRayN_dir_y(args->ray, args->N, 0),
+                    RTCRayN_dir_z(args->ray, args->N, 0)),
+          distance(RTCRayN_tfar(args->ray, args->N, 0)),
+          point(glm::vec3(RTCRayN_org_x(args->ray, args->N, 0),
+                          RTCRayN_org_y(args->ray, args->N, 0),
+                          RTCRayN_org_z(args->ray, args->N, 0)) +
+                distance * direction) {}
+
+    const glm::vec3 direction;
+    const float distance;
+    const glm::vec3 point;
+};
+
+void passStart(const RTCFilterFunctionNArguments* args) {
+    Start& start = *reinterpret_cast<Start*>(args->context);
+    const uint32_t other = start.passage.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    const Hit hit(args);
+    if (passesStart(start, other, hit.direction, hit.distance) ||
+        start.passage.goesOn(other, hit.point))
         args->valid[0] = 0;
 }
 
@@ -131,17 +172,39 @@ void setRay(RTCRay& ray, const glm::vec3& origin, const glm::vec3& direction, fl
     ray.mask = ~0u;
 }
 
+// A ray that starts on no surface; starts with Embree's own part.
+struct FromNowhere {
+    RTCIntersectContext context;
+    Passage passage;
+};
+
+void pass(const RTCFilterFunctionNArguments* args) {
+    Passage& passage = reinterpret_cast<FromNowhere*>(args->context)->passage;
+    const uint32_t parent = passage.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    if (passage.goesOn(parent, Hit(args).point)) args->valid[0] = 0;
+}
+
 }  // namespace
+
+struct Visibility::Passing : FromNowhere {
+    explicit Passing(const Visibility& visibility) {
+        rtcInitIntersectContext(&context);
+        if (!visibility.patches.opacity.empty()) context.filter = pass;
+        passage.patches = &visibility.patches;
+        passage.parentOfTriangle = visibility.embree->parentOfTriangle.data();
+    }
+};
 
 struct Visibility::FromSide : Start {
     FromSide(const Visibility& visibility, uint32_t side) {
         rtcInitIntersectContext(&context);
         context.filter = passStart;
-        patches = &visibility.patches;
-        parentOfTriangle = visibility.embree->parentOfTriangle.data();
-        parent = patches->parentOf[side / 2];
+        const Patches& patches = visibility.patches;
+        passage.patches = &patches;
+        passage.parentOfTriangle = visibility.embree->parentOfTriangle.data();
+        parent = patches.parentOf[side / 2];
         isFront = side % 2 == 0;
-        normal = patches->normal(side);
+        normal = patches.normal(side);
         zone = 2 * visibility.surfaceOffset;
     }
     // Rays start this much behind the surface, so that they meet what coincides with it.
@@ -151,8 +214,8 @@ struct Visibility::FromSide : Start {
     }
 };
 
-bool Visibility::isBlocked(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
-                           float distance) const {
+float Visibility::visibleShare(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
+                               float distance) const {
     FromSide start(*this, side);
     const glm::vec3 origin = start.origin(point, direction);
     RTCRay ray{};
@@ -160,13 +223,13 @@ bool Visibility::isBlocked(uint32_t side, const glm::vec3& point, const glm::vec
         // Aim at the far end from the shifted origin, or the ray would pass beside it.
         const glm::vec3 segment = point + distance * direction - origin;
         const float length = glm::length(segment);
-        if (length <= 2 * surfaceOffset) return false;
+        if (length <= 2 * surfaceOffset) return 1;
         setRay(ray, origin, segment / length, length - 2 * surfaceOffset);
     } else {
         setRay(ray, origin, direction, distance);
     }
     rtcOccluded1(embree->scene, &start.context, &ray);
-    return ray.tfar < 0;
+    return ray.tfar < 0 ? 0.0f : start.passage.share;
 }
 
 namespace {
@@ -175,8 +238,7 @@ namespace {
 // Embree's own part.
 struct Meeting {
     RTCIntersectContext context;
-    const Patches* patches;
-    const uint32_t* parentOfTriangle;
+    Passage passage;
     uint32_t first;  // the parent that comes before all others so far
     glm::vec3 direction;
 };
@@ -185,15 +247,17 @@ struct Meeting {
 void findFirst(const RTCFilterFunctionNArguments* args) {
     Meeting& meeting = *reinterpret_cast<Meeting*>(args->context);
     args->valid[0] = 0;
-    const uint32_t other = meeting.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    Passage& passage = meeting.passage;
+    const uint32_t other = passage.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
     if (other == meeting.first) return;
-    const Parent& a = meeting.patches->parents[meeting.first];
-    const Parent& b = meeting.patches->parents[other];
+    const Parent& a = passage.patches->parents[meeting.first];
+    const Parent& b = passage.patches->parents[other];
     auto enters = [&](const Parent& parent) {
         return glm::dot(parent.normal, meeting.direction) < 0;
     };
     if (areParallel(a, b) &&
-        comesBefore(*meeting.patches, other, enters(b), meeting.first, enters(a)))
+        comesBefore(*passage.patches, other, enters(b), meeting.first, enters(a)) &&
+        !passage.goesOn(other, Hit(args).point))
         meeting.first = other;
 }
 
@@ -205,8 +269,9 @@ uint32_t Visibility::firstCoinciding(uint32_t parent, const glm::vec3& origin,
     Meeting meeting;
     rtcInitIntersectContext(&meeting.context);
     meeting.context.filter = findFirst;
-    meeting.patches = &patches;
-    meeting.parentOfTriangle = embree->parentOfTriangle.data();
+    meeting.passage.patches = &patches;
+    meeting.passage.parentOfTriangle = embree->parentOfTriangle.data();
+    meeting.passage.line = lineName(origin, direction);
     meeting.first = parent;
     meeting.direction = direction;
     const float cosine = std::abs(glm::dot(patches.parents[parent].normal, direction));
@@ -229,6 +294,7 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
                                              const glm::vec3& direction, float* distance) const {
     FromSide start(*this, side);
     const glm::vec3 origin = start.origin(point, direction);
+    if (!patches.opacity.empty()) start.passage.line = lineName(origin, direction);
     RTCRayHit query{};
     setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -244,12 +310,12 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
 
 std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm::vec3& direction,
                                              float* distance) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    Passing passing(*this);
+    if (!patches.opacity.empty()) passing.passage.line = lineName(origin, direction);
     RTCRayHit query{};
     setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(embree->scene, &context, &query);
+    rtcIntersect1(embree->scene, &passing.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     if (distance) *distance = query.ray.tfar;
     const uint32_t parent = firstCoinciding(embree->parentOfTriangle[query.hit.primID], origin,
@@ -257,13 +323,12 @@ std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm:
     return sideOf(parent, origin + query.ray.tfar * direction, direction);
 }
 
-bool Visibility::isFree(const glm::vec3& origin, const glm::vec3& direction) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+float Visibility::escapingShare(const glm::vec3& origin, const glm::vec3& direction) const {
+    Passing passing(*this);
     RTCRay ray{};
     setRay(ray, origin, direction, std::numeric_limits<float>::infinity());
-    rtcOccluded1(embree->scene, &context, &ray);
-    return ray.tfar >= 0;
+    rtcOccluded1(embree->scene, &passing.context, &ray);
+    return ray.tfar < 0 ? 0.0f : passing.passage.share;
 }
 
 namespace {
@@ -307,6 +372,7 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
     rtcIntersect1(embree->scene, &crossed.context, &query);
 
     hits.clear();
+    const uint64_t name = lineName(glm::vec3(point), glm::vec3(direction));
     for (uint32_t index : crossed.parents) {
         // In double and from the plane of the parent, as the rasteriser does: surfaces that
         // coincide then have the same depth.
@@ -324,6 +390,7 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
         const double depth =
             std::clamp(glm::dot(normal, glm::dvec3(parent.origin) - point) / slant, low, high);
         const uint32_t patch = patches.patchAt(index, glm::vec3(point + depth * direction));
+        if (!patches.opacity.empty() && !stops(patches, patch, name)) continue;
         hits.push_back({depth, 2 * patch + (slant < 0 ? 0 : 1)});
     }
     std::sort(hits.begin(), hits.end(), [](const LineHit& a, const LineHit& b) {

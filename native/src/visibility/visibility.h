@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The only code that knows Embree: is a segment free, and what does a ray meet first. All surfaces
-// block from both sides, as in Cycles.
+// block from both sides, as in Cycles. Patches that let light through (Patches::opacity) weaken
+// shadow rays and stop other rays with the probability of their opacity (patches/opacity.h).
 #pragma once
 
 #include <cstdint>
@@ -29,12 +30,18 @@ class Visibility {
     explicit Visibility(const Patches& patches, Blockers blockers = Blockers::EXCHANGING);
     ~Visibility();
 
-    // Whether something lies between a point on a side of a patch (relative to Patches::centre) and
+    // Share of the light that comes through between a point on a side of a patch (relative to Patches::centre) and
     // point + distance * direction (unit vector); distance may be infinite. The far end is kept a
     // little off, since it usually lies on a surface. Of surfaces that coincide with the patch,
     // those on its other side do not block (see comesBefore).
+    float visibleShare(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
+                       float distance) const;
+
+    // Whether nothing comes through.
     bool isBlocked(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
-                   float distance) const;
+                   float distance) const {
+        return visibleShare(side, point, direction, distance) <= 0;
+    }
 
     // The patch side that a ray from a side meets first, if any, and how far from the point. Of
     // surfaces that coincide there, it meets the one that comesBefore.
@@ -45,8 +52,9 @@ class Visibility {
     std::optional<uint32_t> firstHit(const glm::vec3& origin, const glm::vec3& direction,
                                      float* distance = nullptr) const;
 
-    // Whether a ray meets nothing; for origins that lie on no surface, or at least `offset` off it.
-    bool isFree(const glm::vec3& origin, const glm::vec3& direction) const;
+    // Share of a ray's light that leaves the scene; for origins that lie on no surface, or at least
+    // `offset` off it.
+    float escapingShare(const glm::vec3& origin, const glm::vec3& direction) const;
 
     // All hits along the endless line through a point (relative to Patches::centre, not outside the
     // scene's sphere), in order of depth. A line through an edge or a vertex between faces that
@@ -59,6 +67,7 @@ class Visibility {
 
   private:
     struct Embree;
+    struct Passing;
     struct FromSide;
     uint32_t firstCoinciding(uint32_t parent, const glm::vec3& origin, const glm::vec3& direction,
                              float distance) const;

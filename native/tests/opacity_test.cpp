@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Surfaces that let light through, and emission that varies over a surface.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bake/error.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+#include "test_shots.h"
+#include "transport/light_source.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+Material veil(float opacity, float reflectance = 0) {
+    Material material = grey("veil", reflectance);
+    material.reflectance[1] = material.reflectance[0];
+    material.opacity = opacity;
+    return material;
+}
+
+// A plate of 2 m at a height over the floor.
+void placePlate(Scene& scene, const Material& material, float z = 0.5f) {
+    place(scene, rectangle("plate", {-1, -1, z}, {2, 0, 0}, {0, 2, 0}), material, glm::dmat4(1),
+          RB_ROLE_OCCLUDE);
+}
+
+Scene floorUnderSun() {
+    Scene scene;
+    place(scene, rectangle("floor", {-0.2f, -0.2f, 0}, {0.4f, 0, 0}, {0, 0.4f, 0}), grey("", 0));
+    scene.addLight(sunLight({0.1, 0.2, 1}, glm::dvec3(3)));
+    return scene;
+}
+
+// All is in equilibrium with exitance 1, whatever the opacity of the inner shell: of the light that
+// meets it one part passes, one is reflected, and the rest is replaced by emission.
+Scene furnaceWithShell(float opacity) {
+    Scene scene = closedCube(0.6f, 0.4f);
+    Material shell = veil(opacity, 0.3f * opacity);
+    for (glm::vec3& emission : shell.emission) emission = glm::vec3(0.7f * opacity);
+    place(scene, box("shell", {0.25f, 0.25f, 0.25f}, {0.7f, 0.75f, 0.8f}, false), shell);
+    return scene;
+}
+
+void expectFurnace(Bake& bake, const std::string& what, double tolerance = 1e-4) {
+    bake.run(furnaceWithShell(0.5f));
+    for (int32_t instance : {0, 1})
+        for (const glm::vec3& light : cornerLight(bake, instance, RB_OUTPUT_LIGHTING))
+            EXPECT_NEAR(double(light.x) * kPi, 1, tolerance) << what << ", instance " << instance;
+    // The shell sends what it reflects and emits; half of the light is not its own.
+    for (const glm::vec3& light : cornerLight(bake, 1, RB_OUTPUT_COMBINED))
+        EXPECT_NEAR(double(light.x) * kPi, 0.5, tolerance) << what;
+}
+
+TEST(Opacity, AFurnaceWithAHalfTransparentShellIsExact) {
+    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"}) {
+        Bake bake;
+        setQuick(bake);
+        bake.settings.reconstruction = reconstruction;
+        expectFurnace(bake, reconstruction);
+    }
+}
+
+TEST(Opacity, AFurnaceIsExactWithEveryProjector) {
+    for (const char* projector : {"FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL", "PLANES"}) {
+        Bake bake;
+        setQuick(bake);
+        bake.settings.projector = projector;
+        expectFurnace(bake, projector);
+    }
+}
+
+TEST(Opacity, APlateUnderASunLetsItsShareThrough) {
+    for (float opacity : {0.0f, 0.25f, 0.7f, 1.0f}) {
+        Scene scene = floorUnderSun();
+        placePlate(scene, veil(opacity));
+        const ShotScene shot(scene);
+        const double whole = 3 / std::sqrt(1.05);
+        EXPECT_NEAR(meanLight(shot.patches, shot.shoot("GATHER", 0), 0).value,
+                    double(1 - opacity) * whole, 1e-5 * whole)
+            << opacity;
+    }
+}
+
+TEST(Opacity, PlatesMultiply) {
+    Scene scene = floorUnderSun();
+    placePlate(scene, veil(0.5f), 0.5f);
+    placePlate(scene, veil(0.2f), 0.8f);
+    const ShotScene shot(scene);
+    const double exact = 0.5 * 0.8 * 3 / std::sqrt(1.05);
+    EXPECT_NEAR(meanLight(shot.patches, shot.shoot("GATHER", 0), 0).value, exact, 1e-5 * exact);
+    // By rays that a plate stops or not: the standard error of 40,000 lines is known.
+    const Mean shotMean = meanLight(shot.patches, shot.shoot("SHOOT", 400000), 0);
+    EXPECT_NEAR(shotMean.value, exact, 4 * shotMean.error);
+    EXPECT_LT(shotMean.error, 0.02 * exact);
+}
+
+TEST(Opacity, ABlackVeilTakesItsShareOfTheSky) {
+    // Every line from the floor to the sky crosses the dome once. 64 bundles of default lines count
+    // hits by chance: about 1e5 lines of the floor leave a standard error of 0.3 %.
+    for (const char* directions : {"LOW_DISCREPANCY", "RANDOM"}) {
+        Scene scene;
+        place(scene, rectangle("floor", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
+        place(scene, icosphere("dome", 1, 2, true), veil(0.4f), glm::dmat4(1), RB_ROLE_OCCLUDE);
+        scene.worldRadiance = glm::vec3(1);
+        Bake bake;
+        setQuick(bake);
+        bake.settings.directions = directions;
+        bake.run(scene);
+        double mean = 0;
+        for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
+            mean += 0.25 * double(light.x);
+        EXPECT_NEAR(mean, 0.6, 0.012) << directions;
+    }
+}
+
+TEST(Opacity, SingleLinesPassAsOften) {
+    Scene scene;
+    place(scene, rectangle("floor", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}), veil(0.25f));
+    const Patches patches = subdivide(scene, 10, 1000);
+    const Visibility visibility(patches);
+    std::vector<LineHit> hits;
+    int met = 0;
+    for (int k = 0; k < 10000; ++k) {
+        visibility.lineHits({0.00004 * k - 0.2, 0.01, 0}, {0, 0, 1}, hits);
+        met += int(hits.size());
+    }
+    // Binomial: standard deviation 43.
+    EXPECT_NEAR(met, 2500, 4 * 43);
+}
+
+TEST(Opacity, AnImageIsAveragedOverPatches) {
+    // Two by one pixels, white and black, over a plate: in between, bilinear.
+    Scene scene;
+    Mesh mesh = rectangle("leaf", {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+    for (int32_t v : mesh.cornerVertices) mesh.uvs.push_back(glm::vec2(mesh.vertices[size_t(v)]));
+    Material leaf = veil(0.8f, 0.2f);
+    leaf.opacityImage =
+        scene.addImage({"alpha", 2, 1, RB_IMAGE_EXTEND, {glm::vec3(1.0f), glm::vec3(0.0f)}});
+    place(scene, mesh, leaf);
+    const Patches patches = subdivide(scene, 0.25f, 1000);
+    ASSERT_EQ(patches.count(), 16u);
+    EXPECT_FLOAT_EQ(patches.opacity[0], 0.8f);
+    // Three quarters of the way down the ramp from 1/4 to 3/4, the mean of its last half is 1/4.
+    EXPECT_NEAR(patches.opacity[2], 0.8 * 0.25, 1e-3);
+    // A patch's own reflectance is that of its opaque share, its area that share.
+    EXPECT_NEAR(patches.reflectance[0].x, 0.2 / 0.8, 1e-6);
+    EXPECT_NEAR(patches.area[0], 0.8 / 16, 1e-6);
+    // It reflects, so some of it is met.
+    EXPECT_GT(patches.opacity[3], 0);
+}
+
+TEST(Opacity, ALaterBakeSeesItsChange) {
+    Bake bake;
+    setQuick(bake);
+    for (float opacity : {0.25f, 0.75f}) {
+        Scene scene;
+        place(scene, rectangle("floor", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
+        place(scene, icosphere("dome", 1, 2, true), veil(opacity), glm::dmat4(1), RB_ROLE_OCCLUDE);
+        scene.worldRadiance = glm::vec3(1);
+        bake.run(scene);
+        EXPECT_NEAR(double(cornerLight(bake, 0, RB_OUTPUT_LIGHTING)[0].x), 1 - double(opacity),
+                    0.05);
+    }
+}
+
+// A lamp of 1 m with a checker of pixels, its front down, 2 m over the floor.
+Scene floorUnderChecker(int pixels, const glm::vec3& bright) {
+    Scene scene;
+    place(scene, rectangle("floor", {-0.001f, -0.001f, 0}, {0.002f, 0, 0}, {0, 0.002f, 0}),
+          grey("", 0.5f));
+    // A black surface far below, so that the mean exitance is small and the lamp a source.
+    place(scene, rectangle("ground", {-10, -10, -10}, {20, 0, 0}, {0, 20, 0}), grey("", 0),
+          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    Mesh mesh = rectangle("lamp", {-0.5f, -0.5f, 2}, {0, 1, 0}, {1, 0, 0});
+    for (int32_t v : mesh.cornerVertices)
+        mesh.uvs.push_back(glm::vec2(mesh.vertices[size_t(v)]) + 0.5f);
+    std::vector<glm::vec3> checker;
+    for (int y = 0; y < pixels; ++y)
+        for (int x = 0; x < pixels; ++x)
+            checker.push_back((x + y) % 2 ? glm::vec3(0.0f) : glm::vec3(1.0f));
+    Material lamp = grey("lamp", 0);
+    lamp.emissionImage = scene.addImage({"checker", pixels, pixels, RB_IMAGE_REPEAT, checker});
+    lamp.emissionImageWeight = {bright, glm::vec3(0.0f)};
+    place(scene, mesh, lamp, glm::dmat4(1), RB_ROLE_OCCLUDE);
+    return scene;
+}
+
+TEST(VaryingEmission, ACheckerShinesAsItsMean) {
+    // Pixels of 1/16 m on patches of 1/8 m: each has the mean.
+    const Scene scene = floorUnderChecker(16, {600, 300, 100});
+    const ShotScene shot(scene, 0.125f);
+    const glm::dvec3 lamp[4] = {{-0.5, -0.5, 2}, {0.5, -0.5, 2}, {0.5, 0.5, 2}, {-0.5, 0.5, 2}};
+    const double exact = 300 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
+    const FirstShot light = shot.shoot("GATHER", 0, 0, 0.002f);
+    // At most 256 stratified samples: half a per cent of noise.
+    EXPECT_NEAR(meanLight(shot.patches, light, 0).value, exact, 0.01 * exact);
+    EXPECT_NEAR(light.emitted.x, 300, 0.1);
+    EXPECT_NEAR(light.emitted.z, 50, 0.05);
+}
+
+TEST(VaryingEmission, EachPatchShinesByItself) {
+    // Two patches, one bright and one black, with an image that is constant over each.
+    Scene scene = floorUnderChecker(2, {600, 600, 600});
+    scene.images[0] = {"half", 8, 1, RB_IMAGE_EXTEND, std::vector<glm::vec3>(8, glm::vec3(0.0f))};
+    for (size_t x = 0; x < 4; ++x) scene.images[0].pixels[x] = glm::vec3(1.0f);
+    const ShotScene shot(scene, 0.5f);
+    // The bilinear edge between the halves is a pixel wide and gives each half an eighth of the
+    // ramp; the mean over all is a half.
+    glm::dvec3 sum(0.0);
+    for (uint32_t p = 0; p < shot.patches.count(); ++p)
+        sum += double(shot.patches.area[p]) * glm::dvec3(shot.patches.emission[2 * p]);
+    EXPECT_NEAR(sum.x, 300, 1);
+    // Seen from a point under the lamp's centre, each half gives half; with the bright half alone
+    // the light comes from one side.
+    const glm::dvec3 lamp[4] = {{-0.5, -0.5, 2}, {0, -0.5, 2}, {0, 0.5, 2}, {-0.5, 0.5, 2}};
+    const double exact = 600 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
+    EXPECT_NEAR(meanLight(shot.patches, shot.shoot("GATHER", 0, 0, 0.002f), 0).value, exact,
+                0.02 * exact);
+    const Mean shotMean = meanLight(shot.patches, shot.shoot("SHOOT", 1000), 0);
+    EXPECT_GE(shotMean.value, 0);
+}
+
+TEST(VaryingEmission, CornerColoursShineInBundles) {
+    // A closed box whose faces emit 1 on average by their corners, and reflect nothing: the mean
+    // light is that of a uniform one by reciprocity.
+    Scene scene;
+    Mesh mesh = box("box", {0, 0, 0}, {1, 1, 1}, true);
+    for (int32_t v : mesh.cornerVertices)
+        mesh.cornerColors.push_back(glm::vec3(2 * mesh.vertices[size_t(v)].x));
+    Material glow = grey("glow", 0.5f);
+    glow.emissionUsesCornerColors = true;
+    glow.emissionColorWeight[0] = glm::vec3(0.5f);
+    place(scene, mesh, glow);
+    Bake bake;
+    setQuick(bake);
+    bake.run(scene);
+    double mean = 0;
+    for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
+        mean += double(light.x) / 24;
+    // B = E + rho H in the mean: E = 1/2, so H = 1. Noise of 64 bundles is below 1 %.
+    EXPECT_NEAR(mean * kPi, 1, 0.02);
+}
+
+}  // namespace
+}  // namespace raybundle
