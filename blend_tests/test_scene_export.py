@@ -5,6 +5,7 @@ Coordinates are single precision: 1e-6 relative where nothing else is said.
 """
 
 import math
+import sys
 
 import bpy
 import numpy as np
@@ -465,18 +466,134 @@ def test_corner_colours_as_base_colour(principled):
         (np.arange(16).reshape(4, 4) / 16)[:, :3])
 
 
-def test_what_cannot_be_read_is_named(principled):
-    tree = principled.node_tree
+def add_noise(material):
+    tree = material.node_tree
     noise = tree.nodes.new('ShaderNodeTexNoise')
-    tree.links.new(noise.outputs['Color'], shader_of(principled).inputs['Base Color'])
-    shader_of(principled).inputs['Base Color'].default_value = (0.1, 0.2, 0.3, 1.0)
+    tree.links.new(noise.outputs['Color'], shader_of(material).inputs['Base Color'])
+    shader_of(material).inputs['Base Color'].default_value = (0.1, 0.2, 0.3, 1.0)
+    return noise
+
+
+def test_what_cannot_be_read_is_baked_and_named(principled):
+    add_noise(principled)
     material, result = exported_material(principled)
-    assert material.reflectance[0] == pytest.approx([0.1, 0.2, 0.3])
+    pixels = result.scene.images[material.image].pixels
+    # Noise lies about 0.5; the image has room beside the face.
+    assert 0.3 < pixels[pixels > 0].mean() < 0.7
     assert len(result.warnings) == 1
     assert '"Principled"' in result.warnings[0] and '"Noise Texture"' in result.warnings[0]
+    assert 'baked by Cycles on "Square"' in result.warnings[0]
 
 
-def test_glass_reflects_nothing_and_is_named(new_material):
+def fail_to_bake(_stage):
+    raise RuntimeError("no bake today")
+
+
+def test_what_cannot_be_baked_either_is_named(principled, monkeypatch):
+    monkeypatch.setattr(sys.modules['raybundle.surface_bake']._Stage, '_run', fail_to_bake)
+    add_noise(principled)
+    material, result = exported_material(principled)
+    assert material.reflectance[0] == pytest.approx([0.1, 0.2, 0.3])
+    assert len(result.warnings) == 2
+    assert '"Square"' in result.warnings[0] and "no bake today" in result.warnings[0]
+    assert '"Principled"' in result.warnings[1] and '"Noise Texture"' in result.warnings[1]
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_bake_leaves_no_trace(principled, monkeypatch, fails):
+    if fails:
+        monkeypatch.setattr(sys.modules['raybundle.surface_bake']._Stage, '_run', fail_to_bake)
+    add_noise(principled)
+    # The noise is in a group too, which the bake copies.
+    group = bpy.data.node_groups.new("Group", 'ShaderNodeTree')
+    group.nodes.new('ShaderNodeTexNoise')
+    principled.node_tree.nodes.new('ShaderNodeGroup').node_tree = group
+    exported_material(principled)
+    sys.modules['raybundle.surface_bake'].discard_all()
+
+    item = bpy.data.objects["Square"]
+    other = bpy.data.objects.new("Other", None)
+    bpy.context.scene.collection.objects.link(other)
+    bpy.context.view_layer.objects.active = other
+    other.select_set(True)
+
+    def state():
+        scene = bpy.context.scene
+        return ({name: sorted(data.name for data in getattr(bpy.data, name))
+                 for name in ('meshes', 'objects', 'materials', 'images', 'scenes', 'node_groups',
+                              'worlds')},
+                scene.name, scene.render.engine, bpy.context.view_layer.objects.active,
+                [item.select_get(), other.select_get()], bpy.context.mode,
+                [layer.name for layer in item.data.uv_layers],
+                [node.name for node in principled.node_tree.nodes],
+                principled.node_tree.nodes.active,
+                scene.render.bake.margin, scene.render.bake.use_clear)
+
+    before = state()
+    export()
+    assert state() == before
+
+
+def test_a_bake_is_kept_until_something_changes(principled, monkeypatch):
+    stage = sys.modules['raybundle.surface_bake']._Stage
+    runs = []
+    original = stage._run
+    monkeypatch.setattr(stage, '_run', lambda self: (runs.append(1), original(self)))
+    noise = add_noise(principled)
+    ramp = principled.node_tree.nodes.new('ShaderNodeValToRGB')
+    principled.node_tree.links.new(noise.outputs['Fac'], ramp.inputs['Fac'])
+    principled.node_tree.links.new(ramp.outputs['Color'],
+                                   shader_of(principled).inputs['Base Color'])
+    exported_material(principled)
+    item = bpy.data.objects["Square"]
+
+    def bakes_again():
+        count = len(runs)
+        bpy.context.view_layer.update()
+        export()
+        return len(runs) > count
+
+    assert not bakes_again()
+    noise.inputs['Scale'].default_value = 7.0
+    assert bakes_again() and not bakes_again()
+    ramp.color_ramp.elements[0].color = (1, 0, 0, 1)
+    assert bakes_again() and not bakes_again()
+    item.data.vertices[0].co.z = 0.1
+    item.data.update()
+    assert bakes_again() and not bakes_again()
+    shader_of(principled).location.x += 10.0
+    bpy.context.scene.raybundle.target_error = 0.01
+    assert not bakes_again()
+
+
+def test_alpha_is_opacity(principled):
+    shader_of(principled).inputs['Alpha'].default_value = 0.25
+    shader_of(principled).inputs['Base Color'].default_value = (0.8, 0.4, 0.0, 1.0)
+    material, result = exported_material(principled)
+    assert material.opacity == pytest.approx(0.25)
+    # Of the whole: what passes through is not reflected.
+    assert material.reflectance[0] == pytest.approx([0.2, 0.1, 0.0])
+    assert result.warnings == []
+
+
+def test_emission_by_image(principled):
+    values = np.zeros((2, 2, 3), np.float32)
+    values[0, 1] = 0.5
+    tree = principled.node_tree
+    texture = tree.nodes.new('ShaderNodeTexImage')
+    texture.image = new_image(values, True)
+    shader = shader_of(principled)
+    tree.links.new(texture.outputs['Color'],
+                   shader.inputs.get('Emission Color') or shader.inputs['Emission'])
+    shader.inputs['Emission Strength'].default_value = 2.0
+    material, result = exported_material(principled)
+    assert result.warnings == []
+    assert material.image is None and material.emission_image == 0
+    assert material.emission_image_weight == pytest.approx(np.full((2, 3), 2 * math.pi))
+    assert material.emission == pytest.approx(np.zeros((2, 3)))
+
+
+def test_glass_lets_light_through_and_is_named(new_material):
     material = new_material("Window")
     tree = material.node_tree
     glass = tree.nodes.new('ShaderNodeBsdfGlass')
@@ -484,6 +601,7 @@ def test_glass_reflects_nothing_and_is_named(new_material):
     tree.links.new(glass.outputs[0], output.inputs['Surface'])
     exported, result = exported_material(material)
     assert not exported.reflectance.any()
+    assert exported.opacity == pytest.approx(0.0)
     assert '"Window"' in result.warnings[0] and "Glass" in result.warnings[0]
 
 

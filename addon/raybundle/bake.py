@@ -140,7 +140,7 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
             selected |= {original for original, copy in find_copies(context.scene).items()
                          if copy in selected}
     with originals_shown(context.scene) if refine else nullcontext():
-        export = export_scene(context, selected, light_sets)
+        export = export_scene(context, selected, light_sets, settings.patch_size)
     _leave_out_unwritable(export, settings)
     if not export.targets:
         reasons = "; ".join(f'"{name}" {status}' for name, status in export.statuses.items())

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -12,6 +12,7 @@ from .color_expression import WHITE, ColorExpression, Texture
 from .image_export import ImagePixels
 from .node_reader import NodeReader, Surface, output_node
 from .scene_data import ImageData, MaterialData, SceneData, Warnings
+from .surface_bake import BakedMaterial
 
 # What Blender shows where a face has no material.
 DEFAULT_REFLECTANCE = 0.8
@@ -24,6 +25,17 @@ class MaterialExport:
     index: int
     texture: Texture | None = None
     attribute: str | None = None
+    baked_uvs: bool = False  # the images are laid out by surface_bake.py
+
+
+def _share_coordinates(surface: Surface) -> bool:
+    """Whether what varies of reflectance and emission is read at one place."""
+    names = surface.reflectance.attribute, surface.radiance.attribute
+    if None not in names and names[0] != names[1]:
+        return False
+    first, second = surface.reflectance.texture, surface.radiance.texture
+    return first is None or second is None or (
+        first.uv_layer == second.uv_layer and np.allclose(first.uv_matrix, second.uv_matrix))
 
 
 class MaterialExporter:
@@ -43,31 +55,84 @@ class MaterialExporter:
             self._materials[key] = self._export(material)
         return self._materials[key]
 
+    def unread(self, material: bpy.types.Material) -> str | None:
+        """What of the material only Cycles can tell, if anything."""
+        surface = self._surface(material, False, Warnings(), unread := [])
+        if unread:
+            return unread[0]
+        if not _share_coordinates(surface):
+            return "its emission, which varies in another way than its reflectance"
+        return None
+
+    def add_baked(self, material: bpy.types.Material, baked: BakedMaterial) -> MaterialExport:
+        """A material as Cycles baked it for the faces of one object (surface_bake.py)."""
+        # What both ways only approximate is still named.
+        approximated = Warnings()
+        self._surface(material, False, approximated, [])
+        for text in (*approximated, baked.message):
+            self.warnings.add(text)
+        index = {}
+        for name, pixels in (('reflectance', baked.reflectance), ('radiance', baked.radiance),
+                             ('opacity', baked.opacity)):
+            if pixels is not None:
+                index[name] = len(self.scene.images)
+                self.scene.images.append(ImageData(f"{material.name} ({name})", pixels, 'EXTEND'))
+        glows = baked.radiance is not None
+        self.scene.materials.append(MaterialData(
+            material.name, np.zeros((2, 3)), np.zeros((2, 3)), index['reflectance'], np.ones(3),
+            emission_image=index.get('radiance'),
+            emission_image_weight=np.full((2, 3), np.pi) if glows else None,
+            opacity_image=index.get('opacity')))
+        return MaterialExport(len(self.scene.materials) - 1, baked_uvs=True)
+
     def _export(self, material: bpy.types.Material | None) -> MaterialExport:
         name = material.name if material else "(none)"
-        front, back = (self._surface(material, backfacing) for backfacing in (False, True))
-        varying = front.reflectance
-        if not varying.same_variation(back.reflectance):
+        sides = [self._surface(material, backfacing, self.warnings)
+                 for backfacing in (False, True)]
+        if not sides[0].reflectance.same_variation(sides[1].reflectance):
             # The native library lays an image on both sides alike.
             self.warnings.add(f'material "{name}": an image or attribute differs between the '
                               f'sides: its mean is used')
-            front, back = (Surface(ColorExpression(side.reflectance.mean()), side.emission)
-                           for side in (front, back))
-            varying = front.reflectance
-        sides = (front, back)
+            sides = [replace(side, reflectance=ColorExpression(side.reflectance.mean()))
+                     for side in sides]
+        varying = sides[0].reflectance
         texture, attribute = varying.texture, varying.attribute
+        # An image is read at one place for both: where emission has another one, its mean counts.
+        glows = [side.radiance for side in sides]
+        glow_texture = next((glow.texture for glow in glows if glow.texture), None)
+        glow_attribute = next((glow.attribute for glow in glows if glow.attribute is not None),
+                              None)
+        if (any(glow.texture and not glow.texture.same_as(glow_texture) for glow in glows)
+                or any(glow.attribute not in (None, glow_attribute) for glow in glows)
+                or not all(map(_share_coordinates, sides))):
+            self.warnings.add(f'material "{name}": its emission and its reflectance vary in '
+                              f'different ways: the emission has its mean')
+            glows = [ColorExpression(glow.mean()) for glow in glows]
+            glow_texture = glow_attribute = None
+        transmittance = np.clip([side.transmittance for side in sides], 0.0, 1.0)
+        if np.ptp(transmittance) > 1e-3:
+            self.warnings.add(f'material "{name}" lets colours or directions through differently: '
+                              f'the mean is used')
         data = MaterialData(
             name,
             np.maximum([side.reflectance.constant for side in sides], 0.0),
             # A surface of radiance L has the exitance pi L.
-            np.pi * np.maximum([side.emission for side in sides], 0.0),
+            np.pi * np.maximum([glow.constant for glow in glows], 0.0),
             self._image_index(texture) if texture else None,
             varying.texture_weight if texture else None,
-            varying.attribute_weight if attribute is not None else None)
+            varying.attribute_weight if attribute is not None else None,
+            self._image_index(glow_texture) if glow_texture else None,
+            np.pi * np.array([glow.texture_weight for glow in glows]) if glow_texture else None,
+            (np.pi * np.array([glow.attribute_weight for glow in glows])
+             if glow_attribute is not None else None),
+            1.0 - float(transmittance.mean()))
         self.scene.materials.append(data)
-        return MaterialExport(len(self.scene.materials) - 1, texture, attribute)
+        return MaterialExport(len(self.scene.materials) - 1, texture or glow_texture,
+                              glow_attribute if attribute is None else attribute)
 
-    def _surface(self, material: bpy.types.Material | None, backfacing: bool) -> Surface:
+    def _surface(self, material: bpy.types.Material | None, backfacing: bool,
+                 warnings: Warnings, unread: list[str] | None = None) -> Surface:
+        """unread: gets what is inexact, which then is no warning."""
         if material is None:
             return Surface(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
         # From 5.0 on every material has nodes and use_nodes only warns.
@@ -75,10 +140,14 @@ class MaterialExporter:
             return Surface(ColorExpression(np.array(material.diffuse_color[:3])))
         output = output_node(material.node_tree)
         if output is None:
-            self.warnings.add(f'material "{material.name}" has no output node: it is black')
+            warnings.add(f'material "{material.name}" has no output node: it is black')
             return Surface()
-        reader = NodeReader(f'material "{material.name}"', self.images, self.warnings, backfacing)
-        return reader.surface(output.inputs['Surface'])
+        reader = NodeReader(f'material "{material.name}"', self.images, warnings, backfacing,
+                            None if unread is None else Warnings(), varying_emission=True)
+        surface = reader.surface(output.inputs['Surface'])
+        if unread is not None:
+            unread += reader.unread
+        return surface
 
     def _image_index(self, texture: Texture) -> int:
         key = (texture.image.name_full, texture.extension)

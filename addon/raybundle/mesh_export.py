@@ -55,8 +55,11 @@ def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExport],
-                default_material: MaterialExport) -> MeshData:
-    """mesh: evaluated; materials: by slot. Raises MeshError for a mesh that cannot take part."""
+                default_material: MaterialExport, baked_uvs: np.ndarray | None = None) -> MeshData:
+    """mesh: evaluated; materials: by slot; baked_uvs: (c, 2), for those that Cycles baked.
+
+    Raises MeshError for a mesh that cannot take part.
+    """
     if not len(mesh.polygons):
         raise MeshError("has no faces")
     vertices = vertex_positions(mesh)
@@ -77,7 +80,7 @@ def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExp
     return MeshData(
         name, vertices, read(mesh.loops, 'vertex_index', np.int32), face_offsets,
         face_materials, corner_normals(mesh), _sharp_edges(mesh),
-        read(mesh.polygons, 'use_smooth', bool), _uvs(mesh, materials, corner_slots),
+        read(mesh.polygons, 'use_smooth', bool), _uvs(mesh, materials, corner_slots, baked_uvs),
         _corner_colors(mesh, materials, corner_slots))
 
 
@@ -97,13 +100,17 @@ def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray:
     return read(mesh.edges, 'vertices', np.int32, 2)[sharp]
 
 
-def _uvs(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport], corner_slots: np.ndarray
-         ) -> np.ndarray | None:
+def _uvs(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport], corner_slots: np.ndarray,
+         baked_uvs: np.ndarray | None) -> np.ndarray | None:
     """(c, 2) as each corner's own material reads them; None if no material has an image."""
     textures = [(slot, item.texture) for slot, item in enumerate(materials) if item.texture]
-    if not textures:
+    baked = [slot for slot, item in enumerate(materials) if item.baked_uvs]
+    if not textures and not baked:
         return None
     uvs = np.zeros((len(corner_slots), 2), np.float32)
+    if baked:
+        corners = np.isin(corner_slots, baked)
+        uvs[corners] = baked_uvs[corners]
     layers: dict[str, np.ndarray] = {}
     for slot, texture in textures:
         layer = _uv_layer(mesh, texture)

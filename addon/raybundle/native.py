@@ -96,6 +96,10 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_add_material': (_handle, _text, _floats, _floats, _out(_int)),
     'rb_set_material_image': (_handle, _int, _int, _floats),
     'rb_set_material_corner_colors': (_handle, _int, _floats),
+    'rb_set_material_emission_image': (_handle, _int, _int, _floats),
+    'rb_set_material_emission_corner_colors': (_handle, _int, _floats),
+    'rb_set_material_opacity': (_handle, _int, _float),
+    'rb_set_material_opacity_image': (_handle, _int, _int),
     'rb_add_mesh': (_handle, _text, _floats, _size, _ints, _size, _ints, _size, _ints, _out(_int)),
     'rb_set_mesh_corner_normals': (_handle, _int, _floats, _size),
     'rb_set_mesh_sharp_edges': (_handle, _int, _ints, _size),
@@ -324,6 +328,26 @@ class Scene(_Handle):
         """weight: (3,), likewise for the mesh's corner colours."""
         weight = _float_array(weight, (3,), "weight")
         self._library.rb_set_material_corner_colors(self._pointer, material, _as_floats(weight))
+
+    def set_material_emission_image(self, material: int, image: int, weight: np.ndarray) -> None:
+        """weight: (2, 3), W/m^2, of the front side and of the back side."""
+        weight = _float_array(weight, (2, 3), "weight")
+        self._library.rb_set_material_emission_image(
+            self._pointer, material, image, _as_floats(weight))
+
+    def set_material_emission_corner_colors(self, material: int, weight: np.ndarray) -> None:
+        """weight: (2, 3), likewise for the mesh's corner colours."""
+        weight = _float_array(weight, (2, 3), "weight")
+        self._library.rb_set_material_emission_corner_colors(
+            self._pointer, material, _as_floats(weight))
+
+    def set_material_opacity(self, material: int, opacity: float) -> None:
+        """opacity: 0 to 1, share of the light that does not pass straight through."""
+        self._library.rb_set_material_opacity(self._pointer, material, opacity)
+
+    def set_material_opacity_image(self, material: int, image: int) -> None:
+        """The mean of the image's channels multiplies the opacity."""
+        self._library.rb_set_material_opacity_image(self._pointer, material, image)
 
     def add_mesh(self, name: str, vertices: np.ndarray, corner_vertices: np.ndarray,
                  face_offsets: np.ndarray, face_materials: np.ndarray | None) -> int:

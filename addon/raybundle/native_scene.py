@@ -19,6 +19,14 @@ def build_native_scene(data: SceneData) -> native.Scene:
             scene.set_material_image(identifier, images[material.image], material.image_weight)
         if material.color_weight is not None:
             scene.set_material_corner_colors(identifier, material.color_weight)
+        if material.emission_image is not None:
+            scene.set_material_emission_image(identifier, images[material.emission_image],
+                                              material.emission_image_weight)
+        if material.emission_color_weight is not None:
+            scene.set_material_emission_corner_colors(identifier, material.emission_color_weight)
+        scene.set_material_opacity(identifier, material.opacity)
+        if material.opacity_image is not None:
+            scene.set_material_opacity_image(identifier, images[material.opacity_image])
         materials.append(identifier)
     meshes = [_add_mesh(scene, mesh) for mesh in data.meshes]
     for instance in data.instances:

@@ -48,10 +48,17 @@ class Surface:
     """What a shader is to diffuse light, seen from one side."""
 
     reflectance: ColorExpression = field(default_factory=ColorExpression)
-    emission: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) radiance
+    radiance: ColorExpression = field(default_factory=ColorExpression)
+    transmittance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) straight through
+
+    @property
+    def emission(self) -> np.ndarray:
+        """(3,), the mean radiance."""
+        return self.radiance.mean()
 
     def scaled(self, factor: float) -> Surface:
-        return Surface(self.reflectance.scaled(factor), self.emission * factor)
+        return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
+                       self.transmittance * factor)
 
 
 @dataclass(frozen=True)
@@ -65,14 +72,23 @@ class _Source:
 
 
 class NodeReader:
-    """Reads one tree for one side of the surface (backfacing)."""
+    """Reads one tree for one side of the surface (backfacing).
+
+    What is only approximated goes to the warnings. What a node does and the reader cannot express
+    goes to `inexact`, for there is another way to it (surface_bake.py); by default it is a warning
+    too. varying_emission: whether emission may be more than a constant.
+    """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
-                 backfacing: bool = False) -> None:
+                 backfacing: bool = False, inexact: Warnings | None = None,
+                 varying_emission: bool = False) -> None:
         self.owner = owner  # what warnings name, such as 'material "Wall"'
         self.images = images
         self.warnings = warnings
         self.backfacing = backfacing
+        self.inexact = warnings if inexact is None else inexact
+        self.varying_emission = varying_emission
+        self.unread: list[str] = []  # what is inexact, without the consequences
 
     # ----------------------------------------------------------------------------------------------
     # Shaders
@@ -90,8 +106,15 @@ class NodeReader:
         if node.type == 'BSDF_PRINCIPLED':
             return self._principled(node, path)
         if node.type in ('EMISSION', 'BACKGROUND'):
-            color = self._constant_color(node.inputs['Color'], path)
-            return Surface(emission=color * self.value(node.inputs['Strength'], path))
+            strength = self.value(node.inputs['Strength'], path)
+            return Surface(
+                radiance=self._emission_color(node.inputs['Color'], path).scaled(strength))
+        if node.type == 'BSDF_TRANSPARENT':
+            return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
+        if node.type in ('BSDF_GLASS', 'BSDF_REFRACTION', 'BSDF_TRANSLUCENT'):
+            self._warn(node, "lets light through: it goes straight on here, and nothing is "
+                             "reflected")
+            return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
         if node.type == 'MIX_SHADER':
             factor = float(np.clip(self.value(node.inputs[0], path), 0.0, 1.0))
             # A branch that is not seen at all raises no warnings.
@@ -114,20 +137,32 @@ class NodeReader:
         for socket in (node.inputs['Metallic'], transmission):
             diffuse *= 1.0 - float(np.clip(self.value(socket, path), 0.0, 1.0))
         alpha = float(np.clip(self.value(node.inputs['Alpha'], path), 0.0, 1.0))
-        if alpha < 1.0:
-            self._warn(node, f"lets light through (alpha {alpha:.3g}): it stops it here")
         strength = self.value(node.inputs['Emission Strength'], path)
-        radiance = np.zeros(3)
+        radiance = ColorExpression()
         if strength:
-            radiance = self._constant_color(emission, path) * strength
-        reflectance = self.color(node.inputs['Base Color'], path).scaled(diffuse * alpha)
-        return Surface(reflectance, radiance * alpha)
+            radiance = self._emission_color(emission, path).scaled(strength)
+        base = self.color(node.inputs['Base Color'], path)
+        transmittance = WHITE * (1.0 - alpha)
+        metallic = float(np.clip(self.value(node.inputs['Metallic'], path), 0.0, 1.0))
+        through = float(np.clip(self.value(transmission, path), 0.0, 1.0)) * (1.0 - metallic)
+        if through > 0.0:
+            self._warn(node, "lets light through: it goes straight on here")
+            transmittance = transmittance + alpha * through * np.clip(base.mean(), 0.0, 1.0)
+        return Surface(base.scaled(diffuse * alpha), radiance.scaled(alpha), transmittance)
+
+    def _transmitted(self, node: bpy.types.Node, socket: bpy.types.NodeSocket,
+                     path: tuple[bpy.types.Node, ...]) -> np.ndarray:
+        color = self.color(socket, path)
+        if not color.is_constant:
+            self._inexact(node, f"has a varying {socket.name}: its mean is used")
+        return np.clip(color.mean(), 0.0, 1.0)
 
     def _sum(self, parts: list[Surface], node: bpy.types.Node) -> Surface:
         total = Surface()
         for part in parts:
             total = Surface(self._plus(total.reflectance, part.reflectance, node),
-                            total.emission + part.emission)
+                            self._plus(total.radiance, part.radiance, node),
+                            total.transmittance + part.transmittance)
         return total
 
     # ----------------------------------------------------------------------------------------------
@@ -154,16 +189,17 @@ class NodeReader:
             return self._filter(node, path)
         if node.type in _VALUE_NODES:
             return ColorExpression(WHITE * self._node_value(source))
-        self._warn(node, "cannot be read: the colour of the socket it is linked to is used")
+        self._inexact(node, "cannot be read: the colour of the socket it is linked to is used")
         return ColorExpression(_default_color(source.socket))
 
-    def _constant_color(self, socket: bpy.types.NodeSocket,
-                        path: tuple[bpy.types.Node, ...]) -> np.ndarray:
-        """(3,); where only constants are possible (emission), the mean of what varies."""
+    def _emission_color(self, socket: bpy.types.NodeSocket,
+                        path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        """Where only constants are possible (lights, the world), the mean of what varies."""
         color = self.color(socket, path)
-        if not color.is_constant:
-            self._warn(socket.node, f"has a varying {socket.name}: its mean is used")
-        return color.mean()
+        if color.is_constant or self.varying_emission:
+            return color
+        self._warn(socket.node, f"has a varying {socket.name}: its mean is used")
+        return ColorExpression(color.mean())
 
     def _image(self, node: bpy.types.Node, output: bpy.types.NodeSocket,
                path: tuple[bpy.types.Node, ...]) -> ColorExpression:
@@ -173,18 +209,18 @@ class NodeReader:
             return ColorExpression()
         mean = pixels.mean(axis=(0, 1), dtype=np.float64)
         if output.name != 'Color':
-            self._warn(node, f"is used by its {output.name}: 1 is used")
+            self._inexact(node, f"is used by its {output.name}: 1 is used")
             return ColorExpression(WHITE)
         if node.projection != 'FLAT':
-            self._warn(node, f"is projected as {node.projection}: the image's mean is used")
+            self._inexact(node, f"is projected as {node.projection}: the image's mean is used")
             return ColorExpression(mean)
         coordinates = self._coordinates(node.inputs['Vector'], path)
         if coordinates is None:
-            self._warn(node, "has coordinates that are not a UV map: the image's mean is used")
+            self._inexact(node, "has coordinates that are not a UV map: the image's mean is used")
             return ColorExpression(mean)
         extension = node.extension
         if extension not in ('REPEAT', 'EXTEND', 'CLIP'):
-            self._warn(node, f"has extension {extension}: REPEAT is used")
+            self._inexact(node, f"has extension {extension}: REPEAT is used")
             extension = 'REPEAT'
         layer, matrix = coordinates
         return ColorExpression(texture=Texture(node.image, extension, mean, layer, matrix),
@@ -230,7 +266,7 @@ class NodeReader:
 
     def _attribute(self, node: bpy.types.Node) -> ColorExpression:
         if node.type == 'ATTRIBUTE' and node.attribute_type != 'GEOMETRY':
-            self._warn(node, "reads a property of the object: grey is used")
+            self._inexact(node, "reads a property of the object: grey is used")
             return ColorExpression(WHITE * 0.5)
         name = node.layer_name if node.type == 'VERTEX_COLOR' else node.attribute_name
         return ColorExpression(attribute=name, attribute_weight=WHITE)
@@ -249,7 +285,7 @@ class NodeReader:
             a, b = (self.value(sockets[name], path) for name in ('A_Float', 'B_Float'))
             return ColorExpression(WHITE * (a + (b - a) * share))
         else:
-            self._warn(node, f"mixes {node.data_type}: grey is used")
+            self._inexact(node, f"mixes {node.data_type}: grey is used")
             return ColorExpression(WHITE * 0.5)
         share = float(np.clip(self.value(factor, path), 0.0, 1.0))
         a, b = self.color(first, path), self.color(second, path)
@@ -261,7 +297,7 @@ class NodeReader:
             return self._plus(a, b.scaled(-share), node)
         if node.blend_type == 'MULTIPLY':
             return self._plus(a.scaled(1.0 - share), self._times(a, b, node).scaled(share), node)
-        self._warn(node, f"blends by {node.blend_type}: its first colour is used")
+        self._inexact(node, f"blends by {node.blend_type}: its first colour is used")
         return a
 
     def _filter(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
@@ -270,17 +306,17 @@ class NodeReader:
         if node.type == 'VALTORGB' and color.is_constant:
             return ColorExpression(np.array(node.color_ramp.evaluate(color.constant.mean())[:3]))
         if node.type == 'VALTORGB':
-            self._warn(node, "maps a varying colour: its value for the mean is used")
+            self._inexact(node, "maps a varying colour: its value for the mean is used")
             return ColorExpression(np.array(node.color_ramp.evaluate(color.mean().mean())[:3]))
         if node.type == 'RGBTOBW' and color.is_constant:
             return ColorExpression(WHITE * (color.constant @ [0.2126, 0.7152, 0.0722]))
-        self._warn(node, "is left out: the colour that goes into it is used")
+        self._inexact(node, "is left out: the colour that goes into it is used")
         return color
 
     def _plus(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
               ) -> ColorExpression:
         if not a.can_add(b):
-            self._warn(node, "joins two images or attributes: the mean of the second is used")
+            self._inexact(node, "joins two images or attributes: the mean of the second is used")
         return a.plus(b).simplified()
 
     def _times(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
@@ -288,7 +324,8 @@ class NodeReader:
         if a.is_constant:
             return b.scaled(a.constant)
         if not b.is_constant:
-            self._warn(node, "multiplies two images or attributes: the mean of the second is used")
+            self._inexact(node, "multiplies two images or attributes: the mean of the second is "
+                                "used")
         return a.scaled(b.mean())
 
     # ----------------------------------------------------------------------------------------------
@@ -322,11 +359,16 @@ class NodeReader:
             color = self.color(source.socket, path)
             if color.is_constant:
                 return float(color.constant @ [0.2126, 0.7152, 0.0722])
-        self._warn(node, f"is no constant: the value of the socket {source.socket.name} is used")
+        self._inexact(node, f"is no constant: the value of the socket {source.socket.name} is "
+                            f"used")
         return _default_value(source.socket)
 
     def _warn(self, node: bpy.types.Node, what: str) -> None:
         self.warnings.add(f'{self.owner}: node "{node.name}" ({node.bl_label}) {what}')
+
+    def _inexact(self, node: bpy.types.Node, what: str) -> None:
+        self.unread.append(f'node "{node.name}" ({node.bl_label})')
+        self.inexact.add(f'{self.owner}: {self.unread[-1]} {what}')
 
 
 _VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')

@@ -30,6 +30,11 @@ class MaterialData:
     image: int | None = None
     image_weight: np.ndarray | None = None  # (3,)
     color_weight: np.ndarray | None = None  # (3,), of the mesh's corner colours
+    emission_image: int | None = None
+    emission_image_weight: np.ndarray | None = None  # (2, 3), W/m^2
+    emission_color_weight: np.ndarray | None = None  # (2, 3), W/m^2, of the corner colours
+    opacity: float = 1.0  # share of the light that does not pass straight through
+    opacity_image: int | None = None  # multiplies it, by the mean of its channels
 
 
 @dataclass(frozen=True)

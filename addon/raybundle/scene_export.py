@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
 from .light_export import export_light, is_portal
@@ -19,6 +20,7 @@ from .light_sets import LightSet, LightSetMembers
 from .material_export import MaterialExporter
 from .mesh_export import MeshError, export_mesh
 from .scene_data import InstanceData, MeshData, SceneData, Warnings
+from .surface_bake import BakedSurface, bake_surfaces
 from .world_export import export_world
 
 # Object types whose evaluated geometry is a mesh.
@@ -44,12 +46,17 @@ class SceneExport:
 
 
 def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None,
-                 light_sets: Sequence[LightSet] = ()) -> SceneExport:
-    """selected: the objects to bake, None for all. The original data is as before on return."""
+                 light_sets: Sequence[LightSet] = (), patch_size: float = 0.0) -> SceneExport:
+    """selected: the objects to bake, None for all; patch_size: m, 0 for the library's own choice.
+
+    The original data is as before on return.
+    """
+    exporter = _Exporter(context, selected, light_sets)
+    exporter.bake_surfaces(patch_size)
     changed = _meshes_with_changed_topology(context, selected)
     try:
         with ElementCodes(changed):
-            return _Exporter(context, selected, light_sets).export()
+            return exporter.export()
     finally:
         if changed:
             # Evaluate once more, so that nothing that is evaluated still has the codes.
@@ -112,6 +119,11 @@ def _meshes_with_changed_topology(context: bpy.types.Context,
     return meshes
 
 
+def _slots(item: bpy.types.Object) -> tuple[bpy.types.Material | None, ...]:
+    return tuple(slot.material.original if slot.material else None
+                 for slot in item.material_slots)
+
+
 class _Exporter:
     """One walk over the evaluated scene."""
 
@@ -123,11 +135,42 @@ class _Exporter:
         self.result = SceneExport()
         self.materials = MaterialExporter(self.result.scene, self.result.warnings)
         self.members = LightSetMembers(list(light_sets), self.result.scene)
+        self._baked: dict[bpy.types.Object, BakedSurface] = {}
         self._meshes: dict[tuple, int | MeshError] = {}
         self._mesh_digests: dict[bytes, int] = {}
         self._instance_counts: Counter[tuple[str, str]] = Counter()
         self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
         self._placed: set[tuple[str, int, bytes]] = set()
+
+    def bake_surfaces(self, patch_size: float) -> None:
+        """Asks Cycles for the materials that only it can tell. Not while others are evaluated."""
+        wanted: dict[bpy.types.Object, dict[int, str]] = {}
+        seen: set[tuple] = set()
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for instance in renderable_instances(self.context):
+            item = instance.object
+            if item.type not in GEOMETRY_TYPES or _role(item.original, None) == 'IGNORE':
+                continue
+            corners = np.array([instance.matrix_world @ Vector(c) for c in item.bound_box])
+            low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+            # Only what has a mesh of its own. What shares it is exported once, with the first.
+            group = (item.data.as_pointer(), _slots(item))
+            if item.type != 'MESH' or item.original.type != 'MESH' or group in seen:
+                continue
+            seen.add(group)
+            reasons = {}
+            for index, slot in enumerate(item.material_slots):
+                if slot.material is None:
+                    continue
+                unread = self.materials.unread(slot.material)
+                if unread is not None:
+                    reasons[index] = unread
+            if reasons:
+                wanted[item.original] = reasons
+        texel = 0.25 * (patch_size or float(np.linalg.norm(high - low)) / 64.0) if wanted else 0.0
+        self._baked, failures = bake_surfaces(self.context, wanted, texel)
+        for text in failures:
+            self.result.warnings.add(text)
 
     def export(self) -> SceneExport:
         for instance in renderable_instances(self.context):
@@ -213,9 +256,7 @@ class _Exporter:
     def _mesh(self, item: bpy.types.Object, wants_map: bool) -> int | MeshError:
         """Index of the object's mesh in the scene; objects that share it export it once."""
         # Materials may sit on the object, and then differ between objects with the same mesh.
-        slots = tuple(slot.material.original if slot.material else None
-                      for slot in item.material_slots)
-        key = (item.data.as_pointer(), item.type, slots)
+        key = (item.data.as_pointer(), item.type, _slots(item))
         original = item.original
         needs_map = wants_map and original.type == 'MESH' and original not in self._corner_maps
         if key not in self._meshes or needs_map:
@@ -230,10 +271,18 @@ class _Exporter:
         return self._meshes[key]
 
     def _exported(self, item: bpy.types.Object, mesh: bpy.types.Mesh) -> int | MeshError:
-        materials = [self.materials.export(slot.material) for slot in item.material_slots]
+        baked = self._baked.get(item.original)
+        # Evaluated anew, it may be another mesh.
+        if baked is not None and len(baked.uvs) != len(mesh.loops):
+            baked = None
+        materials = [self.materials.add_baked(slot.material, baked.materials[index])
+                     if baked is not None and index in baked.materials
+                     else self.materials.export(slot.material)
+                     for index, slot in enumerate(item.material_slots)]
         try:
             default = None if materials else self.materials.export(None)
-            data = export_mesh(mesh, item.data.name, materials, default)
+            data = export_mesh(mesh, item.data.name, materials, default,
+                               baked.uvs if baked is not None else None)
         except MeshError as error:
             return error
         return self._unique(data)

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Node trees rewritten so that they emit one of their own properties, for Cycles to evaluate.
+
+Each shader gives way to an emission shader of its diffuse reflectance, its radiance or its
+transmittance; mixes and sums of shaders stay as they are, because all three are linear in them.
+The tables say the same as node_reader.py; here whatever is linked to a socket stays linked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+REFLECTANCE, RADIANCE, TRANSMITTANCE = 'REFLECTANCE', 'RADIANCE', 'TRANSMITTANCE'
+PROPERTIES = (REFLECTANCE, RADIANCE, TRANSMITTANCE)
+
+# A value of the rewritten tree: an output of a node, or a constant.
+_Value = object
+
+
+class ShaderColors:
+    """Rewrites trees that nobody else uses; copies of groups are in `groups`, to be removed."""
+
+    def __init__(self, wanted: str, light_path: dict[str, float], backfacing: bool = False) -> None:
+        self.wanted = wanted
+        self.light_path = light_path  # values of the Light Path node's outputs; others are 0
+        self.backfacing = backfacing
+        self.groups: list[bpy.types.NodeTree] = []
+        self.found = False  # whether any shader may have the property
+        self.has_backfacing = False
+
+    def rewrite(self, tree: bpy.types.NodeTree) -> None:
+        for node in list(tree.nodes):
+            if node.type == 'GROUP' and node.node_tree is not None:
+                node.node_tree = node.node_tree.copy()
+                self.groups.append(node.node_tree)
+                self.rewrite(node.node_tree)
+            elif node.type == 'LIGHT_PATH':
+                for output in node.outputs:
+                    _replace(tree, output, self.light_path.get(output.name, 0.0))
+            elif node.type == 'NEW_GEOMETRY' and node.outputs['Backfacing'].is_linked:
+                self.has_backfacing = True
+                _replace(tree, node.outputs['Backfacing'], float(self.backfacing))
+            elif node.type == 'OUTPUT_MATERIAL':
+                for name in ('Volume', 'Displacement'):
+                    for link in list(node.inputs[name].links):
+                        tree.links.remove(link)
+            elif _is_shader(node):
+                self._rewrite_shader(tree, node)
+
+    def _rewrite_shader(self, tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
+        build = _SHADERS.get((node.type, self.wanted))
+        # A muted shader passes nothing on.
+        if build is not None and not node.mute:
+            color = build(_Formula(tree), node)
+            if not isinstance(color, tuple) or any(color):
+                self.found = True
+                emission = tree.nodes.new('ShaderNodeEmission')
+                _set(tree, emission.inputs['Color'], color)
+                for link in list(node.outputs[0].links):
+                    tree.links.new(emission.outputs[0], link.to_socket)
+        tree.nodes.remove(node)
+
+
+def _is_shader(node: bpy.types.Node) -> bool:
+    """Whether the node makes a shader of its own."""
+    return (any(item.type == 'SHADER' for item in node.outputs)
+            and not any(item.type == 'SHADER' for item in node.inputs)
+            and node.type not in ('GROUP', 'GROUP_INPUT', 'REROUTE'))
+
+
+def _replace(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket, value: float) -> None:
+    targets = [link.to_socket for link in output.links]
+    if not targets:
+        return
+    node = tree.nodes.new('ShaderNodeValue')
+    node.outputs[0].default_value = value
+    for target in targets:
+        tree.links.new(node.outputs[0], target)
+
+
+def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: _Value) -> None:
+    """Gives an input a value: links it to an output, or sets its constant."""
+    if isinstance(value, bpy.types.NodeSocket):
+        tree.links.new(value, socket)
+    elif isinstance(value, tuple):
+        # Colours have four components, vectors three.
+        socket.default_value = (*value, 1.0)[:len(socket.default_value)]
+    else:
+        socket.default_value = value
+
+
+class _Formula:
+    """Adds the nodes of a formula to a tree; constants stay constants."""
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self.tree = tree
+
+    def value(self, node: bpy.types.Node, *names: str) -> _Value:
+        """A number, clamped to 0 to 1, by the first of the names that exists."""
+        value = self.raw(node, *names)
+        if not isinstance(value, bpy.types.NodeSocket):
+            return min(max(value, 0.0), 1.0)
+        return self._math('ADD', value, 0.0)
+
+    def raw(self, node: bpy.types.Node, *names: str) -> _Value:
+        socket = next(node.inputs[name] for name in names if name in node.inputs)
+        if socket.is_linked and not socket.links[0].is_muted:
+            return socket.links[0].from_socket
+        value = socket.default_value
+        return tuple(value)[:3] if hasattr(value, '__len__') else float(value)
+
+    def times(self, a: _Value, b: _Value) -> _Value:
+        """Of numbers."""
+        if not isinstance(a, bpy.types.NodeSocket) and not isinstance(b, bpy.types.NodeSocket):
+            return a * b
+        return self._math('MULTIPLY', a, b, clamp=False)
+
+    def rest(self, a: _Value) -> _Value:
+        """1 - a."""
+        if not isinstance(a, bpy.types.NodeSocket):
+            return 1.0 - a
+        return self._math('SUBTRACT', 1.0, a)
+
+    def scaled(self, color: _Value, factor: _Value) -> _Value:
+        if isinstance(color, tuple) and not isinstance(factor, bpy.types.NodeSocket):
+            return tuple(component * factor for component in color)
+        if factor == 0.0 or color == (0.0, 0.0, 0.0):
+            return (0.0, 0.0, 0.0)
+        node = self.tree.nodes.new('ShaderNodeVectorMath')
+        node.operation = 'SCALE'
+        _set(self.tree, node.inputs[0], color)
+        _set(self.tree, node.inputs['Scale'], factor)
+        return node.outputs[0]
+
+    def plus(self, a: _Value, b: _Value) -> _Value:
+        """Of colours."""
+        if isinstance(a, tuple) and isinstance(b, tuple):
+            return tuple(x + y for x, y in zip(a, b))
+        node = self.tree.nodes.new('ShaderNodeVectorMath')
+        node.operation = 'ADD'
+        _set(self.tree, node.inputs[0], a)
+        _set(self.tree, node.inputs[1], b)
+        return node.outputs[0]
+
+    def _math(self, operation: str, a: _Value, b: _Value, clamp: bool = True) -> _Value:
+        node = self.tree.nodes.new('ShaderNodeMath')
+        node.operation, node.use_clamp = operation, clamp
+        _set(self.tree, node.inputs[0], a)
+        _set(self.tree, node.inputs[1], b)
+        return node.outputs[0]
+
+
+def _color(formula: _Formula, node: bpy.types.Node) -> _Value:
+    return formula.raw(node, 'Color')
+
+
+def _emission(formula: _Formula, node: bpy.types.Node) -> _Value:
+    return formula.scaled(formula.raw(node, 'Color'), formula.raw(node, 'Strength'))
+
+
+# Sockets were renamed in 4.0.
+_TRANSMISSION = ('Transmission Weight', 'Transmission')
+
+
+def _principled_reflectance(formula: _Formula, node: bpy.types.Node) -> _Value:
+    share = formula.times(formula.rest(formula.value(node, 'Metallic')),
+                          formula.rest(formula.value(node, *_TRANSMISSION)))
+    return formula.scaled(formula.raw(node, 'Base Color'),
+                          formula.times(share, formula.value(node, 'Alpha')))
+
+
+def _principled_radiance(formula: _Formula, node: bpy.types.Node) -> _Value:
+    strength = formula.times(formula.raw(node, 'Emission Strength'), formula.value(node, 'Alpha'))
+    return formula.scaled(formula.raw(node, 'Emission Color', 'Emission'), strength)
+
+
+def _principled_transmittance(formula: _Formula, node: bpy.types.Node) -> _Value:
+    alpha = formula.value(node, 'Alpha')
+    through = formula.times(formula.value(node, *_TRANSMISSION),
+                            formula.rest(formula.value(node, 'Metallic')))
+    return formula.plus(
+        formula.scaled((1.0, 1.0, 1.0), formula.rest(alpha)),
+        formula.scaled(formula.raw(node, 'Base Color'), formula.times(alpha, through)))
+
+
+# The colour of a property, by kind of shader; a shader that is not here has none of it.
+_SHADERS: dict[tuple[str, str], Callable[[_Formula, bpy.types.Node], _Value]] = {
+    ('BSDF_DIFFUSE', REFLECTANCE): _color,
+    ('SUBSURFACE_SCATTERING', REFLECTANCE): _color,
+    ('EMISSION', RADIANCE): _emission,
+    ('BSDF_TRANSPARENT', TRANSMITTANCE): _color,
+    ('BSDF_GLASS', TRANSMITTANCE): _color,
+    ('BSDF_REFRACTION', TRANSMITTANCE): _color,
+    ('BSDF_TRANSLUCENT', TRANSMITTANCE): _color,
+    ('BSDF_PRINCIPLED', REFLECTANCE): _principled_reflectance,
+    ('BSDF_PRINCIPLED', RADIANCE): _principled_radiance,
+    ('BSDF_PRINCIPLED', TRANSMITTANCE): _principled_transmittance,
+}

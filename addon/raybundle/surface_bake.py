@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Asks Cycles what materials reflect, emit and let through where node_reader.py cannot tell.
+
+A copy of the object, in a scene of its own, gets copies of its materials that emit the property in
+question (shader_colors.py), and Cycles bakes their emission into one image (face_atlas.py). That is
+done once; the images are kept until the object's mesh, place or materials change. Nothing of the
+user's file changes, and nothing is left in it.
+
+Approximations: what depends on the direction of view is as seen from straight above; a Backfacing
+input has the mean of both sides; a random value per object is that of another object.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from .face_atlas import BORDER, FaceAtlas, face_atlas
+from .material_fingerprint import material_fingerprint
+from .node_reader import LIGHT_PATH
+from .shader_colors import PROPERTIES, RADIANCE, REFLECTANCE, TRANSMITTANCE, ShaderColors
+
+# Within a pixel.
+_SAMPLES = 4
+_UV_MAP = "Raybundle Bake"
+
+
+@dataclass(frozen=True)
+class BakedMaterial:
+    """(height, width, 3) float32 each, of all materials of the object in one image."""
+
+    message: str  # what was done and why
+    reflectance: np.ndarray
+    radiance: np.ndarray | None  # None: emits nothing
+    opacity: np.ndarray | None  # None: lets nothing through
+
+
+@dataclass(frozen=True)
+class BakedSurface:
+    uvs: np.ndarray  # (c, 2), corners of the evaluated mesh
+    materials: dict[int, BakedMaterial]  # by slot
+
+
+# By scene: of its last export, by content.
+_cache: dict[str, dict[bytes, BakedSurface]] = {}
+
+
+def discard_all() -> None:
+    _cache.clear()
+
+
+def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, dict[int, str]],
+                  pixel: float) -> tuple[dict[bpy.types.Object, BakedSurface], list[str]]:
+    """wanted: for each original object the slots in question and why; pixel: about its edge, m.
+
+    Returns what was baked, and why something was not.
+    """
+    name = context.scene.name_full
+    before = _cache.get(name, {})
+    kept: dict[bytes, BakedSurface] = {}
+    result: dict[bpy.types.Object, BakedSurface] = {}
+    failures: list[str] = []
+    for item, reasons in wanted.items():
+        try:
+            with _evaluated_mesh(context, item) as mesh:
+                key = _digest(context, item, mesh, sorted(reasons), pixel)
+                surface = before.get(key) or kept.get(key)
+                if surface is None:
+                    surface = _bake(context, item, mesh, reasons, pixel)
+            kept[key] = result[item] = surface
+        except (RuntimeError, TypeError, ValueError) as error:
+            failures.append(f'"{item.name}": Cycles could not bake its materials, which are read '
+                            f'as far as possible: {str(error).strip()}')
+    _cache[name] = kept
+    return result, failures
+
+
+@contextmanager
+def _evaluated_mesh(context: bpy.types.Context, item: bpy.types.Object
+                    ) -> Iterator[bpy.types.Mesh]:
+    """A copy of the object's evaluated mesh."""
+    depsgraph = context.evaluated_depsgraph_get()
+    mesh = bpy.data.meshes.new_from_object(item.evaluated_get(depsgraph),
+                                           preserve_all_data_layers=True, depsgraph=depsgraph)
+    try:
+        # Generated coordinates belong to the original shape.
+        if item.type == 'MESH':
+            mesh.use_auto_texspace = False
+            mesh.texspace_location = item.data.texspace_location
+            mesh.texspace_size = item.data.texspace_size
+        yield mesh
+    finally:
+        bpy.data.meshes.remove(mesh)
+
+
+def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Mesh,
+            slots: list[int], pixel: float) -> bytes:
+    content = hashlib.blake2b(digest_size=16)
+    depsgraph = context.evaluated_depsgraph_get()
+    content.update(repr((slots, round(pixel, 9), context.scene.frame_current,
+                         [tuple(row) for row in item.evaluated_get(depsgraph).matrix_world],
+                         tuple(item.color), item.pass_index,
+                         tuple(mesh.texspace_location), tuple(mesh.texspace_size))).encode())
+    for collection, name, dtype, width in (
+            (mesh.vertices, 'co', np.float32, 3), (mesh.loops, 'vertex_index', np.int32, 1),
+            (mesh.polygons, 'loop_total', np.int32, 1),
+            (mesh.polygons, 'material_index', np.int32, 1),
+            (mesh.polygons, 'use_smooth', bool, 1)):
+        values = np.empty(len(collection) * width, dtype)
+        collection.foreach_get(name, values)
+        content.update(values.data)
+    for layer in mesh.uv_layers:
+        values = np.empty(2 * len(layer.data), np.float32)
+        layer.data.foreach_get('uv', values)
+        content.update(layer.name.encode() + bytes([layer.active_render]) + values.tobytes())
+    for attribute in mesh.attributes:
+        content.update(attribute.name.encode() + _attribute_bytes(attribute))
+    for slot in item.material_slots:
+        content.update(material_fingerprint(slot.material).encode())
+    return content.digest()
+
+
+def _attribute_bytes(attribute: bpy.types.Attribute) -> bytes:
+    name, width = {'FLOAT': ('value', 1), 'INT': ('value', 1), 'BOOLEAN': ('value', 1),
+                   'FLOAT_VECTOR': ('vector', 3), 'FLOAT_COLOR': ('color', 4),
+                   'BYTE_COLOR': ('color', 4), 'FLOAT2': ('vector', 2)}.get(
+                       attribute.data_type, (None, 0))
+    if name is None:
+        return b""
+    values = np.empty(len(attribute.data) * width, np.float32)
+    attribute.data.foreach_get(name, values)
+    return values.tobytes()
+
+
+# --------------------------------------------------------------------------------------------------
+# One object
+# --------------------------------------------------------------------------------------------------
+
+
+def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Mesh,
+          reasons: dict[int, str], pixel: float) -> BakedSurface:
+    slots = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get('material_index', slots)
+    slots = np.clip(slots, 0, max(len(item.material_slots) - 1, 0))
+    wanted = np.isin(slots, list(reasons))
+    uvs = np.full((len(mesh.loops), 2), -1.0, np.float32)
+    if not wanted.any():
+        return BakedSurface(uvs, {})
+    atlas = _atlas(mesh, np.array(item.evaluated_get(
+        context.evaluated_depsgraph_get()).matrix_world), wanted, pixel)
+    layer = mesh.uv_layers.new(name=_UV_MAP, do_init=False)
+    if layer is None:
+        raise RuntimeError("its mesh has no room for another UV map")
+    layer.data.foreach_set('uv', atlas.uvs.ravel())
+    images = {}
+    with _stage(context, item, mesh) as stage:
+        for wanted_property in PROPERTIES:
+            sides = []
+            for backfacing in (False, True):
+                colors = stage.bake(wanted_property, set(reasons), atlas, backfacing)
+                if colors is not None:
+                    sides.append(colors)
+                if not stage.has_backfacing:
+                    break
+            if sides:
+                images[wanted_property] = np.mean(sides, axis=0)
+    opacity = None
+    if TRANSMITTANCE in images:
+        # Coloured transparency is grey.
+        through = np.clip(images[TRANSMITTANCE], 0.0, 1.0).mean(axis=2, keepdims=True)
+        opacity = np.repeat(1.0 - through, 3, axis=2)
+    black = np.zeros((atlas.height, atlas.width, 3), np.float32)
+    return BakedSurface(atlas.uvs, {
+        slot: BakedMaterial(f'material "{item.material_slots[slot].material.name}": baked by '
+                            f'Cycles on "{item.name}", because of {reason}',
+                            images.get(REFLECTANCE, black), images.get(RADIANCE), opacity)
+        for slot, reason in reasons.items()})
+
+
+def _atlas(mesh: bpy.types.Mesh, matrix: np.ndarray, wanted: np.ndarray, pixel: float
+           ) -> FaceAtlas:
+    vertices = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get('co', vertices)
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get('vertex_index', corners)
+    sizes = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get('loop_total', sizes)
+    placed = vertices.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    return face_atlas(placed[corners], np.concatenate([[0], np.cumsum(sizes)]), wanted, pixel)
+
+
+class _Stage:
+    """The copy of an object, alone in a scene that Cycles renders."""
+
+    def __init__(self, context: bpy.types.Context, source: bpy.types.Object,
+                 scene: bpy.types.Scene, item: bpy.types.Object) -> None:
+        self.context, self.source, self.scene, self.item = context, source, scene, item
+        self.has_backfacing = False
+
+    def bake(self, wanted: str, slots: set[int], atlas: FaceAtlas, backfacing: bool
+             ) -> np.ndarray | None:
+        """(height, width, 3); None where no material can have the property."""
+        image = bpy.data.images.new(_UV_MAP, atlas.width, atlas.height, alpha=False,
+                                    float_buffer=True, is_data=True)
+        made: list[bpy.types.ID] = [image]
+        try:
+            found = self._set_materials(wanted, slots, backfacing, image, made)
+            if not found:
+                return None
+            self._run()
+            pixels = np.empty(atlas.width * atlas.height * 4, np.float32)
+            image.pixels.foreach_get(pixels)
+            colors = pixels.reshape(atlas.height, atlas.width, 4)[:, :, :3]
+            return np.ascontiguousarray(np.maximum(np.nan_to_num(colors), 0.0))
+        finally:
+            self.item.data.materials.clear()
+            bpy.data.batch_remove(made)
+
+    def _set_materials(self, wanted: str, slots: set[int], backfacing: bool,
+                       image: bpy.types.Image, made: list[bpy.types.ID]) -> bool:
+        found = False
+        mesh = self.item.data
+        faces = np.empty(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get('material_index', faces)
+        mesh.materials.clear()
+        for index, slot in enumerate(self.source.material_slots):
+            if index in slots:
+                material = slot.material.copy()
+                made.append(material)
+                colors = ShaderColors(wanted, LIGHT_PATH, backfacing)
+                try:
+                    colors.rewrite(material.node_tree)
+                finally:
+                    made += colors.groups
+                found |= colors.found
+                self.has_backfacing |= colors.has_backfacing
+            else:
+                material = bpy.data.materials.new(_UV_MAP)
+                made.append(material)
+                if bpy.app.version < (5, 0, 0):
+                    material.use_nodes = True
+            # The bake writes to the active image of each material.
+            target = material.node_tree.nodes.new('ShaderNodeTexImage')
+            target.image = image
+            material.node_tree.nodes.active = target
+            mesh.materials.append(material)
+        mesh.polygons.foreach_set('material_index', faces)
+        mesh.update()
+        return found
+
+    def _run(self) -> None:
+        view_layer = self.scene.view_layers[0]
+        with self.context.temp_override(
+                scene=self.scene, view_layer=view_layer, object=self.item,
+                active_object=self.item, selected_objects=[self.item],
+                selected_editable_objects=[self.item]):
+            bpy.ops.object.bake(type='EMIT', target='IMAGE_TEXTURES', save_mode='INTERNAL',
+                                use_clear=True, margin=BORDER, uv_layer=_UV_MAP,
+                                use_selected_to_active=False)
+
+
+@contextmanager
+def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types.Mesh
+           ) -> Iterator[_Stage]:
+    scene = bpy.data.scenes.new(_UV_MAP)
+    item = bpy.data.objects.new(_UV_MAP, mesh)
+    try:
+        scene.render.engine = 'CYCLES'
+        scene.cycles.samples = _SAMPLES
+        scene.cycles.use_adaptive_sampling = False
+        scene.cycles.use_denoising = False
+        scene.frame_set(context.scene.frame_current)
+        scene.collection.objects.link(item)
+        depsgraph = context.evaluated_depsgraph_get()
+        item.matrix_world = source.evaluated_get(depsgraph).matrix_world
+        item.color, item.pass_index = source.color, source.pass_index
+        scene.view_layers[0].objects.active = item
+        item.select_set(True, view_layer=scene.view_layers[0])
+        yield _Stage(context, source, scene, item)
+    finally:
+        bpy.data.objects.remove(item)
+        bpy.data.scenes.remove(scene)
