@@ -111,8 +111,8 @@ class MaterialExporter:
             glow_texture = glow_attribute = None
         transmittance = np.clip([side.transmittance for side in sides], 0.0, 1.0)
         if np.ptp(transmittance) > 1e-3:
-            self.warnings.add(f'material "{name}" lets colours or directions through differently: '
-                              f'the mean is used')
+            self.warnings.add(f'material "{name}": what it lets through differs between colours '
+                              f'or sides: its mean is used')
         data = MaterialData(
             name,
             np.maximum([side.reflectance.constant for side in sides], 0.0),

@@ -144,6 +144,8 @@ class NodeReader:
         base = self.color(node.inputs['Base Color'], path)
         transmittance = WHITE * (1.0 - alpha)
         metallic = float(np.clip(self.value(node.inputs['Metallic'], path), 0.0, 1.0))
+        if metallic > 0.0:
+            self._warn(node, "is metallic: that part of it reflects nothing")
         through = float(np.clip(self.value(transmission, path), 0.0, 1.0)) * (1.0 - metallic)
         if through > 0.0:
             self._warn(node, "lets light through: it goes straight on here")

@@ -274,7 +274,8 @@ def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types
         scene.cycles.samples = _SAMPLES
         scene.cycles.use_adaptive_sampling = False
         scene.cycles.use_denoising = False
-        scene.frame_set(context.scene.frame_current)
+        # Not frame_set, which calls the user's handlers.
+        scene.frame_current = context.scene.frame_current
         scene.collection.objects.link(item)
         depsgraph = context.evaluated_depsgraph_get()
         item.matrix_world = source.evaluated_get(depsgraph).matrix_world
