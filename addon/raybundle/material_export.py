@@ -46,6 +46,7 @@ class MaterialExporter:
         self.warnings = warnings
         self.images = ImagePixels()
         self._materials: dict[bpy.types.Material | None, MaterialExport] = {}
+        self._unread: dict[bpy.types.Material, str | None] = {}
         self._image_indices: dict[tuple[str, str], int] = {}
 
     def export(self, material: bpy.types.Material | None) -> MaterialExport:
@@ -57,12 +58,13 @@ class MaterialExporter:
 
     def unread(self, material: bpy.types.Material) -> str | None:
         """What of the material only Cycles can tell, if anything."""
-        surface = self._surface(material, False, Warnings(), unread := [])
-        if unread:
-            return unread[0]
-        if not _share_coordinates(surface):
-            return "its emission, which varies in another way than its reflectance"
-        return None
+        key = material.original
+        if key not in self._unread:
+            surface = self._surface(material, False, Warnings(), unread := [])
+            if not unread and not _share_coordinates(surface):
+                unread.append("its emission, which varies in another way than its reflectance")
+            self._unread[key] = unread[0] if unread else None
+        return self._unread[key]
 
     def add_baked(self, material: bpy.types.Material, baked: BakedMaterial) -> MaterialExport:
         """A material as Cycles baked it for the faces of one object (surface_bake.py)."""

@@ -146,16 +146,14 @@ class _Exporter:
         """Asks Cycles for the materials that only it can tell. Not while others are evaluated."""
         wanted: dict[bpy.types.Object, dict[int, str]] = {}
         seen: set[tuple] = set()
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in renderable_instances(self.context):
             item = instance.object
-            if item.type not in GEOMETRY_TYPES or _role(item.original, None) == 'IGNORE':
-                continue
-            corners = np.array([instance.matrix_world @ Vector(c) for c in item.bound_box])
-            low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
             # Only what has a mesh of its own. What shares it is exported once, with the first.
+            if (item.type != 'MESH' or item.original.type != 'MESH'
+                    or _role(item.original, None) == 'IGNORE'):
+                continue
             group = (item.data.as_pointer(), _slots(item))
-            if item.type != 'MESH' or item.original.type != 'MESH' or group in seen:
+            if group in seen:
                 continue
             seen.add(group)
             reasons = {}
@@ -167,10 +165,23 @@ class _Exporter:
                     reasons[index] = unread
             if reasons:
                 wanted[item.original] = reasons
-        texel = 0.25 * (patch_size or float(np.linalg.norm(high - low)) / 64.0) if wanted else 0.0
-        self._baked, failures = bake_surfaces(self.context, wanted, texel)
+        if not wanted:
+            return
+        # A quarter of a patch, as the native library chooses them.
+        pixel = 0.25 * (patch_size or self._diagonal() / 64.0)
+        self._baked, failures = bake_surfaces(self.context, wanted, pixel)
         for text in failures:
             self.result.warnings.add(text)
+
+    def _diagonal(self) -> float:
+        """About that of the exported scene, m."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for instance in renderable_instances(self.context):
+            item = instance.object
+            if item.type in GEOMETRY_TYPES and _role(item.original, None) != 'IGNORE':
+                box = np.array([instance.matrix_world @ Vector(c) for c in item.bound_box])
+                low, high = np.minimum(low, box.min(axis=0)), np.maximum(high, box.max(axis=0))
+        return float(np.linalg.norm(high - low))
 
     def export(self) -> SceneExport:
         for instance in renderable_instances(self.context):
