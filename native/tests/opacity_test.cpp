@@ -238,6 +238,20 @@ TEST(VaryingEmission, ShotAndGatheredLightHaveTheSameColours) {
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(b[c], a[c], 0.02 * a[c]) << "channel " << c;
 }
 
+TEST(VaryingEmission, SidesOfOtherColoursAreShotInTheirColours) {
+    // A lamp of 1 m between two floors, red below and blue above.
+    Scene scene = floorUnderChecker(2, {0, 0, 0});
+    scene.materials[scene.meshes.back().faceMaterials[0]].emission = {glm::vec3(50, 100, 0),
+                                                                      glm::vec3(0, 20, 900)};
+    place(scene, rectangle("below", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0));
+    place(scene, rectangle("above", {-1, -1, 4}, {0, 2, 0}, {2, 0, 0}), grey("", 0));
+    const ShotScene shot(scene, 0.5f);
+    const glm::dvec3 a = arriving(shot.patches, shot.shoot("GATHER", 0, 0, 0.002f));
+    const glm::dvec3 b = arriving(shot.patches, shot.shoot("SHOOT", 400000));
+    // Red gets 4 % of the lines: noise of half a per cent.
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(b[c], a[c], 0.02 * a[c]) << "channel " << c;
+}
+
 TEST(VaryingEmission, CornerColoursShineInBundles) {
     // A closed box whose faces emit 1 on average by their corners, and reflect nothing: the mean
     // light is that of a uniform one by reciprocity.

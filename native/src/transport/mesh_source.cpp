@@ -135,13 +135,11 @@ EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
         on = onSurface({std::min(u, 0.9999999f), r.y});
     }
     EmittedRay ray;
-    // Power is shared out by the sum of the channels.
-    if (sideEmission) {
-        const glm::vec3& own = (*sideEmission)[on.side];
-        for (int c = 0; c < 3; ++c)
-            if (totalPower[c] > 0)
-                ray.weight[c] = own[c] / strength(own) * (strength(totalPower) / totalPower[c]);
-    }
+    // The side is chosen by the sum of the channels.
+    const glm::vec3 own = emissionOf(on.side / 2, front ? 0 : 1);
+    for (int c = 0; c < 3; ++c)
+        if (totalPower[c] > 0)
+            ray.weight[c] = own[c] / strength(own) * (strength(totalPower) / totalPower[c]);
     ray.origin = on.position;
     ray.normal = front ? on.normal : -on.normal;
     ray.direction = cosineDirection(ray.normal, {r.z, r.w});

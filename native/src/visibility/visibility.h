@@ -30,10 +30,10 @@ class Visibility {
     explicit Visibility(const Patches& patches, Blockers blockers = Blockers::EXCHANGING);
     ~Visibility();
 
-    // Share of the light that comes through between a point on a side of a patch (relative to Patches::centre) and
-    // point + distance * direction (unit vector); distance may be infinite. The far end is kept a
-    // little off, since it usually lies on a surface. Of surfaces that coincide with the patch,
-    // those on its other side do not block (see comesBefore).
+    // Share of the light that comes through between a point on a side of a patch (relative to
+    // Patches::centre) and point + distance * direction (unit vector); distance may be infinite.
+    // The far end is kept a little off, since it usually lies on a surface. Of surfaces that
+    // coincide with the patch, those on its other side do not block (see comesBefore).
     float visibleShare(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
                        float distance) const;
 
