@@ -15,7 +15,8 @@ GROUPS = (properties.RaybundleSceneSettings, properties.RaybundleObjectSettings)
 # Names that scripts use; see the interfaces in docs.
 SCENE_PROPERTIES = """scope target_error output attribute domain data_type topology shared_meshes
     patch_size max_patches solver first_shot directions projector small_patches reconstruction
-    plane_count plane_placement local_rays estimator max_bundles lines_per_bundle memory_limit seed threads report""".split()
+    final_gather plane_count plane_placement local_rays estimator max_bundles lines_per_bundle
+    memory_limit seed threads report""".split()
 OPERATORS = ("bake", "relight", "clear", "preview")
 
 
@@ -67,6 +68,9 @@ def test_every_choice_is_known_to_the_native_library():
             if kind is str:
                 for item in definition.enum_items:
                     bake.set(name, item.identifier)
+            elif definition.type == 'BOOLEAN':
+                bake.set(name, False)
+                bake.set(name, True)
             else:
                 bake.set(name, definition.hard_min)
                 bake.set(name, definition.hard_max)

@@ -68,6 +68,7 @@ SETTINGS: dict[str, type] = {
     'projector': str,
     'small_patches': str,
     'reconstruction': str,
+    'final_gather': int,
     'plane_count': int,
     'plane_placement': str,
     'local_rays': int,

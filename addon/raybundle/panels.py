@@ -112,6 +112,8 @@ class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):
             layout.prop(settings, "plane_placement", text="Placement")
         layout.prop(settings, "small_patches")
         layout.prop(settings, "reconstruction")
+        if settings.reconstruction == 'POINT':
+            layout.prop(settings, "final_gather")
         layout.prop(settings, "seed")
         layout.prop(settings, "threads")
 

@@ -227,6 +227,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     reconstruction: EnumProperty(
         name="Reconstruction", description="How patches become values at vertices",
         items=enum_reconstruction, default='LEAST_SQUARES')
+    final_gather: BoolProperty(
+        name="Final Gather",
+        description="Of the reconstruction Point: gather the light of other surfaces at the "
+                    "vertices too, where it changes between them",
+        default=True)
     max_bundles: IntProperty(
         name="Maximum Bundles",
         description="Most directions that are traced, even if there is still more noise than "
@@ -293,6 +298,7 @@ class BakeSettings:
     plane_placement: str
     small_patches: str
     reconstruction: str
+    final_gather: bool
     max_bundles: int
     lines_per_bundle: int
     memory_limit: float

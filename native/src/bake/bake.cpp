@@ -270,7 +270,8 @@ void Bake::runStages(const Scene& scene) {
         irradiance = sumOf(lights);
 
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
-        light = reconstruct(scene, patches, lights, exposed, settings, progress, report);
+        light = reconstruct(scene, patches, trace->visibility, lights, exposed, settings, progress,
+                            report);
         stateErrors(scene, patches, instanceRanges(scene, patches), irradiance,
                     {exposed, noise.ofBundles, noise.direct}, settings.targetError, light, report);
     }

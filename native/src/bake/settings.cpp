@@ -29,6 +29,7 @@ const std::vector<Number<int>>& integers() {
         {"thesis_literal", &Settings::thesisLiteral, 0, 1},
         {"local_rays", &Settings::localRays, 0, INT32_MAX},
         {"plane_coherence", &Settings::planeCoherence, 0, 1},
+        {"final_gather", &Settings::finalGather, 0, 1},
     };
     return table;
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/reconstruction.h"
 
+#include <optional>
+
 #include "reconstruction/area_average.h"
-#include "reconstruction/corner_receivers.h"
+#include "reconstruction/corner_gather.h"
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
 
@@ -11,60 +13,10 @@ namespace {
 
 // An object whose front gets less than this share of the light of its back is probably inside out.
 constexpr double kInsideOut = 1e-3;
-// A corner whose patch is covered by more than this gathers no light itself.
-constexpr float kHalfCovered = 0.5f;
 
 using Field = std::vector<glm::vec3>;
 
 double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
-
-// Light of the sources at corners, for all instances in one go.
-class SourceLight {
-  public:
-    SourceLight(const Scene& scene, const Patches& patches, const DirectLight& light,
-                const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,
-                float targetError, const Progress& progress) {
-        for (size_t i = 0; i < ranges.size(); ++i) {
-            first.push_back(corners.size());
-            if (scene.instances[i].role != RB_ROLE_BAKE) continue;
-            for (CornerReceiver& corner : cornerReceivers(scene, patches, uint32_t(i), ranges[i]))
-                if (exposed[corner.receiver.side] > kHalfCovered)
-                    corners.push_back(std::move(corner));
-        }
-        first.push_back(corners.size());
-        gathered = light.gather(
-            corners.size(), [&](size_t k) { return corners[k].receiver; }, targetError,
-            [&](double done) { progress.report(RB_STAGE_RECONSTRUCTION, 0.5 * done); });
-    }
-
-    // Replaces the gathered part of the direct light by that of the corners, where they have any:
-    // direct and gathered per node.
-    void replaceGathered(size_t instance, const SmoothRegions& regions,
-                         const std::vector<float>& cornerAngles, const Field& carried,
-                         Field& direct) const {
-        Field light(regions.nodeCount, glm::vec3(0.0f));
-        std::vector<float> weight(regions.nodeCount, 0.0f);
-        for (size_t k = first[instance]; k < first[instance + 1]; ++k) {
-            const uint32_t node = regions.nodeOf[corners[k].corner];
-            const float angle = cornerAngles[corners[k].corner];
-            light[node] += angle * gathered[k].irradiance;
-            weight[node] += angle;
-        }
-        for (size_t v = 0; v < direct.size(); ++v)
-            if (weight[v] > 0) direct[v] = carried[v] + light[v] / weight[v];
-    }
-
-    uint64_t rays() const {
-        uint64_t sum = 0;
-        for (const Gathered& g : gathered) sum += g.rays;
-        return sum;
-    }
-
-  private:
-    std::vector<CornerReceiver> corners;
-    std::vector<size_t> first;  // per instance, into corners
-    std::vector<Gathered> gathered;
-};
 
 bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side side,
                  const SetLights& lights) {
@@ -136,9 +88,9 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
 }
 
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const SetLights& lights, const std::vector<float>& exposed,
-                                       const Settings& settings, const Progress& progress,
-                                       Report& report) {
+                                       const Visibility& visibility, const SetLights& lights,
+                                       const std::vector<float>& exposed, const Settings& settings,
+                                       const Progress& progress, Report& report) {
     const bool isPoint = settings.reconstruction == "POINT";
     const std::vector<SideLight> onSides = sideLights(patches, lights);
     // Of the whole patch, what lets light through included.
@@ -146,12 +98,10 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
     for (size_t side = 0; side < reflectance.size(); ++side)
         reflectance[side] *= patches.opacityOf(uint32_t(side / 2));
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
-    std::vector<SourceLight> atCorners;  // per light
-    for (size_t k = 0; isPoint && k < lights.size(); ++k) {
-        atCorners.emplace_back(scene, patches, lights[k].direct, ranges, exposed,
-                               settings.targetError, progress.part(k, lights.size()));
-        report.shadowRays += atCorners.back().rays();
-    }
+    std::optional<CornerGather> atCorners;
+    if (isPoint)
+        atCorners.emplace(scene, patches, visibility, lights, ranges, exposed, settings,
+                          progress.part(0, 2));
 
     std::vector<InstanceLight> result(scene.instances.size());
     report.objects.resize(scene.instances.size());
@@ -189,10 +139,15 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                 : leastSquares(patches, ranges[i], regions, instance.side, exposed,
                                settings.regularization, fields);
         for (size_t k = 0; k < lights.size(); ++k) {
-            Field &direct = nodes[3 * k], &exitance = nodes[3 * k + 2];
-            const Field& indirect = nodes[3 * k + 1];
+            Field &direct = nodes[3 * k], &indirect = nodes[3 * k + 1];
+            Field& exitance = nodes[3 * k + 2];
             if (isPoint) {
-                atCorners[k].replaceGathered(i, regions, out.cornerAngles, exitance, direct);
+                CornerGather::NodeLight atNodes{std::move(direct), std::move(indirect),
+                                                std::move(exitance)};
+                atCorners->improve(i, k, regions, out.cornerAngles, atNodes);
+                direct = std::move(atNodes.direct);
+                indirect = std::move(atNodes.indirect);
+                exitance.resize(direct.size());
                 const Field& emission = nodes[3 * lights.size() + k];
                 const Field& reflectances = nodes.back();
                 for (size_t v = 0; v < direct.size(); ++v)
@@ -212,6 +167,11 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                                       "\": the baked sides of its faces get no light but the other "
                                       "sides do; flip its normals or choose the other side");
         }
+    }
+    if (atCorners) {
+        report.shadowRays += atCorners->shadowRays();
+        report.skipped.push_back({"final gather", "corners whose light interpolation follows",
+                                  atCorners->smoothNodes()});
     }
     if (occluders)
         report.skipped.push_back({"reconstruction", "objects that only occlude", occluders});

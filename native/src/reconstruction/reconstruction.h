@@ -7,9 +7,9 @@
 // AREA_AVERAGE: the mean of the light on the faces around each corner
 //   (reconstruction/area_average.h).
 // POINT: the light at the corners themselves, as Cycles' bake has it. Light of the sources, which
-//   changes within a face, is gathered at each corner; the rest, which is smooth, is that of least
-//   squares there. Corners that another surface covers, where no light arrives, keep the value of
-//   least squares.
+//   changes within a face, is gathered at each corner, and the rest where it is not smooth;
+//   elsewhere it is that of least squares (reconstruction/corner_gather.h). Corners that another
+//   surface covers, where no light arrives, keep the value of least squares.
 #pragma once
 
 #include <vector>
@@ -23,6 +23,7 @@
 #include "reconstruction/least_squares.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
+#include "visibility/visibility.h"
 
 namespace raybundle {
 
@@ -33,8 +34,8 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
 // exposed: per side, the share of it that nothing covers. Adds the objects, warnings and skips to
 // the report.
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const SetLights& lights, const std::vector<float>& exposed,
-                                       const Settings& settings, const Progress& progress,
-                                       Report& report);
+                                       const Visibility& visibility, const SetLights& lights,
+                                       const std::vector<float>& exposed, const Settings& settings,
+                                       const Progress& progress, Report& report);
 
 }  // namespace raybundle

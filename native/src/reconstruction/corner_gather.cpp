@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/corner_gather.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace raybundle {
+namespace {
+
+// A corner whose patch is covered by more than this gathers no light itself.
+constexpr float kHalfCovered = 0.5f;
+
+// RMS over channels and the exposed area of what is baked, W/m^2.
+double meanLight(const Scene& scene, const Patches& patches,
+                 const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,
+                 const Irradiance& light) {
+    double squares = 0, area = 0;
+    for (size_t i = 0; i < ranges.size(); ++i) {
+        if (scene.instances[i].role != RB_ROLE_BAKE) continue;
+        for (uint32_t p = ranges[i].firstParent; p < ranges[i].lastParent; ++p) {
+            const Parent& parent = patches.parents[p];
+            for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+                const uint32_t patch = parent.firstPatch + k;
+                const uint32_t side = 2 * patch + uint32_t(scene.instances[i].side);
+                const glm::dvec3 h(light.direct[side] + light.indirect[side]);
+                const double weight = double(patches.area[patch]) * double(exposed[side]);
+                squares += weight * glm::dot(h, h) / 3;
+                area += weight;
+            }
+        }
+    }
+    return area > 0 ? std::sqrt(squares / area) : 0;
+}
+
+}  // namespace
+
+CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                           const SetLights& lights, const std::vector<InstanceRange>& ranges,
+                           const std::vector<float>& exposed, const Settings& settings,
+                           const Progress& progress)
+    : scene(scene), ranges(ranges), exposed(exposed) {
+    for (size_t i = 0; i < ranges.size(); ++i) {
+        first.push_back(corners.size());
+        if (scene.instances[i].role != RB_ROLE_BAKE) continue;
+        for (CornerReceiver& corner : cornerReceivers(scene, patches, uint32_t(i), ranges[i]))
+            if (exposed[corner.receiver.side] > kHalfCovered) corners.push_back(std::move(corner));
+    }
+    first.push_back(corners.size());
+    for (size_t k = 0; k < lights.size(); ++k) {
+        const Progress part = progress.part(k, lights.size());
+        sources.push_back(lights[k].direct.gather(
+            corners.size(), [&](size_t c) { return corners[c].receiver; }, settings.targetError,
+            [&](double done) { part.report(RB_STAGE_RECONSTRUCTION, done); }));
+        const double mean = meanLight(scene, patches, ranges, exposed, lights[k].irradiance);
+        if (settings.finalGather && mean > 0)
+            others.emplace_back(patches, visibility, lights[k], float(mean) * settings.targetError);
+    }
+}
+
+void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regions,
+                           const std::vector<float>& cornerAngles, NodeLight& light) {
+    const size_t begin = first[instance], end = first[instance + 1];
+    if (k < others.size()) {
+        const FinalGather& gather = others[k];
+        const std::vector<bool> wanted =
+            gather.isWanted(ranges[instance], regions, scene.instances[instance].side, exposed,
+                            light.carried, light.indirect);
+        std::vector<size_t> cornersOf(regions.nodeCount, 0);
+        for (size_t c = begin; c < end; ++c) ++cornersOf[regions.nodeOf[corners[c].corner]];
+        std::vector<FinalGather::Light> found(end - begin);
+        tbb::parallel_for(begin, end, [&](size_t c) {
+            const uint32_t node = regions.nodeOf[corners[c].corner];
+            if (wanted[node])
+                found[c - begin] = gather.gather(corners[c].receiver, cornersOf[node]);
+        });
+        auto replace = [&](auto part, std::vector<glm::vec3>& values) {
+            const auto means = nodeMeans(instance, regions, cornerAngles,
+                                         [&](size_t c) { return found[c - begin].*part; });
+            for (size_t node = 0; node < values.size(); ++node)
+                if (wanted[node] && means[node]) values[node] = *means[node];
+        };
+        replace(&FinalGather::Light::carried, light.carried);
+        replace(&FinalGather::Light::reflected, light.indirect);
+        smooth += size_t(std::count(wanted.begin(), wanted.end(), false));
+    }
+    const auto means = nodeMeans(instance, regions, cornerAngles,
+                                 [&](size_t c) { return sources[k][c].irradiance; });
+    for (size_t node = 0; node < means.size(); ++node)
+        if (means[node]) light.direct[node] = light.carried[node] + *means[node];
+}
+
+uint64_t CornerGather::shadowRays() const {
+    uint64_t sum = 0;
+    for (const std::vector<Gathered>& light : sources)
+        for (const Gathered& gathered : light) sum += gathered.rays;
+    return sum;
+}
+
+template <class LightOf>
+std::vector<std::optional<glm::vec3>> CornerGather::nodeMeans(
+    size_t instance, const SmoothRegions& regions, const std::vector<float>& cornerAngles,
+    const LightOf& lightOf) const {
+    std::vector<glm::vec3> sums(regions.nodeCount, glm::vec3(0.0f));
+    std::vector<float> weights(regions.nodeCount, 0.0f);
+    for (size_t c = first[instance]; c < first[instance + 1]; ++c) {
+        const uint32_t node = regions.nodeOf[corners[c].corner];
+        const float angle = cornerAngles[corners[c].corner];
+        sums[node] += angle * lightOf(c);
+        weights[node] += angle;
+    }
+    std::vector<std::optional<glm::vec3>> means(regions.nodeCount);
+    for (size_t node = 0; node < means.size(); ++node)
+        if (weights[node] > 0) means[node] = sums[node] / weights[node];
+    return means;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Final gather at corners, against closed forms of light that faces of the mesh are too large for.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test_bakes.h"
+#include "test_scenes.h"
+#include "transport/light_source.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+constexpr float kTarget = 0.01f;
+
+void bakePoint(Bake& bake, const Scene& scene, bool gathers = true) {
+    bake.settings.reconstruction = "POINT";
+    bake.settings.finalGather = gathers;
+    bake.settings.targetError = kTarget;
+    bake.settings.maxBundles = 1024;
+    bake.run(scene);
+}
+
+// The largest difference from an exact irradiance at the corners of the first instance, and the
+// RMS of that, W/m^2; corners where `exact` is not a number aside.
+template <class Exact>
+std::pair<double, double> worstCorner(const Scene& scene, const Bake& bake, const Exact& exact) {
+    const Mesh& mesh = scene.meshes[0];
+    const auto light = cornerLight(bake, 0, RB_OUTPUT_LIGHTING);
+    double worst = 0, squares = 0;
+    for (size_t c = 0; c < light.size(); ++c) {
+        const double expected = exact(mesh.vertices[size_t(mesh.cornerVertices[c])]);
+        if (std::isnan(expected)) continue;
+        worst = std::max(worst, std::abs(double(light[c].x) * kPi - expected));
+        squares += expected * expected / double(light.size());
+    }
+    return {worst, std::sqrt(squares)};
+}
+
+// A black ground of 4 x 4 faces of 1 m under a white sky, with a black board of 1 m on 0.3 m, whose
+// centre is over the ground's.
+Scene groundUnderBoard() {
+    Scene scene;
+    place(scene, grid("ground", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("", 0));
+    place(scene, rectangle("board", {-0.5f, -0.5f, 0.3f}, {1, 0, 0}, {0, 1, 0}), grey("", 0),
+          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    scene.worldRadiance = glm::vec3(1);
+    return scene;
+}
+
+double skyIrradiance(const glm::vec3& point) {
+    const glm::dvec3 board[4] = {
+        {-0.5, -0.5, 0.3}, {0.5, -0.5, 0.3}, {0.5, 0.5, 0.3}, {-0.5, 0.5, 0.3}};
+    return kPi - polygonIrradiance(point, {0, 0, 1}, board, 4);
+}
+
+TEST(FinalGather, CornersUnderABoardSeeTheSkyAroundIt) {
+    const Scene scene = groundUnderBoard();
+    Bake gathered, interpolated;
+    bakePoint(gathered, scene);
+    bakePoint(interpolated, scene, false);
+    // Half the target is noise, one standard error of each of 64 corners; receivers lie 0.7 % of an
+    // edge inside their face, over which light changes by less than itself.
+    const auto [worst, mean] = worstCorner(scene, gathered, skyIrradiance);
+    EXPECT_LT(worst, (4 * 0.5 * double(kTarget) + 0.007) * mean);
+    // Else the test would say nothing.
+    EXPECT_GT(worstCorner(scene, interpolated, skyIrradiance).first, 0.1 * mean);
+}
+
+TEST(FinalGather, CornersBesideAWallSeeWhatItReflects) {
+    // The sun shines along the black ground onto a white wall at its border.
+    Scene scene;
+    place(scene, grid("ground", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("", 0));
+    place(scene, rectangle("wall", {2, -1, 0}, {0, 0, 0.5f}, {0, 2, 0}), grey("", 0.5f),
+          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    scene.addLight(sunLight({-1, 0, 0}, {4, 4, 4}));
+    const auto exact = [](const glm::vec3& at) {
+        // The ends of the wall's foot, where light jumps.
+        if (at.x == 2 && std::abs(at.y) == 1) return std::nan("");
+        const glm::dvec3 wall[4] = {{2, -1, 0}, {2, 1, 0}, {2, 1, 0.5}, {2, -1, 0.5}};
+        // Where the receivers of the corners at the wall are.
+        const glm::dvec3 point(std::min(at.x, 1.995f), at.y, 0);
+        return 2 / kPi * polygonIrradiance(point, {0, 0, 1}, wall, 4);
+    };
+    Bake gathered, interpolated;
+    bakePoint(gathered, scene);
+    bakePoint(interpolated, scene, false);
+    const auto [worst, mean] = worstCorner(scene, gathered, exact);
+    // Where corners are left to interpolation it is off by the target around them, RMS: at the
+    // corner itself it may be thrice that.
+    EXPECT_LT(worst, (4 * 0.5 + 3) * double(kTarget) * mean);
+    EXPECT_GT(worstCorner(scene, interpolated, exact).first, 0.1 * mean);
+}
+
+TEST(FinalGather, LeavesSmoothLightAlone) {
+    // In a furnace nothing changes; the report says how many corners were left.
+    const Scene scene = roomWithBoxes(0.5f, 0.5f, 0.1f);
+    Bake bake;
+    bakePoint(bake, scene);
+    EXPECT_TRUE(mentions(reportOf(bake)["skipped"], "final gather"));
+}
+
+TEST(FinalGather, IsTheSameForAnyNumberOfThreads) {
+    Bake one, two;
+    one.settings.threads = 1;
+    two.settings.threads = 2;
+    bakePoint(one, groundUnderBoard());
+    bakePoint(two, groundUnderBoard());
+    EXPECT_EQ(cornerLight(one, 0, RB_OUTPUT_LIGHTING), cornerLight(two, 0, RB_OUTPUT_LIGHTING));
+}
+
+}  // namespace
+}  // namespace raybundle
