@@ -155,6 +155,10 @@ class SurfaceReference:
             self._weights[item.name] = (self._weights[item.name]
                                         * self._values[item.name].any(axis=1))
 
+    def points(self, name: str, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """At an object's points: what is shown of its corners' values, Cycles' light, the area."""
+        return self._interpolated(name, corners), self._values[name], self._weights[name]
+
     def error(self, light: Light) -> SurfaceError:
         points = {name: self._interpolated(name, values) for name, values in light.items()}
         return _joined_error(points, self._values, self._weights)
