@@ -11,10 +11,12 @@
 #include <chrono>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
+#include <numeric>
 
 #include "bake/combination.h"
 #include "bake/geometry_hash.h"
 #include "bake/window_noise.h"
+#include "patches/refinement.h"
 #include "patches/reflectance.h"
 #include "reconstruction/reconstruction.h"
 #include "reconstruction/stated_error.h"
@@ -47,6 +49,23 @@ class Stopwatch {
     const Clock::time_point start;
 };
 
+// Per side, m^2. exposed: the share of each that nothing covers; empty: all.
+std::vector<float> exposedArea(const Patches& patches, const std::vector<float>& exposed) {
+    std::vector<float> result(patches.sideCount());
+    for (size_t side = 0; side < result.size(); ++side)
+        result[side] = patches.area[side / 2] * (exposed.empty() ? 1.0f : exposed[side]);
+    return result;
+}
+
+// From patch sides to those of tiles. weight: per patch side.
+Irradiance meanOver(const Tiles& tiles, const Irradiance& light, const std::vector<float>& weight) {
+    Irradiance result;
+    result.direct = tiles.mean(light.direct, weight);
+    result.gathered = tiles.mean(light.gathered, weight);
+    result.indirect = tiles.mean(light.indirect, weight);
+    return result;
+}
+
 double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
 
 glm::dvec3 power(const Patches& patches, size_t side, const glm::vec3& perArea) {
@@ -57,8 +76,9 @@ glm::dvec3 power(const Patches& patches, size_t side, const glm::vec3& perArea) 
 float pixelSize(const Patches& patches, int linesPerBundle) {
     if (linesPerBundle > 0)
         return patches.radius * std::sqrt(glm::pi<float>() / float(linesPerBundle));
-    const double mean = std::min(double(patches.size) * patches.size,
-                                 patches.totalArea / double(std::max<size_t>(1, patches.count())));
+    const double mean =
+        std::min(double(patches.size) * patches.size,
+                 patches.totalArea / double(std::max<size_t>(1, patches.tileCount)));
     return std::max(float(std::sqrt(mean / kPixelsPerPatch)), 2 * patches.radius / kMaxPlanePixels);
 }
 
@@ -165,23 +185,32 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
 // Patches and traced lines, which stay valid as long as the geometry does.
 struct Bake::Trace {
     Trace(uint64_t hash, Patches made, const Settings& settings)
-        : hash(hash), patches(std::move(made)), visibility(patches), counts(patches.sideCount()) {
+        : hash(hash), patches(std::move(made)), visibility(patches), counts(0) {
         for (const Parent& parent : patches.parents)
             if (parent.stopsDirect != parent.exchanges && !directVisibility)
                 directVisibility =
                     std::make_unique<const Visibility>(patches, Blockers::STOPPING_DIRECT);
         touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.finest);
-        ProjectorInput input{patches,
-                             visibility,
-                             pixelSize(patches, settings.linesPerBundle),
-                             touchDistance,
-                             settings.smallPatchesKind(),
-                             settings.planeCount,
-                             settings.planePlacementKind(),
-                             settings.planeCoherence != 0,
-                             settings.linesPerBundle == 1,
-                             {}};
-        if (settings.hasLineWindows()) followDetail(input);
+        density.pixelSize = pixelSize(patches, settings.linesPerBundle);
+        // Small patches get windows of finer pixels.
+        if (settings.hasLineWindows())
+            density = densityByDetail(patches, density.pixelSize, kPixelsPerPatch,
+                                      2 * patches.radius / kMaxPlanePixels);
+    }
+
+    // When the patches are as they stay: from here on lines are traced.
+    void startLines(const Settings& settings) {
+        const ProjectorInput input{patches,
+                                   visibility,
+                                   density.pixelSize,
+                                   touchDistance,
+                                   settings.smallPatchesKind(),
+                                   settings.planeCount,
+                                   settings.planePlacementKind(),
+                                   settings.planeCoherence != 0,
+                                   settings.linesPerBundle == 1,
+                                   density.windows};
+        counts = LineCounts(patches.sideCount());
         tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                                 uint32_t(settings.seed));
         // Only line reuse on exact projection sees what lies against what while it traces.
@@ -194,18 +223,13 @@ struct Bake::Trace {
         }
     }
 
-    // Gives small patches windows of finer pixels.
-    void followDetail(ProjectorInput& input) {
-        LineDensity density = densityByDetail(patches, input.pixelSize, kPixelsPerPatch,
-                                              2 * patches.radius / kMaxPlanePixels);
-        input.pixelSize = density.pixelSize;
-        input.windows = std::move(density.windows);
-        windowOf = std::move(density.windowOf);
+    const Visibility& visibilityOfLights() const {
+        return directVisibility ? *directVisibility : visibility;
     }
 
     // Whether all traced lines are in the counts: not after a cancel on the way, and not where a
     // transport uses lines without counting them.
-    bool isWhole() const { return tracer->bundleCount() == counts.bundles; }
+    bool isWhole() const { return tracer && tracer->bundleCount() == counts.bundles; }
 
     // Per side: the share that nothing covers.
     std::vector<float> exposedShare() const {
@@ -215,7 +239,7 @@ struct Bake::Trace {
     // Through the bounding sphere.
     double linesPerBundle() const {
         return glm::pi<double>() * double(patches.radius) * double(patches.radius) /
-               tracer->pixelArea;
+               (double(density.pixelSize) * double(density.pixelSize));
     }
 
     const uint64_t hash;
@@ -224,7 +248,8 @@ struct Bake::Trace {
     const Visibility visibility;
     std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
     Surroundings surrounding;                            // empty: as the counts have it
-    std::vector<int32_t> windowOf;                       // per parent: see LineDensity
+    LineDensity density{};
+    std::vector<Report::Cut> cuts;
     LineCounts counts;
     std::unique_ptr<BundleTracer> tracer;
     Looks looks;  // at the light along its lines
@@ -248,9 +273,15 @@ void Bake::runStages(const Scene& scene) {
         makePatches(scene, report);
 
         const Patches& patches = trace->patches;
-        SetLights lights = shootSources(scene, report);
+        std::vector<CoarseShot> coarse;
+        if (!trace->tracer) {
+            coarse = cutPatches(scene, report);
+            trace->startLines(settings);
+        }
+        SetLights lights = shootSources(scene, coarse, report);
+        const Tiles tiles(patches);
         warnOfVisibility(scene, lights, settings, report);
-        SideNoise noise(patches.sideCount());
+        SideNoise noise(tiles.sideCount());
         exposed.assign(patches.sideCount(), 1.0f);
         if (isDark(scene, lights, report)) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
@@ -261,7 +292,7 @@ void Bake::runStages(const Scene& scene) {
                                   trace->surrounding.exposed, trace->touchDistance, settings,
                                   *trace->tracer, trace->counts});
             const Transports transports = makeTransports(settings.solver, inputs);
-            noise = solveToTarget(scene, lights, transports, report);
+            noise = solveToTarget(scene, tiles, lights, transports, report);
             exposed = trace->exposedShare();
             for (const SetLight& light : lights)
                 balanceEnergy(patches, light, exposed, transports.front()->openShare(), report);
@@ -272,10 +303,14 @@ void Bake::runStages(const Scene& scene) {
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
         light = reconstruct(scene, patches, trace->visibility, lights, exposed, settings, progress,
                             report);
-        stateErrors(scene, patches, instanceRanges(scene, patches), irradiance,
-                    {exposed, noise.ofBundles, noise.direct}, settings.targetError, light, report);
+        const std::vector<float> weight = exposedArea(patches, exposed);
+        stateErrors(scene, tiles, instanceRanges(scene, patches),
+                    meanOver(tiles, irradiance, weight),
+                    {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
+                    settings.targetError, light, report);
     }
     report.patches = trace->patches.count();
+    report.cuts = trace->cuts;
     report.lines = trace->tracer->lineCount();
     report.exchanges = trace->counts.exchangeCount();
     json = report.json();
@@ -302,12 +337,48 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     progress.report(RB_STAGE_PATCHES, 1);
 }
 
+// Cuts the patches where that pays. Returns the coarse shot of each light set, for the first shot
+// to go on with; empty if it is to make its own.
+std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
+    // Other first shots see no shadows' edges, and other solvers follow the lines of single
+    // patches: smaller ones are noisier.
+    if (!settings.refine || settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER")
+        return {};
+    Patches& patches = trace->patches;
+    std::vector<CoarseShot> shots;
+    {
+        Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
+        std::vector<uint32_t> all(patches.sideCount());
+        std::iota(all.begin(), all.end(), 0u);
+        for (int32_t set = kNoLightSet; set < int32_t(scene.lightSets.size()); ++set) {
+            const DirectLight direct(scene, patches, trace->visibilityOfLights(),
+                                     uint32_t(settings.seed), set);
+            CoarseShot shot{std::vector<Gathered>(all.size()), {}};
+            direct.shootCoarsely(
+                shot, all,
+                [&](size_t side) {
+                    return Receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
+                                    uint32_t(side)};
+                },
+                [&](double done) { progress.report(RB_STAGE_FIRST_SHOT, done); });
+            shots.push_back(std::move(shot));
+        }
+    }
+    Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
+    const Cuts cuts =
+        worthwhileCuts(scene, patches, shots, size_t(settings.maxPatches), settings.targetError);
+    if (cuts.count() > 0) cutTiles(scene, patches, cuts.levels);
+    trace->cuts = {{"edge of a shadow", cuts.shadowEdges},
+                   {"light that bends within the patch", cuts.bentLight}};
+    return shots;
+}
+
 // The first shot of each light set, and of what belongs to none.
-SetLights Bake::shootSources(const Scene& scene, Report& report) {
+SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& coarse,
+                             Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
     const Patches& patches = trace->patches;
-    const Visibility& visibility =
-        trace->directVisibility ? *trace->directVisibility : trace->visibility;
+    const Visibility& visibility = trace->visibilityOfLights();
     SetLights lights;
     const int32_t count = int32_t(scene.lightSets.size());
     for (int32_t set = kNoLightSet; set < count; ++set) {
@@ -315,7 +386,8 @@ SetLights Bake::shootSources(const Scene& scene, Report& report) {
         DirectLight direct(scene, patches, visibility, uint32_t(settings.seed), set);
         FirstShot shot = firstShot(
             settings.firstShot, {direct, patches, visibility, settings, share, trace->touchDistance,
-                                 trace->linesPerBundle(), &trace->visibility});
+                                 trace->linesPerBundle(), &trace->visibility,
+                                 coarse.empty() ? nullptr : &coarse[lights.size()]});
         report.shadowRays += shot.rays;
         report.skipped.push_back(
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
@@ -329,8 +401,8 @@ SetLights Bake::shootSources(const Scene& scene, Report& report) {
 
 // Adds bundles by doubling until the difference of the two halves' estimates meets the target, in
 // the light of all and in that of each light set.
-SideNoise Bake::solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
-                              Report& report) {
+SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights& lights,
+                              const Transports& transports, Report& report) {
     Transport& transport = *transports.front();  // traces for all
     const Patches& patches = trace->patches;
     const size_t n = patches.sideCount();
@@ -346,7 +418,10 @@ SideNoise Bake::solveToTarget(const Scene& scene, SetLights& lights, const Trans
             !anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side));
         if (wantedSides[side]) area[side] = patches.area[side / 2];
     }
-    SetNoise noise(trace->looks, lights, weight);
+    std::vector<std::vector<float>> errorOfSets;
+    for (const SetLight& light : lights) errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
+    std::vector<float> tileWeight(tiles.sideCount(), 0);
+    SetNoise noise(trace->looks, std::move(errorOfSets), tileWeight);
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     const uint32_t most = std::max(2u, uint32_t(settings.maxBundles) & ~1u);
@@ -362,18 +437,22 @@ SideNoise Bake::solveToTarget(const Scene& scene, SetLights& lights, const Trans
         const uint32_t bundles = transport.bundleCount();
         progress.report(RB_STAGE_SOLVE, std::min(1.0, double(bundles) / settings.maxBundles));
         std::vector<std::array<Irradiance, 2>> halves(lights.size());
-        for (size_t k = 0; k < lights.size(); ++k)
-            for (int h = 0; h < 2; ++h)
-                halves[k][h] =
-                    transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError);
         const std::vector<float> exposed = trace->exposedShare();
         for (size_t side = 0; side < n; ++side) weight[side] = area[side] * exposed[side];
+        tileWeight = tiles.sum(weight);
+        for (size_t k = 0; k < lights.size(); ++k)
+            for (int h = 0; h < 2; ++h)
+                halves[k][h] = meanOver(
+                    tiles,
+                    transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError),
+                    weight);
         noise.look(halves, bundles, transport.bias());
         errors = noise.relative();
         trace->looks = noise.looks();
 
         const auto worst = std::max_element(errors.begin(), errors.end());
-        const double onSmall = worstWindowNoise(patches, trace->windowOf, halves, weight);
+        const double onSmall =
+            worstWindowNoise(tiles.patches(), trace->density.windowOf, halves, tileWeight);
         const double excess = std::max(*worst, onSmall / kWindowTargets) / settings.targetError;
         if (excess <= 1) break;
         if (bundles >= most) {

@@ -13,7 +13,7 @@
 #include "bake/report.h"
 #include "bake/settings.h"
 #include "bundles/line_counts.h"
-#include "patches/patches.h"
+#include "patches/tiles.h"
 #include "reconstruction/instance_light.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
@@ -53,9 +53,11 @@ class Bake {
     struct Trace;
     void runStages(const Scene& scene);
     void makePatches(const Scene& scene, Report& report);
-    SetLights shootSources(const Scene& scene, Report& report);
-    SideNoise solveToTarget(const Scene& scene, SetLights& lights, const Transports& transports,
-                            Report& report);
+    std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);
+    SetLights shootSources(const Scene& scene, const std::vector<CoarseShot>& coarse,
+                           Report& report);
+    SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, SetLights& lights,
+                            const Transports& transports, Report& report);
 
     std::unique_ptr<Trace> trace;  // of the last run's geometry
     Irradiance irradiance;

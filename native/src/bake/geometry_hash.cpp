@@ -78,7 +78,7 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
         hasher.add(&visibility, sizeof(visibility));
     }
     hasher.add(&settings.patchSize, sizeof(float));
-    for (int value : {settings.maxPatches, settings.linesPerBundle, settings.seed,
+    for (int value : {settings.maxPatches, settings.refine, settings.linesPerBundle, settings.seed,
                       settings.planeCount, settings.planeCoherence, int(settings.hasLineWindows())})
         hasher.add(&value, sizeof(value));
     for (const std::string* name : {&settings.solver, &settings.directions, &settings.projector,

@@ -63,17 +63,18 @@ std::vector<glm::vec3> Noise::perSide() const {
     return result;
 }
 
-SetNoise::SetNoise(const Looks& before, const SetLights& lights, const std::vector<float>& weight)
-    : directError(weight.size()) {
+SetNoise::SetNoise(const Looks& before, std::vector<std::vector<float>> errors,
+                   const std::vector<float>& weight)
+    : errorOfSets(std::move(errors)), directError(weight.size()) {
     for (size_t side = 0; side < directError.size(); ++side) {
         double variance = 0;
-        for (const SetLight& light : lights)
-            variance += double(light.shot.error[side]) * double(light.shot.error[side]);
+        for (const std::vector<float>& error : errorOfSets)
+            variance += double(error[side]) * double(error[side]);
         directError[side] = float(std::sqrt(variance));
     }
     noises.emplace_back(before, weight, directError);
-    for (size_t k = 1; k < lights.size(); ++k)
-        noises.emplace_back(before, weight, lights[k].shot.error);
+    for (size_t k = 1; k < errorOfSets.size(); ++k)
+        noises.emplace_back(before, weight, errorOfSets[k]);
 }
 
 void SetNoise::look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles,

@@ -70,8 +70,10 @@ struct SideNoise {
 // The noise of the light of all, and that of each light set.
 class SetNoise {
   public:
-    // As above. Lights and weight must outlive the object.
-    SetNoise(const Looks& before, const SetLights& lights, const std::vector<float>& weight);
+    // As above. errorOfSets: of each set, standard error of the first shot per side, W/m^2. weight
+    // must outlive the object.
+    SetNoise(const Looks& before, std::vector<std::vector<float>> errorOfSets,
+             const std::vector<float>& weight);
     SetNoise(const SetNoise&) = delete;
 
     // A look at the halves of all lights.
@@ -84,6 +86,7 @@ class SetNoise {
     SideNoise perSide() const;
 
   private:
+    const std::vector<std::vector<float>> errorOfSets;
     std::vector<float> directError;  // of the light of all, per side, W/m^2
     std::vector<Noise> noises;       // of the light of all, then of each light set
 };

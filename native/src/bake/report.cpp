@@ -43,7 +43,9 @@ std::string Report::json() const {
     seconds_["solve"] = seconds[RB_STAGE_SOLVE];
     seconds_["reconstruction"] = seconds[RB_STAGE_RECONSTRUCTION];
     ordered_json objects_ = ordered_json::array(), skipped_ = ordered_json::array(),
-                 lightSets_ = ordered_json::array();
+                 lightSets_ = ordered_json::array(), cuts_ = ordered_json::array();
+    for (const Cut& cut : cuts)
+        if (cut.tiles > 0) cuts_.push_back({{"why", cut.why}, {"tiles", cut.tiles}});
     for (const LightSet& set : lightSets)
         lightSets_.push_back({{"name", set.name}, {"estimated_error", set.estimatedError}});
     for (const Object& object : objects)
@@ -56,6 +58,7 @@ std::string Report::json() const {
             skipped_.push_back({{"what", skip.what}, {"why", skip.why}, {"count", skip.count}});
     const ordered_json report = {{"seconds", seconds_},
                                  {"patches", patches},
+                                 {"refined", cuts_},
                                  {"bundles", bundles},
                                  {"lines", lines},
                                  {"exchanges", exchanges},

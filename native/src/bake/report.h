@@ -28,6 +28,10 @@ struct Report {
         std::string what, why;
         uint64_t count = 0;
     };
+    struct Cut {
+        std::string why;
+        uint64_t tiles = 0;
+    };
     struct LightSet {
         std::string name;
         double estimatedError = 0;  // relative noise
@@ -35,6 +39,7 @@ struct Report {
     std::array<double, 5> seconds{};  // per rb_stage
     double totalSeconds = 0;
     size_t patches = 0;
+    std::vector<Cut> cuts;  // of tiles into patches
     uint32_t bundles = 0;
     uint64_t lines = 0;
     size_t exchanges = 0;  // merged pairs of patch sides

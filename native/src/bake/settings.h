@@ -13,6 +13,7 @@ struct Settings {
     float targetError = 0.02f;  // relative noise at which bundles stop
     float patchSize = 0;        // metres; 0 = automatic
     int maxPatches = 100000;
+    int refine = 0;  // 1: patches smaller than patchSize where that pays
     int minBundles = 64;
     int maxBundles = 4096;
     int linesPerBundle = 0;    // 0 = automatic
@@ -27,7 +28,7 @@ struct Settings {
     std::string smallPatches = "CENTRE_SAMPLING";
     std::string reconstruction = "LEAST_SQUARES";
     int finalGather = 1;  // of POINT; 0: light of other surfaces is always interpolated
-    int planeCount = 4;  // of the projector PLANES
+    int planeCount = 4;   // of the projector PLANES
     std::string planePlacement = "SYSTEMATIC";
     int planeCoherence = 1;               // 0: makes the planes' depth buffers one by one
     int localRays = 0;                    // of a first shot that shoots; 0 = to targetError

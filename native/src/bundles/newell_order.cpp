@@ -75,13 +75,14 @@ void NewellOrder::place(const Bundle& bundle, const std::vector<uint32_t>& drawn
         const ParentFrame& f = frames[s.parent];
         // The first corner is that of (0, 0); the second tells which way up a triangle is.
         const uint32_t inParent = patch - parent.firstPatch;
-        const glm::dvec2 counts(parent.countA, parent.countB);
+        const double scale = std::ldexp(1.0, -parent.levelOf(inParent));  // of a tile's edges
+        const glm::dvec2 counts = glm::dvec2(parent.countA, parent.countB) / scale;
         const glm::dvec2 st = glm::dvec2(parent.pointOn(inParent, {0, 0})) * counts;
         s.turn = parent.isTriangle && parent.pointOn(inParent, {1, 0}).x < float(st.x / counts.x)
-                     ? -1
-                     : 1;
+                     ? -scale
+                     : scale;
         // Whole numbers but for the rounding to float.
-        s.corner = f.origin + std::round(st.x) * f.a + std::round(st.y) * f.b;
+        s.corner = f.origin + scale * (std::round(st.x) * f.a + std::round(st.y) * f.b);
         std::tie(s.nearest, s.farthest) =
             interval(s.corner.z, s.turn * f.a.z, s.turn * f.b.z, parent.isTriangle);
         byDepth.emplace_back(s.nearest, uint32_t(unsorted.size()));

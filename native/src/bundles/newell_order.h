@@ -44,14 +44,14 @@ class NewellOrder : public PatchOrder {
   private:
     // Vectors hold metres along right, up and direction of the bundle.
     struct ParentFrame {
-        glm::dvec3 origin, a, b;  // a and b: edges of a patch
+        glm::dvec3 origin, a, b;  // a and b: edges of a tile
         glm::dvec3 normal;        // unit, along the direction
         glm::dvec2 axes[3];       // unit normals of the edges' projections
         int axisCount;            // 2 for a parallelogram
     };
     struct Shape {
         glm::dvec3 corner;  // with edges turn * a and turn * b of the parent
-        double turn;        // -1: a triangle upside down, else 1
+        double turn;        // 1, for a patch of a cut tile less; negative: a triangle upside down
         double nearest, farthest;
         uint32_t parent;
     };

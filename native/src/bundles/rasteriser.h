@@ -203,13 +203,13 @@ void Rasteriser::fillPatches(const Parent& parent, const Visit& visit) {
         if (x < 0 || y < 0 || x >= width || y >= height) return;
         visit(uint32_t(y) * uint32_t(width) + uint32_t(x), z, 2 * patch + facing);
     };
-    // In pixels; all patches of a parent have the same.
-    const double area = std::abs(det) / (parent.isTriangle ? 2 : 1) / parent.patchCount();
+    const double tileArea = std::abs(det) / (parent.isTriangle ? 2 : 1) / parent.tileCount();
     const glm::vec2 middle(parent.isTriangle ? 1.0f / 3 : 0.5f);
     constexpr glm::vec2 kCorners[2][4] = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}},
                                           {{0, 0}, {1, 0}, {0, 1}, {0, 0}}};
     for (uint32_t k = 0; k < parent.patchCount(); ++k) {
         const uint32_t patch = parent.firstPatch + k;
+        const double area = std::ldexp(tileArea, -2 * parent.levelOf(k));  // pixels
         auto place = [&](const glm::vec2& uv) {
             const glm::dvec2 st(parent.pointOn(k, uv));
             return q0 + st.x * ea + st.y * eb;

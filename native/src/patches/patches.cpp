@@ -13,30 +13,69 @@
 
 namespace raybundle {
 
-uint32_t Parent::patchAt(float s, float t) const {
-    auto cell = [](float x, int n) { return std::clamp(int(x * n), 0, n - 1); };
-    if (!isTriangle) return cell(t, countB) * countA + cell(s, countA);
-    const int n = countA;
-    const int row = cell(t, n);
+namespace {
+
+// A patch of a regular grid over the unit square or the unit triangle, and a place in it: the same
+// affine coordinates in the patch as the grid has in the parent.
+struct GridPlace {
+    uint32_t index;
+    glm::vec2 inside;
+};
+
+GridPlace placeAt(bool isTriangle, int countA, int countB, glm::vec2 st) {
+    const glm::vec2 at = st * glm::vec2(countA, countB);
+    const int row = std::clamp(int(at.y), 0, countB - 1);
     // Row t of a triangle has n - row upright triangles with n - row - 1 upside-down ones between.
-    const int column = std::clamp(int(s * n), 0, n - 1 - row);
-    const bool upsideDown = (s * n - column) + (t * n - row) > 1.0f && column < n - 1 - row;
-    return row * (2 * n - row) + 2 * column + (upsideDown ? 1 : 0);
+    const int columns = isTriangle ? countA - row : countA;
+    const int column = std::clamp(int(at.x), 0, columns - 1);
+    const glm::vec2 inside = at - glm::vec2(column, row);
+    if (!isTriangle) return {uint32_t(row * countA + column), inside};
+    const bool upsideDown = inside.x + inside.y > 1.0f && column < columns - 1;
+    return {uint32_t(row * (2 * countA - row) + 2 * column + (upsideDown ? 1 : 0)),
+            upsideDown ? 1.0f - inside : inside};
+}
+
+// The reverse.
+glm::vec2 pointAt(bool isTriangle, int countA, int countB, const GridPlace& place) {
+    const uint32_t index = place.index;
+    if (!isTriangle)
+        return {(index % countA + place.inside.x) / countA,
+                (index / countA + place.inside.y) / countB};
+    const int n = countA;
+    // Invert row * (2n - row) <= index; float rounding is put right by the two loops.
+    int row = int(n - std::sqrt(std::max(0.0, double(n) * n - index)));
+    while (row > 0 && uint32_t(row * (2 * n - row)) > index) --row;
+    while (uint32_t((row + 1) * (2 * n - row - 1)) <= index) ++row;
+    const int inRow = int(index) - row * (2 * n - row);
+    const glm::vec2 base(inRow / 2, row);
+    return (inRow % 2 ? base + 1.0f - place.inside : base + place.inside) / float(n);
+}
+
+}  // namespace
+
+uint32_t Parent::tileOf(uint32_t patchInParent) const {
+    if (!cut) return patchInParent;
+    const auto& first = cut->first;
+    return uint32_t(std::upper_bound(first.begin(), first.end(), patchInParent) - first.begin()) -
+           1;
+}
+
+uint32_t Parent::patchAt(float s, float t) const {
+    const GridPlace tile = placeAt(isTriangle, countA, countB, {s, t});
+    if (!cut) return tile.index;
+    const int n = 1 << cut->level[tile.index];
+    const uint32_t first = cut->first[tile.index];
+    return n == 1 ? first : first + placeAt(isTriangle, n, n, tile.inside).index;
 }
 
 glm::vec2 Parent::pointOn(uint32_t patchInParent, glm::vec2 uv) const {
-    if (!isTriangle)
-        return {(patchInParent % countA + uv.x) / countA, (patchInParent / countA + uv.y) / countB};
-    const int n = countA;
-    // Invert row * (2n - row) <= index; float rounding is put right by the two loops.
-    int row = int(n - std::sqrt(std::max(0.0, double(n) * n - patchInParent)));
-    while (row > 0 && uint32_t(row * (2 * n - row)) > patchInParent) --row;
-    while (uint32_t((row + 1) * (2 * n - row - 1)) <= patchInParent) ++row;
-    const int inRow = int(patchInParent) - row * (2 * n - row);
     // Fold the unit square onto the lower triangle.
-    if (uv.x + uv.y > 1.0f) uv = glm::vec2(1.0f) - uv;
-    const glm::vec2 base(inRow / 2, row);
-    return (inRow % 2 ? base + glm::vec2(1.0f) - uv : base + uv) / float(n);
+    if (isTriangle && uv.x + uv.y > 1.0f) uv = 1.0f - uv;
+    if (!cut) return pointAt(isTriangle, countA, countB, {patchInParent, uv});
+    const uint32_t tile = tileOf(patchInParent);
+    const int n = 1 << cut->level[tile];
+    if (n > 1) uv = pointAt(isTriangle, n, n, {patchInParent - cut->first[tile], uv});
+    return pointAt(isTriangle, countA, countB, {tile, uv});
 }
 
 namespace {
@@ -269,7 +308,7 @@ class Subdivision {
 size_t numberPatches(Patches& patches) {
     size_t count = 0;
     for (Parent& parent : patches.parents) {
-        parent.firstPatch = uint32_t(count);
+        parent.firstPatch = parent.firstTile = uint32_t(count);
         count += parent.patchCount();
     }
     return count;
@@ -283,6 +322,23 @@ void coarsen(Patches& patches, double factor) {
                             ? parent.countA
                             : uint16_t(std::max(1.0, std::floor(parent.countB / factor)));
     }
+}
+
+// What patches have, after they were numbered.
+void fillPatches(const Scene& scene, Patches& patches) {
+    patches.parentOf.clear();
+    patches.area.clear();
+    for (size_t i = 0; i < patches.parents.size(); ++i) {
+        const Parent& parent = patches.parents[i];
+        patches.parentOf.resize(parent.firstPatch + parent.patchCount(), uint32_t(i));
+        const float tileArea = parent.area() / float(parent.tileCount());
+        for (uint32_t tile = 0; tile < parent.tileCount(); ++tile) {
+            const uint32_t count = parent.firstOf(tile + 1) - parent.firstOf(tile);
+            patches.area.resize(patches.area.size() + count, tileArea / float(count));
+        }
+    }
+    assignOpacity(scene, patches);
+    assignMaterials(scene, patches);
 }
 
 }  // namespace
@@ -311,20 +367,27 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     if (count > size_t(1) << 30)
         throw invalidArgument("the scene has too many faces: " + std::to_string(count) +
                               " patches");
-    patches.parentOf.resize(count);
-    patches.area.resize(count);
-    for (size_t i = 0; i < patches.parents.size(); ++i) {
-        const Parent& parent = patches.parents[i];
-        const uint32_t end = parent.firstPatch + parent.patchCount();
-        std::fill(patches.parentOf.begin() + parent.firstPatch, patches.parentOf.begin() + end,
-                  uint32_t(i));
-        std::fill(patches.area.begin() + parent.firstPatch, patches.area.begin() + end,
-                  parent.area() / parent.patchCount());
-        patches.totalArea += parent.area();
-    }
-    assignOpacity(scene, patches);
-    assignMaterials(scene, patches);
+    patches.tileCount = count;
+    for (const Parent& parent : patches.parents) patches.totalArea += parent.area();
+    fillPatches(scene, patches);
     return patches;
+}
+
+void cutTiles(const Scene& scene, Patches& patches, const std::vector<uint8_t>& levels) {
+    uint32_t next = 0;
+    for (Parent& parent : patches.parents) {
+        parent.firstPatch = next;
+        const auto begin = levels.begin() + ptrdiff_t(parent.firstTile);
+        CutTiles cut{{begin, begin + parent.tileCount()}, {}};
+        for (uint8_t level : cut.level) {
+            cut.first.push_back(next - parent.firstPatch);
+            next += 1u << (2 * level);
+        }
+        cut.first.push_back(next - parent.firstPatch);
+        const bool isCut = next - parent.firstPatch > parent.tileCount();
+        parent.cut = isCut ? std::make_shared<const CutTiles>(std::move(cut)) : nullptr;
+    }
+    fillPatches(scene, patches);
 }
 
 }  // namespace raybundle

@@ -7,14 +7,18 @@
 //   parallelogram: s, t in [0, 1];  triangle: s, t >= 0, s + t <= 1
 //
 // so that whoever meets a parent at a point knows the patch without a search, and projecting the
-// parents costs the same however fine the patches are.
+// parents costs the same however fine the patches are. A patch of the regular grid is a tile; where
+// the light needs it, a tile is cut once more, into 4^level patches of its own regular grid
+// (patches/refinement.h).
 //
 // Differs from the thesis (section 4.2), which projects each patch by itself.
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -22,12 +26,19 @@
 
 namespace raybundle {
 
+// The tiles of a parent of which some are cut once more.
+struct CutTiles {
+    std::vector<uint8_t> level;   // per tile: it has 4^level patches
+    std::vector<uint32_t> first;  // per tile: its first patch in the parent; one more at the end
+};
+
 struct Parent {
     glm::vec3 origin, a, b;  // metres, relative to Patches::centre
     glm::vec3 normal;        // of the front, unit: along cross(a, b)
     std::array<uint32_t, 4>
         vertex;  // into Patches::vertices, in order around; [3] unused by triangles
     uint32_t firstPatch = 0;
+    uint32_t firstTile = 0;  // its number before any tile was cut
     uint16_t countA = 1, countB = 1;  // grid along a and b; equal for triangles
     bool isTriangle = true;
     bool isSolid = false;  // part of a surface that encloses a volume
@@ -38,8 +49,22 @@ struct Parent {
     // The mesh triangle or quad that the parent is part of, for interpolation between its corners:
     // one of Patches::cells.
     uint32_t cell = 0;
+    std::shared_ptr<const CutTiles> cut;  // null: each tile is a patch
 
-    uint32_t patchCount() const { return isTriangle ? countA * countA : countA * countB; }
+    uint32_t tileCount() const { return isTriangle ? countA * countA : countA * countB; }
+    uint32_t patchCount() const { return cut ? cut->first.back() : tileCount(); }
+    // The tile that a patch is part of, and how often its edges are halved, both by the number of
+    // the patch in the parent.
+    uint32_t tileOf(uint32_t patchInParent) const;
+    int levelOf(uint32_t patchInParent) const {
+        return cut ? cut->level[tileOf(patchInParent)] : 0;
+    }
+    // Of a patch by its number in the parent, whatever it lets through, m^2.
+    float areaOf(uint32_t patchInParent) const {
+        return std::ldexp(area() / float(tileCount()), -2 * levelOf(patchInParent));
+    }
+    // The first patch of a tile in the parent, and the end of its patches.
+    uint32_t firstOf(uint32_t tile) const { return cut ? cut->first[tile] : tile; }
     // The patch at affine coordinates (s, t), counted within the parent. Clamps to the parent.
     uint32_t patchAt(float s, float t) const;
     // The point (u, v) in [0, 1]^2 of a patch, in affine coordinates of the parent; uniform by
@@ -84,8 +109,9 @@ struct Patches {
     std::vector<glm::vec3> reflectance;  // per side
     std::vector<glm::vec3> emission;     // per side, W/m^2
     double totalArea = 0;                // of all patches, one side, m^2
-    float size = 0;                      // target edge of a patch, metres
+    float size = 0;                      // target edge of a tile, metres
     float finest = 0;                    // the same where it is least (patch_size.h)
+    size_t tileCount = 0;
     std::vector<std::string> warnings;
     size_t degenerateFaces = 0;  // left out
 
@@ -103,11 +129,25 @@ struct Patches {
     glm::vec3 point(uint32_t patch, glm::vec2 uv) const;
     // The patch of a parent at a point in its plane.
     uint32_t patchAt(uint32_t parent, const glm::vec3& point) const;
+    // The tile of a patch, counted over all parents.
+    uint32_t tileOf(uint32_t patch) const {
+        const Parent& parent = parents[parentOf[patch]];
+        return parent.firstTile + parent.tileOf(patch - parent.firstPatch);
+    }
+    // How often the edges of a patch's tile are halved.
+    int level(uint32_t patch) const {
+        const Parent& parent = parents[parentOf[patch]];
+        return parent.levelOf(patch - parent.firstPatch);
+    }
 };
 
 // Cuts all instances of the scene into patches with edges of about `patchSize` metres (0: as
 // automaticPatchSizes has it), coarser if there would be more than maxPatches, and gives each its
 // reflectance, emission and opacity (means over its area).
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches);
+
+// Cuts the tiles once more: levels holds one entry a tile, in the order of the patches of an uncut
+// subdivision; 0 leaves a tile as it is.
+void cutTiles(const Scene& scene, Patches& patches, const std::vector<uint8_t>& levels);
 
 }  // namespace raybundle

@@ -63,10 +63,11 @@ std::string inMetres(double length) {
 // Of one instance: adds up the squares, and notes the square of the error at each corner.
 class InstanceErrors {
   public:
-    InstanceErrors(const Patches& patches, const InstanceRange& range, rb_side side,
+    InstanceErrors(const Tiles& tiles, const InstanceRange& range, rb_side side,
                    const Irradiance& irradiance, const SideErrors& sides,
                    const InstanceLight& light)
-        : patches(patches),
+        : tiles(tiles),
+          patches(tiles.patches()),
           range(range),
           side(uint32_t(side)),
           irradiance(irradiance),
@@ -169,12 +170,21 @@ class InstanceErrors {
                     if (cell.corner[c] >= 0)
                         shown += w[c] * (light.direct[size_t(cell.corner[c])] +
                                          light.indirect[size_t(cell.corner[c])]);
-                body(at, weight, cell, w, square(shown - lightAt(at)), surplus[patch - first]);
+                // What the patches of a cut tile have of its surplus is known, but nothing between
+                // the corners follows it: no face is smaller than a tile.
+                Surplus beyond = surplus[patch - first];
+                beyond.smooth = std::ldexp(beyond.smooth, -4 * tiles.level(patch));
+                beyond.step = std::ldexp(beyond.step, -tiles.level(patch));
+                const Surplus& whole = surplus[patch - first];
+                const double known = double(whole.smooth - beyond.smooth) +
+                                     std::max(0.0, double(whole.step - beyond.step));
+                body(at, weight, cell, w, square(shown - lightAt(at)) + known, beyond);
             }
         }
     }
 
-    const Patches& patches;
+    const Tiles& tiles;
+    const Patches& patches;  // a tile each
     const InstanceRange& range;
     const uint32_t side;
     const Irradiance& irradiance;
@@ -220,14 +230,14 @@ void warnOfCoarseMesh(const std::string& name, const Squares& s, double noiseSca
 
 }  // namespace
 
-void stateErrors(const Scene& scene, const Patches& patches,
+void stateErrors(const Scene& scene, const Tiles& tiles,
                  const std::vector<InstanceRange>& ranges, const Irradiance& irradiance,
                  const SideErrors& sides, float targetError, std::vector<InstanceLight>& light,
                  Report& report) {
     std::vector<std::optional<InstanceErrors>> errors(light.size());
     tbb::parallel_for(size_t(0), light.size(), [&](size_t i) {
         if (light[i].isBaked)
-            errors[i].emplace(patches, ranges[i], scene.instances[i].side, irradiance, sides,
+            errors[i].emplace(tiles, ranges[i], scene.instances[i].side, irradiance, sides,
                               light[i]);
     });
     Squares all;

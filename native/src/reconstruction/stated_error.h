@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bake/report.h"
-#include "patches/patches.h"
+#include "patches/tiles.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/least_squares.h"
 #include "scene/scene.h"
@@ -21,7 +21,7 @@
 
 namespace raybundle {
 
-// What is known about the light on the patch sides; references must outlive it.
+// What is known about the light on the sides of the tiles; references must outlive it.
 struct SideErrors {
     const std::vector<float>& exposed;      // share of each side that nothing covers
     const std::vector<glm::vec3>& noise;    // a sample of that of the bundles, W/m^2; empty: none
@@ -30,8 +30,8 @@ struct SideErrors {
 
 // Adds the errors, and warnings of objects whose mesh is too coarse, to the report, and the error
 // per corner to the light. report.estimatedError is the noise in all; targetError: that of the
-// settings.
-void stateErrors(const Scene& scene, const Patches& patches,
+// settings. ranges: of the patches; irradiance: mean over each tile's side.
+void stateErrors(const Scene& scene, const Tiles& tiles,
                  const std::vector<InstanceRange>& ranges, const Irradiance& irradiance,
                  const SideErrors& sides, float targetError, std::vector<InstanceLight>& light,
                  Report& report);

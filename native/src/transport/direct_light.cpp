@@ -125,29 +125,53 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
     sources = raybundle::lightSources(scene, patches, isSource, gathered, lightSet);
 }
 
+template <class Tolerance>
+void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
+                              const std::function<Receiver(size_t)>& receiverAt,
+                              const Tolerance& tolerance, Seen& seen,
+                              const std::function<void(double)>& progress) const {
+    constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
+    for (size_t from = 0; from < these.size(); from += kSlice) {
+        progress(0.5 * double(from) / double(these.size()));
+        tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
+            Gathered& result = results[these[k]];
+            const uint64_t before = result.rays;
+            result = gather(receiverAt(these[k]), tolerance(these[k]), seen);
+            result.rays += before;
+        });
+    }
+}
+
+void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
+                                const std::function<Receiver(size_t)>& receiverAt,
+                                const std::function<void(double)>& progress) const {
+    coarse.seen.resize(sources.size());
+    coarse.bundled = 0;
+    for (size_t side = 0; side < bundled.size(); ++side)
+        coarse.bundled +=
+            double(patches.area[side / 2] * brightest(bundled[side])) / patches.totalArea;
+    if (sources.empty()) return;
+    Seen seen(sources.size());
+    gatherThese(
+        coarse.gathered, these, receiverAt, [](uint32_t) { return INFINITY; }, seen, progress);
+    for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
+}
+
 std::vector<Gathered> DirectLight::gather(size_t count,
                                           const std::function<Receiver(size_t)>& receiverAt,
                                           float targetError,
-                                          const std::function<void(double)>& progress) const {
-    std::vector<Gathered> results(count);
-    if (sources.empty()) return results;
-    Seen seen(sources.size());
-    auto gatherThese = [&](const std::vector<uint32_t>& these, auto tolerance, double begin) {
-        constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
-        for (size_t from = 0; from < these.size(); from += kSlice) {
-            progress(begin + 0.5 * double(from) / double(these.size()));
-            tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
-                Gathered& result = results[these[k]];
-                const uint64_t before = result.rays;
-                result = gather(receiverAt(these[k]), tolerance(these[k]), seen);
-                result.rays += before;
-            });
-        }
-    };
+                                          const std::function<void(double)>& progress,
+                                          CoarseShot first) const {
     std::vector<uint32_t> these(count);
     std::iota(these.begin(), these.end(), 0u);
-    gatherThese(
-        these, [](uint32_t) { return INFINITY; }, 0);
+    if (first.gathered.empty()) {
+        first.gathered.resize(count);
+        shootCoarsely(first, these, receiverAt, progress);
+    }
+    std::vector<Gathered> results = std::move(first.gathered);
+    if (sources.empty()) return results;
+    Seen seen(sources.size());
+    for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
 
     double lit = 0, litArea = 0;
     for (size_t k = 0; k < count; ++k)
@@ -159,13 +183,15 @@ std::vector<Gathered> DirectLight::gather(size_t count,
         }
     const float floor = litArea > 0 ? float(kDarkShare * lit / litArea) : 0;
     auto tolerance = [&](uint32_t k) {
-        return kDirectShare * targetError * std::max(floor, brightest(results[k].irradiance));
+        return receiverAt(k).errorFactor * kDirectShare * targetError *
+               std::max(floor, brightest(results[k].irradiance));
     };
     these.erase(
         std::remove_if(these.begin(), these.end(),
                        [&](uint32_t k) { return std::sqrt(results[k].variance) <= tolerance(k); }),
         these.end());
-    gatherThese(these, tolerance, 0.5);
+    gatherThese(results, these, receiverAt, tolerance, seen,
+                [&](double done) { progress(0.5 + done); });
     return results;
 }
 
@@ -222,7 +248,8 @@ std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, uint
     const uint32_t inParent = side / 2 - parent.firstPatch;
     const glm::vec3 normal = patches.normal(side);
     // The patch cut into parts is like a parent with that grid.
-    Parent grid = parent;
+    Parent grid;
+    grid.isTriangle = parent.isTriangle;
     const glm::vec2 o = parent.pointOn(inParent, {0, 0});
     const glm::vec2 a = parent.pointOn(inParent, {1, 0}) - o,
                     b = parent.pointOn(inParent, {0, 1}) - o;
@@ -358,6 +385,9 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
         !patches.parentAt(receiver.side).stopsDirect)
         sum.unpowered += all.estimate(closed);
     sum.variance += variance + closedError * closedError;
+    const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
+    sum.contrast += brightest(closed ? *closed : all.open / float(all.count)) *
+                    std::sqrt(visible * (1 - visible));
 }
 
 bool DirectLight::hasPassingLight(uint32_t side) const {
@@ -374,7 +404,9 @@ glm::vec3 DirectLight::position(const Receiver& receiver, glm::vec2 uv) const {
 float DirectLight::radius(const Receiver& receiver) const {
     if (receiver.point) return 0;
     const Parent& parent = patches.parents[patches.parentOf[receiver.side / 2]];
-    return 0.5f * (glm::length(parent.a) / parent.countA + glm::length(parent.b) / parent.countB);
+    const float tile =
+        0.5f * (glm::length(parent.a) / parent.countA + glm::length(parent.b) / parent.countB);
+    return std::ldexp(tile, -patches.level(receiver.side / 2));
 }
 
 glm::dvec3 DirectLight::escapedPower() const {

@@ -41,6 +41,7 @@ struct Receiver {
     uint32_t seed = 0;               // of its samples
     // Only the light that lines which end at the first surface do not bring it.
     bool passingOnly = false;
+    float errorFactor = 1;  // its error may be so many times that of others
 };
 
 // What one receiver got.
@@ -48,9 +49,18 @@ struct Gathered {
     glm::vec3 irradiance{0.0f};  // W/m^2
     glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
     float variance = 0;          // of the brightest channel
+    float contrast = 0;  // standard deviation over the receiver and the sources, W/m^2, that
+                         // shadows make
     uint64_t rays = 0;
     uint64_t unblocked = 0;  // sources without noise: wholly visible
     uint64_t hidden = 0;     // sources that it cannot see, without a ray
+};
+
+// The light of few samples at each receiver.
+struct CoarseShot {
+    std::vector<Gathered> gathered;
+    std::vector<bool> seen;  // per source: whether any receiver got its light
+    double bundled = 0;      // about the irradiance that emission left to the bundles makes, W/m^2
 };
 
 class DirectLight {
@@ -68,10 +78,15 @@ class DirectLight {
 
     // Gathers at `count` receivers to about `targetError` relative standard error each: all
     // coarsely first, then those again whose error is too large beside the mean light.
-    // `progress` gets the share that is done.
+    // `progress` gets the share that is done. coarse: what is known of all receivers, or empty.
     std::vector<Gathered> gather(size_t count, const std::function<Receiver(size_t)>& receiverAt,
-                                 float targetError,
-                                 const std::function<void(double)>& progress) const;
+                                 float targetError, const std::function<void(double)>& progress,
+                                 CoarseShot coarse = {}) const;
+
+    // The first, coarse pass of that, to begin with: gathers at `these` receivers.
+    void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
+                       const std::function<Receiver(size_t)>& receiverAt,
+                       const std::function<void(double)>& progress) const;
 
     // Whether lines that end at the first surface leave out some of the light of a side's sources.
     bool hasPassingLight(uint32_t side) const;
@@ -83,6 +98,10 @@ class DirectLight {
     struct Block;
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
 
+    template <class Tolerance>
+    void gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
+                     const std::function<Receiver(size_t)>& receiverAt, const Tolerance& tolerance,
+                     Seen& seen, const std::function<void(double)>& progress) const;
     Gathered gather(const Receiver& receiver, float tolerance, Seen& seen) const;
     void gatherFrom(size_t source, const Receiver& receiver, int samples, float tolerance,
                     Seen& seen, Gathered& sum) const;

@@ -42,6 +42,9 @@ struct FirstShotInput {
     float touchDistance = 0;               // surfaces not further apart touch, metres
     double linesPerBundle = 0;             // lines of a bundle through the scene's bounding sphere
     const Visibility* exchange = nullptr;  // of reflected light, where it differs
+    // The coarse shot of the sides of the tiles, perhaps before some were cut: what
+    // GATHER begins with. Null: it makes its own.
+    const CoarseShot* fromTiles = nullptr;
 };
 
 // The first shots, one a row of the table.

@@ -20,14 +20,30 @@ FirstShot gather(const FirstShotInput& input) {
     shot.emission = light.bundledEmission();
     shot.irradiance.resize(n);
     shot.error.resize(n);
-    const std::vector<Gathered> results = light.gather(
-        n,
-        [&](size_t side) {
-            return Receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
-                            uint32_t(side)};
-        },
-        input.settings.targetError,
-        [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); });
+    auto report = [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); };
+    auto receiverAt = [&](size_t side) {
+        Receiver receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
+                          uint32_t(side)};
+        // Most of the error of a cut tile's patches is not in its mean.
+        receiver.errorFactor = std::ldexp(1.0f, 2 * patches.level(uint32_t(side / 2)));
+        return receiver;
+    };
+    CoarseShot coarse;
+    if (input.fromTiles) {
+        coarse.seen = input.fromTiles->seen;
+        coarse.gathered.resize(n);
+        std::vector<uint32_t> cut;
+        for (uint32_t side = 0; side < n; ++side) {
+            if (patches.level(side / 2) > 0)
+                cut.push_back(side);
+            else
+                coarse.gathered[side] =
+                    input.fromTiles->gathered[2 * patches.tileOf(side / 2) + side % 2];
+        }
+        light.shootCoarsely(coarse, cut, receiverAt, report);
+    }
+    const std::vector<Gathered> results =
+        light.gather(n, receiverAt, input.settings.targetError, report, std::move(coarse));
     for (size_t side = 0; side < n; ++side) {
         shot.irradiance[side] = results[side].irradiance;
         shot.emitted += double(patches.area[side / 2]) * glm::dvec3(results[side].unpowered);

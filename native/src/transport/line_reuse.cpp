@@ -211,7 +211,9 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
     std::vector<uint32_t> starved;
     std::vector<bool> isOther(counts.sideCount());  // starved, not in hand yet
     for (uint32_t i = 0; i < counts.sideCount(); ++i) {
-        const bool isStarved = counts.linesMetInAll(i) < minLines;
+        // The patches of a cut tile do with the lines of the tile.
+        const uint32_t enough = std::max(1u, minLines >> (2 * patches.level(i / 2)));
+        const bool isStarved = counts.linesMetInAll(i) < enough;
         if (isStarved && wanted[i])
             starved.push_back(i);
         else

@@ -68,8 +68,8 @@ void MeshSource::chooseByPower() {
     totalPower = glm::vec3(0.0f);
     for (uint32_t index : parents) {
         const Parent& parent = patches.parents[index];
-        const float area = parent.area() / float(parent.patchCount());
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
+            const float area = parent.areaOf(p - parent.firstPatch);
             for (int k = 0; k < 2; ++k) {
                 const glm::vec3 power = area * emissionOf(p, k);
                 if (!(strength(power) > 0)) continue;
@@ -220,7 +220,7 @@ MeshSource::SurfacePoint MeshSource::onSurface(glm::vec2 uv) const {
     const uint32_t patch = shining[k] / 2;
     const Parent& parent = patches.parents[patches.parentOf[patch]];
     const glm::vec2 within(float(std::clamp((at - before) / own, 0.0, 1.0)), uv.y);
-    const float area = parent.area() / float(parent.patchCount());
+    const float area = parent.areaOf(patch - parent.firstPatch);
     // The patch may be chosen for either side.
     const float share = strength(emissionOf(patch, 0) + emissionOf(patch, 1)) * area;
     return {patches.point(patch, within), parent.normal, shining[k],
