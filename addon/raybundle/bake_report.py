@@ -23,6 +23,7 @@ class ObjectReport:
 class BakeReport:
     seconds: dict[str, float] = field(default_factory=dict)  # per stage, and 'total'
     patches: int = 0
+    refined: list[dict] = field(default_factory=list)  # why, tiles: cut into smaller patches
     bundles: int = 0
     lines: int = 0
     exchanges: int = 0
@@ -40,9 +41,9 @@ class BakeReport:
     @classmethod
     def from_native(cls, values: dict) -> BakeReport:
         report = cls()
-        for name in ('seconds', 'patches', 'bundles', 'lines', 'exchanges', 'shadow_rays',
-                     'estimated_error', 'error', 'energy', 'peak_memory_bytes', 'light_sets',
-                     'warnings', 'skipped'):
+        for name in ('seconds', 'patches', 'refined', 'bundles', 'lines', 'exchanges',
+                     'shadow_rays', 'estimated_error', 'error', 'energy', 'peak_memory_bytes',
+                     'light_sets', 'warnings', 'skipped'):
             if name in values:
                 setattr(report, name, values[name])
         return report

@@ -55,6 +55,7 @@ SETTINGS: dict[str, type] = {
     'target_error': float,
     'patch_size': float,
     'max_patches': int,
+    'refine': int,
     'min_bundles': int,
     'max_bundles': int,
     'lines_per_bundle': int,

@@ -74,6 +74,7 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
         layout.prop(settings, "target_error")
         layout.prop(settings, "topology")
         layout.prop(settings, "patch_size")
+        layout.prop(settings, "refine")
 
 
 class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):

@@ -195,6 +195,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         name="Maximum Patches",
         description="Most patches that subdivision may make; patches grow to stay below it",
         default=100_000, min=1, max=2 ** 28, soft_min=1_000, soft_max=10_000_000)
+    refine: BoolProperty(
+        name="Refine",
+        description="Smaller patches at the edges of shadows, where what that gains is worth the "
+                    "time",
+        default=False)
     solver: EnumProperty(
         name="Solver", description="How light is passed on between surfaces", items=enum_solver,
         default='LINE_REUSE')
@@ -288,6 +293,7 @@ class BakeSettings:
     shared_meshes: str
     patch_size: float
     max_patches: int
+    refine: bool
     solver: str
     estimator: str
     first_shot: str
