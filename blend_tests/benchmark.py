@@ -137,14 +137,14 @@ class VertexReference:
 class SurfaceReference:
     """Cycles' light at points inside the faces, one half-way from each corner to the centre."""
 
-    def __init__(self, objects: Sequence[bpy.types.Object], samples: int) -> None:
+    def __init__(self, objects: Sequence[bpy.types.Object], samples: int, seed: int = 0) -> None:
         self._weights = {item.name: corner_areas(item) for item in objects}
         self._sizes = {item.name: face_sizes(item.data) for item in objects}
         twins = {item.name: _with_inner_points(item) for item in objects}
         hidden = [item.hide_render for item in objects]
         for item in objects:
             item.hide_render = True
-        values = _bake_points(list(twins.values()), samples)
+        values = _bake_points(list(twins.values()), samples, seed)
         self._values = {name: values[twin.name] for name, twin in twins.items()}
         for item, was_hidden in zip(objects, hidden):
             item.hide_render = was_hidden
@@ -211,10 +211,10 @@ def _with_inner_points(item: bpy.types.Object) -> bpy.types.Object:
     return twin
 
 
-def _bake_points(twins: Sequence[bpy.types.Object], samples: int) -> Light:
+def _bake_points(twins: Sequence[bpy.types.Object], samples: int, seed: int) -> Light:
     scene = bpy.context.scene
     engine = scene.render.engine
-    prepare_scene(scene, samples, 0)
+    prepare_scene(scene, samples, seed)
     bpy.context.view_layer.update()
     for item in bpy.context.view_layer.objects:
         item.select_set(item in twins)
