@@ -36,6 +36,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils.bvhtree import BVHTree
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
@@ -56,6 +57,8 @@ ERRORS_OF_INTEREST = (0.05, 0.02, 0.01)
 # With four times the samples noise is halved; an error that keeps more than this is something else.
 STILL_NOISE = 0.7
 RAYBUNDLE = "Raybundle"
+# Surfaces nearer to each other than this share of the scene's diagonal touch.
+TOUCH = 2e-5
 
 Light = dict[str, np.ndarray]  # by object name, RGB per corner or point
 
@@ -148,12 +151,15 @@ class SurfaceReference:
         self._values = {name: values[twin.name] for name, twin in twins.items()}
         for item, was_hidden in zip(objects, hidden):
             item.hide_render = was_hidden
+        covered = _covered_points(twins)
         for twin in twins.values():
             bpy.data.meshes.remove(twin.data)
         for item in objects:
-            # Faces that reflect nothing have no value, nor have points covered by other surfaces.
+            # Faces that reflect nothing have no value. Covered points nobody sees, and what Cycles
+            # has there is arbitrary.
             self._weights[item.name] = (self._weights[item.name]
-                                        * self._values[item.name].any(axis=1))
+                                        * self._values[item.name].any(axis=1)
+                                        * ~covered[item.name])
 
     def points(self, name: str, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """At an object's points: what is shown of its corners' values, Cycles' light, the area."""
@@ -209,6 +215,23 @@ def _with_inner_points(item: bpy.types.Object) -> bpy.types.Object:
     # How many vertices come before the points.
     twin["first_point"] = len(positions)
     return twin
+
+
+def _covered_points(twins: dict[str, bpy.types.Object]) -> dict[str, np.ndarray]:
+    """(points,) by name: whether a surface of another object lies against the point."""
+    positions = {name: world_positions(twin) for name, twin in twins.items()}
+    counts = [len(twin.data.polygons) for twin in twins.values()]
+    begins = dict(zip(twins, np.cumsum([0, *map(len, positions.values())]).tolist()))
+    polygons = [[begins[name] + vertex for vertex in polygon.vertices]
+                for name, twin in twins.items() for polygon in twin.data.polygons]
+    every = np.concatenate(list(positions.values()))
+    tree = BVHTree.FromPolygons(every.tolist(), polygons)
+    owner = np.repeat(np.arange(len(twins)), counts)
+    reach = TOUCH * float(np.linalg.norm(np.ptp(every, axis=0)))
+    return {name: np.array([any(owner[face] != index
+                                for _, _, face, _ in tree.find_nearest_range(point, reach))
+                            for point in positions[name][twin["first_point"]:].tolist()], bool)
+            for index, (name, twin) in enumerate(twins.items())}
 
 
 def _bake_points(twins: Sequence[bpy.types.Object], samples: int, seed: int) -> Light:

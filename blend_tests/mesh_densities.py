@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surface error of Raybundle's reconstructions and of Cycles' vertex bake on coarse and fine meshes.
+"""Surface error of Raybundle's reconstructions and of Cycles' vertex bake, by mesh density.
 
     blender -b --factory-startup -P blend_tests/mesh_densities.py -- \\
         [--scenes NAME ...] [--densities 0.5 1 2] [--samples 128] [--seeds 2] \\
@@ -50,6 +50,19 @@ def scene_builder():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def make_plain() -> None:
+    """Gives every object that is shown, instances too, a mesh of its own without modifiers."""
+    bpy.ops.object.select_all(action='SELECT')
+    bpy.ops.object.duplicates_make_real()
+    bpy.ops.object.select_all(action='SELECT')
+    bpy.ops.object.make_single_user(object=True, obdata=True)
+    for item in bpy.context.view_layer.objects:
+        item.select_set(item.type == 'MESH')
+        if item.type == 'MESH':
+            bpy.context.view_layer.objects.active = item
+    bpy.ops.object.convert(target='MESH')
 
 
 def compare(options: argparse.Namespace) -> dict[str, float]:
@@ -105,6 +118,7 @@ def run_scene(builder, name: str, density: float, options: argparse.Namespace) -
     with tempfile.TemporaryDirectory() as folder:
         path = builder.build_scene(name, Path(folder), density)
         bpy.ops.wm.open_mainfile(filepath=str(path))
+        make_plain()
         errors = compare(options)
     return {"scene": name, "density": density, "samples": options.samples,
             "settings": options.set, "errors": errors}

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Error and time of small objects in large scenes: a house on a plain, a laid table in a hall.
+
+    blender -b --factory-startup -P blend_tests/small_objects.py -- \\
+        [--target 0.01] [--seeds 2] [--factor 10] [--runs 3] [--samples 128]
+
+Of LIGHTING, at the corners of the small objects alone, relative RMSE over RGB by area:
+
+noise    against the same patches with --factor times the bundles (4096 at most) and another seed;
+surface  interpolated over the faces, against Cycles at points inside them, whose noise is taken out
+         as in mesh_densities.py; beside it what Cycles' own vertex bake has without noise.
+
+And the seconds of a bake over those of the same small objects without the extent around them (the
+plain cut to 18 m; a hall of 5 x 6 x 3.2 m), side by side: medians of --runs. Prints a table in
+Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import bmesh
+import bpy
+import numpy as np
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+sys.path[:0] = [str(ROOT / "addon"), str(HERE)]
+sys.dont_write_bytecode = True
+
+import raybundle  # noqa: E402
+from benchmark import SurfaceReference, bake_cycles, bake_raybundle  # noqa: E402
+from cycles_reference import bakeable_objects  # noqa: E402
+from mesh_densities import squared_error  # noqa: E402
+from surface_error import corner_areas, surface_error  # noqa: E402
+
+# Names begin with these.
+LARGE = {"house_on_plain": ("plain",), "laid_table": ("floor", "ceiling", "wall_", "lamp_")}
+SMALL = {"house_on_plain": ("",),
+         "laid_table": ("plate", "cup", "fork", "knife", "candlestick")}
+
+
+def small_objects(scene: str) -> list[bpy.types.Object]:
+    return [item for item in bakeable_objects(bpy.context)
+            if item.name.startswith(SMALL[scene]) and not item.name.startswith(LARGE[scene])]
+
+
+def cut(scene: str) -> None:
+    """Takes the extent away from the scene that is open."""
+    if scene == "house_on_plain":
+        mesh = bpy.data.objects["plain"].data
+        shape = bmesh.new()
+        shape.from_mesh(mesh)
+        far = [vertex for vertex in shape.verts if max(map(abs, vertex.co[:2])) > 9.0]
+        bmesh.ops.delete(shape, geom=far, context='VERTS')
+        shape.to_mesh(mesh)
+        shape.free()
+        return
+    for item in list(bpy.data.objects):
+        if item.name.startswith(("floor", "ceiling", "wall_")):
+            item.scale = (0.25, 0.2, 0.4)
+        elif item.name.startswith("lamp_") and item.name != "lamp_table":
+            bpy.data.objects.remove(item)
+
+
+def open_scene(name: str) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / f"scenes/{name}.blend"))
+    bpy.context.scene.raybundle.output = 'LIGHTING'
+
+
+def measure(name: str, options: argparse.Namespace) -> str:
+    open_scene(name)
+    settings = bpy.context.scene.raybundle
+    settings.target_error = options.target
+    objects = small_objects(name)
+    bakes = []
+    for settings.seed in range(1, options.seeds + 1):
+        bakes.append(bake_raybundle(objects)[1:])
+    light, report = bakes[0]
+    references = [SurfaceReference(objects, options.samples, seed) for seed in (0, 1)]
+    surface = squared_error(references, [light, light])
+    cycles = squared_error(references,
+                           [bake_cycles(objects, options.samples, seed)[1] for seed in (2, 3)])
+    settings.seed, settings.target_error = 7, 1e-5
+    settings.max_bundles = min(4096, options.factor * report["bundles"])
+    truth = bake_raybundle(objects)[1]
+    areas = np.concatenate([corner_areas(item) for item in objects])
+    noises = [surface_error(*(np.concatenate([values[item.name] for item in objects])
+                              for values in (found, truth)), areas).rmse for found, _ in bakes]
+
+    seconds: dict[bool, list[float]] = {False: [], True: []}
+    for _ in range(options.runs):
+        for is_cut, times in seconds.items():
+            open_scene(name)
+            if is_cut:
+                cut(name)
+            bpy.context.view_layer.update()
+            bpy.context.scene.raybundle.target_error = options.target
+            times.append(bake_raybundle(small_objects(name))[0])
+    ratio = np.median(seconds[False]) / np.median(seconds[True])
+    return (f"| `{name}` | {len(objects)} | {report['bundles']} | {report['lines'] / 1e6:.0f} "
+            f"million | {', '.join(f'{100 * noise:.2f} %' for noise in noises)} | "
+            f"{100 * surface ** 0.5:.2f} % | {100 * cycles ** 0.5:.2f} % | {ratio:.1f} |")
+
+
+def main(arguments: Sequence[str]) -> None:
+    parser = argparse.ArgumentParser(prog="small_objects.py", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", nargs="+", default=list(LARGE), choices=list(LARGE))
+    parser.add_argument("--target", type=float, default=0.01)
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--factor", type=int, default=10)
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--samples", type=int, default=128)
+    options = parser.parse_args(arguments)
+    raybundle.register()
+    rows = ["| scene | small objects | bundles | lines | noise, by seed | surface | Cycles' bake, "
+            "surface | time over that without the extent |", "|---" * 8 + "|"]
+    rows += [measure(name, options) for name in options.scenes]
+    print("\n".join(rows))
+
+
+if __name__ == "__main__":
+    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
