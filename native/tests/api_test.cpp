@@ -37,7 +37,7 @@ TEST_F(Api, SettingsHaveReadableDefaults) {
     }
     const std::vector<std::pair<const char*, float>> reals = {{"target_error", 0.02f},
                                                               {"memory_limit", 4096},
-                                                              {"regularization", 0.02f},
+                                                              {"regularization", 0.005f},
                                                               {"patch_size", 0.2f}};
     for (const auto& [name, value] : reals) {
         EXPECT_EQ(rb_get_bake_float(bake, name, &real), RB_ERROR_NONE) << name;

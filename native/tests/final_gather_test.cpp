@@ -40,20 +40,18 @@ std::pair<double, double> worstCorner(const Scene& scene, const Bake& bake, cons
     return {worst, std::sqrt(squares)};
 }
 
-// A black ground of 4 x 4 faces of 1 m under a white sky, with a black board of 1 m on 0.3 m, whose
-// centre is over the ground's.
+// A black ground of 4 x 4 faces of 1 m under a white sky, with a black board 0.1 m over one of them.
 Scene groundUnderBoard() {
     Scene scene;
     place(scene, grid("ground", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("", 0));
-    place(scene, rectangle("board", {-0.5f, -0.5f, 0.3f}, {1, 0, 0}, {0, 1, 0}), grey("", 0),
-          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    place(scene, rectangle("board", {0, 0, 0.1f}, {1, 0, 0}, {0, 1, 0}), grey("", 0), glm::dmat4(1),
+          RB_ROLE_OCCLUDE);
     scene.worldRadiance = glm::vec3(1);
     return scene;
 }
 
 double skyIrradiance(const glm::vec3& point) {
-    const glm::dvec3 board[4] = {
-        {-0.5, -0.5, 0.3}, {0.5, -0.5, 0.3}, {0.5, 0.5, 0.3}, {-0.5, 0.5, 0.3}};
+    const glm::dvec3 board[4] = {{0, 0, 0.1}, {1, 0, 0.1}, {1, 1, 0.1}, {0, 1, 0.1}};
     return kPi - polygonIrradiance(point, {0, 0, 1}, board, 4);
 }
 
@@ -62,8 +60,8 @@ TEST(FinalGather, CornersUnderABoardSeeTheSkyAroundIt) {
     Bake gathered, interpolated;
     bakePoint(gathered, scene);
     bakePoint(interpolated, scene, false);
-    // Half the target is noise, one standard error of each of 64 corners; receivers lie 0.7 % of an
-    // edge inside their face, over which light changes by less than itself.
+    // Half the target is noise, one standard error of each of 64 corners; receivers lie 7 mm inside
+    // their face, in four directions around a vertex, and light changes over 0.1 m.
     const auto [worst, mean] = worstCorner(scene, gathered, skyIrradiance);
     EXPECT_LT(worst, (4 * 0.5 * double(kTarget) + 0.007) * mean);
     // Else the test would say nothing.

@@ -254,7 +254,7 @@ RB_API void rb_release_bake(rb_bake bake);
  *   float  memory_limit    for the exchanges, in MB (4096)
  *   int    seed, threads   threads 0 = all (0, 0)
  *   int    final_gather    of POINT: 0 leaves the light of other surfaces to interpolation (1)
- *   float  regularization  of the reconstruction: weight of slope changes across edges (0.02)
+ *   float  regularization  of the reconstruction: weight of slope changes across edges (0.005)
  *   string reconstruction  LEAST_SQUARES | AREA_AVERAGE | POINT
  *   string solver          LINE_REUSE | MULTIPATH | STOCHASTIC_ITERATION | RANDOM_WALK
  *   string first_shot      GATHER | SHOOT | EXTENDED

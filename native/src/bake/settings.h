@@ -20,7 +20,7 @@ struct Settings {
     float memoryLimit = 4096;  // of the exchanges, MB
     int seed = 0;
     int threads = 0;               // 0 = all
-    float regularization = 0.02f;  // of the reconstruction
+    float regularization = 0.005f;  // of the reconstruction
     std::string solver = "LINE_REUSE";
     std::string firstShot = "GATHER";
     std::string directions = "LOW_DISCREPANCY";
