@@ -136,8 +136,8 @@ def test_point_reconstruction_meets_point_samples():
     items = [bpy.data.objects[name] for name in references]
     off_contacts = off_contact_edges(items)
     parts = [(read_colors(item), references[item.name],
-              corner_areas(item) * off_contacts[item.name] * is_defined(item, references[item.name]))
-             for item in items]
+              corner_areas(item) * off_contacts[item.name]
+              * is_defined(item, references[item.name])) for item in items]
     error = surface_error(*(np.concatenate(column) for column in zip(*parts)))
     print(error)
     assert error.rmse <= POINT_TOLERANCE, str(error)

@@ -5,7 +5,7 @@
 |---|---|
 | LIGHTING | Diffuse, Direct and Indirect, without Color |
 | DIRECT | Diffuse, Direct |
-| INDIRECT | the difference of the two: alone, Indirect leaves out what lights give after a reflection |
+| INDIRECT | the difference: alone, Indirect leaves out what lights give after a reflection |
 | COMBINED | Combined: emission, and diffuse light with colour |
 """
 

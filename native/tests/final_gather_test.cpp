@@ -40,7 +40,7 @@ std::pair<double, double> worstCorner(const Scene& scene, const Bake& bake, cons
     return {worst, std::sqrt(squares)};
 }
 
-// A black ground of 4 x 4 faces of 1 m under a white sky, with a black board 0.1 m over one of them.
+// A black ground of 4 x 4 faces of 1 m under a white sky; a black board is 0.1 m over one of them.
 Scene groundUnderBoard() {
     Scene scene;
     place(scene, grid("ground", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("", 0));

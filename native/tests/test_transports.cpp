@@ -23,9 +23,8 @@ TransportScene::TransportScene(const Scene& scene, float patchSize, float pixelS
 std::unique_ptr<Transport> TransportScene::make(const std::string& solver, int seed) {
     settings.seed = seed;
     tracer = std::make_unique<BundleTracer>("AUTO", projector, "RANDOM", uint32_t(seed));
-    return makeTransport(solver,
-                         {patches, visibility, shot, world, exposed, 1e-4f * patches.radius,
-                          settings, *tracer, counts});
+    return makeTransport(solver, {patches, visibility, shot, world, exposed, 1e-4f * patches.radius,
+                                  settings, *tracer, counts});
 }
 
 int cubeFace(const Patches& patches, uint32_t patch) {

@@ -32,8 +32,9 @@ struct Looks {
 
 class Noise {
   public:
-    // before: of earlier bakes with these lines. weight: per side, exposed area in m^2 where the light is a result, else 0. directError: per
-    // side, standard error of the first shot, W/m^2. Both must outlive the object.
+    // before: of earlier bakes with these lines. weight: per side, exposed area in m^2 where the
+    // light is a result, else 0. directError: per side, standard error of the first shot, W/m^2.
+    // Both must outlive the object.
     Noise(const Looks& before, const std::vector<float>& weight,
           const std::vector<float>& directError);
 

@@ -5,8 +5,8 @@
 // the line. A hash of line and patch decides, so that whoever asks twice gets the same answer and
 // the result does not depend on the number of threads.
 //
-// Differs from tracing images of leaves: the mean opacity over a patch is used, so their shadows are
-// as fine as patches; coloured transparency is grey.
+// Differs from tracing images of leaves: the mean opacity over a patch is used, so their shadows
+// are as fine as patches; coloured transparency is grey.
 #pragma once
 
 #include <cstdint>
@@ -53,8 +53,7 @@ inline uint64_t lineName(const glm::vec3& point, const glm::vec3& direction) {
 // Whether a patch stops a line.
 inline bool stops(const Patches& patches, uint32_t patch, uint64_t line) {
     const float opacity = patches.opacityOf(patch);
-    return opacity >= 1 ||
-           double(mixBits(line ^ mixBits(patch)) >> 11) * 0x1p-53 < double(opacity);
+    return opacity >= 1 || double(mixBits(line ^ mixBits(patch)) >> 11) * 0x1p-53 < double(opacity);
 }
 
 }  // namespace raybundle

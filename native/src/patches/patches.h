@@ -38,7 +38,7 @@ struct Parent {
     std::array<uint32_t, 4>
         vertex;  // into Patches::vertices, in order around; [3] unused by triangles
     uint32_t firstPatch = 0;
-    uint32_t firstTile = 0;  // its number before any tile was cut
+    uint32_t firstTile = 0;           // its number before any tile was cut
     uint16_t countA = 1, countB = 1;  // grid along a and b; equal for triangles
     bool isTriangle = true;
     bool isSolid = false;  // part of a surface that encloses a volume
@@ -102,8 +102,8 @@ struct Patches {
     std::vector<Cell> cells;
     std::vector<uint32_t> parentOf;  // per patch
     // Per patch, m^2. Of a patch that lets light through only the opaque share counts, as if it had
-    // many small holes: a global line meets that share of it, and reflectance and emission are those
-    // of what is left between the holes.
+    // many small holes: a global line meets that share of it, and reflectance and emission are
+    // those of what is left between the holes.
     std::vector<float> area;
     std::vector<float> opacity;          // per patch; empty where all are opaque
     std::vector<glm::vec3> reflectance;  // per side

@@ -61,7 +61,8 @@ FinalGather::Light FinalGather::gather(const Receiver& receiver, size_t receiver
         double variance = 0;
         for (const Light& sum : sums)
             variance += square(sum.total() / float(wanted) - mean.total()) / (kSets * (kSets - 1));
-        // What few rays meet can be missed by all sets alike: the step from half as many counts too.
+        // What few rays meet can be missed by all sets alike: the step from half as many counts
+        // too.
         const double step = done > 0 ? square(mean.total() - before.total()) : INFINITY;
         if (std::max(variance, step) <= tolerance) break;
         done = wanted;

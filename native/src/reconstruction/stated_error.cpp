@@ -230,10 +230,9 @@ void warnOfCoarseMesh(const std::string& name, const Squares& s, double noiseSca
 
 }  // namespace
 
-void stateErrors(const Scene& scene, const Tiles& tiles,
-                 const std::vector<InstanceRange>& ranges, const Irradiance& irradiance,
-                 const SideErrors& sides, float targetError, std::vector<InstanceLight>& light,
-                 Report& report) {
+void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
+                 const Irradiance& irradiance, const SideErrors& sides, float targetError,
+                 std::vector<InstanceLight>& light, Report& report) {
     std::vector<std::optional<InstanceErrors>> errors(light.size());
     tbb::parallel_for(size_t(0), light.size(), [&](size_t i) {
         if (light[i].isBaked)

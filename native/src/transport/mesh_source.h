@@ -15,8 +15,8 @@ namespace raybundle {
 class MeshSource : public LightSource {
   public:
     // parents: into Patches::parents; emission: of their front and back, W/m^2. `patches` must
-    // outlive it. Where they vary, sideEmission holds the emission per side of all patches, W/m^2 of
-    // the whole patch, and must outlive it too.
+    // outlive it. Where they vary, sideEmission holds the emission per side of all patches, W/m^2
+    // of the whole patch, and must outlive it too.
     MeshSource(const Patches& patches, std::vector<uint32_t> parents,
                const std::array<glm::vec3, 2>& emission,
                const std::vector<glm::vec3>* sideEmission = nullptr);
