@@ -22,9 +22,10 @@ def plain(reach: float, fine: float, cell: float, growth: float) -> Shape:
     outer = fine + np.cumsum(steps) * ((reach - fine) / sum(steps))
     inner = np.linspace(-fine, fine, int(round(2 * fine / cell)) + 1)
     lines = np.concatenate([-outer[::-1], inner, outer])
-    flat = grid((0, 0, 0), (1, 0, 0), (0, 1, 0), len(lines) - 1, len(lines) - 1)
-    x, y = np.meshgrid(lines, lines)
-    vertices = np.stack([x.reshape(-1), y.reshape(-1), np.zeros(x.size)], axis=1)
+    cells = len(lines) - 1
+    flat = grid((0, 0, 0), (cells, 0, 0), (0, cells, 0), cells, cells)
+    x, y = (np.interp(flat.vertices[:, axis], np.arange(len(lines)), lines) for axis in (0, 1))
+    vertices = np.stack([x, y, np.zeros(x.size)], axis=1)
     return Shape(vertices, [FaceBlock(block.corners) for block in flat.blocks])
 
 
