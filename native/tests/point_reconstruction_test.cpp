@@ -105,6 +105,21 @@ TEST(PointReconstruction, CoveredCornersKeepTheLeastSquares) {
     EXPECT_EQ(covered, 4u);
 }
 
+TEST(PointReconstruction, ACornerUnderASmallBoxIsNotBlack) {
+    // The box covers a corner of the ground and 1 % of its patch.
+    Scene scene;
+    place(scene, rectangle("ground", {0, 0, 0}, {4, 0, 0}, {0, 4, 0}), grey("", 0.5f));
+    place(scene, box("box", {-0.1f, -0.1f, 0}, {0.1f, 0.1f, 0.2f}, false), grey("", 0.5f),
+          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    scene.worldRadiance = glm::vec3(1);
+    Bake bake;
+    bake.settings.reconstruction = "POINT";
+    bake.settings.patchSize = 1;
+    bake.run(scene);
+    for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
+        EXPECT_NEAR(light.x, 1, 0.1f);
+}
+
 TEST(CornerReceivers, EachCornerOfEveryShapeHasOneInsideItsFace) {
     // A quad that is no parallelogram, a concave pentagon and a sliver, far from the origin,
     // mirrored, baked on the back.

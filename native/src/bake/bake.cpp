@@ -301,8 +301,8 @@ void Bake::runStages(const Scene& scene) {
         irradiance = sumOf(lights);
 
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
-        light = reconstruct(scene, patches, trace->visibility, lights, exposed, settings, progress,
-                            report);
+        light = reconstruct(scene, patches, trace->visibility, trace->touchDistance, lights,
+                            exposed, settings, progress, report);
         const std::vector<float> weight = exposedArea(patches, exposed);
         stateErrors(scene, tiles, instanceRanges(scene, patches),
                     meanOver(tiles, irradiance, weight),

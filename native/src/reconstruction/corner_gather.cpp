@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "transport/local_lines.h"
+
 namespace raybundle {
 namespace {
 
@@ -37,15 +39,24 @@ double meanLight(const Scene& scene, const Patches& patches,
 }  // namespace
 
 CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                           const SetLights& lights, const std::vector<InstanceRange>& ranges,
+                           float touchDistance, const SetLights& lights,
+                           const std::vector<InstanceRange>& ranges,
                            const std::vector<float>& exposed, const Settings& settings,
                            const Progress& progress)
     : scene(scene), ranges(ranges), exposed(exposed) {
+    // Whether another surface lies against the corner, though not against all of its patch.
+    auto isTouched = [&](const Receiver& receiver) {
+        const glm::vec3 normal = patches.normal(receiver.side);
+        float distance = 0;
+        const auto met = visibility.firstHit(receiver.side, *receiver.point, normal, &distance);
+        return met && isCovered(patches, receiver.side, *met, normal, distance, touchDistance);
+    };
     for (size_t i = 0; i < ranges.size(); ++i) {
         first.push_back(corners.size());
         if (scene.instances[i].role != RB_ROLE_BAKE) continue;
         for (CornerReceiver& corner : cornerReceivers(scene, patches, uint32_t(i), ranges[i]))
-            if (exposed[corner.receiver.side] > kHalfCovered) corners.push_back(std::move(corner));
+            if (exposed[corner.receiver.side] > kHalfCovered && !isTouched(corner.receiver))
+                corners.push_back(std::move(corner));
     }
     first.push_back(corners.size());
     for (size_t k = 0; k < lights.size(); ++k) {

@@ -23,11 +23,12 @@ namespace raybundle {
 class CornerGather {
   public:
     // Gathers the light of the sources, of all light sets. exposed: per side, the share of it that
-    // nothing covers. References must outlive the object.
+    // nothing covers; surfaces not further apart than touchDistance (m) touch. References must
+    // outlive the object.
     CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                 const SetLights& lights, const std::vector<InstanceRange>& ranges,
-                 const std::vector<float>& exposed, const Settings& settings,
-                 const Progress& progress);
+                 float touchDistance, const SetLights& lights,
+                 const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,
+                 const Settings& settings, const Progress& progress);
 
     // Light at the nodes of an instance, as interpolation has it, W/m^2.
     struct NodeLight {

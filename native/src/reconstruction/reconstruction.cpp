@@ -88,9 +88,10 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
 }
 
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const Visibility& visibility, const SetLights& lights,
-                                       const std::vector<float>& exposed, const Settings& settings,
-                                       const Progress& progress, Report& report) {
+                                       const Visibility& visibility, float touchDistance,
+                                       const SetLights& lights, const std::vector<float>& exposed,
+                                       const Settings& settings, const Progress& progress,
+                                       Report& report) {
     const bool isPoint = settings.reconstruction == "POINT";
     const std::vector<SideLight> onSides = sideLights(patches, lights);
     // Of the whole patch, what lets light through included.
@@ -100,8 +101,8 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
     std::optional<CornerGather> atCorners;
     if (isPoint)
-        atCorners.emplace(scene, patches, visibility, lights, ranges, exposed, settings,
-                          progress.part(0, 2));
+        atCorners.emplace(scene, patches, visibility, touchDistance, lights, ranges, exposed,
+                          settings, progress.part(0, 2));
 
     std::vector<InstanceLight> result(scene.instances.size());
     report.objects.resize(scene.instances.size());

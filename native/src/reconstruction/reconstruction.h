@@ -31,11 +31,12 @@ namespace raybundle {
 std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches);
 
 // Light of every instance, by all lights and by each light set; of those that only occlude, empty.
-// exposed: per side, the share of it that nothing covers. Adds the objects, warnings and skips to
-// the report.
+// exposed: per side, the share of it that nothing covers; surfaces not further apart than
+// touchDistance (m) touch. Adds the objects, warnings and skips to the report.
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const Visibility& visibility, const SetLights& lights,
-                                       const std::vector<float>& exposed, const Settings& settings,
-                                       const Progress& progress, Report& report);
+                                       const Visibility& visibility, float touchDistance,
+                                       const SetLights& lights, const std::vector<float>& exposed,
+                                       const Settings& settings, const Progress& progress,
+                                       Report& report);
 
 }  // namespace raybundle
