@@ -235,6 +235,22 @@ TEST(StatedError, NamesCoarseObjectsAndTheEdgesTheyNeed) {
 // The difference of two halves is small by chance now and then, and bundles stop just then. 5 % of
 // the bakes may be more than a quarter above what they state; if exactly 5 % are, more than 8 of 60
 // come with a probability of 0.3 %.
+TEST(StatedError, NamesTheWorstOfManyCoarseObjects) {
+    // Ten grounds in a row, each below a lamp of its own, brighter from one to the next.
+    Scene scene;
+    for (int k = 0; k < 10; ++k) {
+        const float x = 20.0f * float(k);
+        place(scene, grid("ground" + std::to_string(k), {x - 2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 2, 2),
+              grey("", 0));
+        scene.addLight(pointLight({x, 0, 0.5}, glm::dvec3(10 + k)));
+    }
+    const Json warnings = errorsOf(scene, 0.1f)["warnings"];
+    EXPECT_FALSE(mentions(warnings, "ground3"));
+    for (const char* name : {"ground4", "ground5", "ground6", "ground7", "ground8", "ground9"})
+        EXPECT_TRUE(mentions(warnings, name)) << name;
+    EXPECT_TRUE(mentions(warnings, "4 more objects are too coarse"));
+}
+
 TEST(StatedError, CoversTheNoiseOverManySeeds) {
     constexpr int kSeeds = 60, kMost = 8;
     const Scene scene = litRoom();

@@ -18,6 +18,8 @@ namespace {
 
 // A mesh is too coarse where its share of the error is above this, and above so many targets.
 constexpr double kCoarse = 0.05, kCoarseTargets = 2;
+// Objects that are named for it.
+constexpr size_t kMostNamed = 6;
 // Objects darker than this share of the mean square light are not worth a finer mesh.
 constexpr double kDark = 0.01;
 // An object of whose area less than this is known takes over the surplus of the others.
@@ -212,20 +214,36 @@ double edgeFor(double limit, double smoothShare, double stepShare, double patchE
     return low * patchEdge;
 }
 
-void warnOfCoarseMesh(const std::string& name, const Squares& s, double noiseScale, double limit,
-                      double smoothShare, double stepShare, Report& report) {
+// A mesh that is too coarse: its squared error, and what to say of it.
+using CoarseMesh = std::pair<double, std::string>;
+
+std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, double noiseScale,
+                                     double limit, double smoothShare, double stepShare) {
     const double mesh = std::sqrt(s.mesh(noiseScale) / s.signal);
-    if (mesh <= limit || s.cells == 0) return;
+    if (mesh <= limit || s.cells == 0) return std::nullopt;
     const double faceEdge = std::sqrt(s.cellArea / s.cells);
     const double patchEdge = std::sqrt(s.area / s.patches);
     const double edge = std::min(edgeFor(limit, smoothShare, stepShare, patchEdge), 0.5 * faceEdge);
-    report.warnings.push_back(
+    return CoarseMesh{
+        s.mesh(noiseScale),
         "object \"" + name + "\": its faces, " + inMetres(faceEdge) +
-        " wide in the mean, are too coarse for its light: interpolated over them it is " +
-        inPercent(mesh) + " off. Edges of about " + inMetres(edge) + " would bring that to " +
-        inPercent(limit) +
-        ": subdivide the mesh, or choose the topology SUBDIVIDE with patch_size " +
-        inMetres(0.5 * edge));
+            " wide in the mean, are too coarse for its light: interpolated over them it is " +
+            inPercent(mesh) + " off. Edges of about " + inMetres(edge) + " would bring that to " +
+            inPercent(limit) +
+            ": subdivide the mesh, or choose the topology SUBDIVIDE with patch_size " +
+            inMetres(0.5 * edge)};
+}
+
+// Names those whose error is largest.
+void warnOf(std::vector<CoarseMesh> meshes, Report& report) {
+    std::stable_sort(meshes.begin(), meshes.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    const size_t named = std::min(meshes.size(), kMostNamed);
+    for (size_t k = 0; k < named; ++k) report.warnings.push_back(std::move(meshes[k].second));
+    if (meshes.size() > named)
+        report.warnings.push_back(std::to_string(meshes.size() - named) +
+                                  " more objects are too coarse for their light: the report has "
+                                  "the error of each");
 }
 
 }  // namespace
@@ -250,6 +268,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
     const double limit = std::max(kCoarse, kCoarseTargets * double(targetError));
     double discretisation = 0;
+    std::vector<CoarseMesh> coarse;
     for (size_t i = 0; i < light.size(); ++i) {
         if (!errors[i]) continue;
         const Squares& own = errors[i]->squares();
@@ -259,8 +278,10 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         report.objects[i].error = relative(own, noiseScale, smooth + step);
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         if (own.signal / own.area > kDark * all.signal / all.area)
-            warnOfCoarseMesh(light[i].name, own, noiseScale, limit, smooth, step, report);
+            if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
+                coarse.push_back(std::move(*mesh));
     }
+    warnOf(std::move(coarse), report);
     report.error = relative(all, noiseScale, discretisation);
     report.error.noise = report.estimatedError;
 }
