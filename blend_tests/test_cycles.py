@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import raybundle
 from benchmark import SurfaceReference
+from cycles_comparison import square
 from cycles_reference import bake_objects, bakeable_objects, load
 from surface_error import (SurfaceError, corner_areas, face_means, face_sizes, is_defined,
                            off_contact_edges, read_colors, surface_error)
@@ -161,15 +162,6 @@ NOISE_LIMIT = 0.01
 BLOCK_TOLERANCE = 0.03
 # Noise cancels in the mean over the receiver, a wrong unit does not.
 MEAN_TOLERANCE = 0.01
-
-
-def square(size: float, cells: int) -> tuple[list, list]:
-    """Vertices, row by row, and faces of a square about the origin that looks up."""
-    steps = np.linspace(-size / 2, size / 2, cells + 1)
-    row = cells + 1
-    return ([(x, y, 0.0) for y in steps for x in steps],
-            [(i, i + 1, i + row + 1, i + row)
-             for j in range(cells) for i in range(j * row, j * row + cells)])
 
 
 def block_means(item: bpy.types.Object, corners: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 import pytest
 import raybundle
+from cycles_comparison import square
 from cycles_reference import ATTRIBUTE, bake_objects, corner_values, prepare_scene, target_attribute
 from surface_error import face_means, read_colors
 
@@ -28,14 +29,6 @@ NOISE = 0.003
 MEAN_TOLERANCE, QUARTER_TOLERANCE = 0.01, 0.02
 CELLS = 16  # of the floor, along an edge
 TARGET_ERROR = 0.005
-
-
-def grid(size, cells):
-    steps = np.linspace(-size / 2, size / 2, cells + 1)
-    row = cells + 1
-    return ([(x, y, 0.0) for y in steps for x in steps],
-            [(i, i + 1, i + row + 1, i + row)
-             for j in range(cells) for i in range(j * row, j * row + cells)])
 
 
 class Tree:
@@ -193,7 +186,7 @@ VARYING = (image, color_attribute, noise_by_generated, checker_by_object, ramp_o
 
 @pytest.fixture
 def floor(new_object, new_material):
-    return new_object("Floor", *grid(2.0, CELLS), new_material("White", (0.8, 0.8, 0.8)))
+    return new_object("Floor", *square(2.0, CELLS), new_material("White", (0.8, 0.8, 0.8)))
 
 
 def quarters(item, corners):
@@ -249,7 +242,7 @@ def corner_positions(item):
 def place_canopy(new_object, build):
     tree = Tree()
     # Its corners run from -1 to 1, as do its UVs from 0 to 1.
-    canopy = new_object("Canopy", *grid(2.0, 20), tree.finish(build(tree)), (0.0, 0.0, 1.0))
+    canopy = new_object("Canopy", *square(2.0, 20), tree.finish(build(tree)), (0.0, 0.0, 1.0))
     canopy.rotation_euler, canopy.scale = (np.pi, 0.0, 0.0), (1.5, 1.5, 1.0)
     positions = corner_positions(canopy)
     layer = canopy.data.uv_layers.new(name="UVMap")
