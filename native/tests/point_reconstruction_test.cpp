@@ -51,6 +51,26 @@ double lampIrradiance(const glm::vec3& point) {
     return polygonIrradiance(point, {0, 0, 1}, lamp, 4);
 }
 
+TEST(PointReconstruction, SmallBoxesInVastScenesHaveNoDarkEdges) {
+    // Rays start behind their surface by more than the corners' receivers lie inside it: behind the
+    // next face of the box, which they must not meet.
+    Scene scene;
+    place(scene, box("box", {0, 0, 1}, {0.1f, 0.1f, 1.1f}, false), grey("", 0));
+    place(scene, rectangle("plain", {-1000, -1000, 0}, {2000, 0, 0}, {0, 2000, 0}), grey("", 0),
+          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    const glm::dvec3 sun = glm::normalize(glm::dvec3(1, 2, 3));
+    scene.addLight(sunLight(sun, {4, 4, 4}));
+    const Mesh& mesh = scene.meshes[0];
+    forEachCorner(scene, PointBake(scene), [&](const glm::vec3&, size_t c, double found) {
+        const int32_t* face = &mesh.cornerVertices[c / 4 * 4];
+        const glm::dvec3 origin(mesh.vertices[size_t(face[0])]);
+        const glm::dvec3 normal =
+            glm::normalize(glm::cross(glm::dvec3(mesh.vertices[size_t(face[1])]) - origin,
+                                      glm::dvec3(mesh.vertices[size_t(face[3])]) - origin));
+        EXPECT_NEAR(found, 4 * std::max(0.0, glm::dot(normal, sun)), 1e-3) << "corner " << c;
+    });
+}
+
 TEST(PointReconstruction, CornersHaveTheLightAtThemselves) {
     const Scene scene = groundBelowLamp();
     forEachCorner(scene, PointBake(scene), [](const glm::vec3& at, size_t, double found) {

@@ -118,9 +118,11 @@ struct Start {
     bool isFront;      // the ray leaves the front of the parent
     glm::vec3 normal;  // of the side
     float zone;        // height over the side within which a hit coincides with it, metres
+    float behind;      // how far behind the surface the ray starts, metres along it
 };
 
-// Lets a ray pass the surface that it starts on, and what coincides with it on its other side.
+// Lets a ray pass the surface that it starts on, what coincides with it on its other side, and what
+// it meets behind: the next face of a box whose edge is near.
 bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction, float distance) {
     if (other == start.parent) return true;
     const float height = distance * glm::dot(direction, start.normal);
@@ -128,6 +130,7 @@ bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction,
     const Patches& patches = *start.passage.patches;
     const Parent& a = patches.parents[start.parent];
     const Parent& b = patches.parents[other];
+    if (distance < start.behind && !areParallel(a, b)) return true;
     const float turn = glm::dot(glm::cross(b.a, b.b), direction);
     // Faces of one object that the ray crosses the same way lie beside its start; of others, those
     // that coincide with it may lie behind it.
@@ -206,11 +209,13 @@ struct Visibility::FromSide : Start {
         isFront = side % 2 == 0;
         normal = patches.normal(side);
         zone = 2 * visibility.surfaceOffset;
+        behind = 0;
     }
     // Rays start this much behind the surface, so that they meet what coincides with it.
     // Behind along the ray and not along the normal: the ray still passes through the point.
-    glm::vec3 origin(const glm::vec3& point, const glm::vec3& direction) const {
-        return point - direction * (0.5f * zone / std::max(0.01f, glm::dot(direction, normal)));
+    glm::vec3 origin(const glm::vec3& point, const glm::vec3& direction) {
+        behind = 0.5f * zone / std::max(0.01f, glm::dot(direction, normal));
+        return point - behind * direction;
     }
 };
 
@@ -291,12 +296,13 @@ uint32_t Visibility::sideOf(uint32_t parent, const glm::vec3& point,
 }
 
 std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& point,
-                                             const glm::vec3& direction, float* distance) const {
+                                             const glm::vec3& direction, float* distance,
+                                             float farthest) const {
     FromSide start(*this, side);
     const glm::vec3 origin = start.origin(point, direction);
     if (!patches.opacity.empty()) start.passage.line = lineName(origin, direction);
     RTCRayHit query{};
-    setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
+    setRay(query.ray, origin, direction, farthest + start.behind);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(embree->scene, &start.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;

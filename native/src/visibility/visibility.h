@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -44,9 +45,11 @@ class Visibility {
     }
 
     // The patch side that a ray from a side meets first, if any, and how far from the point. Of
-    // surfaces that coincide there, it meets the one that comesBefore.
+    // surfaces that coincide there, it meets the one that comesBefore. farthest: how far to look,
+    // metres.
     std::optional<uint32_t> firstHit(uint32_t side, const glm::vec3& point,
-                                     const glm::vec3& direction, float* distance = nullptr) const;
+                                     const glm::vec3& direction, float* distance = nullptr,
+                                     float farthest = std::numeric_limits<float>::infinity()) const;
 
     // The same for origins that lie on no surface, or at least `offset` off it.
     std::optional<uint32_t> firstHit(const glm::vec3& origin, const glm::vec3& direction,
