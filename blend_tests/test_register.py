@@ -14,7 +14,7 @@ GROUPS = (properties.RaybundleSceneSettings, properties.RaybundleObjectSettings)
 
 # Names that scripts use; see the interfaces in docs.
 SCENE_PROPERTIES = """scope target_error output attribute domain data_type topology shared_meshes
-    patch_size max_patches refine solver first_shot directions projector small_patches
+    patch_size max_patches refine contacts solver first_shot directions projector small_patches
     reconstruction final_gather plane_count plane_placement local_rays estimator max_bundles
     lines_per_bundle memory_limit seed threads report""".split()
 OPERATORS = ("bake", "relight", "clear", "preview")

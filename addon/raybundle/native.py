@@ -56,6 +56,7 @@ SETTINGS: dict[str, type] = {
     'patch_size': float,
     'max_patches': int,
     'refine': int,
+    'contacts': int,
     'min_bundles': int,
     'max_bundles': int,
     'lines_per_bundle': int,

@@ -75,6 +75,7 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
         layout.prop(settings, "topology")
         layout.prop(settings, "patch_size")
         layout.prop(settings, "refine")
+        layout.prop(settings, "contacts")
 
 
 class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):

@@ -200,6 +200,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         description="Smaller patches at the edges of shadows, where what that gains is worth the "
                     "time",
         default=False)
+    contacts: BoolProperty(
+        name="Contacts",
+        description="Smaller patches beside gaps that are narrower than a patch, as on a table "
+                    "below the rim of a plate",
+        default=True)
     solver: EnumProperty(
         name="Solver", description="How light is passed on between surfaces", items=enum_solver,
         default='LINE_REUSE')
@@ -294,6 +299,7 @@ class BakeSettings:
     patch_size: float
     max_patches: int
     refine: bool
+    contacts: bool
     solver: str
     estimator: str
     first_shot: str

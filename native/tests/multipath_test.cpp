@@ -21,6 +21,7 @@ struct MultipathBake : Bake {
         settings.solver = solver;
         settings.directions = directions;
         settings.patchSize = patchSize;
+        settings.contacts = 0;  // the same patches for all solvers
         settings.minBundles = settings.maxBundles = bundleCount;
         settings.targetError = 1e-5f;
         settings.seed = seed;

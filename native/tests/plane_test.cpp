@@ -302,6 +302,7 @@ TEST(Planes, FurnacesAreExact) {
         // So many that lines of both halves meet all sides. (The solver stops at a share of the
         // stated error, to which sides add that no line of a half met.)
         setQuick(bake, 512);
+        bake.settings.contacts = 0;
         bake.settings.projector = kind.row;
         bake.settings.planePlacement = kind.placement == PlanePlacement::STRATIFIED ? "STRATIFIED"
                                        : kind.placement == PlanePlacement::SYSTEMATIC

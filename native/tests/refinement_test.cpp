@@ -209,6 +209,7 @@ TEST(Refinement, IsTheSameForAnyNumberOfThreads) {
 void bakeRefined(Bake& bake, const Scene& scene, int threads = 0) {
     setQuick(bake);
     bake.settings.refine = 1;
+    bake.settings.contacts = 0;
     bake.settings.threads = threads;
     // The bundles are given; a low target makes cuts worth it.
     bake.settings.targetError = 0.003f;

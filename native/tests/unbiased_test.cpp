@@ -117,6 +117,7 @@ TEST_P(Unbiased, InARoomWithTwoBoxes) {
     static const std::vector<double> exact = [&] {
         Bake bake;
         setMethod(bake, {"", {{"directions", "LOW_DISCREPANCY"}}, 16384}, 0.8f, 999);
+        bake.settings.contacts = 0;  // the same patches for all methods
         bake.run(scene);
         return groupMeans(bake, objects, objectOf);
     }();

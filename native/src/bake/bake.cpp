@@ -16,6 +16,7 @@
 #include "bake/combination.h"
 #include "bake/geometry_hash.h"
 #include "bake/window_noise.h"
+#include "patches/contacts.h"
 #include "patches/refinement.h"
 #include "patches/reflectance.h"
 #include "reconstruction/reconstruction.h"
@@ -28,6 +29,8 @@ namespace {
 // Pixels per mean patch area. The time to 2 % noise is flat from 1 to 4, with its least here
 // (cornell_box and big_room, 5 seeds).
 constexpr float kPixelsPerPatch = 2.0f;
+// The same outside of windows of finer pixels: most lines are to be in the windows.
+constexpr float kPixelsPerPatchAround = 0.25f;
 constexpr int kMaxPlanePixels = 4096;  // along the scene's diameter
 // Surfaces not further apart than these shares of the scene's radius and of a patch touch.
 constexpr float kTouchOfRadius = 1e-4f;
@@ -35,7 +38,7 @@ constexpr float kTouchOfPatch = 0.02f;
 // Relative residual of the last solve: a share of the noise, within these bounds.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 // The lines' noise on the patches of any one window may be this many times the target.
-constexpr double kWindowTargets = 2;
+constexpr double kWindowTargets = 1.4;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 
 class Stopwatch {
@@ -194,7 +197,7 @@ struct Bake::Trace {
         density.pixelSize = pixelSize(patches, settings.linesPerBundle);
         // Small patches get windows of finer pixels.
         if (settings.hasLineWindows())
-            density = densityByDetail(patches, density.pixelSize, kPixelsPerPatch,
+            density = densityByDetail(patches, density.pixelSize, kPixelsPerPatchAround,
                                       2 * patches.radius / kMaxPlanePixels);
     }
 
@@ -340,36 +343,52 @@ void Bake::makePatches(const Scene& scene, Report& report) {
 // Cuts the patches where that pays. Returns the coarse shot of each light set, for the first shot
 // to go on with; empty if it is to make its own.
 std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
-    // Other first shots see no shadows' edges, and other solvers follow the lines of single
-    // patches: smaller ones are noisier.
-    if (!settings.refine || settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER")
-        return {};
+    // Other solvers follow the lines of single patches and other first shots meet them with rays:
+    // smaller ones are noisier.
+    if (settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER") return {};
     Patches& patches = trace->patches;
+    Cuts cuts;
+    if (settings.contacts) {
+        Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
+        cuts = contactCuts(patches, trace->visibility, trace->touchDistance,
+                           size_t(settings.maxPatches));
+    }
     std::vector<CoarseShot> shots;
-    {
-        Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
-        std::vector<uint32_t> all(patches.sideCount());
-        std::iota(all.begin(), all.end(), 0u);
-        for (int32_t set = kNoLightSet; set < int32_t(scene.lightSets.size()); ++set) {
-            const DirectLight direct(scene, patches, trace->visibilityOfLights(),
-                                     uint32_t(settings.seed), set);
-            CoarseShot shot{std::vector<Gathered>(all.size()), {}};
-            direct.shootCoarsely(
-                shot, all,
-                [&](size_t side) {
-                    return Receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
-                                    uint32_t(side)};
-                },
-                [&](double done) { progress.report(RB_STAGE_FIRST_SHOT, done); });
-            shots.push_back(std::move(shot));
-        }
+    if (settings.refine) {
+        shots = shootCoarsely(scene, report);
+        Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
+        const size_t most =
+            size_t(settings.maxPatches) - std::min(size_t(settings.maxPatches), cuts.morePatches());
+        cuts.add(worthwhileCuts(scene, patches, shots, most, settings.targetError));
     }
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
-    const Cuts cuts =
-        worthwhileCuts(scene, patches, shots, size_t(settings.maxPatches), settings.targetError);
     if (cuts.count() > 0) cutTiles(scene, patches, cuts.levels);
-    trace->cuts = {{"edge of a shadow", cuts.shadowEdges},
+    trace->cuts = {{"narrow gap", cuts.contacts},
+                   {"edge of a shadow", cuts.shadowEdges},
                    {"light that bends within the patch", cuts.bentLight}};
+    return shots;
+}
+
+// A few shadow rays from each tile, for each light set.
+std::vector<CoarseShot> Bake::shootCoarsely(const Scene& scene, Report& report) {
+    Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
+    const Patches& patches = trace->patches;
+    std::vector<uint32_t> all(patches.sideCount());
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<CoarseShot> shots;
+    for (int32_t set = kNoLightSet; set < int32_t(scene.lightSets.size()); ++set) {
+        const DirectLight direct(scene, patches, trace->visibilityOfLights(),
+                                 uint32_t(settings.seed), set);
+        CoarseShot shot{std::vector<Gathered>(all.size()), {}};
+        direct.shootCoarsely(
+            shot, all,
+            [&](size_t side) {
+                return Receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
+                                uint32_t(side)};
+            },
+            [&](double done) { progress.report(RB_STAGE_FIRST_SHOT, done); });
+        shots.push_back(std::move(shot));
+    }
     return shots;
 }
 

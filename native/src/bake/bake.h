@@ -54,6 +54,7 @@ class Bake {
     void runStages(const Scene& scene);
     void makePatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);
+    std::vector<CoarseShot> shootCoarsely(const Scene& scene, Report& report);
     SetLights shootSources(const Scene& scene, const std::vector<CoarseShot>& coarse,
                            Report& report);
     SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, SetLights& lights,

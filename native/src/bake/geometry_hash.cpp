@@ -78,8 +78,9 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
         hasher.add(&visibility, sizeof(visibility));
     }
     hasher.add(&settings.patchSize, sizeof(float));
-    for (int value : {settings.maxPatches, settings.refine, settings.linesPerBundle, settings.seed,
-                      settings.planeCount, settings.planeCoherence, int(settings.hasLineWindows())})
+    for (int value : {settings.maxPatches, settings.refine, settings.contacts,
+                      settings.linesPerBundle, settings.seed, settings.planeCount,
+                      settings.planeCoherence, int(settings.hasLineWindows())})
         hasher.add(&value, sizeof(value));
     for (const std::string* name : {&settings.solver, &settings.directions, &settings.projector,
                                     &settings.smallPatches, &settings.planePlacement})

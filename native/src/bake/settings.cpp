@@ -23,6 +23,7 @@ const std::vector<Number<int>>& integers() {
         {"min_bundles", &Settings::minBundles, 2, 1 << 24},
         {"max_bundles", &Settings::maxBundles, 2, 1 << 24},
         {"refine", &Settings::refine, 0, 1},
+        {"contacts", &Settings::contacts, 0, 1},
         {"lines_per_bundle", &Settings::linesPerBundle, 0, 1 << 26},
         {"seed", &Settings::seed, 0, INT32_MAX},
         {"threads", &Settings::threads, 0, 1024},

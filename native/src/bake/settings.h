@@ -13,7 +13,8 @@ struct Settings {
     float targetError = 0.02f;  // relative noise at which bundles stop
     float patchSize = 0;        // metres; 0 = automatic
     int maxPatches = 100000;
-    int refine = 0;  // 1: patches smaller than patchSize where that pays
+    int refine = 0;    // 1: patches smaller than patchSize where that pays
+    int contacts = 1;  // 1: patches smaller than patchSize beside narrow gaps
     int minBundles = 64;
     int maxBundles = 4096;
     int linesPerBundle = 0;    // 0 = automatic

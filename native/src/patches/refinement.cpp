@@ -119,7 +119,8 @@ Cuts worthwhileCuts(const Scene& scene, const Patches& patches,
     std::stable_sort(order.begin(), order.end(),
                      [&](uint32_t a, uint32_t b) { return marks[a].gain > marks[b].gain; });
     order.resize(std::min(order.size(), (maxPatches - tiles) / kMorePatches));
-    Cuts cuts{std::vector<uint8_t>(tiles, 0), 0, 0};
+    Cuts cuts;
+    cuts.levels.assign(tiles, 0);
     double gain = 0;
     for (uint32_t tile : order) {
         cuts.levels[tile] = kLevel;

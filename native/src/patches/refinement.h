@@ -13,8 +13,8 @@
 // of the noise, which are those of the target, down by 2 * kNoiseSlope (bake/noise.h) * 3 * c of
 // them: with c = 1/2 that is the square of 1.4 targets.
 //
-// Contacts are cut only where the sources' light shows them. Marking them by short rays, as well
-// cut twice, made no difference in any scene that was worth the rays.
+// Contacts are cut only where the sources' light shows them; narrow gaps are cut for themselves
+// (patches/contacts.h).
 //
 // Sources: the marks are those of hierarchical radiosity: Cohen, Greenberg, Immel, Brock, "An
 // Efficient Radiosity Approach for Realistic Image Synthesis" (1986); Hanrahan, Salzman, Aupperle,
@@ -28,19 +28,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "patches/cuts.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
 #include "transport/direct_light.h"
 
 namespace raybundle {
-
-struct Cuts {
-    std::vector<uint8_t> levels;  // per tile: how often to halve its edges; empty without cuts
-    size_t shadowEdges = 0;       // tiles that are cut for a shadow's edge
-    size_t bentLight = 0;         // and those for light that bends within them
-
-    size_t count() const { return shadowEdges + bentLight; }
-};
 
 // The cuts of an uncut subdivision that pay. shots: of all sides, of each light set. At most
 // maxPatches patches come out, the most worthwhile cuts first. targetError: relative.

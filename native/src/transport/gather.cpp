@@ -24,8 +24,10 @@ FirstShot gather(const FirstShotInput& input) {
     auto receiverAt = [&](size_t side) {
         Receiver receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
                           uint32_t(side)};
-        // Most of the error of a cut tile's patches is not in its mean.
-        receiver.errorFactor = std::ldexp(1.0f, 2 * patches.level(uint32_t(side / 2)));
+        // Most of the error of a cut tile's patches is not in its mean, which keeps twice what
+        // other tiles have.
+        if (const int level = patches.level(uint32_t(side / 2)); level > 0)
+            receiver.errorFactor = std::ldexp(1.0f, level);
         return receiver;
     };
     CoarseShot coarse;

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/contacts.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "transport/sobol.h"
+#include "transport/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+// More would leave patches that few lines meet.
+constexpr int kMostLevel = 2;
+// Rays from each side, one in each quarter of it.
+constexpr uint32_t kFirstRays = 4;
+// Rays that tell whether a tile is near another surface in part.
+constexpr uint32_t kRays = 16;
+// Patches that the cuts may add: as many as there are tiles, or so many.
+constexpr size_t kMostMore = 40000;
+
+class Gaps {
+  public:
+    Gaps(const Patches& patches, const Visibility& visibility, float touchDistance)
+        : patches(patches),
+          visibility(visibility),
+          touchDistance(touchDistance),
+          least(patches.sideCount()) {
+        for (std::atomic<float>& gap : least) gap = INFINITY;
+    }
+
+    // Looks from each side what lies nearer than it or what it meets is wide.
+    void find() {
+        tbb::parallel_for(uint32_t(0), uint32_t(patches.sideCount()), [&](uint32_t side) {
+            if (!counts(side)) return;
+            for (uint32_t i = 0; i < kFirstRays; ++i) {
+                const glm::vec4 u = sobolPoint(i, hash(side, 0));
+                uint32_t met = 0;
+                const auto gap = gapAt(side, u, patches.normal(side), patches.size, &met);
+                if (!gap) continue;
+                if (*gap < width(side)) note(side, *gap);
+                if (*gap < width(met)) note(met, *gap);
+            }
+        });
+    }
+
+    // How often the edges of a side's tile are to be halved.
+    int level(uint32_t side) const {
+        const float gap = least[side];
+        if (std::isinf(gap)) return 0;
+        uint32_t near = 0;
+        for (uint32_t i = 0; i < kRays; ++i) {
+            const glm::vec4 u = sobolPoint(i, hash(side, 1));
+            const glm::vec3 direction = cosineDirection(patches.normal(side), {u.z, u.w});
+            if (gapAt(side, u, direction, width(side))) ++near;
+        }
+        if (near == 0 || near == kRays) return 0;
+        return std::min(kMostLevel, int(std::ceil(std::log2(width(side) / gap))));
+    }
+
+  private:
+    bool counts(uint32_t side) const {
+        const Parent& parent = patches.parentAt(side);
+        return parent.exchanges && !(parent.isSolid && side % 2 == 1);
+    }
+    float width(uint32_t side) const { return std::sqrt(patches.area[side / 2]); }
+
+    // From a point of a side to what is not too far in a direction, metres; none to what touches
+    // it.
+    std::optional<float> gapAt(uint32_t side, const glm::vec4& u, const glm::vec3& direction,
+                               float farthest, uint32_t* met = nullptr) const {
+        float distance = 0;
+        const auto hit = visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}), direction,
+                                             &distance, farthest);
+        if (!hit || distance <= touchDistance) return std::nullopt;
+        if (met) *met = *hit;
+        return distance;
+    }
+
+    void note(uint32_t side, float gap) {
+        float before = least[side];
+        while (gap < before && !least[side].compare_exchange_weak(before, gap)) {
+        }
+    }
+
+    const Patches& patches;
+    const Visibility& visibility;
+    const float touchDistance;
+    std::vector<std::atomic<float>> least;  // per side, metres
+};
+
+}  // namespace
+
+Cuts contactCuts(const Patches& patches, const Visibility& visibility, float touchDistance,
+                 size_t maxPatches) {
+    const size_t tiles = patches.count();
+    if (maxPatches <= tiles) return {};
+    Gaps gaps(patches, visibility, touchDistance);
+    gaps.find();
+    Cuts cuts;
+    cuts.levels.assign(tiles, 0);
+    tbb::parallel_for(uint32_t(0), uint32_t(tiles), [&](uint32_t tile) {
+        cuts.levels[tile] = uint8_t(std::max(gaps.level(2 * tile), gaps.level(2 * tile + 1)));
+    });
+    const size_t most = std::min(maxPatches - tiles, std::max(tiles, kMostMore));
+    while (cuts.morePatches() > most)
+        for (uint8_t& level : cuts.levels) level = uint8_t(std::max(0, level - 1));
+    for (uint8_t level : cuts.levels) cuts.contacts += level > 0;
+    if (cuts.contacts == 0) return {};
+    return cuts;
+}
+
+}  // namespace raybundle

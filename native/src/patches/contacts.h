@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Contacts: tiles that lie nearer to another surface than they are wide, and only in part, as a
+// table under the rim of a plate or under a knife. What such a tile sends into the gap is not its
+// mean light, and what it gets is not the same all over it; so it is cut to the width of the gap, or
+// into sixteen. Only the geometry says so, and not the light: light sets baked together have the
+// same cuts as baked alone. (Surfaces that touch have no gap; there the exposed share of a patch counts.)
+//
+// Source: the contact test of adaptive radiosity, as in the disk approximations that fail where
+// "distance is less than size" (Cohen and Wallace, "Radiosity and Realistic Image Synthesis",
+// 1993, section 4.11).
+// Differs: found by single rays along the normals, from the small surface to the large one and
+// back, instead of by the form factors of pairs.
+#pragma once
+
+#include <cstddef>
+
+#include "patches/cuts.h"
+#include "patches/patches.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// The cuts of an uncut subdivision at contacts. Surfaces not further apart than touchDistance
+// (metres) touch. At most maxPatches patches come out; where that is not enough, all cuts are
+// coarser.
+Cuts contactCuts(const Patches& patches, const Visibility& visibility, float touchDistance,
+                 size_t maxPatches);
+
+}  // namespace raybundle
