@@ -15,14 +15,14 @@ namespace {
 constexpr double kStarvedPixels = 1.0 / 8, kLeastStarvedShare = 0.1;
 // A patch belongs into the next level while it has fewer pixels than this. A whole window gets
 // finer only for this share of the patches that it was made for.
-constexpr double kFewPixels = 0.25, kLeastFinerShare = 0.2;
+constexpr double kFewPixels = 0.35, kLeastFinerShare = 0.2;
 // Pixels of all windows along a direction, in the mean: finer levels are left out beyond it.
 constexpr double kMostWindowPixels = 1 << 17;
 constexpr size_t kMostWindows = 24, kLeastPatches = 64;
 // What a window costs besides its pixels, in pixels: looking whether the parents meet it.
 constexpr double kWindowCost = 500, kParentCost = 1.0 / 32;
 constexpr double kWorthSplitting = 0.97;  // share of the cost that splitting must come below
-constexpr double kAlmostAll = 0.6;       // a window with so much of the one around replaces it
+constexpr double kAlmostAll = 0.6;        // a window with so much of the one around replaces it
 constexpr int kBins = 16;
 // The counts' bits: lines of the largest patch in the finest pixels, times the bundles.
 constexpr double kMostUnits = double(1u << 31) / kMostWindowBundles;

@@ -11,6 +11,8 @@
 namespace raybundle {
 namespace {
 
+float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
+
 // A corner whose patch is covered by more than this gathers no light itself.
 constexpr float kHalfCovered = 0.5f;
 
@@ -48,15 +50,22 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
         float distance = 0;
-        const auto met = visibility.firstHit(receiver.side, *receiver.point, normal, &distance);
+        const auto met = visibility.firstHit(receiver.side, *receiver.point, normal, &distance,
+                                             2 * touchDistance);
         return met && isCovered(patches, receiver.side, *met, normal, distance, touchDistance);
     };
     for (size_t i = 0; i < ranges.size(); ++i) {
         first.push_back(corners.size());
         if (scene.instances[i].role != RB_ROLE_BAKE) continue;
-        for (CornerReceiver& corner : cornerReceivers(scene, patches, uint32_t(i), ranges[i]))
-            if (exposed[corner.receiver.side] > kHalfCovered && !isTouched(corner.receiver))
-                corners.push_back(std::move(corner));
+        const std::vector<CornerReceiver> all =
+            cornerReceivers(scene, patches, uint32_t(i), ranges[i]);
+        std::vector<uint8_t> isFree(all.size());
+        tbb::parallel_for(size_t(0), all.size(), [&](size_t c) {
+            const Receiver& receiver = all[c].receiver;
+            isFree[c] = exposed[receiver.side] > kHalfCovered && !isTouched(receiver);
+        });
+        for (size_t c = 0; c < all.size(); ++c)
+            if (isFree[c]) corners.push_back(all[c]);
     }
     first.push_back(corners.size());
     for (size_t k = 0; k < lights.size(); ++k) {
@@ -66,7 +75,7 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
             [&](double done) { part.report(RB_STAGE_RECONSTRUCTION, done); }));
         const double mean = meanLight(scene, patches, ranges, exposed, lights[k].irradiance);
         if (settings.finalGather && mean > 0)
-            others.emplace_back(patches, visibility, lights[k], float(mean) * settings.targetError);
+            others.emplace_back(patches, visibility, lights[k], float(mean), settings.targetError);
     }
 }
 
@@ -75,16 +84,25 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
     const size_t begin = first[instance], end = first[instance + 1];
     if (k < others.size()) {
         const FinalGather& gather = others[k];
-        const std::vector<bool> wanted =
+        std::vector<bool> wanted =
             gather.isWanted(ranges[instance], regions, scene.instances[instance].side, exposed,
                             light.carried, light.indirect);
         std::vector<size_t> cornersOf(regions.nodeCount, 0);
         for (size_t c = begin; c < end; ++c) ++cornersOf[regions.nodeOf[corners[c].corner]];
+        std::vector<uint8_t> isNear(end - begin);
+        tbb::parallel_for(begin, end, [&](size_t c) {
+            isNear[c - begin] =
+                !wanted[regions.nodeOf[corners[c].corner]] && gather.isNear(corners[c].receiver);
+        });
+        for (size_t c = begin; c < end; ++c)
+            if (isNear[c - begin]) wanted[regions.nodeOf[corners[c].corner]] = true;
         std::vector<FinalGather::Light> found(end - begin);
         tbb::parallel_for(begin, end, [&](size_t c) {
             const uint32_t node = regions.nodeOf[corners[c].corner];
             if (wanted[node])
-                found[c - begin] = gather.gather(corners[c].receiver, cornersOf[node]);
+                found[c - begin] = gather.gather(
+                    corners[c].receiver, brightest(light.direct[node] + light.indirect[node]),
+                    cornersOf[node]);
         });
         auto replace = [&](auto part, std::vector<glm::vec3>& values) {
             const auto means = nodeMeans(instance, regions, cornerAngles,

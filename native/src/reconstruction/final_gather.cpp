@@ -14,31 +14,41 @@ namespace {
 
 // Sobol sets, each with its own shift, and rays of each: at first and at most.
 constexpr uint32_t kSets = 8, kFirstRays = 16, kMostRays = 256;
+// So many patches on a face tell whether interpolation follows them.
+constexpr uint32_t kTellingPatches = 4;
+// Rays that look for surfaces nearer than patches are wide.
+constexpr uint32_t kNearRays = 8;
+// What is so many lengths of the receiver's patch away may light its ends differently.
+constexpr float kNearLengths = 2;
 // The standard error of what is gathered, and how far interpolation may be off the light around,
 // as shares of the error.
-constexpr float kNoiseShare = 0.5f, kInterpolationShare = 1;
+constexpr float kNoiseShare = 0.75f, kInterpolationShare = 1;
 
 double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 
 }  // namespace
 
 FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
-                         const SetLight& light, float error)
+                         const SetLight& light, float meanLight, float targetError)
     : patches(patches),
       visibility(visibility),
       light(light),
       emission(light.direct.bundledEmission()),
       reflected(patches.sideCount()),
       world(glm::pi<float>() * light.worldRadiance),
-      error(error) {
+      targetError(targetError),
+      error(targetError * meanLight) {
     for (size_t side = 0; side < reflected.size(); ++side)
         reflected[side] = patches.reflectance[side] *
                           (light.irradiance.direct[side] + light.irradiance.indirect[side]);
 }
 
-FinalGather::Light FinalGather::gather(const Receiver& receiver, size_t receivers) const {
+FinalGather::Light FinalGather::gather(const Receiver& receiver, float brightness,
+                                       size_t receivers) const {
     const glm::vec3 side = patches.normal(receiver.side);
-    const double tolerance = double(receivers) * std::pow(double(kNoiseShare * error), 2);
+    const double tolerance =
+        double(receivers) *
+        std::pow(double(kNoiseShare * std::max(error, targetError * brightness)), 2);
     std::array<Light, kSets> sums{};
     Light mean;
     for (uint32_t done = 0, wanted = kFirstRays; done < kMostRays; wanted *= 2) {
@@ -48,9 +58,19 @@ FinalGather::Light FinalGather::gather(const Receiver& receiver, size_t receiver
                 const glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
                 // Below a face that is shaded as if it were bent.
                 if (glm::dot(direction, side) <= 0) continue;
-                const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction);
+                float distance = 0;
+                const auto hit =
+                    visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
                 sums[set].carried += hit ? emission[*hit] : world;
-                if (hit) sums[set].reflected += reflected[*hit];
+                if (!hit) continue;
+                sums[set].reflected += reflected[*hit];
+                if (distance >= width(*hit)) continue;
+                const Receiver met{*hit, patches.normal(*hit),
+                                   *receiver.point + distance * direction,
+                                   hash(receiver.seed, kSets + set)};
+                sums[set].reflected +=
+                    patches.reflectance[*hit] *
+                    (light.direct.sample(met, i) - light.irradiance.gathered[*hit]);
             }
         const Light before = mean;
         mean = {};
@@ -69,6 +89,24 @@ FinalGather::Light FinalGather::gather(const Receiver& receiver, size_t receiver
     }
     return mean;
 }
+
+bool FinalGather::isNear(const Receiver& receiver) const {
+    const Parent& parent = patches.parentAt(receiver.side);
+    if (parent.patchCount() >= kTellingPatches) return false;
+    const float longest = std::ldexp(
+        std::max(glm::length(parent.a) / parent.countA, glm::length(parent.b) / parent.countB),
+        -patches.level(receiver.side / 2));
+    for (uint32_t i = 0; i < kNearRays; ++i) {
+        const glm::vec4 u = sobolPoint(i, hash(receiver.seed, 0));
+        const glm::vec3 direction = cosineDirection(patches.normal(receiver.side), {u.x, u.y});
+        float distance = 0;
+        const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
+        if (hit && distance < std::max(width(*hit), kNearLengths * longest)) return true;
+    }
+    return false;
+}
+
+float FinalGather::width(uint32_t side) const { return std::sqrt(patches.area[side / 2]); }
 
 std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const SmoothRegions& regions,
                                         rb_side side, const std::vector<float>& exposed,

@@ -9,8 +9,11 @@
 // blur.
 // Differs:
 // - Light of the sources is left out: DirectLight gathers it better.
-// - Only where the interpolation leaves the light of the patches around: elsewhere it is nearer to
-//   the truth than rays are, whose noise differs from point to point.
+// - Only where the interpolation leaves the light of the patches around, or where another surface
+//   is nearer than patches are wide and there are too few to tell: elsewhere it is nearer to the truth than rays are, whose noise
+//   differs from point to point.
+// - Where a ray ends nearer than the patch there is wide, the light of the sources is sampled at
+//   its end: the mean of the patch is not what shines into a narrow gap.
 // - As many rays as the error needs: the spread of several independently shifted Sobol sets tells.
 #pragma once
 
@@ -27,10 +30,10 @@ namespace raybundle {
 
 class FinalGather {
   public:
-    // The light of one set, or what belongs to none; `error`, W/m^2, is what it may be off. All
-    // must outlive the object.
+    // The light of one set, or what belongs to none. meanLight: of all that is baked, W/m^2;
+    // targetError: relative to it, or to the light of what is brighter. All must outlive the object.
     FinalGather(const Patches& patches, const Visibility& visibility, const SetLight& light,
-                float error);
+                float meanLight, float targetError);
 
     // What arrives at a point, W/m^2.
     struct Light {
@@ -38,8 +41,13 @@ class FinalGather {
         glm::vec3 reflected{0.0f};
         glm::vec3 total() const { return carried + reflected; }
     };
-    // receivers: how many share the error, because their mean counts.
-    Light gather(const Receiver& receiver, size_t receivers) const;
+    // brightness: of all light there, about, W/m^2; receivers: how many share the error, because their mean counts.
+    Light gather(const Receiver& receiver, float brightness, size_t receivers) const;
+
+    // Whether the receiver's face has too few patches to tell whether interpolation follows the
+    // light, and a surface is so near that it may not: nearer than its patch is wide, or than the
+    // receiver's is long.
+    bool isNear(const Receiver& receiver) const;
 
     // Per node of an instance: whether the light there is to be gathered. carried, reflected: per
     // node, as reconstructed. exposed: per side, the share of it that counts.
@@ -49,13 +57,16 @@ class FinalGather {
                                const std::vector<glm::vec3>& reflected) const;
 
   private:
+    float width(uint32_t side) const;  // of a patch, metres
+
     const Patches& patches;
     const Visibility& visibility;
     const SetLight& light;
     const std::vector<glm::vec3>& emission;  // per side, without sources, W/m^2
     std::vector<glm::vec3> reflected;        // per side, W/m^2
     const glm::vec3 world;                   // exitance, W/m^2
-    const float error;                       // W/m^2
+    const float targetError;
+    const float error;  // W/m^2
 };
 
 }  // namespace raybundle

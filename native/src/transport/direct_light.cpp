@@ -390,6 +390,17 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
                     std::sqrt(visible * (1 - visible));
 }
 
+glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
+    glm::vec3 sum(0.0f);
+    for (size_t k = 0; k < sources.size(); ++k) {
+        Gathered unused;
+        sum += sampleBlock(*sources[k], hash(seed, hash(receiver.seed, uint32_t(k))), receiver,
+                           int(index), 1, unused)
+                   .visible;
+    }
+    return sum;
+}
+
 bool DirectLight::hasPassingLight(uint32_t side) const {
     if (!patches.parentAt(side).stopsDirect) return !sources.empty();
     return std::any_of(sources.begin(), sources.end(),

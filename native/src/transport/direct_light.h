@@ -88,6 +88,9 @@ class DirectLight {
                        const std::function<Receiver(size_t)>& receiverAt,
                        const std::function<void(double)>& progress) const;
 
+    // An unbiased estimate at a point by one sample of each source, W/m^2; index: of the sample.
+    glm::vec3 sample(const Receiver& receiver, uint32_t index) const;
+
     // Whether lines that end at the first surface leave out some of the light of a side's sources.
     bool hasPassingLight(uint32_t side) const;
 
