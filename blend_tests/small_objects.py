@@ -2,17 +2,19 @@
 """Error and time of small objects in large scenes: a house on a plain, a laid table in a hall.
 
     blender -b --factory-startup -P blend_tests/small_objects.py -- \\
-        [--target 0.01] [--seeds 2] [--factor 10] [--runs 3] [--samples 128]
+        [--target 0.01] [--seeds 2] [--factor 10] [--runs 3] [--samples 1024]
 
-Of LIGHTING, at the corners of the small objects alone, relative RMSE over RGB by area:
+Of LIGHTING, at the corners of the small objects alone, relative RMSE over RGB by area, with each of
+two reconstructions:
 
-noise    against the same patches with --factor times the bundles (4096 at most) and another seed;
-surface  interpolated over the faces, against Cycles at points inside them, whose noise is taken out
-         as in mesh_densities.py; beside it what Cycles' own vertex bake has without noise.
+noise     against the same patches with --factor times the bundles (4096 at most) and another seed;
+vertices  against Cycles at the vertices off contact edges;
+surface   interpolated over the faces, against Cycles at points inside them; beside it what Cycles'
+          own vertex bake has without noise.
 
-And the seconds of a bake over those of the same small objects without the extent around them (the
-plain cut to 18 m; a hall of 5 x 6 x 3.2 m), side by side: medians of --runs. Prints a table in
-Markdown.
+Cycles' noise is taken out as in mesh_densities.py. And the seconds of a bake over those of the same
+small objects without the extent around them (the plain cut to 18 m; a hall of 5 x 6 x 3.2 m), side
+by side: medians of --runs. Prints a table in Markdown.
 """
 
 from __future__ import annotations
@@ -32,15 +34,17 @@ sys.path[:0] = [str(ROOT / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
-from benchmark import SurfaceReference, bake_cycles, bake_raybundle  # noqa: E402
+from benchmark import Light, SurfaceReference, bake_cycles, bake_raybundle  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
 from mesh_densities import squared_error  # noqa: E402
-from surface_error import corner_areas, surface_error  # noqa: E402
+from surface_error import (corner_areas, is_defined, off_contact_edges,  # noqa: E402
+                           surface_error)
 
 # Names begin with these.
 LARGE = {"house_on_plain": ("plain",), "laid_table": ("floor", "ceiling", "wall_", "lamp_")}
 SMALL = {"house_on_plain": ("",),
          "laid_table": ("plate", "cup", "fork", "knife", "candlestick")}
+RECONSTRUCTIONS = ("LEAST_SQUARES", "POINT")
 
 
 def small_objects(scene: str) -> list[bpy.types.Object]:
@@ -71,26 +75,22 @@ def open_scene(name: str) -> None:
     bpy.context.scene.raybundle.output = 'LIGHTING'
 
 
-def measure(name: str, options: argparse.Namespace) -> str:
-    open_scene(name)
-    settings = bpy.context.scene.raybundle
-    settings.target_error = options.target
-    objects = small_objects(name)
-    bakes = []
-    for settings.seed in range(1, options.seeds + 1):
-        bakes.append(bake_raybundle(objects)[1:])
-    light, report = bakes[0]
-    references = [SurfaceReference(objects, options.samples, seed) for seed in (0, 1)]
-    surface = squared_error(references, [light, light])
-    cycles = squared_error(references,
-                           [bake_cycles(objects, options.samples, seed)[1] for seed in (2, 3)])
-    settings.seed, settings.target_error = 7, 1e-5
-    settings.max_bundles = min(4096, options.factor * report["bundles"])
-    truth = bake_raybundle(objects)[1]
-    areas = np.concatenate([corner_areas(item) for item in objects])
-    noises = [surface_error(*(np.concatenate([values[item.name] for item in objects])
-                              for values in (found, truth)), areas).rmse for found, _ in bakes]
+def squared_vertex_error(objects: list[bpy.types.Object], light: Light, references: list[Light]
+                         ) -> float:
+    """Relative, off contact edges, without the noise of the two independent references."""
+    off_contacts = off_contact_edges(bakeable_objects(bpy.context))
+    product = scale = 0.0
+    for item in objects:
+        first, second = (reference[item.name] for reference in references)
+        area = corner_areas(item) * off_contacts[item.name] * is_defined(item, first)
+        off = (light[item.name] - first) * (light[item.name] - second)
+        product += area @ off.sum(axis=1)
+        scale += area @ (first * second).sum(axis=1)
+    return max(0.0, product / scale)
 
+
+def time_ratio(name: str, options: argparse.Namespace, reconstruction: str) -> float:
+    """Seconds of a bake over those without the extent."""
     seconds: dict[bool, list[float]] = {False: [], True: []}
     for _ in range(options.runs):
         for is_cut, times in seconds.items():
@@ -98,12 +98,44 @@ def measure(name: str, options: argparse.Namespace) -> str:
             if is_cut:
                 cut(name)
             bpy.context.view_layer.update()
-            bpy.context.scene.raybundle.target_error = options.target
+            settings = bpy.context.scene.raybundle
+            settings.target_error, settings.reconstruction = options.target, reconstruction
             times.append(bake_raybundle(small_objects(name))[0])
-    ratio = np.median(seconds[False]) / np.median(seconds[True])
-    return (f"| `{name}` | {len(objects)} | {report['bundles']} | {report['lines'] / 1e6:.0f} "
-            f"million | {', '.join(f'{100 * noise:.2f} %' for noise in noises)} | "
-            f"{100 * surface ** 0.5:.2f} % | {100 * cycles ** 0.5:.2f} % | {ratio:.1f} |")
+    return float(np.median(seconds[False]) / np.median(seconds[True]))
+
+
+def measure(name: str, options: argparse.Namespace) -> list[str]:
+    """Rows of the table, one for each reconstruction."""
+    open_scene(name)
+    objects = small_objects(name)
+    cycles = [bake_cycles(objects, options.samples, seed)[1] for seed in (2, 3)]
+    references = [SurfaceReference(objects, options.samples, seed) for seed in (0, 1)]
+    areas = np.concatenate([corner_areas(item) for item in objects])
+    rows = []
+    for reconstruction in RECONSTRUCTIONS:
+        open_scene(name)
+        settings = bpy.context.scene.raybundle
+        settings.target_error, settings.reconstruction = options.target, reconstruction
+        objects = small_objects(name)
+        bakes = []
+        for settings.seed in range(1, options.seeds + 1):
+            bakes.append(bake_raybundle(objects)[1:])
+        light, report = bakes[0]
+        vertices = squared_vertex_error(objects, light, cycles)
+        surface = squared_error(references, [light, light])
+        settings.seed, settings.target_error = 7, 1e-5
+        settings.max_bundles = min(4096, options.factor * report["bundles"])
+        truth = bake_raybundle(objects)[1]
+        noises = [surface_error(*(np.concatenate([values[item.name] for item in objects])
+                                  for values in (found, truth)), areas).rmse for found, _ in bakes]
+        columns = [f"`{name}`", f"`{reconstruction}`", f"{report['bundles']}",
+                   f"{report['lines'] / 1e6:.0f} million",
+                   ", ".join(f"{100 * noise:.2f} %" for noise in noises),
+                   *(f"{100 * square ** 0.5:.2f} %"
+                     for square in (vertices, surface, squared_error(references, cycles))),
+                   f"{time_ratio(name, options, reconstruction):.1f}"]
+        rows.append("| " + " | ".join(columns) + " |")
+    return rows
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -114,12 +146,14 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--factor", type=int, default=10)
     parser.add_argument("--runs", type=int, default=3)
-    parser.add_argument("--samples", type=int, default=128)
+    parser.add_argument("--samples", type=int, default=1024)
     options = parser.parse_args(arguments)
     raybundle.register()
-    rows = ["| scene | small objects | bundles | lines | noise, by seed | surface | Cycles' bake, "
-            "surface | time over that without the extent |", "|---" * 8 + "|"]
-    rows += [measure(name, options) for name in options.scenes]
+    columns = ["scene", "reconstruction", "bundles", "lines", "noise, by seed", "vertices",
+               "surface", "Cycles' bake, surface", "time over that without the extent"]
+    rows = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
+    for name in options.scenes:
+        rows += measure(name, options)
     print("\n".join(rows))
 
 

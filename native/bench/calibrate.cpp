@@ -3,13 +3,14 @@
 // Stated errors against true ones: bakes scenes with many seeds and targets and writes one line of
 // JSON per bake. Usage: see kUsage.
 //
-// - True noise: the light per patch side against the mean over all seeds at the least target, which
-//   is as many times the bundles as there are seeds. A bake's own share in that mean is allowed
-//   for.
+// - True noise: the light per side of a tile against the mean over all seeds at the least target,
+//   which is as many times the bundles as there are seeds. A bake's own share in that mean is
+//   allowed for.
 // - True surface error: the light interpolated between the corners against that of patches with a
 //   third of the edge, at each of them. The reference is two bakes of independent bundles and
 //   shadow rays; the mean of the product of the two differences is the square of the error without
-//   the reference's own noise.
+//   the reference's own noise. Not where patches of some objects are much finer than those of
+//   others: a third of the largest edge would be no reference for them.
 // Both by exposed area.
 #include <cmath>
 #include <cstdio>
@@ -24,6 +25,7 @@
 
 #include "bake/bake.h"
 #include "bake/error.h"
+#include "patches/tiles.h"
 #include "scene_file.h"
 
 namespace raybundle::bench {
@@ -45,6 +47,8 @@ constexpr char kUsage[] =
 
 // Seeds that no bake has.
 constexpr int kReferenceSeeds[2] = {1 << 29, 1 << 30};
+// The largest patches' edge over the finest ones', up to which there is a surface error.
+constexpr float kMostSizes = 4;
 // Relative standard error of the direct light of each half of the reference.
 constexpr float kReferenceShotError = 0.01f;
 
@@ -167,17 +171,26 @@ double surfaceError(const std::vector<Point>& points, const Bake& bake) {
 // ------------------------------------------------------------------------------------------------
 
 struct SideLight {
-    std::vector<glm::vec3> light;  // per patch with a result, W/m^2
+    std::vector<glm::vec3> light;  // per tile with a result, W/m^2
     std::vector<float> area;       // exposed, m^2
 };
 
 SideLight sideLight(const Scene& scene, const Bake& bake) {
-    SideLight result;
     const Patches& patches = bake.patches();
-    for (uint32_t patch = 0; patch < patches.count(); ++patch)
-        if (const auto side = bakedSide(scene, patches, patch)) {
-            result.light.push_back(glm::vec3(lightAt(bake, *side)));
-            result.area.push_back(patches.area[patch] * bake.exposedShare()[*side]);
+    std::vector<glm::vec3> light(patches.sideCount());
+    std::vector<float> weight(patches.sideCount());
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        light[side] = glm::vec3(lightAt(bake, side));
+        weight[side] = patches.area[side / 2] * bake.exposedShare()[side];
+    }
+    const Tiles tiles(patches);
+    const std::vector<glm::vec3> mean = tiles.mean(light, weight);
+    const std::vector<float> area = tiles.sum(weight);
+    SideLight result;
+    for (uint32_t tile = 0; tile < tiles.sideCount() / 2; ++tile)
+        if (const auto side = bakedSide(scene, tiles.patches(), tile)) {
+            result.light.push_back(mean[*side]);
+            result.area.push_back(area[*side]);
         }
     return result;
 }
@@ -207,7 +220,9 @@ void calibrate(const std::string& path, const Options& options, std::ostream& ou
             bake.settings.targetError = target;
             bake.settings.seed = seed;
             bake.run(scene);
-            if (points.empty()) points = reference(scene, bake.patches().size, options);
+            const bool isUniform = kMostSizes * bake.patches().finest >= bake.patches().size;
+            if (points.empty() && isUniform)
+                points = reference(scene, bake.patches().size, options);
             const Json report = Json::parse(bake.reportJson());
             rows.push_back({{"scene", name},
                             {"target", target},
@@ -218,7 +233,8 @@ void calibrate(const std::string& path, const Options& options, std::ostream& ou
                             {"estimated_error", report.at("estimated_error")},
                             {"stated", report.at("error")},
                             {"warnings", report.at("warnings").size()},
-                            {"true", {{"surface", surfaceError(points, bake)}}}});
+                            {"true", Json::object()}});
+            if (isUniform) rows.back()["true"]["surface"] = surfaceError(points, bake);
             lights.push_back(sideLight(scene, bake));
         }
     std::vector<glm::dvec3> mean(lights.back().light.size(), glm::dvec3(0.0));
