@@ -2,9 +2,10 @@
 //
 // Contacts: tiles that lie nearer to another surface than they are wide, and only in part, as a
 // table under the rim of a plate or under a knife. What such a tile sends into the gap is not its
-// mean light, and what it gets is not the same all over it; so it is cut to the width of the gap, or
-// into sixteen. Only the geometry says so, and not the light: light sets baked together have the
-// same cuts as baked alone. (Surfaces that touch have no gap; there the exposed share of a patch counts.)
+// mean light, and what it gets is not the same all over it; so it is cut to the width of the gap,
+// or into sixteen. Only the geometry says so, and not the light: light sets baked together have the
+// same cuts as baked alone. (Surfaces that touch have no gap; there the exposed share of a patch
+// counts.)
 //
 // Source: the contact test of adaptive radiosity, as in the disk approximations that fail where
 // "distance is less than size" (Cohen and Wallace, "Radiosity and Realistic Image Synthesis",

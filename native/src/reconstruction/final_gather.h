@@ -10,8 +10,8 @@
 // Differs:
 // - Light of the sources is left out: DirectLight gathers it better.
 // - Only where the interpolation leaves the light of the patches around, or where another surface
-//   is nearer than patches are wide and there are too few to tell: elsewhere it is nearer to the truth than rays are, whose noise
-//   differs from point to point.
+//   is nearer than patches are wide and there are too few to tell: elsewhere it is nearer to the
+//   truth than rays are, whose noise differs from point to point.
 // - Where a ray ends nearer than the patch there is wide, the light of the sources is sampled at
 //   its end: the mean of the patch is not what shines into a narrow gap.
 // - As many rays as the error needs: the spread of several independently shifted Sobol sets tells.
@@ -31,7 +31,8 @@ namespace raybundle {
 class FinalGather {
   public:
     // The light of one set, or what belongs to none. meanLight: of all that is baked, W/m^2;
-    // targetError: relative to it, or to the light of what is brighter. All must outlive the object.
+    // targetError: relative to it, or to the light of what is brighter. References must outlive the
+    // object.
     FinalGather(const Patches& patches, const Visibility& visibility, const SetLight& light,
                 float meanLight, float targetError);
 
@@ -41,7 +42,8 @@ class FinalGather {
         glm::vec3 reflected{0.0f};
         glm::vec3 total() const { return carried + reflected; }
     };
-    // brightness: of all light there, about, W/m^2; receivers: how many share the error, because their mean counts.
+    // brightness: of all light there, about, W/m^2; receivers: how many share the error, because
+    // their mean counts.
     Light gather(const Receiver& receiver, float brightness, size_t receivers) const;
 
     // Whether the receiver's face has too few patches to tell whether interpolation follows the
