@@ -7,7 +7,7 @@
 // On one thread, or with --threads N where the work is parallel inside (Merge, Solve, ...).
 //   Project           a bundle, of the default pixels; lines and fragments per second
 //   Project10k        a bundle of 100 x 100 lines over 20 000 patches, as in the thesis
-//   Merge             32 bundles into the counts that 224 made
+//   Merge             128 bundles into the counts that 128 made
 //   Solve             both halves of 256 bundles, to a tenth of the default target
 //   ShadowRays        from patches to a point light in the middle of the scene
 //   ClosestHits       cosine-distributed rays from patches
@@ -45,7 +45,7 @@ namespace {
 
 constexpr float kPixelsPerPatch = 2;  // as in bake.cpp
 constexpr float kTouchDistance = 1e-4f;
-constexpr uint32_t kTraced = 256, kMerged = 32;
+constexpr uint32_t kTraced = 256, kMerged = 128;
 constexpr uint32_t kRays = 4096;
 
 // A scene ready to be traced.

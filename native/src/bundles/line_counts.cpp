@@ -9,8 +9,7 @@
 namespace raybundle {
 namespace {
 
-// An exchange seen from one of its ends: partner, half and lines packed into one key, so that
-// sorting the keys brings equal partners together.
+// An exchange seen from one of its ends: partner, half and lines packed into one key.
 uint32_t partnerOf(uint64_t key) { return uint32_t(key >> 32); }
 uint32_t halfOf(uint64_t key) { return uint32_t(key >> 31) & 1; }
 uint32_t linesOf(uint64_t key) { return uint32_t(key) & 0x7fffffffu; }
@@ -22,6 +21,37 @@ constexpr uint32_t kBlockBits = 8;
 template <class T>
 std::unique_ptr<T[]> uninitialised(size_t n) {
     return std::unique_ptr<T[]>(new T[n]);
+}
+
+// Bits of a partner that one pass of the sort below looks at, at most.
+constexpr uint32_t kMostDigitBits = 11;
+
+// The keys of a block, and the row of each within the block.
+struct Keys {
+    uint64_t* key;
+    uint8_t* row;
+};
+
+// Sorts the keys of a block by partner, stably and least significant digit first; partners have so
+// many bits. Returns where the sorted keys are: in `keys` or in `spare`.
+Keys sortByPartner(Keys keys, Keys spare, size_t count, uint32_t partnerBits) {
+    const uint32_t passes = (partnerBits + kMostDigitBits - 1) / kMostDigitBits;
+    const uint32_t digitBits = (partnerBits + passes - 1) / passes;
+    const uint32_t mask = (1u << digitBits) - 1;
+    std::vector<uint32_t> place(mask + 2);
+    for (uint32_t pass = 0; pass < passes; ++pass) {
+        const uint32_t shift = pass * digitBits;
+        std::fill(place.begin(), place.end(), 0u);
+        for (size_t k = 0; k < count; ++k) ++place[(partnerOf(keys.key[k]) >> shift & mask) + 1];
+        std::partial_sum(place.begin(), place.end(), place.begin());
+        for (size_t k = 0; k < count; ++k) {
+            const uint32_t at = place[partnerOf(keys.key[k]) >> shift & mask]++;
+            spare.key[at] = keys.key[k];
+            spare.row[at] = keys.row[k];
+        }
+        std::swap(keys, spare);
+    }
+    return keys;
 }
 
 }  // namespace
@@ -133,28 +163,35 @@ void LineCounts::add(const std::vector<TracedBundle>& bundles) {
         });
     });
 
-    // In each block: group by row, sort each row, merge equal partners with the row's old entries.
+    // In each block: sort by partner, group by row, merge equal partners with the row's old entries.
+    uint32_t partnerBits = 1;
+    while (n > size_t(1) << partnerBits) ++partnerBits;
     std::vector<size_t> merged(n + 1, 0);
     std::vector<std::unique_ptr<LineCount[]>> mergedBlocks(blocks);
     tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
         const size_t firstRow = block << kBlockBits,
                      lastRow = std::min(n, (block + 1) << kBlockBits);
         if (firstRow >= lastRow) return;
+        const size_t keyCount = blockBegin[block + 1] - blockBegin[block];
+        const auto spareKeys = uninitialised<uint64_t>(keyCount);
+        const auto spareRows = uninitialised<uint8_t>(keyCount);
+        const Keys unsorted{keys.get() + blockBegin[block], rowOf.get() + blockBegin[block]};
+        const Keys spare{spareKeys.get(), spareRows.get()};
+        const Keys sorted = sortByPartner(unsorted, spare, keyCount, partnerBits);
+        uint64_t* const grouped = (sorted.key == spare.key ? unsorted : spare).key;
+
         std::vector<size_t> begin(lastRow - firstRow + 1, 0);
-        for (size_t k = blockBegin[block]; k < blockBegin[block + 1]; ++k) ++begin[rowOf[k] + 1u];
+        for (size_t k = 0; k < keyCount; ++k) ++begin[sorted.row[k] + 1u];
         std::partial_sum(begin.begin(), begin.end(), begin.begin());
-        const auto grouped = uninitialised<uint64_t>(begin.back());
         std::vector<size_t> fill(begin.begin(), begin.end() - 1);
-        for (size_t k = blockBegin[block]; k < blockBegin[block + 1]; ++k)
-            grouped[fill[rowOf[k]]++] = keys[k];
+        for (size_t k = 0; k < keyCount; ++k) grouped[fill[sorted.row[k]]++] = sorted.key[k];
 
         mergedBlocks[block] =
             uninitialised<LineCount>(begin.back() + rows[lastRow] - rows[firstRow]);
         LineCount* out = mergedBlocks[block].get();
         for (size_t row = firstRow; row < lastRow; ++row) {
-            uint64_t* key = grouped.get() + begin[row - firstRow];
-            uint64_t* const lastKey = grouped.get() + begin[row - firstRow + 1];
-            std::sort(key, lastKey);
+            const uint64_t* key = grouped + begin[row - firstRow];
+            const uint64_t* const lastKey = grouped + begin[row - firstRow + 1];
             const LineCount* old = rowBegin(uint32_t(row));
             const LineCount* const lastOld = rowEnd(uint32_t(row));
             LineCount* const firstOut = out;
