@@ -149,8 +149,10 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
 
     // Find the span of each row. An edge is evaluated from its lower end whichever way the parent
     // turns, so that two parents with a common edge find the same crossing to the last bit.
-    spanLeft.resize(size_t(row1 - row0));
-    spanRight.resize(size_t(row1 - row0));
+    if (spanLeft.size() < size_t(row1 - row0)) {
+        spanLeft.resize(size_t(row1 - row0));
+        spanRight.resize(size_t(row1 - row0));
+    }
     for (int k = 0; k < sides; ++k) {
         glm::dvec2 lower = q[k], upper = q[(k + 1) % sides];
         const bool rising = lower.y < upper.y;
