@@ -11,7 +11,7 @@
 //   Solve             both halves of 256 bundles, to a tenth of the default target
 //   ShadowRays        from patches to a point light in the middle of the scene
 //   ClosestHits       cosine-distributed rays from patches
-//   FirstShot         GATHER at the default target
+//   FirstShotGather   at the default target
 //   LeastSquares      of all objects, one field
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
@@ -20,14 +20,12 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "bake/bake.h"
 #include "bundles/bundle_tracer.h"
 #include "bundles/fragment_lists.h"
 #include "bundles/line_counts.h"
-#include "bundles/rasteriser.h"
 #include "patches/patches.h"
 #include "reconstruction/least_squares.h"
 #include "reconstruction/reconstruction.h"

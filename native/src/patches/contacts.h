@@ -7,11 +7,11 @@
 // same cuts as baked alone. (Surfaces that touch have no gap; there the exposed share of a patch
 // counts.)
 //
-// Source: the contact test of adaptive radiosity, as in the disk approximations that fail where
-// "distance is less than size" (Cohen and Wallace, "Radiosity and Realistic Image Synthesis",
-// 1993, section 4.11).
-// Differs: found by single rays along the normals, from the small surface to the large one and
-// back, instead of by the form factors of pairs.
+// Source: that elements are cut until they are small beside their distance is the rule of
+// hierarchical radiosity: Hanrahan, Salzman, Aupperle, "A Rapid Hierarchical Radiosity Algorithm"
+// (1991).
+// Differs: only at narrow gaps, and once; found by single rays along the normals, from the small
+// surface to the large one and back, instead of by the form factors of pairs.
 #pragma once
 
 #include <cstddef>
