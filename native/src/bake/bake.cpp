@@ -38,7 +38,7 @@ constexpr float kTouchOfPatch = 0.02f;
 // Relative residual of the last solve: a share of the noise, within these bounds.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 // The lines' noise on the patches of any one window may be this many times the target.
-constexpr double kWindowTargets = 1.4;
+constexpr double kWindowTargets = 1.2;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 
 class Stopwatch {
