@@ -202,8 +202,8 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         default=False)
     contacts: BoolProperty(
         name="Contacts",
-        description="Smaller patches beside gaps that are narrower than a patch, as on a table "
-                    "below the rim of a plate",
+        description="Smaller patches beside gaps much narrower than a patch, as on a table below "
+                    "the rim of a plate",
         default=True)
     solver: EnumProperty(
         name="Solver", description="How light is passed on between surfaces", items=enum_solver,

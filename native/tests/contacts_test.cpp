@@ -42,7 +42,6 @@ TEST(ContactCuts, AreWhereAGapIsCoveredInPart) {
         for (int x = 0; x < 10; ++x) {
             const int ring = std::max(std::abs(2 * x - 9), std::abs(2 * y - 9)) / 2;
             const int level = cuts.levels[size_t(10 * y + x)];
-            // 0.1 / 0.02 is 2.3 halvings, of two at most.
             if (ring > 0) {
                 EXPECT_EQ(level, ring == 1 ? 2 : 0) << x << " " << y;
             }
@@ -52,7 +51,7 @@ TEST(ContactCuts, AreWhereAGapIsCoveredInPart) {
 }
 
 TEST(ContactCuts, LeaveWideGapsAndTouchingSurfacesAlone) {
-    EXPECT_EQ(cutsOf(groundUnderBoard(0.15f)).count(), 0u);
+    EXPECT_EQ(cutsOf(groundUnderBoard(0.03f)).count(), 0u);
     EXPECT_EQ(cutsOf(groundUnderBoard(0.5f * kTouch)).count(), 0u);
     EXPECT_EQ(cutsOf(closedCube(0.5f)).count(), 0u);
 }

@@ -15,8 +15,11 @@
 namespace raybundle {
 namespace {
 
-// More would leave patches that few lines meet.
-constexpr int kMostLevel = 2;
+// Gaps narrower than this share of a tile's width count, and its edges are halved so often. With
+// wider gaps the cuts of spheres on a floor (scene instances) cost more than they gained; more
+// would leave patches that few lines meet.
+constexpr float kNarrow = 0.25f;
+constexpr uint8_t kLevel = 2;
 // Rays from each side, one in each quarter of it.
 constexpr uint32_t kFirstRays = 4;
 // Rays that tell whether a tile is near another surface in part.
@@ -30,11 +33,9 @@ class Gaps {
         : patches(patches),
           visibility(visibility),
           touchDistance(touchDistance),
-          least(patches.sideCount()) {
-        for (std::atomic<float>& gap : least) gap = INFINITY;
-    }
+          narrow(patches.sideCount()) {}
 
-    // Looks from each side what lies nearer than it or what it meets is wide.
+    // Looks from each side which gaps are narrow beside it or beside what it meets.
     void find() {
         tbb::parallel_for(uint32_t(0), uint32_t(patches.sideCount()), [&](uint32_t side) {
             if (!counts(side)) return;
@@ -43,24 +44,22 @@ class Gaps {
                 uint32_t met = 0;
                 const auto gap = gapAt(side, u, patches.normal(side), patches.size, &met);
                 if (!gap) continue;
-                if (*gap < width(side)) note(side, *gap);
-                if (*gap < width(met)) note(met, *gap);
+                if (*gap < kNarrow * width(side)) narrow[side] = true;
+                if (*gap < kNarrow * width(met)) narrow[met] = true;
             }
         });
     }
 
-    // How often the edges of a side's tile are to be halved.
-    int level(uint32_t side) const {
-        const float gap = least[side];
-        if (std::isinf(gap)) return 0;
+    // Whether a side lies at a narrow gap, and only a part of it near another surface.
+    bool isContact(uint32_t side) const {
+        if (!narrow[side]) return false;
         uint32_t near = 0;
         for (uint32_t i = 0; i < kRays; ++i) {
             const glm::vec4 u = sobolPoint(i, hash(side, 1));
             const glm::vec3 direction = cosineDirection(patches.normal(side), {u.z, u.w});
             if (gapAt(side, u, direction, width(side))) ++near;
         }
-        if (near == 0 || near == kRays) return 0;
-        return std::min(kMostLevel, int(std::ceil(std::log2(width(side) / gap))));
+        return near > 0 && near < kRays;
     }
 
   private:
@@ -82,16 +81,10 @@ class Gaps {
         return distance;
     }
 
-    void note(uint32_t side, float gap) {
-        float before = least[side];
-        while (gap < before && !least[side].compare_exchange_weak(before, gap)) {
-        }
-    }
-
     const Patches& patches;
     const Visibility& visibility;
     const float touchDistance;
-    std::vector<std::atomic<float>> least;  // per side, metres
+    std::vector<std::atomic<bool>> narrow;  // per side
 };
 
 }  // namespace
@@ -105,7 +98,7 @@ Cuts contactCuts(const Patches& patches, const Visibility& visibility, float tou
     Cuts cuts;
     cuts.levels.assign(tiles, 0);
     tbb::parallel_for(uint32_t(0), uint32_t(tiles), [&](uint32_t tile) {
-        cuts.levels[tile] = uint8_t(std::max(gaps.level(2 * tile), gaps.level(2 * tile + 1)));
+        if (gaps.isContact(2 * tile) || gaps.isContact(2 * tile + 1)) cuts.levels[tile] = kLevel;
     });
     const size_t most = std::min(maxPatches - tiles, std::max(tiles, kMostMore));
     while (cuts.morePatches() > most)

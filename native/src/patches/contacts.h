@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Contacts: tiles that lie nearer to another surface than they are wide, and only in part, as a
-// table under the rim of a plate or under a knife. What such a tile sends into the gap is not its
-// mean light, and what it gets is not the same all over it; so it is cut to the width of the gap,
-// or into sixteen. Only the geometry says so, and not the light: light sets baked together have the
+// Contacts: tiles beside a gap less than a quarter of their width, and only in part near another
+// surface, as a table under the rim of a plate or under a knife. What such a tile sends into the
+// gap is not its mean light, and what it gets is not the same all over it; so it is cut into
+// sixteen. Only the geometry says so, and not the light: light sets baked together have the
 // same cuts as baked alone. (Surfaces that touch have no gap; there the exposed share of a patch
 // counts.)
 //
