@@ -101,9 +101,9 @@ TEST(FormFactor, RowsOfAClosedSceneSumToOne) {
     const LineCounts counts = traceLines(patches, 0.05f, kBundles);
     for (uint32_t i = 0; i < counts.sideCount(); i += 2) {
         double sum = 0;
-        for (const LineCount* c = counts.rowBegin(i); c < counts.rowEnd(i); ++c) {
-            const double f = (c->lines[0] + c->lines[1]) / linesOf(counts, i);
-            const bool opposite = patches.normal(i) == -patches.normal(c->side);
+        for (const LineCount& c : counts.row(i)) {
+            const double f = (c.lines[0] + c.lines[1]) / linesOf(counts, i);
+            const bool opposite = patches.normal(i) == -patches.normal(c.side);
             const double exact =
                 opposite ? parallelRectangles(1, 1, 1) : perpendicularRectangles(1, 1, 1);
             EXPECT_NEAR(f, exact, bound(exact));

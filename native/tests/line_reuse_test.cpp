@@ -52,8 +52,8 @@ struct System {
         std::vector<double> lines(x.size());
         for (uint32_t i = 0; i < x.size(); ++i) {
             lines[i] = counts.sky[i][0] + counts.sky[i][1];
-            for (const LineCount* c = counts.rowBegin(i); c < counts.rowEnd(i); ++c)
-                lines[i] += double(x[c->side]) * (c->lines[0] + c->lines[1]);
+            for (const LineCount& c : counts.row(i))
+                lines[i] += double(x[c.side]) * (c.lines[0] + c.lines[1]);
             lines[i] *= double(x[i]);
         }
         return lines;

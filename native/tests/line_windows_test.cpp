@@ -86,9 +86,9 @@ TEST(LineWindows, ExchangesHaveTheMeanOfUniformLines) {
         double lines = 0;
         for (uint32_t i = 0; i < counts.sideCount(); ++i) {
             if (patches.parents[patches.parentOf[i / 2]].instance != from) continue;
-            for (const LineCount* c = counts.rowBegin(i); c < counts.rowEnd(i); ++c)
-                if (patches.parents[patches.parentOf[c->side / 2]].instance == to)
-                    lines += double(c->lines[0]) + c->lines[1];
+            for (const LineCount& c : counts.row(i))
+                if (patches.parents[patches.parentOf[c.side / 2]].instance == to)
+                    lines += double(c.lines[0]) + c.lines[1];
         }
         return lines;
     };
@@ -121,9 +121,9 @@ TEST(LineWindows, CountsAreSymmetricAndAddUp) {
     const LineCounts counts = trace(patches, kPixel, smallWindows(), 16).counts;
     for (uint32_t i = 0; i < counts.sideCount(); ++i) {
         std::array<uint32_t, 2> sum = counts.sky[i];
-        for (const LineCount* c = counts.rowBegin(i); c < counts.rowEnd(i); ++c) {
-            for (size_t h = 0; h < 2; ++h) sum[h] += c->lines[h];
-            ASSERT_EQ(linesBetween(counts, c->side, i), double(c->lines[0]) + c->lines[1]);
+        for (const LineCount& c : counts.row(i)) {
+            for (size_t h = 0; h < 2; ++h) sum[h] += c.lines[h];
+            ASSERT_EQ(linesBetween(counts, c.side, i), double(c.lines[0]) + c.lines[1]);
         }
         ASSERT_EQ(sum, counts.total[i]);
     }

@@ -176,8 +176,8 @@ double linesOf(const LineCounts& counts, uint32_t side) {
 }
 
 double linesBetween(const LineCounts& counts, uint32_t i, uint32_t j) {
-    for (const LineCount* c = counts.rowBegin(i); c < counts.rowEnd(i); ++c)
-        if (c->side == j) return double(c->lines[0]) + c->lines[1];
+    for (const LineCount& c : counts.row(i))
+        if (c.side == j) return double(c.lines[0]) + c.lines[1];
     return 0;
 }
 
@@ -189,8 +189,8 @@ double formFactor(const Patches& patches, const LineCounts& counts, uint32_t fro
     for (uint32_t i = 0; i < counts.sideCount(); i += 2) {
         if (instanceOf(i) != from) continue;
         all += linesOf(counts, i);
-        for (const LineCount* c = counts.rowBegin(i); c < counts.rowEnd(i); ++c)
-            if (c->side % 2 == 0 && instanceOf(c->side) == to) between += c->lines[0] + c->lines[1];
+        for (const LineCount& c : counts.row(i))
+            if (c.side % 2 == 0 && instanceOf(c.side) == to) between += c.lines[0] + c.lines[1];
     }
     return between / all;
 }

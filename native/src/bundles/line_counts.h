@@ -4,25 +4,29 @@
 // symmetric), how many leave the scene from a side (the sky column), and how many leave a side in
 // all (m_i). c_ij / m_i estimates the form factor F_ij (thesis section 2.3.2, eq. 2.30).
 //
-// Differs from the thesis: lines that leave the scene count in m_i. The two
-// independent halves of the bundles are counted apart for the error estimate. Counts are integers
-// and are merged before any floating-point work, so that the result does not depend on the number
-// of threads. Where lines have several densities (bundles/line_windows.h), counts are in lines of
-// the finest one.
+// Differs from the thesis: lines that leave the scene count in m_i. The two independent halves of
+// the bundles are counted apart for the error estimate, each in rows of its own, so that a solve on
+// one half reads nothing of the other. Counts are integers, in the order of the bundles, so that
+// the result does not depend on the number of threads. Where lines have several densities
+// (bundles/line_windows.h), counts are in lines of the finest one.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "bundles/bundle_tracer.h"
+#include "bundles/line_rows.h"
 
 namespace raybundle {
 
+// What joins a side with another one.
 struct LineCount {
     uint32_t side;                  // the other end
     std::array<uint32_t, 2> lines;  // per half
+
+    bool operator==(const LineCount& o) const { return side == o.side && lines == o.lines; }
+    bool operator!=(const LineCount& o) const { return !(*this == o); }
 };
 
 class LineCounts {
@@ -39,13 +43,14 @@ class LineCounts {
     void dropExchanges();
 
     size_t sideCount() const { return sky.size(); }
-    // Merged pairs i < j.
-    size_t exchangeCount() const { return rows.back() / 2; }
+    // Pairs that are kept; those that are found again may be kept again.
+    size_t exchangeCount() const { return (halves[0].entryCount() + halves[1].entryCount()) / 2; }
     size_t byteCount() const;
 
-    // Row i of the symmetric matrix, ordered by the other side.
-    const LineCount* rowBegin(uint32_t i) const { return entries.get() + rows[i]; }
-    const LineCount* rowEnd(uint32_t i) const { return entries.get() + rows[i + 1]; }
+    // The rows of a half.
+    const LineRows& rows(size_t half) const { return halves[half]; }
+    // Row i of the symmetric matrix, ordered by the other side, each once. Takes its time.
+    std::vector<LineCount> row(uint32_t i) const;
 
     // The share of each side that does not lie against another surface: 0 to 1, and 1 without
     // lines.
@@ -67,9 +72,8 @@ class LineCounts {
   private:
     void countMet(const std::vector<TracedBundle>& traced);
 
+    std::array<LineRows, 2> halves;
     std::vector<uint32_t> met;  // per side: linesMetInAll, if lines have several densities
-    std::vector<size_t> rows;   // per side, into entries; one more at the end
-    std::unique_ptr<LineCount[]> entries;
 };
 
 }  // namespace raybundle

@@ -60,31 +60,29 @@ struct alignas(16) Padded {
 };
 using PaddedField = std::vector<Padded>;  // per side
 
-template <class Lines>
-glm::vec3 rowTimes(const LineCounts& counts, size_t i, const PaddedField& x, const Lines& lines) {
-    Padded sum;
-    const LineCount* const end = counts.rowEnd(uint32_t(i));
-    for (const LineCount* c = counts.rowBegin(uint32_t(i)); c < end; ++c) {
-        const float weight = float(int32_t(lines(*c)));
-        const Padded& other = x[c->side];
-        for (int k = 0; k < 4; ++k) sum.v[k] += weight * other.v[k];
-    }
-    return {sum.v[0], sum.v[1], sum.v[2]};
+// Calls visit(other side, lines) for row i of a half, or of both.
+template <class Visit>
+void forEachOther(const LineCounts& counts, Half half, uint32_t i, const Visit& visit) {
+    for (size_t h = 0; h < 2; ++h)
+        if (half == Half::BOTH || half == Half(h)) counts.rows(h).forEach(i, visit);
 }
 
 // sum_j c_ij x_j
 glm::vec3 rowTimes(const LineCounts& counts, Half half, size_t i, const PaddedField& x) {
-    if (half == Half::BOTH)
-        return rowTimes(counts, i, x, [](const LineCount& c) { return c.lines[0] + c.lines[1]; });
-    return rowTimes(counts, i, x, [h = size_t(half)](const LineCount& c) { return c.lines[h]; });
+    Padded sum;
+    forEachOther(counts, half, uint32_t(i), [&](uint32_t side, uint32_t lines) {
+        const float weight = float(int32_t(lines));
+        const Padded& other = x[side];
+        for (int k = 0; k < 4; ++k) sum.v[k] += weight * other.v[k];
+    });
+    return {sum.v[0], sum.v[1], sum.v[2]};
 }
 
 // sum_j c_ij x_j and the lines to the sky
 float weightedLines(const LineCounts& counts, Half half, size_t i, const std::vector<float>& x) {
     float sum = float(linesOf(counts.sky[i], half));
-    const LineCount* const end = counts.rowEnd(uint32_t(i));
-    for (const LineCount* c = counts.rowBegin(uint32_t(i)); c < end; ++c)
-        sum += float(int32_t(linesOf(c->lines, half))) * x[c->side];
+    forEachOther(counts, half, uint32_t(i),
+                 [&](uint32_t side, uint32_t lines) { sum += float(int32_t(lines)) * x[side]; });
     return sum;
 }
 

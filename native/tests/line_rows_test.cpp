@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bundles/line_rows.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+namespace raybundle {
+namespace {
+
+// Lines of row i by the other side.
+std::map<uint32_t, uint64_t> row(const LineRows& rows, uint32_t i) {
+    std::map<uint32_t, uint64_t> result;
+    rows.forEach(i, [&](uint32_t side, uint32_t lines) { result[side] += lines; });
+    return result;
+}
+
+// `pairs` exchanges of one line between `sides` sides.
+BundleLines everyPair(uint32_t sides, uint32_t pairs) {
+    BundleLines bundle;
+    for (uint32_t k = 0; k < pairs; ++k) {
+        const uint32_t i = k % sides, j = (i + 1 + k / sides % (sides - 1)) % sides;
+        bundle.exchanges.push_back({std::min(i, j), std::max(i, j), 1});
+    }
+    return bundle;
+}
+
+TEST(LineRows, BothEndsHaveTheLines) {
+    BundleLines a, b;
+    a.exchanges = {{1, 700, 3}, {0, 1, 2}};
+    b.exchanges = {{1, 700, 4}};
+    LineRows rows(1000);
+    const std::vector<uint32_t> got = rows.append({&a, &b});
+    EXPECT_EQ(got[1], 9u);
+    EXPECT_EQ(got[700], 7u);
+    EXPECT_EQ(row(rows, 1), (std::map<uint32_t, uint64_t>{{0, 2}, {700, 7}}));
+    EXPECT_EQ(row(rows, 700), (std::map<uint32_t, uint64_t>{{1, 7}}));
+    EXPECT_EQ(rows.append({&b})[1], 4u) << "the new ones alone";
+    EXPECT_EQ(row(rows, 1), (std::map<uint32_t, uint64_t>{{0, 2}, {700, 11}}));
+}
+
+TEST(LineRows, AnyNumberOfLinesIsKept) {
+    BundleLines bundle;
+    bundle.exchanges = {{0, 1, 1000000}};
+    bundle.densities = {{64, 1, 0, 0}};  // lines of a coarse view
+    LineRows rows(2);
+    EXPECT_EQ(rows.append({&bundle})[0], 64000000u);
+    EXPECT_EQ(row(rows, 0)[1], 64000000u);
+    for (int k = 0; k < 8; ++k) rows.append({&bundle});  // some of them joined
+    EXPECT_EQ(row(rows, 1)[0], 9 * 64000000u);
+}
+
+TEST(LineRows, RepeatedPairsAreJoined) {
+    // 20 x 19 / 2 pairs and no more, however many lines.
+    LineRows rows(20);
+    const BundleLines bundle = everyPair(20, 380);
+    for (int k = 0; k < 100; ++k) rows.append({&bundle});
+    EXPECT_LE(rows.entryCount(), 4 * 380u);
+    for (const auto& [side, lines] : row(rows, 7)) EXPECT_EQ(lines, 200u) << side;
+    EXPECT_LE(rows.byteCount(), 4 * 380u * 6 + 21 * sizeof(size_t));
+}
+
+}  // namespace
+}  // namespace raybundle
