@@ -299,8 +299,9 @@ DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t 
                                             const Receiver& receiver, int first, int count,
                                             Gathered& sum) const {
     Block block;
+    const SobolPoints points(seed);
     for (int i = first; i < first + count; ++i) {
-        const glm::vec4 u = sobolPoint(uint32_t(i), seed);
+        const glm::vec4 u = points[uint32_t(i)];
         const glm::vec3 point = position(receiver, {u.x, u.y});
         const LightSample sample = source.sample(point, receiver.normal, {u.z, u.w});
         ++block.count;

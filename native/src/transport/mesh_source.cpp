@@ -86,12 +86,16 @@ glm::vec3 MeshSource::emissionOf(uint32_t patch, int k) const {
     return sideEmission ? (*sideEmission)[2 * patch + uint32_t(k)] : emission[size_t(k)];
 }
 
+glm::vec3 MeshSource::emissionAt(const SurfacePoint& on, int k) const {
+    return on.side ? emissionOf(*on.side / 2, k) : emission[size_t(k)];
+}
+
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
                                glm::vec2 uv) const {
     const SurfacePoint on = onSurface(uv);
     const bool front = glm::dot(point - on.position, on.normal) > 0;
     return surfaceSample(point, receiver, on.position, front ? on.normal : -on.normal,
-                         emissionOf(on.side / 2, front ? 0 : 1) / glm::pi<float>(), on.area);
+                         emissionAt(on, front ? 0 : 1) / glm::pi<float>(), on.area);
 }
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
@@ -126,7 +130,7 @@ EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     bool front;
     if (sideEmission) {
         on = onSurface({r.x, r.y});
-        front = on.side % 2 == 0;
+        front = *on.side % 2 == 0;
     } else {
         const float share0 =
             strength(emission[0]) / (strength(emission[0]) + strength(emission[1]));
@@ -136,14 +140,15 @@ EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     }
     EmittedRay ray;
     // The side is chosen by the sum of the channels.
-    const glm::vec3 own = emissionOf(on.side / 2, front ? 0 : 1);
+    const glm::vec3 own = emissionAt(on, front ? 0 : 1);
     for (int c = 0; c < 3; ++c)
         if (totalPower[c] > 0)
             ray.weight[c] = own[c] / strength(own) * (strength(totalPower) / totalPower[c]);
     ray.origin = on.position;
     ray.normal = front ? on.normal : -on.normal;
     ray.direction = cosineDirection(ray.normal, {r.z, r.w});
-    ray.side = on.side / 2 * 2 + (front ? 0 : 1);
+    const uint32_t patch = on.side ? *on.side / 2 : patches.patchAt(on.parent, on.position);
+    ray.side = 2 * patch + (front ? 0 : 1);
     return ray;
 }
 
@@ -211,7 +216,7 @@ void MeshSource::boundSource() {
 // A point, uniform by area or chosen by power, and the front's normal there.
 MeshSource::SurfacePoint MeshSource::onSurface(glm::vec2 uv) const {
     if (!sideEmission) return onParents(uv);
-    if (shining.empty()) return {};
+    if (shining.empty()) return {{}, {}, parents.front(), 0, 0};
     const double at = double(uv.x) * powerUpTo.back();
     const size_t k = std::min<size_t>(
         size_t(std::upper_bound(powerUpTo.begin(), powerUpTo.end(), at) - powerUpTo.begin()),
@@ -223,7 +228,7 @@ MeshSource::SurfacePoint MeshSource::onSurface(glm::vec2 uv) const {
     const float area = parent.areaOf(patch - parent.firstPatch);
     // The patch may be chosen for either side.
     const float share = strength(emissionOf(patch, 0) + emissionOf(patch, 1)) * area;
-    return {patches.point(patch, within), parent.normal, shining[k],
+    return {patches.point(patch, within), parent.normal, patches.parentOf[patch], shining[k],
             float(double(area) * powerUpTo.back() / double(share))};
 }
 
@@ -239,8 +244,7 @@ MeshSource::SurfacePoint MeshSource::onParents(glm::vec2 uv) const {
         s = 1 - s;
         t = 1 - t;
     }
-    const glm::vec3 position = parent.position({s, t});
-    return {position, parent.normal, 2 * patches.patchAt(parents[k], position), float(total)};
+    return {parent.position({s, t}), parent.normal, parents[k], std::nullopt, float(total)};
 }
 
 }  // namespace raybundle

@@ -40,12 +40,14 @@ class MeshSource : public LightSource {
     void findOutline();
     struct SurfacePoint {
         glm::vec3 position, normal;
-        uint32_t side;  // of the patch; where points are not chosen by power, the front
-        float area;     // over the probability of the point: m^2 that it stands for
+        uint32_t parent;
+        std::optional<uint32_t> side;  // where it is chosen by power
+        float area;                    // over the probability of the point: m^2 that it stands for
     };
     SurfacePoint onSurface(glm::vec2 uv) const;
     SurfacePoint onParents(glm::vec2 uv) const;
     glm::vec3 emissionOf(uint32_t patch, int k) const;
+    glm::vec3 emissionAt(const SurfacePoint& on, int k) const;
     void chooseByPower();
 
     const Patches& patches;

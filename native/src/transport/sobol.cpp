@@ -63,12 +63,15 @@ uint32_t hash(uint32_t a, uint32_t b) {
     return uint32_t(z ^ (z >> 31));
 }
 
-glm::vec4 sobolPoint(uint32_t index, uint32_t seed) {
+SobolPoints::SobolPoints(uint32_t seed) {
+    for (uint32_t d = 0; d < 4; ++d) shift[d] = hash(seed, d);
+}
+
+glm::vec4 SobolPoints::operator[](uint32_t index) const {
     const Point bits = index < kTableSize ? sobolTable()[index] : sobolBits(index);
     glm::vec4 point;
     // The top 24 bits fit a float and stay below 1.
-    for (int d = 0; d < 4; ++d)
-        point[d] = float((bits[d] ^ hash(seed, uint32_t(d))) >> 8) * 0x1p-24f;
+    for (int d = 0; d < 4; ++d) point[d] = float((bits[d] ^ shift[d]) >> 8) * 0x1p-24f;
     return point;
 }
 

@@ -10,9 +10,20 @@
 
 namespace raybundle {
 
-// Point `index` in [0, 1)^4 of the set with the given seed. Any 2^k consecutive points from a
-// multiple of 2^k on are stratified.
-glm::vec4 sobolPoint(uint32_t index, uint32_t seed);
+// The points of a seed. Any 2^k consecutive ones from a multiple of 2^k on are stratified.
+class SobolPoints {
+  public:
+    explicit SobolPoints(uint32_t seed);
+
+    // In [0, 1)^4.
+    glm::vec4 operator[](uint32_t index) const;
+
+  private:
+    std::array<uint32_t, 4> shift;
+};
+
+// A single point of a seed's.
+inline glm::vec4 sobolPoint(uint32_t index, uint32_t seed) { return SobolPoints(seed)[index]; }
 
 // A well-mixed hash, to make seeds from indices.
 uint32_t hash(uint32_t a, uint32_t b);
