@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import attribute_picture  # noqa: E402
 import raybundle  # noqa: E402
-from raybundle.properties import checked_value  # noqa: E402
+from raybundle.properties import assign, enum_skip  # noqa: E402
 
 # Between two lines of progress within a stage.
 PROGRESS_SECONDS = 1.0
@@ -66,15 +66,13 @@ def _apply(scene: bpy.types.Scene, assignment: str) -> None:
     name, equals, value = assignment.partition("=")
     if not equals:
         raise raybundle.BakeError(f'--set "{assignment}": expected name=value')
-    if name.startswith("skip."):
-        raise raybundle.BakeError(f'--set "{name}": skips cannot be switched in this version')
-    definition = type(scene.raybundle).bl_rna.properties.get(name)
-    if definition is None or name in ('rna_type', 'name', 'report'):
-        names = [item.identifier for item in type(scene.raybundle).bl_rna.properties
-                 if item.identifier not in ('rna_type', 'name', 'report')]
+    names = [item.identifier for item in type(scene.raybundle).bl_rna.properties
+             if item.identifier not in ('rna_type', 'name', 'report')]
+    names += [f"skip.{item[0]}" for item in enum_skip]
+    if name not in names:
         raise raybundle.BakeError(f'--set "{name}": there is no such setting; there are: '
                                   f'{", ".join(names)}')
-    setattr(scene.raybundle, name, checked_value(name, value))
+    assign(scene.raybundle, name, value)
 
 
 class ProgressLines:

@@ -46,7 +46,7 @@ import raybundle  # noqa: E402
 from cycles_reference import (ATTRIBUTE, bakeable_objects, corner_values, load,  # noqa: E402
                               prepare_scene, target_attribute)
 from raybundle import bake_cache  # noqa: E402
-from raybundle.properties import checked_value  # noqa: E402
+from raybundle.properties import assign  # noqa: E402
 from surface_error import (SurfaceError, corner_areas, corner_vertices, face_means,  # noqa: E402
                            face_sizes, is_defined, off_contact_edges, read_colors, surface_error,
                            world_positions)
@@ -264,7 +264,7 @@ def run_scene(name: str, options: argparse.Namespace) -> dict:
     settings.output, settings.threads = 'LIGHTING', options.threads
     for assignment in options.set:
         key, _, value = assignment.partition("=")
-        setattr(settings, key, checked_value(key, value))
+        assign(settings, key, value)
     bpy.context.scene.render.threads_mode = 'FIXED' if options.threads else 'AUTO'
     if options.threads:
         bpy.context.scene.render.threads = options.threads

@@ -39,7 +39,7 @@ sys.dont_write_bytecode = True
 import raybundle  # noqa: E402
 from benchmark import Light, SurfaceReference, bake_cycles, bake_raybundle  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
-from raybundle.properties import checked_value  # noqa: E402
+from raybundle.properties import assign  # noqa: E402
 
 CYCLES_SAMPLES = 4096  # whose noise is stated
 
@@ -71,7 +71,7 @@ def compare(options: argparse.Namespace) -> dict[str, float]:
     settings.output = 'LIGHTING'
     for assignment in options.set:
         key, _, value = assignment.partition("=")
-        setattr(settings, key, checked_value(key, value))
+        assign(settings, key, value)
     objects = bakeable_objects(bpy.context)
     references = [SurfaceReference(objects, options.samples, seed) for seed in (0, 1)]
     errors: dict[str, float] = {}

@@ -63,7 +63,7 @@ BLENDERS_OWN_LINE = "could not get a list of mounted file-systems"
 
 
 @pytest.mark.parametrize("arguments, message", [
-    (["--set", "skip.bundles=0"], "skip.bundles"),
+    (["--set", "skip.nothing=0"], "skip.nothing"),
     (["--set", "no_such=1"], "no_such"),
     (["--set", "solver=MAGIC"], "MAGIC"),
     (["--set", "seed"], "name=value"),

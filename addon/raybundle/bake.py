@@ -185,6 +185,8 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
     for name in native.SETTINGS:
         if hasattr(settings, name):
             native_bake.set(name, getattr(settings, name))
+    for name in native.SKIPS:
+        native_bake.set(f'skip.{name}', name not in settings.skips_off)
 
 
 # --------------------------------------------------------------------------------------------------

@@ -52,6 +52,21 @@ enum_shared_meshes = (
     ('AVERAGE', "Average", "Objects that share a mesh keep sharing it and show their mean light"),
 )
 
+# What each skip leaves out; the names are those of the native library's settings "skip.NAME".
+enum_skip = (
+    ('darkness', "Darkness", "Bundles and solve, if no light reaches any surface"),
+    ('reflection', "Reflection", "The same, if no surface reflects light"),
+    ('geometry', "Geometry", "Patches and lines, if the geometry is as in the last bake"),
+    ('facing', "Facing", "Shadow rays to a light that the surface cannot face"),
+    ('occluders', "Occluders", "Reconstruction of objects that are not baked"),
+    ('lit', "Lit", "Noise of a light that is wholly visible: its light is known exactly"),
+    ('weak', "Weak", "Most shadow rays to a light that gives little of all"),
+    ('inside', "Inside", "Most shadow rays from the inside of solids"),
+    ('gather', "Gather", "Final gather where interpolation follows the light"),
+    ('bundles', "Bundles", "Bundles once the noise is at its target"),
+    ('warm_start', "Warm Start", "Iterations that a solve from zero takes more"),
+)
+
 enum_solver = (
     ('LINE_REUSE', "Line Reuse",
      "Keep all lines as a sparse matrix and solve on it to convergence"),
@@ -260,6 +275,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     threads: IntProperty(
         name="Threads", description="Processor threads to use; 0 is all", default=0, min=0,
         soft_max=64, max=1024)
+    skips_off: EnumProperty(
+        name="Skips Off",
+        description="Work that is done although the scene does not need it, to test that the result "
+                    "stays the same",
+        items=enum_skip, options={'ENUM_FLAG'}, default=set())
     light_sets: CollectionProperty(
         name="Light Sets",
         description="Groups of lights that are baked into attributes of their own along the same "
@@ -316,6 +336,7 @@ class BakeSettings:
     memory_limit: float
     seed: int
     threads: int
+    skips_off: set[str]
 
 
 def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
@@ -329,19 +350,37 @@ def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeS
     return BakeSettings(**values)
 
 
+def assign(settings: RaybundleSceneSettings, name: str, value: object) -> None:
+    """Sets a setting to a value that may be text; "skip.NAME" switches a skip.
+
+    Raises KeyError for a name that is unknown and ValueError for a value that is none of it.
+    """
+    section, dot, skip = name.partition(".")
+    if dot and section == "skip":
+        if skip not in {item[0] for item in enum_skip}:
+            raise KeyError(name)
+        off = settings.skips_off
+        settings.skips_off = off - {skip} if _checked_bool(name, value) else off | {skip}
+        return
+    setattr(settings, name, checked_value(name, value))
+
+
 def checked_value(name: str, value: object) -> object:
     """The value in the type of the scene setting of this name; text is converted."""
     definition = RaybundleSceneSettings.bl_rna.properties[name]
+    if definition.type == 'ENUM' and definition.is_enum_flag:
+        unknown = set(value) - set(definition.enum_items.keys())
+        if unknown:
+            raise ValueError(f'{name}: {sorted(unknown)} are none of '
+                             f'{", ".join(definition.enum_items.keys())}')
+        return set(value)
     if definition.type == 'ENUM':
         choices = [item.identifier for item in definition.enum_items]
         if value not in choices:
             raise ValueError(f'{name}: "{value}" is none of {", ".join(choices)}')
         return value
     if definition.type == 'BOOLEAN':
-        choices = {'0': False, 'false': False, '1': True, 'true': True}
-        if str(value).lower() not in choices:
-            raise ValueError(f'{name}: "{value}" is neither true nor false')
-        return choices[str(value).lower()]
+        return _checked_bool(name, value)
     if definition.type == 'STRING':
         return str(value)
     try:
@@ -352,6 +391,13 @@ def checked_value(name: str, value: object) -> object:
         raise ValueError(f"{name}: {number} is not between {definition.hard_min:g} and "
                          f"{definition.hard_max:g}")
     return number
+
+
+def _checked_bool(name: str, value: object) -> bool:
+    choices = {'0': False, 'false': False, '1': True, 'true': True}
+    if str(value).lower() not in choices:
+        raise ValueError(f'{name}: "{value}" is neither true nor false')
+    return choices[str(value).lower()]
 
 
 classes = (

@@ -38,7 +38,7 @@ constexpr float kTouchOfPatch = 0.02f;
 // Relative residual of the last solve: a share of the noise, within these bounds.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 // The lines' noise on the patches of any one window may be this many times the target.
-constexpr double kWindowTargets = 1.2;
+constexpr double kWindowTargets = 1.1;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 
 class Stopwatch {
@@ -164,7 +164,34 @@ void warnOfVisibility(const Scene& scene, const SetLights& lights, const Setting
     }
 }
 
-// Whether there is nothing for bundles to carry; says so, also of single light sets.
+// Per side, m^2: the whole area of those that have a result, else 0.
+std::vector<float> wantedArea(const Scene& scene, const Patches& patches) {
+    bool anyBaked = false;
+    for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
+    std::vector<float> area(patches.sideCount(), 0);
+    for (size_t side = 0; side < area.size(); ++side) {
+        const Instance& instance =
+            scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
+        if (!anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side)))
+            area[side] = patches.area[side / 2];
+    }
+    return area;
+}
+
+// Whether no light is left after the first shot: nothing reflects it, and lines bring none of the
+// world's or of dim emission.
+bool isFirstShotAll(const Patches& patches, const SetLights& lights) {
+    auto isBlack = [](const glm::vec3& v) { return v == glm::vec3(0.0f); };
+    auto areBlack = [&](const std::vector<glm::vec3>& values) {
+        return std::all_of(values.begin(), values.end(), isBlack);
+    };
+    return areBlack(patches.reflectance) &&
+           std::all_of(lights.begin(), lights.end(), [&](const SetLight& light) {
+               return areBlack(light.shot.emission) && isBlack(light.worldRadiance);
+           });
+}
+
+// Whether no light reaches any surface; says so, also of single light sets.
 bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
     const bool isEmpty = lights.front().shot.irradiance.empty();
     const bool isDark = std::all_of(lights.begin(), lights.end(),
@@ -203,27 +230,34 @@ struct Bake::Trace {
 
     // When the patches are as they stay: from here on lines are traced.
     void startLines(const Settings& settings) {
-        const ProjectorInput input{patches,
-                                   visibility,
-                                   density.pixelSize,
-                                   touchDistance,
-                                   settings.smallPatchesKind(),
-                                   settings.planeCount,
-                                   settings.planePlacementKind(),
-                                   settings.planeCoherence != 0,
-                                   settings.linesPerBundle == 1,
-                                   density.windows};
+        const ProjectorInput input = projectorInput(settings);
         counts = LineCounts(patches.sideCount());
         tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                                 uint32_t(settings.seed));
         // Only line reuse on exact projection sees what lies against what while it traces.
         if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact()) {
-            // By lists of pixels also where a bundle is one line.
-            ProjectorInput exact = input;
-            exact.singleLine = false;
-            if (input.singleLine) exact.pixelSize = pixelSize(patches, 0);
-            surrounding = surroundings(exact, uint32_t(settings.seed));
+            surrounding = surroundings(exactInput(settings), uint32_t(settings.seed));
         }
+    }
+
+    ProjectorInput projectorInput(const Settings& settings) const {
+        return {patches,
+                visibility,
+                density.pixelSize,
+                touchDistance,
+                settings.smallPatchesKind(),
+                settings.planeCount,
+                settings.planePlacementKind(),
+                settings.planeCoherence != 0,
+                settings.linesPerBundle == 1,
+                density.windows};
+    }
+    // By lists of pixels also where a bundle is one line.
+    ProjectorInput exactInput(const Settings& settings) const {
+        ProjectorInput exact = projectorInput(settings);
+        if (exact.singleLine) exact.pixelSize = pixelSize(patches, 0);
+        exact.singleLine = false;
+        return exact;
     }
 
     const Visibility& visibilityOfLights() const {
@@ -286,8 +320,12 @@ void Bake::runStages(const Scene& scene) {
         warnOfVisibility(scene, lights, settings, report);
         SideNoise noise(tiles.sideCount());
         exposed.assign(patches.sideCount(), 1.0f);
-        if (isDark(scene, lights, report)) {
+        const bool dark = isDark(scene, lights, report);
+        if (patches.count() == 0 || (dark && settings.skipDarkness)) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
+        } else if (settings.skipReflection && isFirstShotAll(patches, lights)) {
+            report.skipped.push_back({"bundles and solve", "no surface reflects light", 1});
+            noise = keepFirstShot(scene, tiles, lights, report);
         } else {
             std::vector<TransportInput> inputs;
             for (const SetLight& light : lights)
@@ -324,7 +362,7 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
     progress.report(RB_STAGE_PATCHES, 0);
     const uint64_t hash = geometryHash(scene, settings);
-    if (trace && trace->hash == hash && trace->isWhole()) {
+    if (settings.skipGeometry && trace && trace->hash == hash && trace->isWhole()) {
         assignMaterials(scene, trace->patches);
         report.skipped.push_back({"patches and lines", "geometry unchanged since the last bake",
                                   trace->tracer->bundleCount()});
@@ -378,7 +416,7 @@ std::vector<CoarseShot> Bake::shootCoarsely(const Scene& scene, Report& report) 
     std::vector<CoarseShot> shots;
     for (int32_t set = kNoLightSet; set < int32_t(scene.lightSets.size()); ++set) {
         const DirectLight direct(scene, patches, trace->visibilityOfLights(),
-                                 uint32_t(settings.seed), set);
+                                 uint32_t(settings.seed), set, settings);
         CoarseShot shot{std::vector<Gathered>(all.size()), {}};
         direct.shootCoarsely(
             shot, all,
@@ -402,7 +440,7 @@ SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& 
     const int32_t count = int32_t(scene.lightSets.size());
     for (int32_t set = kNoLightSet; set < count; ++set) {
         const Progress share = progress.part(lights.size(), size_t(count) + 1);
-        DirectLight direct(scene, patches, visibility, uint32_t(settings.seed), set);
+        DirectLight direct(scene, patches, visibility, uint32_t(settings.seed), set, settings);
         FirstShot shot = firstShot(
             settings.firstShot, {direct, patches, visibility, settings, share, trace->touchDistance,
                                  trace->linesPerBundle(), &trace->visibility,
@@ -412,10 +450,45 @@ SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& 
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
         report.skipped.push_back(
             {"shadow rays", "side and source face away from each other", shot.hiddenSides});
+        report.skipped.push_back(
+            {"most shadow rays", "the source gives little of the light", shot.weakSides});
+        report.skipped.push_back(
+            {"most shadow rays", "the side is the inside of a solid", shot.insideSides});
         lights.push_back({set, std::move(direct), std::move(shot), scene.worldRadianceOf(set),
                           Irradiance(patches.sideCount())});
     }
     return lights;
+}
+
+// The result where bundles have nothing to bring; some of them tell what is covered.
+SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, SetLights& lights,
+                              Report& report) {
+    Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
+    const Patches& patches = trace->patches;
+    exposed = trace->surrounding.exposed;
+    if (exposed.empty())
+        exposed = surroundings(trace->exactInput(settings), uint32_t(settings.seed)).exposed;
+    std::vector<float> weight = wantedArea(scene, patches);
+    for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exposed[side];
+    const std::vector<float> tileWeight = tiles.sum(weight);
+    std::vector<std::vector<float>> errorOfSets;
+    std::vector<std::array<Irradiance, 2>> halves;
+    for (SetLight& light : lights) {
+        HandOver first = handOver(patches, light.shot, exposed);
+        light.irradiance.gathered = first.gathered;
+        light.irradiance.direct = std::move(first.gathered);
+        light.irradiance.indirect = std::move(first.indirect);
+        const Irradiance mean = meanOver(tiles, light.irradiance, weight);
+        halves.push_back({mean, mean});
+        errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
+    }
+    SetNoise noise({}, std::move(errorOfSets), tileWeight);
+    noise.look(halves, 1, 0);
+    const std::vector<double> errors = noise.relative();
+    report.estimatedError = errors.front();
+    for (size_t set = 0; set < report.lightSets.size(); ++set)
+        report.lightSets[set].estimatedError = errors[set + 1];
+    return noise.perSide();
 }
 
 // Adds bundles by doubling until the difference of the two halves' estimates meets the target, in
@@ -426,17 +499,10 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
     const Patches& patches = trace->patches;
     const size_t n = patches.sideCount();
     // Sides whose noise counts: those with a result, by the area that is exposed as far as known.
-    std::vector<float> weight(n, 0), area(n, 0);
-    std::vector<bool> wantedSides(n, false);
-    bool anyBaked = false;
-    for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
-    for (size_t side = 0; side < n; ++side) {
-        const Instance& instance =
-            scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
-        wantedSides[side] =
-            !anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side));
-        if (wantedSides[side]) area[side] = patches.area[side / 2];
-    }
+    const std::vector<float> area = wantedArea(scene, patches);
+    std::vector<float> weight(n, 0);
+    std::vector<bool> wantedSides(n);
+    for (size_t side = 0; side < n; ++side) wantedSides[side] = area[side] > 0;
     std::vector<std::vector<float>> errorOfSets;
     for (const SetLight& light : lights) errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
     std::vector<float> tileWeight(tiles.sideCount(), 0);
@@ -473,7 +539,11 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
         const double onSmall =
             worstWindowNoise(tiles.patches(), trace->density.windowOf, halves, tileWeight);
         const double excess = std::max(*worst, onSmall / kWindowTargets) / settings.targetError;
-        if (excess <= 1) break;
+        if (excess <= 1 && settings.skipBundles) {
+            report.skipped.push_back(
+                {"bundles", "the noise is at its target", most - std::min(most, bundles)});
+            break;
+        }
         if (bundles >= most) {
             const int32_t set = lights[size_t(worst - errors.begin())].set;
             report.warnings.push_back(
@@ -486,7 +556,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
             break;
         }
         // Double at most; less where the error's slope says that less will do.
-        const double factor = std::pow(excess, 1 / kNoiseSlope);
+        const double factor = settings.skipBundles ? std::pow(excess, 1 / kNoiseSlope) : INFINITY;
         wanted = std::min(most, (uint32_t(bundles * std::min(2.0, 1.05 * factor)) + 2) & ~1u);
     }
 

@@ -57,6 +57,8 @@ class Bake {
     std::vector<CoarseShot> shootCoarsely(const Scene& scene, Report& report);
     SetLights shootSources(const Scene& scene, const std::vector<CoarseShot>& coarse,
                            Report& report);
+    SideNoise keepFirstShot(const Scene& scene, const Tiles& tiles, SetLights& lights,
+                            Report& report);
     SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, SetLights& lights,
                             const Transports& transports, Report& report);
 

@@ -32,6 +32,17 @@ const std::vector<Number<int>>& integers() {
         {"local_rays", &Settings::localRays, 0, INT32_MAX},
         {"plane_coherence", &Settings::planeCoherence, 0, 1},
         {"final_gather", &Settings::finalGather, 0, 1},
+        {"skip.darkness", &Settings::skipDarkness, 0, 1},
+        {"skip.reflection", &Settings::skipReflection, 0, 1},
+        {"skip.geometry", &Settings::skipGeometry, 0, 1},
+        {"skip.facing", &Settings::skipFacing, 0, 1},
+        {"skip.occluders", &Settings::skipOccluders, 0, 1},
+        {"skip.lit", &Settings::skipLit, 0, 1},
+        {"skip.weak", &Settings::skipWeak, 0, 1},
+        {"skip.inside", &Settings::skipInside, 0, 1},
+        {"skip.gather", &Settings::skipGather, 0, 1},
+        {"skip.bundles", &Settings::skipBundles, 0, 1},
+        {"skip.warm_start", &Settings::skipWarmStart, 0, 1},
     };
     return table;
 }

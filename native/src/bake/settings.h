@@ -4,12 +4,13 @@
 #include <cstdint>
 #include <string>
 
+#include "bake/skips.h"
 #include "bundles/projector.h"
 
 namespace raybundle {
 
 // Settings of a bake and, in this one place, their defaults. Settable by name (see raybundle.h).
-struct Settings {
+struct Settings : Skips {
     float targetError = 0.02f;  // relative noise at which bundles stop
     float patchSize = 0;        // metres; 0 = automatic
     int maxPatches = 100000;
@@ -20,7 +21,7 @@ struct Settings {
     int linesPerBundle = 0;    // 0 = automatic
     float memoryLimit = 4096;  // of the exchanges, MB
     int seed = 0;
-    int threads = 0;               // 0 = all
+    int threads = 0;                // 0 = all
     float regularization = 0.005f;  // of the reconstruction
     std::string solver = "LINE_REUSE";
     std::string firstShot = "GATHER";

@@ -45,7 +45,7 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
                            const std::vector<InstanceRange>& ranges,
                            const std::vector<float>& exposed, const Settings& settings,
                            const Progress& progress)
-    : scene(scene), ranges(ranges), exposed(exposed) {
+    : scene(scene), ranges(ranges), exposed(exposed), skips(settings) {
     // Whether another surface lies against the corner, though not against all of its patch.
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
@@ -94,6 +94,7 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
             isNear[c - begin] =
                 !wanted[regions.nodeOf[corners[c].corner]] && gather.isNear(corners[c].receiver);
         });
+        if (!skips.skipGather) wanted.assign(wanted.size(), true);
         for (size_t c = begin; c < end; ++c)
             if (isNear[c - begin]) wanted[regions.nodeOf[corners[c].corner]] = true;
         std::vector<FinalGather::Light> found(end - begin);

@@ -55,6 +55,7 @@ class CornerGather {
     const Scene& scene;
     const std::vector<InstanceRange>& ranges;
     const std::vector<float>& exposed;
+    const Skips skips;
     std::vector<CornerReceiver> corners;
     std::vector<size_t> first;                   // per instance, into corners
     std::vector<std::vector<Gathered>> sources;  // per light and corner

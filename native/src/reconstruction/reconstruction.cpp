@@ -115,12 +115,12 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         InstanceLight& out = result[i];
         out.name = instance.name;
         report.objects[i] = {instance.name, mesh.cornerCount(), "occluder", {}};
-        if (instance.role != RB_ROLE_BAKE) {
+        out.isBaked = instance.role == RB_ROLE_BAKE;
+        if (!out.isBaked && settings.skipOccluders) {
             ++occluders;
             continue;
         }
-        report.objects[i].status = "baked";
-        out.isBaked = true;
+        if (out.isBaked) report.objects[i].status = "baked";
         out.cornerVertices = mesh.cornerVertices;
         out.vertexCount = mesh.vertices.size();
         out.cornerAngles = cornerAngles(mesh);
@@ -162,7 +162,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         }
         for (const CornerLight& light : out.sets) out.add(light);
 
-        if (isInsideOut(patches, ranges[i], instance.side, lights)) {
+        if (out.isBaked && isInsideOut(patches, ranges[i], instance.side, lights)) {
             report.objects[i].status = "baked; no light on this side";
             report.warnings.push_back("object \"" + instance.name +
                                       "\": the baked sides of its faces get no light but the other "

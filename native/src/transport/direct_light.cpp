@@ -100,10 +100,11 @@ struct DirectLight::Block {
 };
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                         uint32_t seed, int32_t lightSet)
+                         uint32_t seed, int32_t lightSet, const Skips& skips)
     : patches(patches),
       visibility(visibility),
       seed(seed),
+      skips(skips),
       emitted(patches.emission),
       bundled(patches.sideCount()),
       gathered(patches.sideCount()) {
@@ -205,11 +206,11 @@ Gathered DirectLight::gather(const Receiver& receiver, float tolerance, Seen& se
             patches.parentAt(receiver.side).stopsDirect)
             continue;
         const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
-        gatherFrom(k, receiver,
-                   share < kSmallShare    ? kFewSamples
-                   : share < kMiddleShare ? kFirstSamples / 2
-                                          : kFirstSamples,
-                   tolerance, seen, sum);
+        const int samples = share < kSmallShare    ? kFewSamples
+                            : share < kMiddleShare ? kFirstSamples / 2
+                                                   : kFirstSamples;
+        if (samples < kFirstSamples) ++sum.weak;
+        gatherFrom(k, receiver, samples, tolerance, seen, sum);
     }
     return sum;
 }
@@ -278,12 +279,10 @@ std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, uint
 // About what each source would give without occluders, to share out the samples; empty where
 // there are so few sources that it does not pay.
 std::vector<float> DirectLight::unblockedWeights(const Receiver& receiver) const {
-    if (sources.size() <= kFewSources) return {};
+    if (sources.size() <= kFewSources || !skips.skipWeak) return {};
     std::vector<float> weights(sources.size());
     for (size_t k = 0; k < sources.size(); ++k) {
-        if (sources[k]->isOutOfSight(position(receiver, {0.5f, 0.5f}), receiver.normal,
-                                     radius(receiver)))
-            continue;
+        if (isOutOfSight(*sources[k], receiver)) continue;
         for (uint32_t i = 0; i < 2; ++i) {
             const glm::vec4 u = sobolPoint(i, hash(receiver.seed, uint32_t(k)));
             weights[k] +=
@@ -323,14 +322,15 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
                              Seen& seen, Gathered& sum) const {
     const LightSource& source = *sources[index];
     const uint32_t sampleSeed = hash(seed, hash(receiver.seed, uint32_t(index)));
-    if (source.isOutOfSight(position(receiver, {0.5f, 0.5f}), receiver.normal, radius(receiver))) {
+    if (isOutOfSight(source, receiver)) {
         ++sum.hidden;
         return;
     }
     // Inside a solid it is dark, unless a source is in there too: look before taking all
     // samples.
-    const bool isInside =
-        patches.parents[patches.parentOf[receiver.side / 2]].isSolid && receiver.side % 2 == 1;
+    const bool isInside = skips.skipInside && receiver.side % 2 == 1 &&
+                          patches.parents[patches.parentOf[receiver.side / 2]].isSolid;
+    if (isInside) ++sum.inside;
     int next = isInside ? std::min(kFewSamples, samples) : samples;
     std::array<Block, kBlocks> blocks;
     Block all;
@@ -345,7 +345,7 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
             blocks[size_t(b)].add(block);
             all.add(block);
         }
-        if (!closed && (brightest(all.open) <= 0 || brightest(all.visible) > 0))
+        if (skips.skipLit && !closed && (brightest(all.open) <= 0 || brightest(all.visible) > 0))
             closed = closedMean(source, receiver, tolerance, closedError);
         // No sample faced the receiver: few of them may, beside a source of many faces.
         if (brightest(all.open) <= 0 && all.count < source.mostSamples() &&
@@ -353,7 +353,6 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
             next = 4 * all.count;
             continue;
         }
-        if (brightest(all.open) <= 0) ++sum.hidden;
         const float missed =
             source.surrounds() && !isInside
                 ? kMissed * brightest(all.open) / (float(all.count) * float(all.count))
@@ -406,6 +405,11 @@ bool DirectLight::hasPassingLight(uint32_t side) const {
     if (!patches.parentAt(side).stopsDirect) return !sources.empty();
     return std::any_of(sources.begin(), sources.end(),
                        [](const auto& source) { return !source->castsShadows; });
+}
+
+bool DirectLight::isOutOfSight(const LightSource& source, const Receiver& receiver) const {
+    return skips.skipFacing &&
+           source.isOutOfSight(position(receiver, {0.5f, 0.5f}), receiver.normal, radius(receiver));
 }
 
 glm::vec3 DirectLight::position(const Receiver& receiver, glm::vec2 uv) const {

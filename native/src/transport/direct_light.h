@@ -22,6 +22,7 @@
 #include <optional>
 #include <vector>
 
+#include "bake/skips.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
 #include "transport/light_source.h"
@@ -53,7 +54,9 @@ struct Gathered {
                          // shadows make
     uint64_t rays = 0;
     uint64_t unblocked = 0;  // sources without noise: wholly visible
-    uint64_t hidden = 0;     // sources that it cannot see, without a ray
+    uint64_t hidden = 0;     // sources that it cannot face, without a sample
+    uint64_t weak = 0;       // sources that took fewer rays since they give little of the light
+    uint64_t inside = 0;     // sources that took fewer rays since it is the inside of a solid
 };
 
 // The light of few samples at each receiver.
@@ -67,7 +70,7 @@ class DirectLight {
   public:
     // The light of a set, or what belongs to none. Everything passed must outlive the object.
     DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                uint32_t seed, int32_t lightSet = kNoLightSet);
+                uint32_t seed, int32_t lightSet = kNoLightSet, const Skips& skips = {});
 
     // Per side: all emission of the set, W/m^2.
     const std::vector<glm::vec3>& emission() const { return emitted; }
@@ -115,12 +118,14 @@ class DirectLight {
     std::optional<glm::vec3> quadrature(const LightSource& source, uint32_t side, int parts,
                                         glm::vec3& low, glm::vec3& high) const;
     std::vector<float> unblockedWeights(const Receiver& receiver) const;
+    bool isOutOfSight(const LightSource& source, const Receiver& receiver) const;
     glm::vec3 position(const Receiver& receiver, glm::vec2 uv) const;
     float radius(const Receiver& receiver) const;
 
     const Patches& patches;
     const Visibility& visibility;
     const uint32_t seed;
+    const Skips skips;
     std::vector<glm::vec3> emitted, bundled;
     std::vector<glm::vec3> gathered;  // per side: emission of sources, W/m^2 of the whole patch
     std::vector<std::unique_ptr<LightSource>> sources;

@@ -29,7 +29,9 @@ struct FirstShot {
     glm::dvec3 escaped{0.0};  // part of it that meets no surface, W
     uint64_t rays = 0;
     uint64_t unblockedSides = 0;  // side and source pairs without noise: wholly visible
-    uint64_t hiddenSides = 0;     // side and source pairs that cannot see each other, without a ray
+    uint64_t hiddenSides = 0;     // side and source pairs that cannot face each other
+    uint64_t weakSides = 0;    // pairs with fewer rays since the source gives little of the light
+    uint64_t insideSides = 0;  // pairs with fewer rays since the side is the inside of a solid
 };
 
 // What first shots are made of. References must outlive them.

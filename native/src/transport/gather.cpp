@@ -53,6 +53,8 @@ FirstShot gather(const FirstShotInput& input) {
         shot.rays += results[side].rays;
         shot.unblockedSides += results[side].unblocked;
         shot.hiddenSides += results[side].hidden;
+        shot.weakSides += results[side].weak;
+        shot.insideSides += results[side].inside;
     }
     for (const auto& source : light.lightSources())
         if (source->castsShadows) shot.emitted += glm::dvec3(source->power());

@@ -79,14 +79,21 @@ class LineReuseTransport : public Transport {
     Irradiance irradiance(Half half, float tolerance) override {
         if (streaming[0]) return streamed(half);
         std::vector<glm::vec3>& guess = reflected[size_t(half)];
-        if (half == Half::BOTH)
+        if (!input.settings.skipWarmStart)
+            std::fill(guess.begin(), guess.end(), glm::vec3(0.0f));
+        else if (half == Half::BOTH)
             for (size_t i = 0; i < guess.size(); ++i)
                 guess[i] = 0.5f * (reflected[0][i] + reflected[1][i]);
+        ++solves;
         return solver.solve(half, tolerance, guess);
     }
 
     Irradiance finish(float tolerance, const std::vector<bool>& wanted, Report& report) override {
         Irradiance result = irradiance(Half::BOTH, tolerance);
+        // The first of each half starts from nothing.
+        if (input.settings.skipWarmStart && solves > 2)
+            report.skipped.push_back(
+                {"iterations of a solve", "it starts from the last solution", solves - 2});
         const size_t starved = solver.gatherStarvedSides(input.visibility, kStarvedLines,
                                                          uint32_t(input.settings.seed), wanted,
                                                          reflected[size_t(Half::BOTH)], result);
@@ -161,6 +168,7 @@ class LineReuseTransport : public Transport {
     const LineReuse solver;
     const size_t limit;                   // bytes
     std::vector<glm::vec3> reflected[3];  // per half and for both: the last solution
+    uint64_t solves = 0;
     std::array<std::optional<StreamingReuse>, 2> streaming;  // per half, once the limit is reached
     HandOver first;                                          // while streaming
     std::vector<LineReuseTransport*> carriers{this};         // all that the traced lines serve

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Every skip, on and off: the report says what was skipped, and the light stays the same.
+#include "bake/skips.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "bake/bake.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+// The room with one bright lamp and five dim ones, and something that only occludes.
+Scene roomOfLamps() {
+    Scene scene = litRoom();
+    for (int k = 0; k < 5; ++k)
+        scene.addLight(pointLight({0.5 + 0.6 * k, 0.5, 2.4}, glm::dvec3(0.01)));
+    place(scene, box("post", {3.2f, 2.4f, 0}, {3.4f, 2.6f, 1}, false), grey("post", 0.5f),
+          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    return scene;
+}
+
+struct Case {
+    const char* name;
+    std::string said;  // in the report's list of what was skipped
+    // Largest difference over the largest value; 0: within the stated errors of the two bakes.
+    double tolerance;
+    std::function<Scene()> scene = roomOfLamps;
+    std::function<void(Settings&)> prepare = [](Settings&) {};
+};
+
+std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
+
+class Skip : public testing::TestWithParam<Case> {};
+
+TEST_P(Skip, ChangesNoLight) {
+    const Case& c = GetParam();
+    const Scene scene = c.scene();
+    std::vector<glm::vec3> light[2];
+    double stated[2];
+    for (int on : {0, 1}) {
+        Bake bake;
+        setQuick(bake);
+        c.prepare(bake.settings);
+        bake.settings.set(std::string("skip.") + c.name, on);
+        bake.run(scene);
+        bake.run(scene);  // a second time: geometry is as it was
+        const Json report = reportOf(bake);
+        EXPECT_EQ(mentions(report["skipped"], c.said), on == 1) << report["skipped"];
+        light[on] = everything(bake);
+        stated[on] = report["estimated_error"];
+    }
+    bool isDark = true;
+    for (const glm::vec3& v : light[0]) isDark = isDark && v == glm::vec3(0.0f);
+    if (isDark)
+        EXPECT_EQ(light[1], light[0]);
+    else if (c.tolerance > 0)
+        EXPECT_LT(difference(light[1], light[0]), c.tolerance);
+    else
+        // The noise at corners is that of patches, and up to twice as much beside contacts.
+        EXPECT_LT(noise(light[1], light[0]), 2 * std::hypot(stated[0], stated[1]));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Skips, Skip,
+    testing::Values(Case{"darkness", "no light to exchange", 1e-5,
+                         [] { return roomWithBoxes(0.5f); }},
+                    Case{"reflection", "no surface reflects", 1e-5, [] { return litRoom(0); }},
+                    Case{"geometry", "unchanged", 1e-5}, Case{"facing", "face away", 1e-5},
+                    Case{"occluders", "only occlude", 1e-5}, Case{"lit", "closed form", 0},
+                    Case{"weak", "little of the light", 0}, Case{"inside", "inside of a solid", 0},
+                    Case{"gather", "whose light interpolation follows", 0, roomOfLamps,
+                         [](Settings& settings) { settings.reconstruction = "POINT"; }},
+                    Case{"bundles", "at its target", 0, roomOfLamps,
+                         [](Settings& settings) {
+                             settings.minBundles = 32;
+                             settings.maxBundles = 512;
+                             settings.targetError = 0.05f;
+                         }},
+                    Case{"warm_start", "last solution", 1e-3}),
+    [](const testing::TestParamInfo<Case>& c) { return std::string(c.param.name); });
+
+}  // namespace
+}  // namespace raybundle
