@@ -16,7 +16,7 @@ namespace raybundle {
 namespace {
 
 // Gaps narrower than this share of a tile's width count, and its edges are halved so often. With
-// wider gaps the cuts of spheres on a floor (scene instances) cost more than they gained; more
+// wider gaps the cuts below round things (scene instances) cost more than they gained; more
 // would leave patches that few lines meet.
 constexpr float kNarrow = 0.25f;
 constexpr uint8_t kLevel = 2;

@@ -29,7 +29,7 @@ constexpr float kRelativeOffset = 2e-6f;
 struct Visibility::Embree {
     RTCDevice device = nullptr;
     RTCScene scene = nullptr;
-    std::vector<uint32_t> parentOfTriangle;
+    std::vector<uint32_t> parentOf;
 
     ~Embree() {
         if (scene) rtcReleaseScene(scene);
@@ -50,27 +50,23 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     auto blocks = [&](const Parent& parent) {
         return blockers == Blockers::EXCHANGING ? parent.exchanges : parent.stopsDirect;
     };
-    for (size_t i = 0; i < patches.parents.size(); ++i) {
-        if (!blocks(patches.parents[i])) continue;
-        embree->parentOfTriangle.push_back(uint32_t(i));
-        if (!patches.parents[i].isTriangle) embree->parentOfTriangle.push_back(uint32_t(i));
-    }
-    const size_t triangles = embree->parentOfTriangle.size();
-    if (triangles > 0) {
-        RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    for (size_t i = 0; i < patches.parents.size(); ++i)
+        if (blocks(patches.parents[i])) embree->parentOf.push_back(uint32_t(i));
+    const size_t quads = embree->parentOf.size();
+    if (quads > 0) {
+        RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_QUAD);
         float* vertices = static_cast<float*>(
             rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                     3 * sizeof(float), patches.vertices.size()));
         uint32_t* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
-            geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), triangles));
+            geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(uint32_t), quads));
         if (!vertices || !indices) fail(rtcGetDeviceError(embree->device), "no memory");
         std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
         for (const Parent& parent : patches.parents) {
             if (!blocks(parent)) continue;
-            const auto& v = parent.vertex;
-            for (uint32_t index : {v[0], v[1], v[2]}) *indices++ = index;
-            if (!parent.isTriangle)
-                for (uint32_t index : {v[0], v[2], v[3]}) *indices++ = index;
+            // A triangle is a quad with its last corner twice.
+            for (int k = 0; k < 4; ++k)
+                *indices++ = parent.vertex[parent.isTriangle && k == 3 ? 2 : k];
         }
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(embree->scene, geometry);
@@ -88,7 +84,7 @@ namespace {
 // How a ray passes what lets light through: in part, or by chance.
 struct Passage {
     const Patches* patches;
-    const uint32_t* parentOfTriangle;
+    const uint32_t* parentOf;
     std::optional<uint64_t> line;  // its name, where it passes by chance
     float share = 1;               // that has come through, where it passes in part
     // Parents that have taken their part: a ray along the diagonal of a quad meets both of its
@@ -156,7 +152,7 @@ struct Hit {
 
 void passStart(const RTCFilterFunctionNArguments* args) {
     Start& start = *reinterpret_cast<Start*>(args->context);
-    const uint32_t other = start.passage.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
     const Hit hit(args);
     if (passesStart(start, other, hit.direction, hit.distance) ||
         start.passage.goesOn(other, hit.point))
@@ -183,7 +179,7 @@ struct FromNowhere {
 
 void pass(const RTCFilterFunctionNArguments* args) {
     Passage& passage = reinterpret_cast<FromNowhere*>(args->context)->passage;
-    const uint32_t parent = passage.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    const uint32_t parent = passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
     if (passage.goesOn(parent, Hit(args).point)) args->valid[0] = 0;
 }
 
@@ -194,7 +190,7 @@ struct Visibility::Passing : FromNowhere {
         rtcInitIntersectContext(&context);
         if (!visibility.patches.opacity.empty()) context.filter = pass;
         passage.patches = &visibility.patches;
-        passage.parentOfTriangle = visibility.embree->parentOfTriangle.data();
+        passage.parentOf = visibility.embree->parentOf.data();
     }
 };
 
@@ -204,7 +200,7 @@ struct Visibility::FromSide : Start {
         context.filter = passStart;
         const Patches& patches = visibility.patches;
         passage.patches = &patches;
-        passage.parentOfTriangle = visibility.embree->parentOfTriangle.data();
+        passage.parentOf = visibility.embree->parentOf.data();
         parent = patches.parentOf[side / 2];
         isFront = side % 2 == 0;
         normal = patches.normal(side);
@@ -253,7 +249,7 @@ void findFirst(const RTCFilterFunctionNArguments* args) {
     Meeting& meeting = *reinterpret_cast<Meeting*>(args->context);
     args->valid[0] = 0;
     Passage& passage = meeting.passage;
-    const uint32_t other = passage.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    const uint32_t other = passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
     if (other == meeting.first) return;
     const Parent& a = passage.patches->parents[meeting.first];
     const Parent& b = passage.patches->parents[other];
@@ -275,7 +271,7 @@ uint32_t Visibility::firstCoinciding(uint32_t parent, const glm::vec3& origin,
     rtcInitIntersectContext(&meeting.context);
     meeting.context.filter = findFirst;
     meeting.passage.patches = &patches;
-    meeting.passage.parentOfTriangle = embree->parentOfTriangle.data();
+    meeting.passage.parentOf = embree->parentOf.data();
     meeting.passage.line = lineName(origin, direction);
     meeting.first = parent;
     meeting.direction = direction;
@@ -307,7 +303,7 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
     rtcIntersect1(embree->scene, &start.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     if (distance) *distance = std::max(0.0f, query.ray.tfar - glm::length(point - origin));
-    uint32_t parent = embree->parentOfTriangle[query.hit.primID];
+    uint32_t parent = embree->parentOf[query.hit.primID];
     // What coincides with the start has its order already.
     if (query.ray.tfar * glm::dot(direction, start.normal) > 2 * start.zone)
         parent = firstCoinciding(parent, origin, direction, query.ray.tfar);
@@ -324,8 +320,8 @@ std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm:
     rtcIntersect1(embree->scene, &passing.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     if (distance) *distance = query.ray.tfar;
-    const uint32_t parent = firstCoinciding(embree->parentOfTriangle[query.hit.primID], origin,
-                                            direction, query.ray.tfar);
+    const uint32_t parent =
+        firstCoinciding(embree->parentOf[query.hit.primID], origin, direction, query.ray.tfar);
     return sideOf(parent, origin + query.ray.tfar * direction, direction);
 }
 
@@ -342,7 +338,7 @@ namespace {
 // Collects the parents that a line crosses; starts with Embree's own part.
 struct Crossed {
     RTCIntersectContext context;
-    const uint32_t* parentOfTriangle;
+    const uint32_t* parentOf;
     std::vector<uint32_t> parents;
 };
 
@@ -350,7 +346,7 @@ struct Crossed {
 // of a quad meets both of its triangles, and Embree may offer a hit twice.
 void collect(const RTCFilterFunctionNArguments* args) {
     Crossed& crossed = *reinterpret_cast<Crossed*>(args->context);
-    const uint32_t parent = crossed.parentOfTriangle[RTCHitN_primID(args->hit, args->N, 0)];
+    const uint32_t parent = crossed.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
     if (std::find(crossed.parents.begin(), crossed.parents.end(), parent) == crossed.parents.end())
         crossed.parents.push_back(parent);
     args->valid[0] = 0;
@@ -370,7 +366,7 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
     Crossed crossed;
     rtcInitIntersectContext(&crossed.context);
     crossed.context.filter = collect;
-    crossed.parentOfTriangle = embree->parentOfTriangle.data();
+    crossed.parentOf = embree->parentOf.data();
     RTCRayHit query{};
     setRay(query.ray, glm::vec3(point - 2.5 * double(patches.radius) * direction),
            glm::vec3(direction), std::numeric_limits<float>::infinity());
