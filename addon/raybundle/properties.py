@@ -57,6 +57,7 @@ enum_skip = (
     ('darkness', "Darkness", "Bundles and solve, if no light reaches any surface"),
     ('reflection', "Reflection", "The same, if no surface reflects light"),
     ('geometry', "Geometry", "Patches and lines, if the geometry is as in the last bake"),
+    ('lights', "Lights", "The first shot, if lights too are as in the last bake"),
     ('facing', "Facing", "Shadow rays to a light that the surface cannot face"),
     ('occluders', "Occluders", "Reconstruction of objects that are not baked"),
     ('lit', "Lit", "Noise of a light that is wholly visible: its light is known exactly"),

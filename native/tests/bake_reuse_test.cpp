@@ -35,6 +35,30 @@ TEST(Relighting, GivesWhatAFreshBakeGives) {
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
 }
 
+TEST(Relighting, ShootsAgainOnlyWhereLightsChanged) {
+    // Without emission, whose being a source depends on reflectances.
+    auto room = [](float reflectance, double power) {
+        Scene scene = roomWithBoxes(reflectance);
+        scene.addLight(pointLight({1, 1, 2}, glm::dvec3(power)));
+        return scene;
+    };
+    Bake again;
+    setQuick(again);
+    auto skips = [&](const Scene& scene) {
+        again.run(scene);
+        Bake fresh;
+        setQuick(fresh);
+        fresh.run(scene);
+        EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
+        return mentions(reportOf(again)["skipped"], "lights unchanged");
+    };
+    EXPECT_FALSE(skips(room(0.6f, 1)));
+    EXPECT_TRUE(skips(room(0.3f, 1)));
+    EXPECT_FALSE(skips(room(0.3f, 2)));
+    again.settings.targetError = 0.5f;
+    EXPECT_FALSE(mentions((again.run(room(0.3f, 2)), reportOf(again)["skipped"]), "lights unch"));
+}
+
 TEST(Relighting, TheSameSceneNeedsNoMoreBundles) {
     // However many looks at the noise its first bake took.
     for (float target : {0.03f, 0.02f, 0.014f, 0.01f}) {

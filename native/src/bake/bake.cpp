@@ -11,10 +11,13 @@
 #include <chrono>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
+#include <map>
 #include <numeric>
+#include <optional>
 
 #include "bake/combination.h"
 #include "bake/geometry_hash.h"
+#include "bake/light_hash.h"
 #include "bake/window_noise.h"
 #include "patches/contacts.h"
 #include "patches/refinement.h"
@@ -290,6 +293,12 @@ struct Bake::Trace {
     LineCounts counts;
     std::unique_ptr<BundleTracer> tracer;
     Looks looks;  // at the light along its lines
+
+    struct Shot {
+        std::optional<uint64_t> hash;  // lightHash; none: there is no shot
+        FirstShot shot;
+    };
+    std::map<int32_t, Shot> shots;  // the last GATHER of each light set
 };
 
 Bake::Bake() = default;
@@ -441,11 +450,20 @@ SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& 
     for (int32_t set = kNoLightSet; set < count; ++set) {
         const Progress share = progress.part(lights.size(), size_t(count) + 1);
         DirectLight direct(scene, patches, visibility, uint32_t(settings.seed), set, settings);
-        FirstShot shot = firstShot(
-            settings.firstShot, {direct, patches, visibility, settings, share, trace->touchDistance,
-                                 trace->linesPerBundle(), &trace->visibility,
-                                 coarse.empty() ? nullptr : &coarse[lights.size()]});
-        report.shadowRays += shot.rays;
+        Trace::Shot& last = trace->shots[set];
+        const uint64_t hash = lightHash(scene, direct, set, settings);
+        FirstShot shot;
+        if (settings.skipLights && settings.firstShot == "GATHER" && last.hash == hash) {
+            report.skipped.push_back({"first shot", "lights unchanged since the last bake", 1});
+            shot = last.shot;
+        } else {
+            shot = firstShot(settings.firstShot,
+                             {direct, patches, visibility, settings, share, trace->touchDistance,
+                              trace->linesPerBundle(), &trace->visibility,
+                              coarse.empty() ? nullptr : &coarse[lights.size()]});
+            report.shadowRays += shot.rays;
+            if (settings.firstShot == "GATHER") last = {hash, shot};
+        }
         report.skipped.push_back(
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
         report.skipped.push_back(

@@ -35,6 +35,7 @@ const std::vector<Number<int>>& integers() {
         {"skip.darkness", &Settings::skipDarkness, 0, 1},
         {"skip.reflection", &Settings::skipReflection, 0, 1},
         {"skip.geometry", &Settings::skipGeometry, 0, 1},
+        {"skip.lights", &Settings::skipLights, 0, 1},
         {"skip.facing", &Settings::skipFacing, 0, 1},
         {"skip.occluders", &Settings::skipOccluders, 0, 1},
         {"skip.lit", &Settings::skipLit, 0, 1},

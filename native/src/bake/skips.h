@@ -12,6 +12,7 @@ struct Skips {
     int skipDarkness = 1;    // bundles and solve, if no light reaches any surface
     int skipReflection = 1;  // the same, if no surface reflects and lines carry nothing else
     int skipGeometry = 1;    // patches and lines, if geometry is as in the last bake
+    int skipLights = 1;      // the first shot, if lights too are as in the last bake
     int skipFacing = 1;      // shadow rays to a source that the receiver cannot face
     int skipOccluders = 1;   // reconstruction of objects that only occlude
     // Within the stated error.
