@@ -10,14 +10,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <glm/gtc/constants.hpp>
-#include <map>
 #include <numeric>
-#include <optional>
 
 #include "bake/combination.h"
+#include "bake/energy_balance.h"
 #include "bake/geometry_hash.h"
 #include "bake/light_hash.h"
+#include "bake/trace.h"
 #include "bake/window_noise.h"
 #include "patches/contacts.h"
 #include "patches/refinement.h"
@@ -29,15 +28,6 @@
 namespace raybundle {
 namespace {
 
-// Pixels per mean patch area. The time to 2 % noise is flat from 1 to 4, with its least here
-// (cornell_box and big_room, 5 seeds).
-constexpr float kPixelsPerPatch = 2.0f;
-// The same outside of windows of finer pixels: most lines are to be in the windows.
-constexpr float kPixelsPerPatchAround = 0.25f;
-constexpr int kMaxPlanePixels = 4096;  // along the scene's diameter
-// Surfaces not further apart than these shares of the scene's radius and of a patch touch.
-constexpr float kTouchOfRadius = 1e-4f;
-constexpr float kTouchOfPatch = 0.02f;
 // Relative residual of the last solve: a share of the noise, within these bounds.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 // The lines' noise on the patches of any one window may be this many times the target.
@@ -70,80 +60,6 @@ Irradiance meanOver(const Tiles& tiles, const Irradiance& light, const std::vect
     result.gathered = tiles.mean(light.gathered, weight);
     result.indirect = tiles.mean(light.indirect, weight);
     return result;
-}
-
-double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
-
-glm::dvec3 power(const Patches& patches, size_t side, const glm::vec3& perArea) {
-    return double(patches.area[side / 2]) * glm::dvec3(perArea);
-}
-
-// Edge of a pixel, metres. The same for all bundles: power per line is the same for all only then.
-float pixelSize(const Patches& patches, int linesPerBundle) {
-    if (linesPerBundle > 0)
-        return patches.radius * std::sqrt(glm::pi<float>() / float(linesPerBundle));
-    const double mean =
-        std::min(double(patches.size) * patches.size,
-                 patches.totalArea / double(std::max<size_t>(1, patches.tileCount)));
-    return std::max(float(std::sqrt(mean / kPixelsPerPatch)), 2 * patches.radius / kMaxPlanePixels);
-}
-
-// Compares the power that the lights emit with what surfaces absorb and what leaves the scene: adds
-// those of one light set.
-void balanceEnergy(const Patches& patches, const SetLight& light,
-                   const std::vector<float>& exposedShare, const std::vector<float>& openShare,
-                   Report& report) {
-    const FirstShot& shot = light.shot;
-    const Irradiance& irradiance = light.irradiance;
-    const glm::vec3 worldExitance = glm::pi<float>() * light.worldRadiance;
-    glm::dvec3 emitted = shot.emitted, absorbed(0.0), escaped = shot.escaped;
-    for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const double exposed = double(exposedShare[side]);
-        const float open = openShare[side];
-        if (!patches.parentAt(uint32_t(side)).exchanges) {
-            absorbed += exposed * power(patches, side, irradiance.gathered[side]);
-            continue;
-        }
-        const glm::vec3 total = irradiance.direct[side] + irradiance.indirect[side];
-        emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
-        absorbed += exposed * power(patches, side, (1.0f - patches.reflectance[side]) * total);
-        escaped +=
-            exposed *
-            power(patches, side, open * (shot.emission[side] + patches.reflectance[side] * total));
-    }
-    report.emitted += sum(emitted);
-    report.absorbed += sum(absorbed);
-    report.escaped += sum(escaped);
-}
-
-// The share of the lines of the weighted sides that leave the scene, or stay in it, only because
-// the projector lets lines through surfaces (ROULETTE): the difference to exact projection, object
-// by object, so that the noise of single sides cancels.
-double leakedShare(const Scene& scene, const Patches& patches, const std::vector<float>& weight,
-                   const std::vector<float>& exactOpen, const std::vector<float>& open) {
-    std::vector<double> difference(2 * scene.instances.size(), 0);
-    double total = 0;
-    for (size_t side = 0; side < weight.size(); ++side) {
-        const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
-        difference[2 * instance + side % 2] +=
-            double(weight[side] * (open[side] - exactOpen[side]));
-        total += double(weight[side]);
-    }
-    double sum = 0;
-    for (double d : difference) sum += std::abs(d);
-    return total > 0 ? sum / total : 0;
-}
-
-// Relative error of the light where so large a share of the exchanges is wrong: each reflection
-// adds to it.
-double errorByWrongExchanges(const Patches& patches, double share) {
-    double reflectance = 0, area = 0;
-    for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const glm::vec3& rho = patches.reflectance[side];
-        reflectance += double(patches.area[side / 2] * std::max({rho.x, rho.y, rho.z}));
-        area += double(patches.area[side / 2]);
-    }
-    return area > 0 ? share / (1 - reflectance / area * (1 - share)) : 0;
 }
 
 // Names the instances whose visibility is only approximated.
@@ -214,92 +130,6 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
 }
 
 }  // namespace
-
-// Patches and traced lines, which stay valid as long as the geometry does.
-struct Bake::Trace {
-    Trace(uint64_t hash, Patches made, const Settings& settings)
-        : hash(hash), patches(std::move(made)), visibility(patches), counts(0) {
-        for (const Parent& parent : patches.parents)
-            if (parent.stopsDirect != parent.exchanges && !directVisibility)
-                directVisibility =
-                    std::make_unique<const Visibility>(patches, Blockers::STOPPING_DIRECT);
-        touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.finest);
-        density.pixelSize = pixelSize(patches, settings.linesPerBundle);
-        // Small patches get windows of finer pixels.
-        if (settings.hasLineWindows())
-            density = densityByDetail(patches, density.pixelSize, kPixelsPerPatchAround,
-                                      2 * patches.radius / kMaxPlanePixels);
-    }
-
-    // When the patches are as they stay: from here on lines are traced.
-    void startLines(const Settings& settings) {
-        const ProjectorInput input = projectorInput(settings);
-        counts = LineCounts(patches.sideCount());
-        tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
-                                                uint32_t(settings.seed));
-        // Only line reuse on exact projection sees what lies against what while it traces.
-        if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact()) {
-            surrounding = surroundings(exactInput(settings), uint32_t(settings.seed));
-        }
-    }
-
-    ProjectorInput projectorInput(const Settings& settings) const {
-        return {patches,
-                visibility,
-                density.pixelSize,
-                touchDistance,
-                settings.smallPatchesKind(),
-                settings.planeCount,
-                settings.planePlacementKind(),
-                settings.planeCoherence != 0,
-                settings.linesPerBundle == 1,
-                density.windows};
-    }
-    // By lists of pixels also where a bundle is one line.
-    ProjectorInput exactInput(const Settings& settings) const {
-        ProjectorInput exact = projectorInput(settings);
-        if (exact.singleLine) exact.pixelSize = pixelSize(patches, 0);
-        exact.singleLine = false;
-        return exact;
-    }
-
-    const Visibility& visibilityOfLights() const {
-        return directVisibility ? *directVisibility : visibility;
-    }
-
-    // Whether all traced lines are in the counts: not after a cancel on the way, and not where a
-    // transport uses lines without counting them.
-    bool isWhole() const { return tracer && tracer->bundleCount() == counts.bundles; }
-
-    // Per side: the share that nothing covers.
-    std::vector<float> exposedShare() const {
-        return surrounding.exposed.empty() ? counts.exposedShare() : surrounding.exposed;
-    }
-
-    // Through the bounding sphere.
-    double linesPerBundle() const {
-        return glm::pi<double>() * double(patches.radius) * double(patches.radius) /
-               (double(density.pixelSize) * double(density.pixelSize));
-    }
-
-    const uint64_t hash;
-    Patches patches;
-    float touchDistance = 0;  // surfaces not further apart touch, metres
-    const Visibility visibility;
-    std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
-    Surroundings surrounding;                            // empty: as the counts have it
-    LineDensity density{};
-    std::vector<Report::Cut> cuts;
-    LineCounts counts;
-    std::unique_ptr<BundleTracer> tracer;
-    Looks looks;  // at the light along its lines
-
-    struct Shot {
-        std::optional<uint64_t> hash;  // lightHash; none: there is no shot
-        FirstShot shot;
-    };
-    std::map<int32_t, Shot> shots;  // the last GATHER of each light set
-};
 
 Bake::Bake() = default;
 Bake::~Bake() = default;

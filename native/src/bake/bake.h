@@ -22,6 +22,8 @@
 
 namespace raybundle {
 
+struct Trace;
+
 // One bake: settings in, light per corner and a report out. Keeps patches and traced lines for the
 // next run on the same geometry.
 class Bake {
@@ -50,7 +52,6 @@ class Bake {
     const CornerLight& setLight(int32_t set, int32_t instance) const;
 
   private:
-    struct Trace;
     void runStages(const Scene& scene);
     void makePatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "bake/noise.h"
+#include "bake/report.h"
+#include "bake/settings.h"
+#include "bundles/bundle_tracer.h"
+#include "bundles/line_counts.h"
+#include "bundles/line_windows.h"
+#include "patches/patches.h"
+#include "transport/first_shot.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// Patches and traced lines, which stay valid as long as the geometry does, and what later bakes
+// with them can go on with.
+struct Trace {
+    Trace(uint64_t hash, Patches made, const Settings& settings);
+
+    // When the patches are as they stay: from here on lines are traced.
+    void startLines(const Settings& settings);
+
+    // Of lines as the settings have them, and of those that see all surfaces: by lists of pixels
+    // also where a bundle is one line.
+    ProjectorInput projectorInput(const Settings& settings) const;
+    ProjectorInput exactInput(const Settings& settings) const;
+
+    const Visibility& visibilityOfLights() const {
+        return directVisibility ? *directVisibility : visibility;
+    }
+
+    // Whether all traced lines are in the counts: not after a cancel on the way, and not where a
+    // transport uses lines without counting them.
+    bool isWhole() const { return tracer && tracer->bundleCount() == counts.bundles; }
+
+    // Per side: the share that nothing covers.
+    std::vector<float> exposedShare() const {
+        return surrounding.exposed.empty() ? counts.exposedShare() : surrounding.exposed;
+    }
+
+    // Through the bounding sphere.
+    double linesPerBundle() const;
+
+    const uint64_t hash;  // geometryHash
+    Patches patches;
+    float touchDistance = 0;  // surfaces not further apart touch, metres
+    const Visibility visibility;
+    std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
+    Surroundings surrounding;                            // empty: as the counts have it
+    LineDensity density{};
+    std::vector<Report::Cut> cuts;
+    LineCounts counts;
+    std::unique_ptr<BundleTracer> tracer;
+    Looks looks;  // at the light along its lines
+
+    struct Shot {
+        std::optional<uint64_t> hash;  // lightHash; none: there is no shot
+        FirstShot shot;
+    };
+    std::map<int32_t, Shot> shots;  // the last GATHER of each light set
+};
+
+}  // namespace raybundle
