@@ -2,6 +2,7 @@
 #include "bundles/fragment_lists.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
 
 #include "bundles/run_lengths.h"
@@ -42,8 +43,9 @@ void FragmentLists::projectView(BundleLines& out) {
     const double depthLow = rasteriser.depthLow();
     depthSteps = kDepthSteps /
                  std::max(rasteriser.depthHigh() - depthLow, std::numeric_limits<double>::min());
+    nearSteps = int64_t(std::min(contacts.zone() * depthSteps, kDepthSteps)) + 1;
     rasteriser.forEachFragment([&](uint32_t pixel, double depth, uint32_t side) {
-        fragments.push_back({pixel, uint32_t((depth - depthLow) * depthSteps), side});
+        fragments.emplace_back(pixel, uint32_t((depth - depthLow) * depthSteps), side);
         ++begin[pixel + 1];
     });
     sortIntoLists();
@@ -82,10 +84,14 @@ double FragmentLists::along(uint64_t a, uint64_t b) const {
     return (double(depthOf(b)) - double(depthOf(a))) / depthSteps;
 }
 
+bool FragmentLists::areNear(uint64_t a, uint64_t b) const {
+    return std::abs(int64_t(depthOf(b)) - int64_t(depthOf(a))) <= nearSteps;
+}
+
 void FragmentLists::orderCoinciding(uint64_t* first, uint64_t* last) const {
     for (uint64_t* a = first + 1; a < last; ++a)
-        for (uint64_t* b = a;
-             b > first && contacts.belongBackwards(sideOf(b[-1]), sideOf(*b), along(b[-1], *b));
+        for (uint64_t* b = a; b > first && areNear(b[-1], *b) &&
+                              contacts.belongBackwards(sideOf(b[-1]), sideOf(*b), along(b[-1], *b));
              --b)
             std::swap(*b, b[-1]);
 }
@@ -101,7 +107,8 @@ void FragmentLists::pairLists(BundleLines& out) {
         for (size_t k = first; k + 1 < last; ++k) {
             // The far side of the nearer surface sees the near side of the farther one.
             const uint32_t i = sideOf(keys[k]) ^ 1, j = sideOf(keys[k + 1]);
-            if (contacts.touches(i ^ 1, j, along(keys[k], keys[k + 1]))) {
+            if (areNear(keys[k], keys[k + 1]) &&
+                contacts.touches(i ^ 1, j, along(keys[k], keys[k + 1]))) {
                 out.touching.push_back(i);
                 out.touching.push_back(j);
             } else {
