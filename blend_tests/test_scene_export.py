@@ -15,8 +15,11 @@ from mathutils import Matrix
 from raybundle.corner_map import CORNER_CODE, VERTEX_CODE, build_corner_map
 from raybundle.light_export import (area_light_radiance,
                                     sun_irradiance_factor)
+from raybundle.node_reader import principled_albedo
 from raybundle.scene_export import export_scene
 
+# Of the Principled shader as it is made.
+ALBEDO = principled_albedo(0.5)
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
 
@@ -350,7 +353,8 @@ def test_principled(principled):
     shader.inputs['Emission Strength'].default_value = 3.0
     material, _ = exported_material(principled)
     for side in range(2):
-        assert material.reflectance[side] == pytest.approx([0.2, 0.1, 0.05])
+        assert material.reflectance[side] == pytest.approx(
+            ALBEDO * np.array([0.2, 0.1, 0.05]))
         assert material.emission[side] == pytest.approx([3 * math.pi, 1.5 * math.pi, 0.0])
 
 
@@ -435,7 +439,8 @@ def test_image_as_base_colour(principled, is_float):
     tree.links.new(texture.outputs['Color'], shader_of(principled).inputs['Base Color'])
     material, result = exported_material(principled)
     assert result.warnings == []
-    assert material.image == 0 and material.image_weight == pytest.approx(np.ones(3))
+    assert material.image == 0 and material.image_weight == pytest.approx(
+        np.full(3, ALBEDO))
     assert material.reflectance == pytest.approx(np.zeros((2, 3)))
     data = result.scene.images[0]
     assert data.extension == 'EXTEND'
@@ -461,7 +466,7 @@ def test_corner_colours_as_base_colour(principled):
     bpy.context.scene.collection.objects.link(item)
     bpy.context.view_layer.update()
     scene = export().scene
-    assert scene.materials[0].color_weight == pytest.approx(np.ones(3))
+    assert scene.materials[0].color_weight == pytest.approx(np.full(3, ALBEDO))
     assert scene.meshes[0].corner_colors == pytest.approx(
         (np.arange(16).reshape(4, 4) / 16)[:, :3])
 
@@ -493,7 +498,7 @@ def test_what_cannot_be_baked_either_is_named(principled, monkeypatch):
     monkeypatch.setattr(sys.modules['raybundle.surface_bake']._Stage, '_run', fail_to_bake)
     add_noise(principled)
     material, result = exported_material(principled)
-    assert material.reflectance[0] == pytest.approx([0.1, 0.2, 0.3])
+    assert material.reflectance[0] == pytest.approx(ALBEDO * np.array([0.1, 0.2, 0.3]))
     assert len(result.warnings) == 2
     assert '"Square"' in result.warnings[0] and "no bake today" in result.warnings[0]
     assert '"Principled"' in result.warnings[1] and '"Noise Texture"' in result.warnings[1]
@@ -572,7 +577,7 @@ def test_alpha_is_opacity(principled):
     material, result = exported_material(principled)
     assert material.opacity == pytest.approx(0.25)
     # Of the whole: what passes through is not reflected.
-    assert material.reflectance[0] == pytest.approx([0.2, 0.1, 0.0])
+    assert material.reflectance[0] == pytest.approx(ALBEDO * np.array([0.2, 0.1, 0.0]))
     assert result.warnings == []
 
 
