@@ -33,7 +33,7 @@ class Hasher {
             mix(word);
         }
         uint64_t rest = 0;
-        std::memcpy(&rest, at, bytes);
+        if (bytes > 0) std::memcpy(&rest, at, bytes);  // an empty vector has no address
         mix(rest);
     }
     void mix(uint64_t word) {
