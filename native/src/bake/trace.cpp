@@ -50,9 +50,8 @@ void Trace::startLines(const Settings& settings) {
     tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                             uint32_t(settings.seed));
     // Only line reuse on exact projection sees what lies against what while it traces.
-    if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact()) {
+    if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact())
         surrounding = surroundings(exactInput(settings), uint32_t(settings.seed));
-    }
 }
 
 ProjectorInput Trace::projectorInput(const Settings& settings) const {
@@ -67,6 +66,7 @@ ProjectorInput Trace::projectorInput(const Settings& settings) const {
             settings.linesPerBundle == 1,
             density.windows};
 }
+
 ProjectorInput Trace::exactInput(const Settings& settings) const {
     ProjectorInput exact = projectorInput(settings);
     if (exact.singleLine) exact.pixelSize = pixelSize(patches, 0);
