@@ -10,7 +10,7 @@
 #include <optional>
 #include <sstream>
 
-#include "reconstruction/patch_neighbours.h"
+#include "patches/neighbours.h"
 #include "reconstruction/surplus.h"
 
 namespace raybundle {
@@ -137,8 +137,8 @@ class InstanceErrors {
     double rippleShare() const {
         if (sides.noise.empty()) return 0;
         double rough = 0, all = 0;
-        for (const PatchPair& pair :
-             neighbouringPatches(patches, range.firstParent, range.lastParent)) {
+        for (const TilePair& pair :
+             neighbouringTiles(patches, range.firstParent, range.lastParent)) {
             const uint32_t a = 2 * pair.first + side, b = 2 * pair.second + side;
             const double direct =
                 noiseAt(a) - square(sides.noise[a]) + noiseAt(b) - square(sides.noise[b]);

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "reconstruction/patch_neighbours.h"
+#include "patches/neighbours.h"
 
 namespace raybundle {
 namespace {
@@ -98,14 +98,14 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
         return field == 0 ? irradiance.direct[at] + irradiance.indirect[at]
                           : irradiance.gathered[at];
     };
-    std::vector<PatchPair> pairs = neighbouringPatches(patches, firstParent, lastParent);
+    std::vector<TilePair> pairs = neighbouringTiles(patches, firstParent, lastParent);
     pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
-                               [&](const PatchPair& pair) {
+                               [&](const TilePair& pair) {
                                    return !sites[pair.first - first].isUsed ||
                                           !sites[pair.second - first].isUsed;
                                }),
                 pairs.end());
-    for (const PatchPair& pair : pairs)
+    for (const TilePair& pair : pairs)
         for (const auto& [a, b] :
              {std::make_pair(pair.first, pair.second), std::make_pair(pair.second, pair.first)}) {
             Site& site = sites[a - first];
@@ -124,7 +124,7 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
         }
     for (Site& site : sites) site.solve();
 
-    for (const PatchPair& pair : pairs) {
+    for (const TilePair& pair : pairs) {
         Site& a = sites[pair.first - first];
         Site& b = sites[pair.second - first];
         // A gradient at the border looks to one side only: beside another one it says nothing.

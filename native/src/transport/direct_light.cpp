@@ -18,6 +18,7 @@ namespace {
 constexpr double kBundledEmission = 1.5;
 // Shadow rays per receiver and source: at first, and for sources of little weight.
 constexpr int kFirstSamples = 16;
+constexpr int kNeighbourSamples = 8;  // each, of receivers that can tell from their neighbours
 constexpr int kFewSamples = 4;
 constexpr size_t kFewSources = 4;
 // A source of less than this share of the light that a receiver could get takes few samples, one of
@@ -36,6 +37,13 @@ constexpr float kSmooth = 1.1f;
 // A patch smaller than this share of its distance from a source needs one point only: the error is
 // about a quarter of its square, 0.3 %.
 constexpr float kFar = 0.1f;
+// Where few receivers have noise, each may have up to so many times the error that it may have
+// elsewhere, while all of them together keep to this share of the target.
+constexpr float kMostLaxity = 3;
+constexpr double kLaxShare = 0.35;
+// A shadow's edge lies between two neighbours where the light differs by this share, or where one
+// has more of it by so many times the error that it may have.
+constexpr float kStep = 0.33f, kEdge = 6;
 // For the power balance: rays of all sources together, and of each at least.
 constexpr uint32_t kEscapeRays = 16384, kLeastEscapeRays = 1024;
 
@@ -126,18 +134,55 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
     sources = raybundle::lightSources(scene, patches, isSource, gathered, lightSet);
 }
 
-template <class Tolerance>
+namespace {
+
+// How many times these tolerances the errors may be, so that all of them together are no more than
+// this share of the light: where few receivers have any, each may have more.
+float laxity(const std::vector<Gathered>& results, const std::vector<float>& tolerance,
+             double share) {
+    double light = 0;
+    for (const Gathered& result : results)
+        light += double(brightest(result.irradiance)) * brightest(result.irradiance);
+    for (float factor = kMostLaxity; factor > 1; factor *= 0.8f) {
+        double left = 0;
+        for (size_t k = 0; k < results.size(); ++k)
+            left += double(
+                std::min(results[k].variance, factor * factor * tolerance[k] * tolerance[k]));
+        if (left <= share * share * light) return factor;
+    }
+    return 1;
+}
+
+// Receivers whose samples may have missed the edge of a shadow: one beside them has it, or is as
+// dark as behind one. tolerance: W/m^2.
+std::vector<bool> besideShadows(const std::vector<Gathered>& results,
+                                const std::vector<ReceiverPair>& neighbours,
+                                const std::vector<float>& tolerance) {
+    std::vector<bool> beside(results.size(), false);
+    for (const auto& [a, b] : neighbours) {
+        const float light = brightest(results[a].irradiance),
+                    other = brightest(results[b].irradiance);
+        const bool isStep = std::abs(light - other) > kStep * std::max(light, other);
+        const float edge = results[b].contrast - results[a].contrast;
+        if (isStep || edge > kEdge * tolerance[a]) beside[a] = true;
+        if (isStep || -edge > kEdge * tolerance[b]) beside[b] = true;
+    }
+    return beside;
+}
+
+}  // namespace
+
+template <class AimOf>
 void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
-                              const std::function<Receiver(size_t)>& receiverAt,
-                              const Tolerance& tolerance, Seen& seen,
-                              const std::function<void(double)>& progress) const {
+                              const std::function<Receiver(size_t)>& receiverAt, const AimOf& aimOf,
+                              Seen& seen, const std::function<void(double)>& progress) const {
     constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
     for (size_t from = 0; from < these.size(); from += kSlice) {
         progress(0.5 * double(from) / double(these.size()));
         tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
             Gathered& result = results[these[k]];
             const uint64_t before = result.rays;
-            result = gather(receiverAt(these[k]), tolerance(these[k]), seen);
+            result = gather(receiverAt(these[k]), aimOf(these[k]), seen);
             result.rays += before;
         });
     }
@@ -145,7 +190,8 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<
 
 void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                                 const std::function<Receiver(size_t)>& receiverAt,
-                                const std::function<void(double)>& progress) const {
+                                const std::function<void(double)>& progress,
+                                bool hasNeighbours) const {
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
     for (size_t side = 0; side < bundled.size(); ++side)
@@ -153,8 +199,9 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
             double(patches.area[side / 2] * brightest(bundled[side])) / patches.totalArea;
     if (sources.empty()) return;
     Seen seen(sources.size());
+    const Aim aim{INFINITY, hasNeighbours ? kNeighbourSamples : kFirstSamples, false};
     gatherThese(
-        coarse.gathered, these, receiverAt, [](uint32_t) { return INFINITY; }, seen, progress);
+        coarse.gathered, these, receiverAt, [&](uint32_t) { return aim; }, seen, progress);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }
 
@@ -162,12 +209,13 @@ std::vector<Gathered> DirectLight::gather(size_t count,
                                           const std::function<Receiver(size_t)>& receiverAt,
                                           float targetError,
                                           const std::function<void(double)>& progress,
-                                          CoarseShot first) const {
+                                          CoarseShot first,
+                                          const std::vector<ReceiverPair>& neighbours) const {
     std::vector<uint32_t> these(count);
     std::iota(these.begin(), these.end(), 0u);
     if (first.gathered.empty()) {
         first.gathered.resize(count);
-        shootCoarsely(first, these, receiverAt, progress);
+        shootCoarsely(first, these, receiverAt, progress, !neighbours.empty());
     }
     std::vector<Gathered> results = std::move(first.gathered);
     if (sources.empty()) return results;
@@ -175,29 +223,35 @@ std::vector<Gathered> DirectLight::gather(size_t count,
     for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
 
     double lit = 0, litArea = 0;
-    for (size_t k = 0; k < count; ++k)
-        if (const float h = brightest(results[k].irradiance); h > 0) {
+    for (uint32_t k = 0; k < count; ++k)
+        if (const double h = brightest(results[k].irradiance); h > 0) {
             const Receiver receiver = receiverAt(k);
             const double weight = receiver.point ? 1 : double(patches.area[receiver.side / 2]);
             lit += weight * h;
             litArea += weight;
         }
     const float floor = litArea > 0 ? float(kDarkShare * lit / litArea) : 0;
-    auto tolerance = [&](uint32_t k) {
-        return receiverAt(k).errorFactor * kDirectShare * targetError *
-               std::max(floor, brightest(results[k].irradiance));
-    };
-    these.erase(
-        std::remove_if(these.begin(), these.end(),
-                       [&](uint32_t k) { return std::sqrt(results[k].variance) <= tolerance(k); }),
-        these.end());
-    gatherThese(results, these, receiverAt, tolerance, seen,
+    std::vector<float> tolerance(count);
+    for (size_t k = 0; k < count; ++k)
+        tolerance[k] = receiverAt(k).errorFactor * kDirectShare * targetError *
+                       std::max(floor, brightest(results[k].irradiance));
+    const float factor = laxity(results, tolerance, kLaxShare * targetError);
+    for (float& error : tolerance) error *= factor;
+    const std::vector<bool> besideShadow = besideShadows(results, neighbours, tolerance);
+    these.erase(std::remove_if(these.begin(), these.end(),
+                               [&](uint32_t k) {
+                                   return !besideShadow[k] &&
+                                          std::sqrt(results[k].variance) <= tolerance[k];
+                               }),
+                these.end());
+    auto aimOf = [&](uint32_t k) { return Aim{tolerance[k], kFirstSamples, besideShadow[k]}; };
+    gatherThese(results, these, receiverAt, aimOf, seen,
                 [&](double done) { progress(0.5 + done); });
     return results;
 }
 
 // Each source takes samples until its standard error is below `tolerance`.
-Gathered DirectLight::gather(const Receiver& receiver, float tolerance, Seen& seen) const {
+Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen) const {
     Gathered sum;
     const std::vector<float> weights = unblockedWeights(receiver);
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
@@ -206,11 +260,13 @@ Gathered DirectLight::gather(const Receiver& receiver, float tolerance, Seen& se
             patches.parentAt(receiver.side).stopsDirect)
             continue;
         const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
-        const int samples = share < kSmallShare    ? kFewSamples
-                            : share < kMiddleShare ? kFirstSamples / 2
-                                                   : kFirstSamples;
-        if (samples < kFirstSamples) ++sum.weak;
-        gatherFrom(k, receiver, samples, tolerance, seen, sum);
+        Aim own = aim;
+        if (share < kSmallShare)
+            own.samples = kFewSamples;
+        else if (share < kMiddleShare)
+            own.samples = std::max(kFewSamples, aim.samples / 2);
+        if (own.samples < aim.samples) ++sum.weak;
+        gatherFrom(k, receiver, own, seen, sum);
     }
     return sum;
 }
@@ -318,8 +374,9 @@ DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t 
     return block;
 }
 
-void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples, float tolerance,
-                             Seen& seen, Gathered& sum) const {
+void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Aim& aim, Seen& seen,
+                             Gathered& sum) const {
+    const float tolerance = aim.tolerance;
     const LightSource& source = *sources[index];
     const uint32_t sampleSeed = hash(seed, hash(receiver.seed, uint32_t(index)));
     if (isOutOfSight(source, receiver)) {
@@ -331,7 +388,7 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
     const bool isInside = skips.skipInside && receiver.side % 2 == 1 &&
                           patches.parents[patches.parentOf[receiver.side / 2]].isSolid;
     if (isInside) ++sum.inside;
-    int next = isInside ? std::min(kFewSamples, samples) : samples;
+    int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
     std::array<Block, kBlocks> blocks;
     Block all;
     std::optional<glm::vec3> closed;
@@ -353,11 +410,12 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
             next = 4 * all.count;
             continue;
         }
+        const bool isLit = all.visible == all.open, isDark = brightest(all.visible) <= 0;
         const float missed =
-            source.surrounds() && !isInside
+            (source.surrounds() || (aim.isBesideShadow && (isLit || isDark))) && !isInside
                 ? kMissed * brightest(all.open) / (float(all.count) * float(all.count))
                 : 0;
-        if (brightest(all.visible) <= 0) {
+        if (isDark) {
             if (missed > tolerance && all.count < kDarkSamples && seen[index]) {
                 next = 4 * all.count;
                 continue;
@@ -373,10 +431,10 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, int samples
             const float d = brightest(glm::abs(block.estimate(closed) - mean));
             variance += d * d / (kBlocks * (kBlocks - 1));
         }
-        if (all.count >= samples &&
+        if (all.count >= aim.samples &&
             (variance <= tolerance * tolerance || all.count >= source.mostSamples()))
             break;
-        next = all.count < samples ? samples : 4 * all.count;
+        next = all.count < aim.samples ? aim.samples : 4 * all.count;
     }
     if (closed && all.visible == all.open) ++sum.unblocked;
     sum.irradiance += all.estimate(closed);

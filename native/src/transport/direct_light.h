@@ -45,6 +45,11 @@ struct Receiver {
     float errorFactor = 1;  // its error may be so many times that of others
 };
 
+// Two receivers beside each other, by their numbers.
+struct ReceiverPair {
+    uint32_t first = 0, second = 0;
+};
+
 // What one receiver got.
 struct Gathered {
     glm::vec3 irradiance{0.0f};  // W/m^2
@@ -82,14 +87,18 @@ class DirectLight {
     // Gathers at `count` receivers to about `targetError` relative standard error each: all
     // coarsely first, then those again whose error is too large beside the mean light.
     // `progress` gets the share that is done. coarse: what is known of all receivers, or empty.
+    // neighbours: if there are any, half as many samples do at first, and receivers whose
+    // neighbours disagree with them about a shadow take more.
     std::vector<Gathered> gather(size_t count, const std::function<Receiver(size_t)>& receiverAt,
                                  float targetError, const std::function<void(double)>& progress,
-                                 CoarseShot coarse = {}) const;
+                                 CoarseShot coarse = {},
+                                 const std::vector<ReceiverPair>& neighbours = {}) const;
 
     // The first, coarse pass of that, to begin with: gathers at `these` receivers.
     void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                        const std::function<Receiver(size_t)>& receiverAt,
-                       const std::function<void(double)>& progress) const;
+                       const std::function<void(double)>& progress,
+                       bool hasNeighbours = false) const;
 
     // An unbiased estimate at a point by one sample of each source, W/m^2; index: of the sample.
     glm::vec3 sample(const Receiver& receiver, uint32_t index) const;
@@ -104,13 +113,20 @@ class DirectLight {
     struct Block;
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
 
-    template <class Tolerance>
+    // What a receiver's samples are to reach.
+    struct Aim {
+        float tolerance = INFINITY;  // standard error, W/m^2
+        int samples = 0;             // of each source, at least
+        bool isBesideShadow = false;
+    };
+
+    template <class AimOf>
     void gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
-                     const std::function<Receiver(size_t)>& receiverAt, const Tolerance& tolerance,
+                     const std::function<Receiver(size_t)>& receiverAt, const AimOf& aimOf,
                      Seen& seen, const std::function<void(double)>& progress) const;
-    Gathered gather(const Receiver& receiver, float tolerance, Seen& seen) const;
-    void gatherFrom(size_t source, const Receiver& receiver, int samples, float tolerance,
-                    Seen& seen, Gathered& sum) const;
+    Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen) const;
+    void gatherFrom(size_t source, const Receiver& receiver, const Aim& aim, Seen& seen,
+                    Gathered& sum) const;
     Block sampleBlock(const LightSource& source, uint32_t seed, const Receiver& receiver, int first,
                       int count, Gathered& sum) const;
     std::optional<glm::vec3> closedMean(const LightSource& source, const Receiver& receiver,

@@ -8,9 +8,35 @@
 // it is. Gathering spends its rays where the light is to be known (transport/direct_light.h).
 #include <cmath>
 
+#include "patches/neighbours.h"
 #include "transport/first_shot.h"
 
 namespace raybundle {
+namespace {
+
+// The sides of neighbouring tiles; the patches of a cut one stand beside each other.
+std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
+    std::vector<uint32_t> firstOf;  // per tile; one more at the end
+    for (const Parent& parent : patches.parents)
+        for (uint32_t tile = 0; tile < parent.tileCount(); ++tile)
+            firstOf.push_back(parent.firstPatch + parent.firstOf(tile));
+    firstOf.push_back(uint32_t(patches.count()));
+    std::vector<ReceiverPair> pairs;
+    auto add = [&](uint32_t patch, uint32_t other) {
+        for (uint32_t back = 0; back < 2; ++back)
+            pairs.push_back({2 * patch + back, 2 * other + back});
+    };
+    for (const TilePair& tiles : neighbouringTiles(patches, 0, uint32_t(patches.parents.size()))) {
+        const uint32_t a = firstOf[tiles.first], b = firstOf[tiles.second];
+        for (uint32_t p = a; p < firstOf[tiles.first + 1]; ++p) add(p, b);
+        for (uint32_t p = b + 1; p < firstOf[tiles.second + 1]; ++p) add(p, a);
+    }
+    for (size_t tile = 0; tile + 1 < firstOf.size(); ++tile)
+        for (uint32_t p = firstOf[tile] + 1; p < firstOf[tile + 1]; ++p) add(p, p - 1);
+    return pairs;
+}
+
+}  // namespace
 
 FirstShot gather(const FirstShotInput& input) {
     const DirectLight& light = input.light;
@@ -45,7 +71,8 @@ FirstShot gather(const FirstShotInput& input) {
         light.shootCoarsely(coarse, cut, receiverAt, report);
     }
     const std::vector<Gathered> results =
-        light.gather(n, receiverAt, input.settings.targetError, report, std::move(coarse));
+        light.gather(n, receiverAt, input.settings.targetError, report, std::move(coarse),
+                     neighbouringSides(patches));
     for (size_t side = 0; side < n; ++side) {
         shot.irradiance[side] = results[side].irradiance;
         shot.emitted += double(patches.area[side / 2]) * glm::dvec3(results[side].unpowered);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reconstruction/patch_neighbours.h"
+#include "patches/neighbours.h"
 
 #include <algorithm>
 #include <tuple>
@@ -24,10 +24,10 @@ BorderEdge borderEdge(uint32_t from, uint32_t to, uint32_t count, uint32_t numbe
     return {to, from, count, count - 1 - number, patch};
 }
 
-void pairParallelogram(const Parent& parent, std::vector<PatchPair>& pairs,
+void pairParallelogram(const Parent& parent, std::vector<TilePair>& pairs,
                        std::vector<BorderEdge>& border) {
     const uint32_t nA = parent.countA, nB = parent.countB;
-    auto patch = [&](uint32_t a, uint32_t b) { return parent.firstPatch + b * nA + a; };
+    auto patch = [&](uint32_t a, uint32_t b) { return parent.firstTile + b * nA + a; };
     for (uint32_t b = 0; b < nB; ++b)
         for (uint32_t a = 0; a < nA; ++a) {
             if (a + 1 < nA) pairs.push_back({patch(a, b), patch(a + 1, b)});
@@ -45,11 +45,11 @@ void pairParallelogram(const Parent& parent, std::vector<PatchPair>& pairs,
 }
 
 // Upright triangles and those upside down between them, as in Parent::patchAt.
-void pairTriangle(const Parent& parent, std::vector<PatchPair>& pairs,
+void pairTriangle(const Parent& parent, std::vector<TilePair>& pairs,
                   std::vector<BorderEdge>& border) {
     const uint32_t n = parent.countA;
     auto upright = [&](uint32_t column, uint32_t row) {
-        return parent.firstPatch + row * (2 * n - row) + 2 * column;
+        return parent.firstTile + row * (2 * n - row) + 2 * column;
     };
     const auto& v = parent.vertex;
     for (uint32_t row = 0; row < n; ++row)
@@ -72,9 +72,9 @@ void pairTriangle(const Parent& parent, std::vector<PatchPair>& pairs,
 
 }  // namespace
 
-std::vector<PatchPair> neighbouringPatches(const Patches& patches, uint32_t firstParent,
-                                           uint32_t lastParent) {
-    std::vector<PatchPair> pairs;
+std::vector<TilePair> neighbouringTiles(const Patches& patches, uint32_t firstParent,
+                                        uint32_t lastParent) {
+    std::vector<TilePair> pairs;
     std::vector<BorderEdge> border;
     for (uint32_t p = firstParent; p < lastParent; ++p) {
         const Parent& parent = patches.parents[p];
