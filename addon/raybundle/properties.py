@@ -210,7 +210,7 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     max_patches: IntProperty(
         name="Maximum Patches",
         description="Most patches that subdivision may make; patches grow to stay below it",
-        default=100_000, min=1, max=2 ** 28, soft_min=1_000, soft_max=10_000_000)
+        default=100_000, min=1, max=2 ** 23, soft_min=1_000, soft_max=1_000_000)
     refine: BoolProperty(
         name="Refine",
         description="Smaller patches at the edges of shadows, where what that gains is worth the "

@@ -123,7 +123,7 @@ std::vector<Point> reference(const Scene& scene, float patchSize, const Options&
     for (size_t half = 0; half < 2; ++half) {
         Bake bake;
         bake.settings.patchSize = patchSize / float(options.finer);
-        bake.settings.maxPatches = 1 << 24;
+        bake.settings.maxPatches = int32_t(kMostPatches);
         bake.settings.minBundles = bake.settings.maxBundles = options.referenceBundles;
         bake.settings.targetError = kReferenceShotError;
         bake.settings.seed = kReferenceSeeds[half];

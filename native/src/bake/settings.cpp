@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bake/error.h"
+#include "patches/patches.h"
 
 namespace raybundle {
 namespace {
@@ -19,7 +20,7 @@ struct Number {
 
 const std::vector<Number<int>>& integers() {
     static const std::vector<Number<int>> table = {
-        {"max_patches", &Settings::maxPatches, 1, 1 << 28},
+        {"max_patches", &Settings::maxPatches, 1, int(kMostPatches)},
         {"min_bundles", &Settings::minBundles, 2, 1 << 24},
         {"max_bundles", &Settings::maxBundles, 2, 1 << 24},
         {"refine", &Settings::refine, 0, 1},

@@ -3,6 +3,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <numeric>
+
 namespace raybundle {
 
 namespace {
@@ -18,14 +20,16 @@ BundleTracer::BundleTracer(const std::string& projector, const ProjectorInput& i
 std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
     const std::vector<Bundle> sequence = directions.next(count);
     std::vector<TracedBundle> traced(sequence.size());
+    std::vector<uint64_t> joined(sequence.size());  // lines of the exchanges, per bundle
     tbb::parallel_for(size_t(0), sequence.size(), [&](size_t k) {
         traced[k].bundle = sequence[k];
         projectors.local()->project(sequence[k], traced[k].lines);
+        for (const Exchange& e : traced[k].lines.exchanges) joined[k] += e.lines;
     });
     bundles += count;
+    exchanges = std::accumulate(joined.begin(), joined.end(), exchanges);
     for (const TracedBundle& t : traced) {
         lines += t.lines.lines;
-        for (const Exchange& e : t.lines.exchanges) exchanges += e.lines;
         disordered += t.lines.disordered;
         cycles += t.lines.cycles;
     }

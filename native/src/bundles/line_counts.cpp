@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bundles/line_counts.h"
 
+#include <tbb/parallel_for.h>
+
 #include <map>
 
 namespace raybundle {
@@ -19,8 +21,8 @@ size_t LineCounts::byteCount() const {
 std::vector<LineCount> LineCounts::row(uint32_t i) const {
     std::map<uint32_t, std::array<uint32_t, 2>> counts;
     for (size_t half = 0; half < 2; ++half)
-        halves[half].forEach(i,
-                             [&](uint32_t side, uint32_t lines) { counts[side][half] += lines; });
+        for (const uint32_t* e = halves[half].first(i); e < halves[half].last(i); ++e)
+            counts[LineRows::sideOf(*e)][half] += LineRows::linesOf<uint32_t>()[*e & 255];
     std::vector<LineCount> row;
     for (const auto& [side, lines] : counts) row.push_back({side, lines});
     return row;
@@ -73,22 +75,22 @@ double LineCounts::linesMet(uint32_t side) const {
 void LineCounts::dropExchanges() { halves = {LineRows(sideCount()), LineRows(sideCount())}; }
 
 void LineCounts::add(const std::vector<TracedBundle>& traced) {
-    for (const TracedBundle& t : traced) {
-        t.lines.forEachSky([&](uint32_t side, uint32_t weight) {
-            sky[side][t.bundle.half] += weight;
-            total[side][t.bundle.half] += weight;
-        });
+    for (const TracedBundle& t : traced)
         t.lines.forEachTouching([&](uint32_t side, uint32_t weight) { touching[side] += weight; });
-    }
     countMet(traced);
     bundles += uint32_t(traced.size());
-    for (size_t half = 0; half < 2; ++half) {
+    tbb::parallel_for(size_t(0), halves.size(), [&](size_t half) {
         std::vector<const BundleLines*> ofHalf;
         for (const TracedBundle& t : traced)
             if (t.bundle.half == half) ofHalf.push_back(&t.lines);
+        for (const BundleLines* lines : ofHalf)
+            lines->forEachSky([&](uint32_t side, uint32_t weight) {
+                sky[side][half] += weight;
+                total[side][half] += weight;
+            });
         const std::vector<uint32_t> got = halves[half].append(ofHalf);
         for (size_t i = 0; i < got.size(); ++i) total[i][half] += got[i];
-    }
+    });
 }
 
 }  // namespace raybundle

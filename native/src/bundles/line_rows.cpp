@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bundles/line_rows.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -11,8 +12,8 @@ namespace {
 
 // Sides are handled in blocks of 2^kBlockBits rows: a block is the unit of parallel work.
 constexpr uint32_t kBlockBits = 8;
-// More lines than this take several entries.
-constexpr uint32_t kMostLines = UINT16_MAX;
+// Of the number of lines m * 8^e.
+constexpr uint32_t kMostM = 31, kMostE = 7;
 // Rows that tell how much is repeated, and the repetition from which on it is joined.
 constexpr size_t kSampledRows = 64;
 constexpr double kMostRepetition = 2;
@@ -23,26 +24,35 @@ std::unique_ptr<T[]> uninitialised(size_t n) {
     return std::unique_ptr<T[]>(new T[n]);
 }
 
-// Calls visit(row, other side, lines) for the entries of a bundle.
+// Calls visit(entry) for the entries that stand for some lines to a side.
+template <class Visit>
+void encode(uint32_t side, uint64_t lines, const Visit& visit) {
+    while (lines > 0) {
+        uint32_t e = 0;
+        while (e < kMostE && lines >> (3 * e) > kMostM) ++e;
+        const uint32_t m = uint32_t(std::min<uint64_t>(lines >> (3 * e), kMostM));
+        visit(side << 8 | e << 5 | m);
+        lines -= uint64_t(m) << (3 * e);
+    }
+}
+
+// Calls visit(row, entry) for the entries of a bundle.
 template <class Visit>
 void forEachEntry(const BundleLines& bundle, const Visit& visit) {
     bundle.forEachExchange([&](const Exchange& e, uint32_t weight) {
-        for (uint32_t left = e.lines * weight; left > 0;) {
-            const uint32_t lines = std::min(left, kMostLines);
-            visit(e.i, e.j, uint16_t(lines));
-            visit(e.j, e.i, uint16_t(lines));
-            left -= lines;
-        }
+        const uint64_t lines = uint64_t(e.lines) * weight;
+        encode(e.j, lines, [&](uint32_t entry) { visit(e.i, entry); });
+        encode(e.i, lines, [&](uint32_t entry) { visit(e.j, entry); });
     });
 }
 
 }  // namespace
 
 LineRows::LineRows(size_t sideCount)
-    : begin(sideCount + 1, 0), entries{uninitialised<uint32_t>(0), uninitialised<uint16_t>(0)} {}
+    : begin(sideCount + 1, 0), entries(uninitialised<uint32_t>(0)) {}
 
 size_t LineRows::byteCount() const {
-    return entryCount() * (sizeof(uint32_t) + sizeof(uint16_t)) + begin.size() * sizeof(begin[0]);
+    return entryCount() * sizeof(uint32_t) + begin.size() * sizeof(begin[0]);
 }
 
 std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bundles) {
@@ -50,8 +60,7 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
     const size_t n = sideCount(), blocks = (n >> kBlockBits) + 1;
     std::vector<std::vector<size_t>> places(bundles.size(), std::vector<size_t>(blocks, 0));
     tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
-        forEachEntry(*bundles[b],
-                     [&](uint32_t row, uint32_t, uint16_t) { ++places[b][row >> kBlockBits]; });
+        forEachEntry(*bundles[b], [&](uint32_t row, uint32_t) { ++places[b][row >> kBlockBits]; });
     });
     std::vector<size_t> blockBegin(blocks + 1, 0);
     size_t place = 0;
@@ -64,14 +73,12 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
         }
     }
     blockBegin[blocks] = place;
-    const auto sideOf = uninitialised<uint32_t>(place);
-    const auto linesOf = uninitialised<uint16_t>(place);
+    const auto entryOf = uninitialised<uint32_t>(place);
     const auto rowOf = uninitialised<uint8_t>(place);  // within the block
     tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
-        forEachEntry(*bundles[b], [&](uint32_t row, uint32_t side, uint16_t lines) {
+        forEachEntry(*bundles[b], [&](uint32_t row, uint32_t entry) {
             const size_t at = places[b][row >> kBlockBits]++;
-            sideOf[at] = side;
-            linesOf[at] = lines;
+            entryOf[at] = entry;
             rowOf[at] = uint8_t(row & ((1u << kBlockBits) - 1));
         });
     });
@@ -85,33 +92,32 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
     // Put them behind the entries that their rows have.
     std::vector<size_t> ends(n + 1, 0);
     std::vector<uint32_t> got(n, 0);
+    const LinesOf<uint32_t>& lines = linesOf<uint32_t>();
     forEachBlock([&](size_t first, size_t last, size_t firstRow, size_t lastRow) {
         for (size_t k = first; k < last; ++k) {
             ++ends[firstRow + rowOf[k] + 1];
-            got[firstRow + rowOf[k]] += linesOf[k];
+            got[firstRow + rowOf[k]] += lines[entryOf[k] & 255];
         }
         for (size_t row = firstRow; row < lastRow; ++row)
             ends[row + 1] += begin[row + 1] - begin[row];
     });
     std::partial_sum(ends.begin(), ends.end(), ends.begin());
-    Entries joined{uninitialised<uint32_t>(ends[n]), uninitialised<uint16_t>(ends[n])};
+    auto joined = uninitialised<uint32_t>(ends[n]);
     forEachBlock([&](size_t first, size_t last, size_t firstRow, size_t lastRow) {
         std::vector<size_t> next(lastRow - firstRow);
         for (size_t row = firstRow; row < lastRow; ++row) {
             const size_t count = begin[row + 1] - begin[row];
-            std::copy_n(entries.side.get() + begin[row], count, joined.side.get() + ends[row]);
-            std::copy_n(entries.lines.get() + begin[row], count, joined.lines.get() + ends[row]);
+            std::copy_n(entries.get() + begin[row], count, joined.get() + ends[row]);
             next[row - firstRow] = ends[row] + count;
         }
-        for (size_t k = first; k < last; ++k) {
-            const size_t at = next[rowOf[k]]++;
-            joined.side[at] = sideOf[k];
-            joined.lines[at] = linesOf[k];
-        }
+        for (size_t k = first; k < last; ++k) joined[next[rowOf[k]]++] = entryOf[k];
     });
     begin = std::move(ends);
     entries = std::move(joined);
-    if (repetition() > kMostRepetition) joinRepeated();
+    if (repetition() > kMostRepetition * leastRepetition) {
+        joinRepeated();
+        leastRepetition = repetition();
+    }
     return got;
 }
 
@@ -121,7 +127,8 @@ double LineRows::repetition() const {
     std::vector<uint32_t> sides;
     for (size_t s = 0; s < rows; ++s) {
         const size_t i = s * sideCount() / rows;
-        sides.assign(entries.side.get() + begin[i], entries.side.get() + begin[i + 1]);
+        sides.clear();
+        for (size_t k = begin[i]; k < begin[i + 1]; ++k) sides.push_back(sideOf(entries[k]));
         std::sort(sides.begin(), sides.end());
         all += sides.size();
         different += size_t(std::unique(sides.begin(), sides.end()) - sides.begin());
@@ -130,36 +137,42 @@ double LineRows::repetition() const {
 }
 
 void LineRows::joinRepeated() {
-    // In place: a row only becomes shorter.
-    const size_t n = sideCount();
+    const size_t n = sideCount(), blocks = (n >> kBlockBits) + 1;
+    const LinesOf<uint32_t>& lines = linesOf<uint32_t>();
+    // Per thread: the place of each side in the row in hand, plus 1.
+    tbb::enumerable_thread_specific<std::vector<uint32_t>> places(std::vector<uint32_t>(n, 0));
+    std::vector<std::vector<uint32_t>> joinedOf(blocks);
     std::vector<size_t> ends(n + 1, 0);
-    tbb::parallel_for(size_t(0), n, [&](size_t i) {
-        std::vector<std::pair<uint32_t, uint16_t>> row;
-        for (size_t k = begin[i]; k < begin[i + 1]; ++k)
-            row.emplace_back(entries.side[k], entries.lines[k]);
-        std::sort(row.begin(), row.end());
-        size_t at = begin[i];
-        for (const auto& [side, lines] : row) {
-            if (at > begin[i] && entries.side[at - 1] == side &&
-                entries.lines[at - 1] + lines <= kMostLines) {
-                entries.lines[at - 1] = uint16_t(entries.lines[at - 1] + lines);
-            } else {
-                entries.side[at] = side;
-                entries.lines[at++] = lines;
+    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+        std::vector<uint32_t>& place = places.local();
+        std::vector<uint32_t>& joined = joinedOf[block];
+        std::vector<std::pair<uint32_t, uint64_t>> row;  // side, lines
+        for (size_t i = block << kBlockBits; i < std::min(n, (block + 1) << kBlockBits); ++i) {
+            row.clear();
+            for (size_t k = begin[i]; k < begin[i + 1]; ++k) {
+                const uint32_t side = sideOf(entries[k]);
+                if (!place[side]) {
+                    row.emplace_back(side, 0);
+                    place[side] = uint32_t(row.size());
+                }
+                row[place[side] - 1].second += lines[entries[k] & 255];
             }
+            const size_t before = joined.size();
+            for (const auto& [side, count] : row) {
+                place[side] = 0;
+                encode(side, count, [&](uint32_t entry) { joined.push_back(entry); });
+            }
+            ends[i + 1] = joined.size() - before;
         }
-        ends[i + 1] = at - begin[i];
     });
     std::partial_sum(ends.begin(), ends.end(), ends.begin());
-    Entries joined{uninitialised<uint32_t>(ends[n]), uninitialised<uint16_t>(ends[n])};
-    tbb::parallel_for(size_t(0), n, [&](size_t i) {
-        std::copy_n(entries.side.get() + begin[i], ends[i + 1] - ends[i],
-                    joined.side.get() + ends[i]);
-        std::copy_n(entries.lines.get() + begin[i], ends[i + 1] - ends[i],
-                    joined.lines.get() + ends[i]);
+    entries = uninitialised<uint32_t>(ends[n]);
+    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+        if (!joinedOf[block].empty())
+            std::copy(joinedOf[block].begin(), joinedOf[block].end(),
+                      entries.get() + ends[block << kBlockBits]);
     });
     begin = std::move(ends);
-    entries = std::move(joined);
 }
 
 }  // namespace raybundle

@@ -3,12 +3,16 @@
 // The exchanges of one half of the bundles as the rows of a symmetric matrix: for each patch side,
 // the sides that lines join it with, and how many lines.
 //
-// An entry takes 6 bytes, and each exchange has one in the row of either end. Rows are in the order
-// of the bundles, and a pair that several bundles found has several entries: most pairs are found
-// once (256 bundles of cornell_box leave 1.23 entries a pair), so that looking for equal ones costs
-// more than it saves. They are joined when every other entry is a repetition.
+// An entry takes 4 bytes, 24 bits of them the other side and 8 the number of lines, and each
+// exchange has one in the row of either end. The number is m * 8^e with m in 5 bits and e in 3: few
+// lines fit exactly, and so do few lines that stand for 4^n each (bundles/line_windows.h); others
+// take several entries. Rows are in the order of the bundles, and a pair that several bundles found
+// has several entries: most pairs are found once (256 bundles of cornell_box leave 1.23 entries a
+// pair), so that looking for equal ones costs more than it saves. They are joined when there are
+// twice as many entries as needed.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -20,36 +24,47 @@ namespace raybundle {
 
 class LineRows {
   public:
+    // sideCount: at most 2^24.
     explicit LineRows(size_t sideCount);
 
     // Appends the exchanges of some bundles. Returns how many of their lines each side has.
     std::vector<uint32_t> append(const std::vector<const BundleLines*>& bundles);
 
-    // Calls visit(other side, lines) for the entries of row i.
-    template <class Visit>
-    void forEach(uint32_t i, const Visit& visit) const {
-        for (size_t k = begin[i]; k < begin[i + 1]; ++k)
-            visit(entries.side[k], uint32_t(entries.lines[k]));
-    }
+    // An entry: its side, and its lines by this table.
+    static uint32_t sideOf(uint32_t entry) { return entry >> 8; }
+    template <class Number>
+    using LinesOf = std::array<Number, 256>;  // by entry & 255
+    template <class Number>
+    static const LinesOf<Number>& linesOf();
+
+    // The entries of row i.
+    const uint32_t* first(uint32_t i) const { return entries.get() + begin[i]; }
+    const uint32_t* last(uint32_t i) const { return entries.get() + begin[i + 1]; }
 
     // Of all rows.
     size_t entryCount() const { return begin.back(); }
     size_t byteCount() const;
 
   private:
-    // Apart, since together they would be padded to 8 bytes.
-    struct Entries {
-        std::unique_ptr<uint32_t[]> side;
-        std::unique_ptr<uint16_t[]> lines;
-    };
-
     size_t sideCount() const { return begin.size() - 1; }
     // Entries of a row over the different sides in it, by some of the rows.
     double repetition() const;
     void joinRepeated();
 
     std::vector<size_t> begin;  // per side, into the entries; one more at the end
-    Entries entries;
+    std::unique_ptr<uint32_t[]> entries;
+    double leastRepetition = 1;  // after the last joining
 };
+
+template <class Number>
+inline const LineRows::LinesOf<Number>& LineRows::linesOf() {
+    static const LinesOf<Number> table = [] {
+        LinesOf<Number> lines{};
+        for (uint32_t code = 0; code < lines.size(); ++code)
+            lines[code] = Number((code & 31u) << (3 * (code >> 5)));
+        return lines;
+    }();
+    return table;
+}
 
 }  // namespace raybundle

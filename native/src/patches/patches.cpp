@@ -364,9 +364,10 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
         patches.finest *= 1.1f;
     }
     const size_t count = numberPatches(patches);
-    if (count > size_t(1) << 30)
-        throw invalidArgument("the scene has too many faces: " + std::to_string(count) +
-                              " patches");
+    if (count > kMostPatches)
+        throw invalidArgument("the scene has too many faces: they are " + std::to_string(count) +
+                              " patches at least, and " + std::to_string(kMostPatches) +
+                              " are possible");
     patches.tileCount = count;
     for (const Parent& parent : patches.parents) patches.totalArea += parent.area();
     fillPatches(scene, patches);

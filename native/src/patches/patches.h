@@ -26,6 +26,9 @@
 
 namespace raybundle {
 
+// The number of a side takes 24 bits (bundles/line_rows.h).
+constexpr size_t kMostPatches = size_t(1) << 23;
+
 // The tiles of a parent of which some are cut once more.
 struct CutTiles {
     std::vector<uint8_t> level;   // per tile: it has 4^level patches
@@ -141,7 +144,7 @@ struct Patches {
     }
 };
 
-// Cuts all instances of the scene into patches with edges of about `patchSize` metres (0: as
+// Cuts all instances of the scene into patches, kMostPatches at most, with edges of about `patchSize` metres (0: as
 // automaticPatchSizes has it), coarser if there would be more than maxPatches, and gives each its
 // reflectance, emission and opacity (means over its area).
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches);

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -24,8 +25,11 @@ constexpr float kSettled = 1e-5f;
 // Local rays per starved side: kLocalRays, less where there are many, to stay below kMostLocalRays
 // in all.
 constexpr size_t kLocalRays = 64, kFewLocalRays = 16, kMostLocalRays = 8 << 20;
-// Each step of the balancing halves the deviation of the measured areas from the true ones.
-constexpr int kBalanceSteps = 8;
+// The balancing corrects weights by these powers of what is missing, one after the other: all of it
+// settles at once what has no pattern, half of it what is common to all sides, which all of it
+// would reverse. Four such steps leave the deviation of the measured areas from the true ones that
+// eight by halves leave (0.05 % in cornell_box, from 1.6 after the first).
+constexpr float kBalancePowers[] = {0.5f, 1.0f, 0.5f, 1.0f};
 constexpr float kMaxLineWeight =
     2.0f;  // and at least its inverse: a few lines cannot stand for many
 
@@ -53,37 +57,39 @@ uint32_t linesOf(const std::array<uint32_t, 2>& lines, Half half) {
 }
 
 // What a row is multiplied with: padded, so that one SIMD register holds a side.
-struct alignas(16) Padded {
-    float v[4];
-    Padded() : v{0, 0, 0, 0} {}
-    explicit Padded(const glm::vec3& x) : v{x.x, x.y, x.z, 0} {}
-};
+using Padded = Eigen::Array4f;
 using PaddedField = std::vector<Padded>;  // per side
 
-// Calls visit(other side, lines) for row i of a half, or of both.
-template <class Visit>
-void forEachOther(const LineCounts& counts, Half half, uint32_t i, const Visit& visit) {
-    for (size_t h = 0; h < 2; ++h)
-        if (half == Half::BOTH || half == Half(h)) counts.rows(h).forEach(i, visit);
+Padded padded(const glm::vec3& v) { return {v.x, v.y, v.z, 0}; }
+
+// sum_j c_ij x_j; Value: float or Padded.
+template <class Value>
+Value rowTimes(const LineCounts& counts, Half half, size_t row, const std::vector<Value>& x,
+               const Value& zero) {
+    const LineRows::LinesOf<float>& lines = LineRows::linesOf<float>();
+    // Sums that do not wait for each other.
+    constexpr int kSums = 4;
+    Value sums[kSums] = {zero, zero, zero, zero};
+    for (size_t h = 0; h < 2; ++h) {
+        if (half != Half::BOTH && half != Half(h)) continue;
+        const uint32_t* e = counts.rows(h).first(uint32_t(row));
+        const uint32_t* const last = counts.rows(h).last(uint32_t(row));
+        for (; e + kSums <= last; e += kSums)
+            for (int k = 0; k < kSums; ++k)
+                sums[k] += lines[e[k] & 255] * x[LineRows::sideOf(e[k])];
+        for (; e < last; ++e) sums[0] += lines[*e & 255] * x[LineRows::sideOf(*e)];
+    }
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-// sum_j c_ij x_j
 glm::vec3 rowTimes(const LineCounts& counts, Half half, size_t i, const PaddedField& x) {
-    Padded sum;
-    forEachOther(counts, half, uint32_t(i), [&](uint32_t side, uint32_t lines) {
-        const float weight = float(int32_t(lines));
-        const Padded& other = x[side];
-        for (int k = 0; k < 4; ++k) sum.v[k] += weight * other.v[k];
-    });
-    return {sum.v[0], sum.v[1], sum.v[2]};
+    const Padded sum = rowTimes<Padded>(counts, half, i, x, Padded::Zero());
+    return {sum[0], sum[1], sum[2]};
 }
 
-// sum_j c_ij x_j and the lines to the sky
+// The same and the lines to the sky.
 float weightedLines(const LineCounts& counts, Half half, size_t i, const std::vector<float>& x) {
-    float sum = float(linesOf(counts.sky[i], half));
-    forEachOther(counts, half, uint32_t(i),
-                 [&](uint32_t side, uint32_t lines) { sum += float(int32_t(lines)) * x[side]; });
-    return sum;
+    return float(linesOf(counts.sky[i], half)) + rowTimes<float>(counts, half, i, x, 0.0f);
 }
 
 glm::dvec3 ratio(const glm::dvec3& a, const glm::dvec3& b) {
@@ -113,12 +119,12 @@ std::vector<float> LineReuse::lineWeights(Half half) const {
         area += double(patches.area[i / 2] * exposed[i]);
     }
     std::vector<float> next(n);
-    for (int step = 0; step < kBalanceSteps; ++step) {
+    for (const float power : kBalancePowers) {
         forEachSide(n, [&](size_t i) {
             const float row = weightedLines(counts, half, i, x);
             const float wanted = float(patches.area[i / 2] * exposed[i] * lines / area);
-            next[i] = row > 0 ? std::clamp(std::sqrt(x[i] * wanted / row), 1 / kMaxLineWeight,
-                                           kMaxLineWeight)
+            next[i] = row > 0 ? std::clamp(x[i] * std::pow(wanted / (x[i] * row), power),
+                                           1 / kMaxLineWeight, kMaxLineWeight)
                               : 1;
         });
         x.swap(next);
@@ -133,7 +139,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
     const std::vector<float> x = lineWeights(half);
     std::vector<float> m(n);  // weighted lines of each side
     PaddedField scaled(n);    // what the matrix multiplies next
-    forEachSide(n, [&](size_t i) { scaled[i] = Padded(glm::vec3(x[i])); });
+    forEachSide(n, [&](size_t i) { scaled[i] = Padded::Constant(x[i]); });
     forEachSide(n, [&](size_t i) {
         m[i] =
             half == Half::BOTH
@@ -143,7 +149,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
 
     // Direct light.
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
-    forEachSide(n, [&](size_t i) { scaled[i] = Padded(x[i] * shot.emission[i]); });
+    forEachSide(n, [&](size_t i) { scaled[i] = padded(x[i] * shot.emission[i]); });
     forEachSide(n, [&](size_t i) {
         result.gathered[i] = result.direct[i] = first.gathered[i];
         if (m[i] == 0) return;
@@ -162,7 +168,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
         const glm::vec3 unshot = patches.reflectance[i] * (result.direct[i] - first.gathered[i]);
         for (int c = 0; c < 3; ++c)
             product[i][c] = scale[i][c] > 0 ? (first.unshot[i][c] + unshot[c]) / scale[i][c] : 0;
-        scaled[i] = Padded(lineScale[i] * z[i]);
+        scaled[i] = padded(lineScale[i] * z[i]);
     });
     const glm::dvec3 enough = dot(product, product) * double(tolerance) * double(tolerance);
     forEachSide(n, [&](size_t i) {
@@ -174,7 +180,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
     glm::dvec3 rr = dot(r, r);
     int iterations = 0;
     while (glm::any(glm::greaterThan(rr, enough)) && iterations < kMaxIterations) {
-        forEachSide(n, [&](size_t i) { scaled[i] = Padded(lineScale[i] * p[i]); });
+        forEachSide(n, [&](size_t i) { scaled[i] = padded(lineScale[i] * p[i]); });
         forEachSide(n, [&](size_t i) {
             product[i] = p[i] - lineScale[i] * rowTimes(counts, half, i, scaled);
         });
@@ -192,7 +198,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
 
     forEachSide(n, [&](size_t i) {
         reflected[i] = scale[i] * z[i];
-        scaled[i] = Padded(x[i] * reflected[i]);
+        scaled[i] = padded(x[i] * reflected[i]);
     });
     forEachSide(n, [&](size_t i) {
         result.indirect[i] = first.indirect[i];
