@@ -9,8 +9,6 @@
 #include <glm/gtc/constants.hpp>
 #include <numeric>
 
-#include "transport/sobol.h"
-
 namespace raybundle {
 namespace {
 
@@ -26,7 +24,6 @@ constexpr size_t kFewSources = 4;
 constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
 // Receivers darker than this share of the mean may have the error of one that bright.
 constexpr float kDarkShare = 0.25f;
-constexpr int kBlocks = 4;
 // What n samples tell nothing of: a part s of a source is missed by all with the probability
 // (1 - s)^n, and then s is wrong; this over n at most, in the mean.
 constexpr float kMissed = 0.37f;
@@ -105,6 +102,36 @@ struct DirectLight::Block {
             if (open[c] > 0) mean[c] *= visible[c] / open[c];
         return mean;
     }
+};
+
+// Where a receiver is: all of a patch, or a point.
+struct DirectLight::Place {
+    glm::vec3 origin, a{0.0f}, b{0.0f};  // a point is origin + u * a + v * b
+    glm::vec3 middle, normal;
+    float radius = 0;  // of a sphere around the middle that holds it, metres
+    bool isTriangle = false;
+
+    Place(const Patches& patches, const Receiver& receiver) : normal(receiver.normal) {
+        if (receiver.point) {
+            origin = middle = *receiver.point;
+            return;
+        }
+        const uint32_t patch = receiver.side / 2;
+        const Parent& parent = patches.parents[patches.parentOf[patch]];
+        isTriangle = parent.isTriangle;
+        origin = patches.point(patch, {0, 0});
+        a = patches.point(patch, {1, 0}) - origin;
+        b = patches.point(patch, {0, 1}) - origin;
+        middle = at({0.5f, 0.5f});
+        radius = 0.5f * (glm::length(a) + glm::length(b));
+    }
+
+    // u, v uniform in [0, 1]^2: uniform by area. The square is folded onto a triangle.
+    glm::vec3 at(glm::vec2 uv) const {
+        if (isTriangle && uv.x + uv.y > 1) uv = 1.0f - uv;
+        return origin + uv.x * a + uv.y * b;
+    }
+    glm::vec3 centroid() const { return isTriangle ? origin + (a + b) / 3.0f : middle; }
 };
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
@@ -253,7 +280,8 @@ std::vector<Gathered> DirectLight::gather(size_t count,
 // Each source takes samples until its standard error is below `tolerance`.
 Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen) const {
     Gathered sum;
-    const std::vector<float> weights = unblockedWeights(receiver);
+    const Place place(patches, receiver);
+    const std::vector<float> weights = unblockedWeights(place);
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
     for (size_t k = 0; k < sources.size(); ++k) {
         if (receiver.passingOnly && sources[k]->castsShadows &&
@@ -266,7 +294,7 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
         else if (share < kMiddleShare)
             own.samples = std::max(kFewSamples, aim.samples / 2);
         if (own.samples < aim.samples) ++sum.weak;
-        gatherFrom(k, receiver, own, seen, sum);
+        gatherFrom(k, receiver, place, own, seen, sum);
     }
     return sum;
 }
@@ -274,56 +302,46 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
 // Mean of the closed form over a patch by Gauss quadrature (degree 3 on a parallelogram, 2 on a
 // triangle), on more parts where it varies much: beside a source it falls from a finite value
 // at the common edge with an infinite slope.
-std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source,
-                                                 const Receiver& receiver, float tolerance,
-                                                 float& error) const {
+std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, const Place& place,
+                                                 float tolerance, float& error) const {
     glm::vec3 low, high;
     error = 0;
-    if (receiver.point) return source.irradiance(*receiver.point, receiver.normal);
-    const uint32_t side = receiver.side;
-    const bool isTriangle = patches.parents[patches.parentOf[side / 2]].isTriangle;
-    const glm::vec3 centroid = patches.point(side / 2, glm::vec2(isTriangle ? 1.0f / 3 : 0.5f));
-    if (radius(receiver) < kFar * source.distance(centroid))
-        return source.irradiance(centroid, receiver.normal);
-    const auto coarse = quadrature(source, side, 1, low, high);
+    if (place.radius <= kFar * source.distance(place.centroid()))
+        return source.irradiance(place.centroid(), place.normal);
+    const auto coarse = quadrature(source, place, 1, low, high);
     if (!coarse) return coarse;
     // The points of the quadrature alone may be alike by symmetry.
-    const auto middle = source.irradiance(centroid, receiver.normal);
+    const auto middle = source.irradiance(place.centroid(), place.normal);
     if (brightest(glm::max(high, *middle)) <= kSmooth * brightest(glm::min(low, *middle)))
         return coarse;
-    const auto fine = quadrature(source, side, 4, low, high);
+    const auto fine = quadrature(source, place, 4, low, high);
     // The error falls with the square of the parts, or at a kink with their number.
     error = brightest(glm::abs(*fine - *coarse)) / 4;
     if (error <= tolerance) return fine;
     error /= 4;
-    return quadrature(source, side, 16, low, high);
+    return quadrature(source, place, 16, low, high);
 }
 
-std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, uint32_t side,
+std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, const Place& place,
                                                  int parts, glm::vec3& low, glm::vec3& high) const {
-    const Parent& parent = patches.parents[patches.parentOf[side / 2]];
-    const uint32_t inParent = side / 2 - parent.firstPatch;
-    const glm::vec3 normal = patches.normal(side);
     // The patch cut into parts is like a parent with that grid.
     Parent grid;
-    grid.isTriangle = parent.isTriangle;
-    const glm::vec2 o = parent.pointOn(inParent, {0, 0});
-    const glm::vec2 a = parent.pointOn(inParent, {1, 0}) - o,
-                    b = parent.pointOn(inParent, {0, 1}) - o;
+    grid.isTriangle = place.isTriangle;
     grid.countA = grid.countB = uint16_t(parts);
     static constexpr float kGauss = 0.21132487f;  // (1 - 1 / sqrt 3) / 2
     static const glm::vec2 kSquare[4] = {
         {kGauss, kGauss}, {1 - kGauss, kGauss}, {kGauss, 1 - kGauss}, {1 - kGauss, 1 - kGauss}};
     static const glm::vec2 kTriangle[3] = {
         {1.0f / 6, 1.0f / 6}, {2.0f / 3, 1.0f / 6}, {1.0f / 6, 2.0f / 3}};
-    const int points = parent.isTriangle ? 3 : 4;
+    const int points = place.isTriangle ? 3 : 4;
     glm::vec3 sum(0.0f);
     low = glm::vec3(INFINITY);
     high = glm::vec3(0.0f);
     for (uint32_t part = 0; part < grid.patchCount(); ++part)
         for (int k = 0; k < points; ++k) {
-            const glm::vec2 st = grid.pointOn(part, parent.isTriangle ? kTriangle[k] : kSquare[k]);
-            const auto value = source.irradiance(parent.position(o + st.x * a + st.y * b), normal);
+            const glm::vec2 st = grid.pointOn(part, place.isTriangle ? kTriangle[k] : kSquare[k]);
+            const auto value =
+                source.irradiance(place.origin + st.x * place.a + st.y * place.b, place.normal);
             if (!value) return std::nullopt;
             sum += *value;
             low = glm::min(low, *value);
@@ -334,31 +352,39 @@ std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, uint
 
 // About what each source would give without occluders, to share out the samples; empty where
 // there are so few sources that it does not pay.
-std::vector<float> DirectLight::unblockedWeights(const Receiver& receiver) const {
+std::vector<float> DirectLight::unblockedWeights(const Place& place) const {
     if (sources.size() <= kFewSources || !skips.skipWeak) return {};
+    static const glm::vec2 kAt[2] = {{0.25f, 0.25f}, {0.5f, 0.75f}};
     std::vector<float> weights(sources.size());
     for (size_t k = 0; k < sources.size(); ++k) {
-        if (isOutOfSight(*sources[k], receiver)) continue;
-        for (uint32_t i = 0; i < 2; ++i) {
-            const glm::vec4 u = sobolPoint(i, hash(receiver.seed, uint32_t(k)));
-            weights[k] +=
-                brightest(sources[k]
-                              ->sample(position(receiver, {u.x, u.y}), receiver.normal, {u.z, u.w})
-                              .irradiance);
-        }
+        if (isOutOfSight(*sources[k], place)) continue;
+        for (int i = 0; i < 2; ++i)
+            weights[k] += brightest(
+                sources[k]->sample(place.at(kAt[i]), place.normal, kAt[1 - i]).irradiance);
     }
     return weights;
 }
 
-DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t seed,
-                                            const Receiver& receiver, int first, int count,
-                                            Gathered& sum) const {
-    Block block;
-    const SobolPoints points(seed);
-    for (int i = first; i < first + count; ++i) {
-        const glm::vec4 u = points[uint32_t(i)];
-        const glm::vec3 point = position(receiver, {u.x, u.y});
-        const LightSample sample = source.sample(point, receiver.normal, {u.z, u.w});
+// Samples [first, first + kBlocks * each), `each` to a block: consecutive ones are stratified.
+void DirectLight::takeSamples(const LightSource& source, const SobolPoints& points, uint32_t side,
+                              const Place& place, int first, int each,
+                              std::array<Block, kBlocks>& blocks, Gathered& sum) const {
+    std::array<ShadowRay, Visibility::kPacket> rays;
+    std::array<std::pair<glm::vec3, Block*>, Visibility::kPacket> held;
+    int count = 0;
+    auto trace = [&] {
+        std::array<float, Visibility::kPacket> shares;
+        visibility.visibleShares(side, rays.data(), count, shares.data());
+        for (int k = 0; k < count; ++k)
+            held[size_t(k)].second->visible += shares[size_t(k)] * held[size_t(k)].first;
+        sum.rays += uint64_t(count);
+        count = 0;
+    };
+    for (int i = 0; i < int(kBlocks) * each; ++i) {
+        const glm::vec4 u = points[uint32_t(first + i)];
+        const glm::vec3 point = place.at({u.x, u.y});
+        const LightSample sample = source.sample(point, place.normal, {u.z, u.w});
+        Block& block = blocks[size_t(i / each)];
         ++block.count;
         if (brightest(sample.irradiance) <= 0) continue;
         block.open += sample.irradiance;
@@ -366,20 +392,18 @@ DirectLight::Block DirectLight::sampleBlock(const LightSource& source, uint32_t 
             block.visible += sample.irradiance;
             continue;
         }
-        ++sum.rays;
-        block.visible +=
-            sample.irradiance *
-            visibility.visibleShare(receiver.side, point, sample.direction, sample.distance);
+        held[size_t(count)] = {sample.irradiance, &block};
+        rays[size_t(count++)] = {point, sample.direction, sample.distance};
+        if (count == Visibility::kPacket) trace();
     }
-    return block;
+    if (count > 0) trace();
 }
 
-void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Aim& aim, Seen& seen,
-                             Gathered& sum) const {
+void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place& place,
+                             const Aim& aim, Seen& seen, Gathered& sum) const {
     const float tolerance = aim.tolerance;
     const LightSource& source = *sources[index];
-    const uint32_t sampleSeed = hash(seed, hash(receiver.seed, uint32_t(index)));
-    if (isOutOfSight(source, receiver)) {
+    if (isOutOfSight(source, place)) {
         ++sum.hidden;
         return;
     }
@@ -391,19 +415,16 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Aim& 
     int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
     std::array<Block, kBlocks> blocks;
     Block all;
+    const SobolPoints points(hash(seed, hash(receiver.seed, uint32_t(index))));
     std::optional<glm::vec3> closed;
     float closedError = 0, variance = 0;
     for (;;) {
-        // A quarter of the new samples to each block: consecutive ones are stratified.
-        const int first = all.count, each = (next - first) / kBlocks;
-        for (int b = 0; b < kBlocks; ++b) {
-            const Block block =
-                sampleBlock(source, sampleSeed, receiver, first + b * each, each, sum);
-            blocks[size_t(b)].add(block);
-            all.add(block);
-        }
+        takeSamples(source, points, receiver.side, place, all.count,
+                    (next - all.count) / int(kBlocks), blocks, sum);
+        all = {};
+        for (const Block& block : blocks) all.add(block);
         if (skips.skipLit && !closed && (brightest(all.open) <= 0 || brightest(all.visible) > 0))
-            closed = closedMean(source, receiver, tolerance, closedError);
+            closed = closedMean(source, place, tolerance, closedError);
         // No sample faced the receiver: few of them may, beside a source of many faces.
         if (brightest(all.open) <= 0 && all.count < source.mostSamples() &&
             (source.isNarrow || (closed && brightest(*closed) > 0))) {
@@ -449,12 +470,18 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Aim& 
 }
 
 glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
+    const Place place(patches, receiver);
     glm::vec3 sum(0.0f);
     for (size_t k = 0; k < sources.size(); ++k) {
-        Gathered unused;
-        sum += sampleBlock(*sources[k], hash(seed, hash(receiver.seed, uint32_t(k))), receiver,
-                           int(index), 1, unused)
-                   .visible;
+        const glm::vec4 u = sobolPoint(index, hash(seed, hash(receiver.seed, uint32_t(k))));
+        const glm::vec3 point = place.at({u.x, u.y});
+        const LightSample sample = sources[k]->sample(point, place.normal, {u.z, u.w});
+        if (brightest(sample.irradiance) <= 0) continue;
+        const float share =
+            sources[k]->castsShadows
+                ? visibility.visibleShare(receiver.side, point, sample.direction, sample.distance)
+                : 1;
+        sum += share * sample.irradiance;
     }
     return sum;
 }
@@ -465,22 +492,8 @@ bool DirectLight::hasPassingLight(uint32_t side) const {
                        [](const auto& source) { return !source->castsShadows; });
 }
 
-bool DirectLight::isOutOfSight(const LightSource& source, const Receiver& receiver) const {
-    return skips.skipFacing &&
-           source.isOutOfSight(position(receiver, {0.5f, 0.5f}), receiver.normal, radius(receiver));
-}
-
-glm::vec3 DirectLight::position(const Receiver& receiver, glm::vec2 uv) const {
-    return receiver.point ? *receiver.point : patches.point(receiver.side / 2, uv);
-}
-
-// Radius of a sphere around position(receiver, {0.5, 0.5}) that holds the receiver, metres.
-float DirectLight::radius(const Receiver& receiver) const {
-    if (receiver.point) return 0;
-    const Parent& parent = patches.parents[patches.parentOf[receiver.side / 2]];
-    const float tile =
-        0.5f * (glm::length(parent.a) / parent.countA + glm::length(parent.b) / parent.countB);
-    return std::ldexp(tile, -patches.level(receiver.side / 2));
+bool DirectLight::isOutOfSight(const LightSource& source, const Place& place) const {
+    return skips.skipFacing && source.isOutOfSight(place.middle, place.normal, place.radius);
 }
 
 glm::dvec3 DirectLight::escapedPower() const {

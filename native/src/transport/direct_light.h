@@ -14,6 +14,7 @@
 //   what a scene with no other lights would have, sample for sample.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -26,6 +27,7 @@
 #include "patches/patches.h"
 #include "scene/scene.h"
 #include "transport/light_source.h"
+#include "transport/sobol.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
@@ -111,6 +113,8 @@ class DirectLight {
 
   private:
     struct Block;
+    struct Place;
+    static constexpr size_t kBlocks = 4;          // of a receiver's samples, to see how they differ
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
 
     // What a receiver's samples are to reach.
@@ -125,18 +129,17 @@ class DirectLight {
                      const std::function<Receiver(size_t)>& receiverAt, const AimOf& aimOf,
                      Seen& seen, const std::function<void(double)>& progress) const;
     Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen) const;
-    void gatherFrom(size_t source, const Receiver& receiver, const Aim& aim, Seen& seen,
-                    Gathered& sum) const;
-    Block sampleBlock(const LightSource& source, uint32_t seed, const Receiver& receiver, int first,
-                      int count, Gathered& sum) const;
-    std::optional<glm::vec3> closedMean(const LightSource& source, const Receiver& receiver,
+    void gatherFrom(size_t source, const Receiver& receiver, const Place& place, const Aim& aim,
+                    Seen& seen, Gathered& sum) const;
+    void takeSamples(const LightSource& source, const SobolPoints& points, uint32_t side,
+                     const Place& place, int first, int each, std::array<Block, kBlocks>& blocks,
+                     Gathered& sum) const;
+    std::optional<glm::vec3> closedMean(const LightSource& source, const Place& place,
                                         float tolerance, float& error) const;
-    std::optional<glm::vec3> quadrature(const LightSource& source, uint32_t side, int parts,
+    std::optional<glm::vec3> quadrature(const LightSource& source, const Place& place, int parts,
                                         glm::vec3& low, glm::vec3& high) const;
-    std::vector<float> unblockedWeights(const Receiver& receiver) const;
-    bool isOutOfSight(const LightSource& source, const Receiver& receiver) const;
-    glm::vec3 position(const Receiver& receiver, glm::vec2 uv) const;
-    float radius(const Receiver& receiver) const;
+    std::vector<float> unblockedWeights(const Place& place) const;
+    bool isOutOfSight(const LightSource& source, const Place& place) const;
 
     const Patches& patches;
     const Visibility& visibility;

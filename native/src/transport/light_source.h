@@ -5,6 +5,7 @@
 // Blender's light units (addon/raybundle/light_export.py).
 #pragma once
 
+#include <cmath>
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
@@ -36,8 +37,21 @@ struct EmittedRay {
 
 // Sample of a surface point `on` with normal onNormal and radiance towards the receiver; area: m^2
 // per sample.
-LightSample surfaceSample(const glm::vec3& point, const glm::vec3& normal, const glm::vec3& on,
-                          const glm::vec3& onNormal, const glm::vec3& radiance, float area);
+inline LightSample surfaceSample(const glm::vec3& point, const glm::vec3& normal,
+                                 const glm::vec3& on, const glm::vec3& onNormal,
+                                 const glm::vec3& radiance, float area) {
+    LightSample sample;
+    const glm::vec3 d = on - point;
+    const float distance2 = glm::dot(d, d);
+    if (distance2 <= 0) return sample;
+    sample.distance = std::sqrt(distance2);
+    sample.direction = d / sample.distance;
+    const float cosReceiver = glm::dot(normal, sample.direction);
+    const float cosSource = -glm::dot(onNormal, sample.direction);
+    if (cosReceiver > 0 && cosSource > 0)
+        sample.irradiance = radiance * (area * cosReceiver * cosSource / distance2);
+    return sample;
+}
 
 class LightSource {
   public:

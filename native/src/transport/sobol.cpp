@@ -32,28 +32,6 @@ Columns sobolColumns() {
     return v;
 }
 
-// Most points are taken from the beginning of the sequence.
-constexpr uint32_t kTableSize = 1024;
-using Point = std::array<uint32_t, 4>;
-
-Point sobolBits(uint32_t index) {
-    static const Columns kColumns = sobolColumns();
-    Point point{};
-    for (int d = 0; d < 4; ++d)
-        for (uint32_t i = index, k = 0; i; i >>= 1, ++k)
-            if (i & 1) point[d] ^= kColumns[d][k];
-    return point;
-}
-
-const std::array<Point, kTableSize>& sobolTable() {
-    static const std::array<Point, kTableSize> table = [] {
-        std::array<Point, kTableSize> points;
-        for (uint32_t i = 0; i < kTableSize; ++i) points[i] = sobolBits(i);
-        return points;
-    }();
-    return table;
-}
-
 }  // namespace
 
 uint32_t hash(uint32_t a, uint32_t b) {
@@ -63,16 +41,26 @@ uint32_t hash(uint32_t a, uint32_t b) {
     return uint32_t(z ^ (z >> 31));
 }
 
-SobolPoints::SobolPoints(uint32_t seed) {
+SobolPoints::SobolPoints(uint32_t seed) : table(firstPoints().data()) {
     for (uint32_t d = 0; d < 4; ++d) shift[d] = hash(seed, d);
 }
 
-glm::vec4 SobolPoints::operator[](uint32_t index) const {
-    const Point bits = index < kTableSize ? sobolTable()[index] : sobolBits(index);
-    glm::vec4 point;
-    // The top 24 bits fit a float and stay below 1.
-    for (int d = 0; d < 4; ++d) point[d] = float((bits[d] ^ shift[d]) >> 8) * 0x1p-24f;
-    return point;
+SobolPoints::Bits SobolPoints::bitsOf(uint32_t index) {
+    static const Columns kColumns = sobolColumns();
+    Bits bits{};
+    for (int d = 0; d < 4; ++d)
+        for (uint32_t i = index, k = 0; i; i >>= 1, ++k)
+            if (i & 1) bits[d] ^= kColumns[d][k];
+    return bits;
+}
+
+const std::array<SobolPoints::Bits, SobolPoints::kTableSize>& SobolPoints::firstPoints() {
+    static const std::array<Bits, kTableSize> points = [] {
+        std::array<Bits, kTableSize> first;
+        for (uint32_t i = 0; i < kTableSize; ++i) first[i] = bitsOf(i);
+        return first;
+    }();
+    return points;
 }
 
 }  // namespace raybundle

@@ -16,10 +16,23 @@ class SobolPoints {
     explicit SobolPoints(uint32_t seed);
 
     // In [0, 1)^4.
-    glm::vec4 operator[](uint32_t index) const;
+    glm::vec4 operator[](uint32_t index) const {
+        const Bits bits = index < kTableSize ? table[index] : bitsOf(index);
+        glm::vec4 point;
+        // The top 24 bits fit a float and stay below 1.
+        for (int d = 0; d < 4; ++d) point[d] = float((bits[d] ^ shift[d]) >> 8) * 0x1p-24f;
+        return point;
+    }
 
   private:
-    std::array<uint32_t, 4> shift;
+    using Bits = std::array<uint32_t, 4>;
+    // Most points are taken from the beginning of the sequence.
+    static constexpr uint32_t kTableSize = 1024;
+    static const std::array<Bits, kTableSize>& firstPoints();
+    static Bits bitsOf(uint32_t index);
+
+    Bits shift;
+    const Bits* table;  // of the first points
 };
 
 // A single point of a seed's.

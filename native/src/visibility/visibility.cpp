@@ -4,6 +4,7 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -114,19 +115,21 @@ struct Start {
     bool isFront;      // the ray leaves the front of the parent
     glm::vec3 normal;  // of the side
     float zone;        // height over the side within which a hit coincides with it, metres
-    float behind;      // how far behind the surface the ray starts, metres along it
+    // How far behind the surface each ray starts, by its id in the packet, metres along it.
+    std::array<float, Visibility::kPacket> behind;
 };
 
 // Lets a ray pass the surface that it starts on, what coincides with it on its other side, and what
 // it meets behind: the next face of a box whose edge is near.
-bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction, float distance) {
+bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction, float distance,
+                 float behind) {
     if (other == start.parent) return true;
     const float height = distance * glm::dot(direction, start.normal);
     if (height > start.zone) return false;
     const Patches& patches = *start.passage.patches;
     const Parent& a = patches.parents[start.parent];
     const Parent& b = patches.parents[other];
-    if (distance < start.behind && !areParallel(a, b)) return true;
+    if (distance < behind && !areParallel(a, b)) return true;
     const float turn = glm::dot(glm::cross(b.a, b.b), direction);
     // Faces of one object that the ray crosses the same way lie beside its start; of others, those
     // that coincide with it may lie behind it.
@@ -136,13 +139,13 @@ bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction,
 }
 
 struct Hit {
-    explicit Hit(const RTCFilterFunctionNArguments* args)
-        : direction(RTCRayN_dir_x(args->ray, args->N, 0), RTCRayN_dir_y(args->ray, args->N, 0),
-                    RTCRayN_dir_z(args->ray, args->N, 0)),
-          distance(RTCRayN_tfar(args->ray, args->N, 0)),
-          point(glm::vec3(RTCRayN_org_x(args->ray, args->N, 0),
-                          RTCRayN_org_y(args->ray, args->N, 0),
-                          RTCRayN_org_z(args->ray, args->N, 0)) +
+    explicit Hit(const RTCFilterFunctionNArguments* args, uint32_t k = 0)
+        : direction(RTCRayN_dir_x(args->ray, args->N, k), RTCRayN_dir_y(args->ray, args->N, k),
+                    RTCRayN_dir_z(args->ray, args->N, k)),
+          distance(RTCRayN_tfar(args->ray, args->N, k)),
+          point(glm::vec3(RTCRayN_org_x(args->ray, args->N, k),
+                          RTCRayN_org_y(args->ray, args->N, k),
+                          RTCRayN_org_z(args->ray, args->N, k)) +
                 distance * direction) {}
 
     const glm::vec3 direction;
@@ -152,11 +155,15 @@ struct Hit {
 
 void passStart(const RTCFilterFunctionNArguments* args) {
     Start& start = *reinterpret_cast<Start*>(args->context);
-    const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
-    const Hit hit(args);
-    if (passesStart(start, other, hit.direction, hit.distance) ||
-        start.passage.goesOn(other, hit.point))
-        args->valid[0] = 0;
+    for (uint32_t k = 0; k < args->N; ++k) {
+        if (args->valid[k] == 0) continue;
+        const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, k)];
+        const Hit hit(args, k);
+        const float behind = start.behind[RTCRayN_id(args->ray, args->N, k)];
+        if (passesStart(start, other, hit.direction, hit.distance, behind) ||
+            start.passage.goesOn(other, hit.point))
+            args->valid[k] = 0;
+    }
 }
 
 void setRay(RTCRay& ray, const glm::vec3& origin, const glm::vec3& direction, float distance) {
@@ -169,6 +176,7 @@ void setRay(RTCRay& ray, const glm::vec3& origin, const glm::vec3& direction, fl
     ray.tnear = 0;
     ray.tfar = distance;
     ray.mask = ~0u;
+    ray.id = 0;
 }
 
 // A ray that starts on no surface; starts with Embree's own part.
@@ -205,32 +213,73 @@ struct Visibility::FromSide : Start {
         isFront = side % 2 == 0;
         normal = patches.normal(side);
         zone = 2 * visibility.surfaceOffset;
-        behind = 0;
     }
     // Rays start this much behind the surface, so that they meet what coincides with it.
     // Behind along the ray and not along the normal: the ray still passes through the point.
-    glm::vec3 origin(const glm::vec3& point, const glm::vec3& direction) {
-        behind = 0.5f * zone / std::max(0.01f, glm::dot(direction, normal));
-        return point - behind * direction;
+    glm::vec3 origin(const glm::vec3& point, const glm::vec3& direction, size_t id = 0) {
+        behind[id] = 0.5f * zone / std::max(0.01f, glm::dot(direction, normal));
+        return point - behind[id] * direction;
+    }
+    // Sets a shadow ray; false if it is so short that nothing is between.
+    bool setShadowRay(RTCRay& ray, const ShadowRay& shadow, size_t id = 0) {
+        const glm::vec3 from = origin(shadow.point, shadow.direction, id);
+        if (std::isfinite(shadow.distance)) {
+            // Aim at the far end from the shifted origin, or the ray would pass beside it.
+            const glm::vec3 segment = shadow.point + shadow.distance * shadow.direction - from;
+            const float length = glm::length(segment);
+            if (length <= zone) return false;
+            setRay(ray, from, segment / length, length - zone);
+        } else {
+            setRay(ray, from, shadow.direction, shadow.distance);
+        }
+        ray.id = uint32_t(id);
+        return true;
     }
 };
 
 float Visibility::visibleShare(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
                                float distance) const {
     FromSide start(*this, side);
-    const glm::vec3 origin = start.origin(point, direction);
     RTCRay ray{};
-    if (std::isfinite(distance)) {
-        // Aim at the far end from the shifted origin, or the ray would pass beside it.
-        const glm::vec3 segment = point + distance * direction - origin;
-        const float length = glm::length(segment);
-        if (length <= 2 * surfaceOffset) return 1;
-        setRay(ray, origin, segment / length, length - 2 * surfaceOffset);
-    } else {
-        setRay(ray, origin, direction, distance);
-    }
+    if (!start.setShadowRay(ray, {point, direction, distance})) return 1;
     rtcOccluded1(embree->scene, &start.context, &ray);
     return ray.tfar < 0 ? 0.0f : start.passage.share;
+}
+
+void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
+                               float* shares) const {
+    // What a ray has passed is noted for one ray alone.
+    if (!patches.opacity.empty() || count == 1) {
+        for (int k = 0; k < count; ++k)
+            shares[k] = visibleShare(side, rays[k].point, rays[k].direction, rays[k].distance);
+        return;
+    }
+    FromSide start(*this, side);
+    start.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    alignas(32) int valid[kPacket] = {};
+    RTCRay8 packet;
+    for (int k = 0; k < count; ++k) {
+        RTCRay ray{};
+        if (!start.setShadowRay(ray, rays[k], size_t(k))) {
+            packet.tfar[k] = 0;
+            continue;
+        }
+        valid[k] = -1;
+        packet.org_x[k] = ray.org_x;
+        packet.org_y[k] = ray.org_y;
+        packet.org_z[k] = ray.org_z;
+        packet.dir_x[k] = ray.dir_x;
+        packet.dir_y[k] = ray.dir_y;
+        packet.dir_z[k] = ray.dir_z;
+        packet.tnear[k] = ray.tnear;
+        packet.tfar[k] = ray.tfar;
+        packet.time[k] = 0;
+        packet.mask[k] = ray.mask;
+        packet.id[k] = ray.id;
+        packet.flags[k] = 0;
+    }
+    rtcOccluded8(valid, embree->scene, &start.context, &packet);
+    for (int k = 0; k < count; ++k) shares[k] = packet.tfar[k] < 0 ? 0.0f : 1.0f;
 }
 
 namespace {
@@ -298,7 +347,7 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
     const glm::vec3 origin = start.origin(point, direction);
     if (!patches.opacity.empty()) start.passage.line = lineName(origin, direction);
     RTCRayHit query{};
-    setRay(query.ray, origin, direction, farthest + start.behind);
+    setRay(query.ray, origin, direction, farthest + start.behind[0]);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(embree->scene, &start.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;

@@ -25,6 +25,13 @@ struct LineHit {
 // Which surfaces block: those that light is exchanged with, or those that stop direct light.
 enum class Blockers { EXCHANGING, STOPPING_DIRECT };
 
+// From a point on a side of a patch, relative to Patches::centre.
+struct ShadowRay {
+    glm::vec3 point;
+    glm::vec3 direction;  // unit
+    float distance;       // metres; may be infinite
+};
+
 class Visibility {
   public:
     // Builds the acceleration structure over the parents that block. `patches` must outlive it.
@@ -37,6 +44,10 @@ class Visibility {
     // coincide with the patch, those on its other side do not block (see comesBefore).
     float visibleShare(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
                        float distance) const;
+
+    // The same for up to kPacket rays from one side, which is quicker the nearer they lie together.
+    static constexpr int kPacket = 8;
+    void visibleShares(uint32_t side, const ShadowRay* rays, int count, float* shares) const;
 
     // Whether nothing comes through.
     bool isBlocked(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
