@@ -12,8 +12,9 @@
 namespace raybundle {
 namespace {
 
-// Sobol sets, each with its own shift, and rays of each: at first and at most.
-constexpr uint32_t kSets = 8, kFirstRays = 16, kMostRays = 256;
+// Sobol sets, each with its own shift, and rays of each: at first, of all receivers whose mean
+// counts and of one at least; and at most.
+constexpr uint32_t kSets = 8, kFirstRays = 16, kFewestRays = 4, kMostRays = 256;
 // So many patches on a face tell whether interpolation follows them.
 constexpr uint32_t kTellingPatches = 4;
 // Rays that look for surfaces nearer than patches are wide.
@@ -51,7 +52,9 @@ FinalGather::Light FinalGather::gather(const Receiver& receiver, float brightnes
         std::pow(double(kNoiseShare * std::max(error, targetError * brightness)), 2);
     std::array<Light, kSets> sums{};
     Light mean;
-    for (uint32_t done = 0, wanted = kFirstRays; done < kMostRays; wanted *= 2) {
+    uint32_t wanted = kFirstRays;
+    for (size_t sharing = receivers; sharing > 1 && wanted > kFewestRays; sharing /= 2) wanted /= 2;
+    for (uint32_t done = 0; done < kMostRays; wanted *= 2) {
         for (uint32_t set = 0; set < kSets; ++set)
             for (uint32_t i = done; i < wanted; ++i) {
                 const glm::vec4 u = sobolPoint(i, hash(receiver.seed, set));
