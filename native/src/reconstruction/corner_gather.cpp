@@ -87,8 +87,6 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
         std::vector<bool> wanted =
             gather.isWanted(ranges[instance], regions, scene.instances[instance].side, exposed,
                             light.carried, light.indirect);
-        std::vector<size_t> cornersOf(regions.nodeCount, 0);
-        for (size_t c = begin; c < end; ++c) ++cornersOf[regions.nodeOf[corners[c].corner]];
         std::vector<uint8_t> isNear(end - begin);
         tbb::parallel_for(begin, end, [&](size_t c) {
             isNear[c - begin] =
@@ -97,22 +95,22 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
         if (!skips.skipGather) wanted.assign(wanted.size(), true);
         for (size_t c = begin; c < end; ++c)
             if (isNear[c - begin]) wanted[regions.nodeOf[corners[c].corner]] = true;
-        std::vector<FinalGather::Light> found(end - begin);
-        tbb::parallel_for(begin, end, [&](size_t c) {
+        std::vector<std::vector<FinalGather::Share>> receivers(regions.nodeCount);
+        for (size_t c = begin; c < end; ++c) {
             const uint32_t node = regions.nodeOf[corners[c].corner];
-            if (wanted[node])
-                found[c - begin] = gather.gather(
-                    corners[c].receiver, brightest(light.direct[node] + light.indirect[node]),
-                    cornersOf[node]);
+            const float angle = cornerAngles[corners[c].corner];
+            if (wanted[node] && angle > 0) receivers[node].push_back({&corners[c].receiver, angle});
+        }
+        tbb::parallel_for(size_t(0), receivers.size(), [&](size_t node) {
+            if (receivers[node].empty()) return;
+            float sum = 0;
+            for (const FinalGather::Share& share : receivers[node]) sum += share.share;
+            for (FinalGather::Share& share : receivers[node]) share.share /= sum;
+            const FinalGather::Light found = gather.gather(
+                receivers[node], brightest(light.direct[node] + light.indirect[node]));
+            light.carried[node] = found.carried;
+            light.indirect[node] = found.reflected;
         });
-        auto replace = [&](auto part, std::vector<glm::vec3>& values) {
-            const auto means = nodeMeans(instance, regions, cornerAngles,
-                                         [&](size_t c) { return found[c - begin].*part; });
-            for (size_t node = 0; node < values.size(); ++node)
-                if (wanted[node] && means[node]) values[node] = *means[node];
-        };
-        replace(&FinalGather::Light::carried, light.carried);
-        replace(&FinalGather::Light::reflected, light.indirect);
         smooth += size_t(std::count(wanted.begin(), wanted.end(), false));
     }
     const auto means = nodeMeans(instance, regions, cornerAngles,

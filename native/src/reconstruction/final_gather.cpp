@@ -12,9 +12,12 @@
 namespace raybundle {
 namespace {
 
-// Sobol sets, each with its own shift, and rays of each: at first, of all receivers whose mean
-// counts and of one at least; and at most.
-constexpr uint32_t kSets = 8, kFirstRays = 16, kFewestRays = 4, kMostRays = 256;
+// Sobol sets, each with its own shift: of all receivers that share in a mean, and of each of them at
+// least. Rays of a set: at first and at most.
+constexpr uint32_t kSets = 8, kFewestSets = 2, kFirstRays = 16, kMostRays = 512;
+// The first rays of all sets times the target: what so few miss is a share of the light around of
+// about one over their number.
+constexpr float kFirstTimesTarget = 2.5f;
 // So many patches on a face tell whether interpolation follows them.
 constexpr uint32_t kTellingPatches = 4;
 // Rays that look for surfaces nearer than patches are wide.
@@ -44,46 +47,34 @@ FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
                           (light.irradiance.direct[side] + light.irradiance.indirect[side]);
 }
 
-FinalGather::Light FinalGather::gather(const Receiver& receiver, float brightness,
-                                       size_t receivers) const {
-    const glm::vec3 side = patches.normal(receiver.side);
+FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
+                                       float brightness) const {
     const double tolerance =
-        double(receivers) *
         std::pow(double(kNoiseShare * std::max(error, targetError * brightness)), 2);
-    std::array<Light, kSets> sums{};
-    Light mean;
+    const uint32_t sets = std::max(kFewestSets, kSets / uint32_t(receivers.size()));
+    std::vector<Light> sums(receivers.size() * sets);
     uint32_t wanted = kFirstRays;
-    for (size_t sharing = receivers; sharing > 1 && wanted > kFewestRays; sharing /= 2) wanted /= 2;
+    while (wanted < kMostRays / 2 && float(wanted * sums.size()) * targetError < kFirstTimesTarget)
+        wanted *= 2;
+    Light mean;
     for (uint32_t done = 0; done < kMostRays; wanted *= 2) {
-        for (uint32_t set = 0; set < kSets; ++set)
-            for (uint32_t i = done; i < wanted; ++i) {
-                const glm::vec4 u = sobolPoint(i, hash(receiver.seed, set));
-                const glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
-                // Below a face that is shaded as if it were bent.
-                if (glm::dot(direction, side) <= 0) continue;
-                float distance = 0;
-                const auto hit =
-                    visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
-                sums[set].carried += hit ? emission[*hit] : world;
-                if (!hit) continue;
-                sums[set].reflected += reflected[*hit];
-                if (distance >= width(*hit)) continue;
-                const Receiver met{*hit, patches.normal(*hit),
-                                   *receiver.point + distance * direction,
-                                   hash(receiver.seed, kSets + set)};
-                sums[set].reflected +=
-                    patches.reflectance[*hit] *
-                    (light.direct.sample(met, i) - light.irradiance.gathered[*hit]);
-            }
         const Light before = mean;
         mean = {};
-        for (const Light& sum : sums) {
-            mean.carried += sum.carried / float(kSets * wanted);
-            mean.reflected += sum.reflected / float(kSets * wanted);
-        }
+        for (size_t r = 0; r < receivers.size(); ++r)
+            for (uint32_t set = 0; set < sets; ++set) {
+                Light& sum = sums[r * sets + set];
+                addRays(*receivers[r].receiver, set, done, wanted, sum);
+                const float share = receivers[r].share / float(sets * wanted);
+                mean.carried += share * sum.carried;
+                mean.reflected += share * sum.reflected;
+            }
+        // From the mean of all: sets of one receiver are so few that they are alike by chance.
         double variance = 0;
-        for (const Light& sum : sums)
-            variance += square(sum.total() / float(wanted) - mean.total()) / (kSets * (kSets - 1));
+        for (size_t k = 0; k < sums.size(); ++k) {
+            const double share = double(receivers[k / sets].share) / sets;
+            variance += share * share * square(sums[k].total() / float(wanted) - mean.total());
+        }
+        variance *= double(sums.size()) / double(sums.size() - 1);
         // What few rays meet can be missed by all sets alike: the step from half as many counts
         // too.
         const double step = done > 0 ? square(mean.total() - before.total()) : INFINITY;
@@ -91,6 +82,29 @@ FinalGather::Light FinalGather::gather(const Receiver& receiver, float brightnes
         done = wanted;
     }
     return mean;
+}
+
+// Adds what rays [first, last) of a set bring to a receiver.
+void FinalGather::addRays(const Receiver& receiver, uint32_t set, uint32_t first, uint32_t last,
+                          Light& sum) const {
+    const glm::vec3 side = patches.normal(receiver.side);
+    const SobolPoints points(hash(receiver.seed, set));
+    for (uint32_t i = first; i < last; ++i) {
+        const glm::vec4 u = points[i];
+        const glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
+        // Below a face that is shaded as if it were bent.
+        if (glm::dot(direction, side) <= 0) continue;
+        float distance = 0;
+        const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
+        sum.carried += hit ? emission[*hit] : world;
+        if (!hit) continue;
+        sum.reflected += reflected[*hit];
+        if (distance >= width(*hit)) continue;
+        const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
+                           hash(receiver.seed, kSets + set)};
+        sum.reflected += patches.reflectance[*hit] *
+                         (light.direct.sample(met, i) - light.irradiance.gathered[*hit]);
+    }
 }
 
 bool FinalGather::isNear(const Receiver& receiver) const {

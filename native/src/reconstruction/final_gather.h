@@ -42,9 +42,14 @@ class FinalGather {
         glm::vec3 reflected{0.0f};
         glm::vec3 total() const { return carried + reflected; }
     };
-    // brightness: of all light there, about, W/m^2; receivers: how many share the error, because
-    // their mean counts.
-    Light gather(const Receiver& receiver, float brightness, size_t receivers) const;
+    // A receiver and its share in a mean.
+    struct Share {
+        const Receiver* receiver;
+        float share;
+    };
+    // The mean of some receivers, whose shares sum to 1. brightness: of all light there, about,
+    // W/m^2.
+    Light gather(const std::vector<Share>& receivers, float brightness) const;
 
     // Whether the receiver's face has too few patches to tell whether interpolation follows the
     // light, and a surface is so near that it may not: nearer than its patch is wide, or than the
@@ -59,6 +64,8 @@ class FinalGather {
                                const std::vector<glm::vec3>& reflected) const;
 
   private:
+    void addRays(const Receiver& receiver, uint32_t set, uint32_t first, uint32_t last,
+                 Light& sum) const;
     float width(uint32_t side) const;  // of a patch, metres
 
     const Patches& patches;
