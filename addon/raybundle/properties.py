@@ -262,7 +262,7 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         name="Maximum Bundles",
         description="Most directions that are traced, even if there is still more noise than "
                     "wanted",
-        default=4096, min=2, max=2 ** 24, soft_max=65_536)
+        default=65_536, min=2, max=2 ** 24, soft_max=65_536)
     lines_per_bundle: IntProperty(
         name="Lines per Bundle",
         description="Lines in each direction; 0 is automatic: two per patch",

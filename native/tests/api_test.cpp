@@ -29,7 +29,7 @@ TEST_F(Api, SettingsHaveReadableDefaults) {
     float real = -1;
     const char* text = nullptr;
     const std::vector<std::pair<const char*, int32_t>> integers = {
-        {"max_patches", 100000}, {"refine", 0}, {"min_bundles", 64}, {"max_bundles", 4096},
+        {"max_patches", 100000}, {"refine", 0}, {"min_bundles", 64}, {"max_bundles", 65536},
         {"lines_per_bundle", 0}, {"seed", 0},   {"threads", 0}};
     for (const auto& [name, value] : integers) {
         EXPECT_EQ(rb_get_bake_int(bake, name, &number), RB_ERROR_NONE) << name;

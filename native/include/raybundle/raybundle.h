@@ -250,7 +250,7 @@ RB_API void rb_release_bake(rb_bake bake);
  *   int    max_patches     most patches that subdivision may make (100000)
  *   int    refine          1: smaller patches at shadow edges where that pays (0)
  *   int    contacts        1: smaller patches beside gaps much narrower than a patch (1)
- *   int    min_bundles, max_bundles   bounds of the number of bundles (64, 4096)
+ *   int    min_bundles, max_bundles   bounds of the number of bundles (64, 65536)
  *   int    lines_per_bundle   0 = automatic: two lines per mean patch (0)
  *   float  memory_limit    for the exchanges, in MB (4096)
  *   int    seed, threads   threads 0 = all (0, 0)

@@ -32,6 +32,8 @@ namespace {
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 // The lines' noise on the patches of any one window may be this many times the target.
 constexpr double kWindowTargets = 1.1;
+// Bundles whose noise is less than this share of the target have done their part.
+constexpr double kFewNoise = 0.3;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 
 class Stopwatch {
@@ -390,6 +392,14 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
         if (excess <= 1 && settings.skipBundles) {
             report.skipped.push_back(
                 {"bundles", "the noise is at its target", most - std::min(most, bundles)});
+            break;
+        }
+        if (onSmall <= kWindowTargets * settings.targetError &&
+            noise.ofBundles() < kFewNoise * settings.targetError) {
+            report.warnings.push_back(
+                "the noise is " + std::to_string(100 * *worst) + " % and not below " +
+                std::to_string(100 * settings.targetError) +
+                " %: what is left is that of direct light, which more bundles do not help");
             break;
         }
         if (bundles >= most) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bake/noise.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace raybundle {
@@ -50,8 +51,11 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
 double Noise::factor() const { return 1 + kSmallSample / (double(looked) * looked); }
 
 double Noise::relative() const {
-    if (!(signal > 0)) return 0;
-    return std::sqrt(factor() * factor() * pooled + directNoise + bias * bias);
+    return signal > 0 ? std::hypot(ofBundles(), std::sqrt(directNoise)) : 0;
+}
+
+double Noise::ofBundles() const {
+    return signal > 0 ? std::hypot(factor() * std::sqrt(pooled), bias) : 0;
 }
 
 Looks Noise::looks() const { return {looked, bundles, bundleNoise > 0 ? pooled / bundleNoise : 1}; }
@@ -95,6 +99,12 @@ std::vector<double> SetNoise::relative() const {
     std::vector<double> result;
     for (const Noise& noise : noises) result.push_back(noise.relative());
     return result;
+}
+
+double SetNoise::ofBundles() const {
+    double most = 0;
+    for (const Noise& noise : noises) most = std::max(most, noise.ofBundles());
+    return most;
 }
 
 SideNoise SetNoise::perSide() const {

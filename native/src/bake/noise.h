@@ -43,6 +43,7 @@ class Noise {
 
     // As of the last look, relative to the RMS of the light.
     double relative() const;
+    double ofBundles() const;  // without that of the first shot
     Looks looks() const;
     // Per side: half the difference of the halves, brought to the stated size, W/m^2.
     std::vector<glm::vec3> perSide() const;
@@ -82,6 +83,8 @@ class SetNoise {
 
     // As of the last look, relative: of the light of all, then of each light set.
     std::vector<double> relative() const;
+    // The largest of them without that of the first shot.
+    double ofBundles() const;
     // Of the light of all.
     Looks looks() const { return noises.front().looks(); }
     SideNoise perSide() const;

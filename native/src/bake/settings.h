@@ -17,7 +17,7 @@ struct Settings : Skips {
     int refine = 0;    // 1: patches smaller than patchSize where that pays
     int contacts = 1;  // 1: patches smaller than patchSize beside narrow gaps
     int minBundles = 64;
-    int maxBundles = 4096;
+    int maxBundles = kMostWindowBundles;
     int linesPerBundle = 0;    // 0 = automatic
     float memoryLimit = 4096;  // of the exchanges, MB
     int seed = 0;
