@@ -11,8 +11,6 @@
 namespace raybundle {
 namespace {
 
-float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
-
 // A corner whose patch is covered by more than this gathers no light itself.
 constexpr float kHalfCovered = 0.5f;
 

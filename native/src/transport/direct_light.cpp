@@ -14,16 +14,12 @@ namespace {
 
 // Emission up to this many times the mean exitance of the scene is left to the bundles.
 constexpr double kBundledEmission = 1.5;
-// Shadow rays per receiver and source: at first, and for sources of little weight.
-constexpr int kFirstSamples = 16;
-constexpr int kNeighbourSamples = 8;  // each, of receivers that can tell from their neighbours
+// Shadow rays per receiver and source for sources of little weight.
 constexpr int kFewSamples = 4;
 constexpr size_t kFewSources = 4;
 // A source of less than this share of the light that a receiver could get takes few samples, one of
 // less than the second half as many as others.
 constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
-// Receivers darker than this share of the mean may have the error of one that bright.
-constexpr float kDarkShare = 0.25f;
 // What n samples tell nothing of: a part s of a source is missed by all with the probability
 // (1 - s)^n, and then s is wrong; this over n at most, in the mean.
 constexpr float kMissed = 0.37f;
@@ -37,17 +33,8 @@ constexpr float kSmooth = 1.1f;
 // A patch smaller than this share of its distance from a source needs one point only: the error is
 // about a quarter of its square, 0.3 %.
 constexpr float kFar = 0.1f;
-// Where few receivers have noise, each may have up to so many times the error that it may have
-// elsewhere, while all of them together keep to this share of the target.
-constexpr float kMostLaxity = 3;
-constexpr double kLaxShare = 0.25;
-// A shadow's edge lies between two neighbours where the light differs by this share, or where one
-// has more of it by so many times the error that it may have.
-constexpr float kStep = 0.33f, kEdge = 6;
 // For the power balance: rays of all sources together, and of each at least.
 constexpr uint32_t kEscapeRays = 16384, kLeastEscapeRays = 1024;
-
-float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
 // Estimate of the scene's mean exitance by the light of a set: all power over the area, times the
 // bounces of the mean reflectance. Only its order of magnitude matters. emission: of the set, per
@@ -164,55 +151,17 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
     sources = raybundle::lightSources(scene, patches, isSource, gathered, lightSet);
 }
 
-namespace {
-
-// How many times these tolerances the errors may be, so that all of them together are no more than
-// `most` at each receiver that has light: where few receivers have any, each may have more.
-float laxity(const std::vector<Gathered>& results, const std::vector<float>& tolerance,
-             double most) {
-    double allowed = 0;
-    for (const Gathered& result : results)
-        if (brightest(result.irradiance) > 0) allowed += most * most;
-    for (float factor = kMostLaxity; factor > 1; factor *= 0.8f) {
-        double left = 0;
-        for (size_t k = 0; k < results.size(); ++k)
-            left += double(
-                std::min(results[k].variance, factor * factor * tolerance[k] * tolerance[k]));
-        if (left <= allowed) return factor;
-    }
-    return 1;
-}
-
-// Receivers whose samples may have missed the edge of a shadow: one beside them has it, or is as
-// dark as behind one. tolerance: W/m^2.
-std::vector<bool> besideShadows(const std::vector<Gathered>& results,
-                                const std::vector<ReceiverPair>& neighbours,
-                                const std::vector<float>& tolerance) {
-    std::vector<bool> beside(results.size(), false);
-    for (const auto& [a, b] : neighbours) {
-        const float light = brightest(results[a].irradiance),
-                    other = brightest(results[b].irradiance);
-        const bool isStep = std::abs(light - other) > kStep * std::max(light, other);
-        const float edge = results[b].contrast - results[a].contrast;
-        if (isStep || edge > kEdge * tolerance[a]) beside[a] = true;
-        if (isStep || -edge > kEdge * tolerance[b]) beside[b] = true;
-    }
-    return beside;
-}
-
-}  // namespace
-
-template <class AimOf>
 void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
-                              const std::function<Receiver(size_t)>& receiverAt, const AimOf& aimOf,
-                              Seen& seen, const std::function<void(double)>& progress) const {
+                              const std::function<Receiver(size_t)>& receiverAt,
+                              const std::vector<Aim>& aims, Seen& seen,
+                              const std::function<void(double)>& progress) const {
     constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
     for (size_t from = 0; from < these.size(); from += kSlice) {
         progress(0.5 * double(from) / double(these.size()));
         tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
             Gathered& result = results[these[k]];
             const uint64_t before = result.rays;
-            result = gather(receiverAt(these[k]), aimOf(these[k]), seen);
+            result = gather(receiverAt(these[k]), aims[k], seen);
             result.rays += before;
         });
     }
@@ -230,8 +179,8 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     if (sources.empty()) return;
     Seen seen(sources.size());
     const Aim aim{INFINITY, hasNeighbours ? kNeighbourSamples : kFirstSamples, false};
-    gatherThese(
-        coarse.gathered, these, receiverAt, [&](uint32_t) { return aim; }, seen, progress);
+    gatherThese(coarse.gathered, these, receiverAt, std::vector<Aim>(these.size(), aim), seen,
+                progress);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }
 
@@ -241,10 +190,10 @@ std::vector<Gathered> DirectLight::gather(size_t count,
                                           const std::function<void(double)>& progress,
                                           CoarseShot first,
                                           const std::vector<ReceiverPair>& neighbours) const {
-    std::vector<uint32_t> these(count);
-    std::iota(these.begin(), these.end(), 0u);
     if (first.gathered.empty()) {
         first.gathered.resize(count);
+        std::vector<uint32_t> these(count);
+        std::iota(these.begin(), these.end(), 0u);
         shootCoarsely(first, these, receiverAt, progress, !neighbours.empty());
     }
     std::vector<Gathered> results = std::move(first.gathered);
@@ -252,32 +201,8 @@ std::vector<Gathered> DirectLight::gather(size_t count,
     Seen seen(sources.size());
     for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
 
-    double lit = 0, litArea = 0;
-    for (uint32_t k = 0; k < count; ++k)
-        if (const double h = brightest(results[k].irradiance); h > 0) {
-            const Receiver receiver = receiverAt(k);
-            const double weight = receiver.point ? 1 : double(patches.area[receiver.side / 2]);
-            lit += weight * h;
-            litArea += weight;
-        }
-    // Not its square: a few receivers beside a lamp may have most of that.
-    const double meanLight = litArea > 0 ? lit / litArea : 0;
-    const float floor = kDarkShare * float(meanLight);
-    std::vector<float> tolerance(count);
-    for (size_t k = 0; k < count; ++k)
-        tolerance[k] = receiverAt(k).errorFactor * kDirectShare * targetError *
-                       std::max(floor, brightest(results[k].irradiance));
-    const float factor = laxity(results, tolerance, kLaxShare * targetError * meanLight);
-    for (float& error : tolerance) error *= factor;
-    const std::vector<bool> besideShadow = besideShadows(results, neighbours, tolerance);
-    these.erase(std::remove_if(these.begin(), these.end(),
-                               [&](uint32_t k) {
-                                   return !besideShadow[k] &&
-                                          std::sqrt(results[k].variance) <= tolerance[k];
-                               }),
-                these.end());
-    auto aimOf = [&](uint32_t k) { return Aim{tolerance[k], kFirstSamples, besideShadow[k]}; };
-    gatherThese(results, these, receiverAt, aimOf, seen,
+    const Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
+    gatherThese(results, further.receivers, receiverAt, further.aims, seen,
                 [&](double done) { progress(0.5 + done); });
     return results;
 }
@@ -311,7 +236,7 @@ std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, cons
                                                  float tolerance, float& error) const {
     glm::vec3 low, high;
     error = 0;
-    if (place.radius <= kFar * source.distance(place.centroid()))
+    if (place.radius == 0 || place.radius < kFar * source.distance(place.centroid()))
         return source.irradiance(place.centroid(), place.normal);
     const auto coarse = quadrature(source, place, 1, low, high);
     if (!coarse) return coarse;

@@ -27,44 +27,11 @@
 #include "patches/patches.h"
 #include "scene/scene.h"
 #include "transport/light_source.h"
+#include "transport/receiver.h"
 #include "transport/sobol.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
-
-// Standard error that direct light may keep, as a share of the target: errors of receivers are
-// independent, while those of bundles are shared by many.
-constexpr float kDirectShare = 0.75f;
-
-// Where direct light is to be known: a whole patch side (the mean over it), or a point on one.
-struct Receiver {
-    uint32_t side = 0;
-    glm::vec3 normal{0.0f};          // unit; a point may have a shading normal
-    std::optional<glm::vec3> point;  // relative to Patches::centre
-    uint32_t seed = 0;               // of its samples
-    // Only the light that lines which end at the first surface do not bring it.
-    bool passingOnly = false;
-    float errorFactor = 1;  // its error may be so many times that of others
-};
-
-// Two receivers beside each other, by their numbers.
-struct ReceiverPair {
-    uint32_t first = 0, second = 0;
-};
-
-// What one receiver got.
-struct Gathered {
-    glm::vec3 irradiance{0.0f};  // W/m^2
-    glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
-    float variance = 0;          // of the brightest channel
-    float contrast = 0;  // standard deviation over the receiver and the sources, W/m^2, that
-                         // shadows make
-    uint64_t rays = 0;
-    uint64_t unblocked = 0;  // sources without noise: wholly visible
-    uint64_t hidden = 0;     // sources that it cannot face, without a sample
-    uint64_t weak = 0;       // sources that took fewer rays since they give little of the light
-    uint64_t inside = 0;     // sources that took fewer rays since it is the inside of a solid
-};
 
 // The light of few samples at each receiver.
 struct CoarseShot {
@@ -117,17 +84,11 @@ class DirectLight {
     static constexpr size_t kBlocks = 4;          // of a receiver's samples, to see how they differ
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
 
-    // What a receiver's samples are to reach.
-    struct Aim {
-        float tolerance = INFINITY;  // standard error, W/m^2
-        int samples = 0;             // of each source, at least
-        bool isBesideShadow = false;
-    };
-
-    template <class AimOf>
+    // aims: of `these`.
     void gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
-                     const std::function<Receiver(size_t)>& receiverAt, const AimOf& aimOf,
-                     Seen& seen, const std::function<void(double)>& progress) const;
+                     const std::function<Receiver(size_t)>& receiverAt,
+                     const std::vector<Aim>& aims, Seen& seen,
+                     const std::function<void(double)>& progress) const;
     Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen) const;
     void gatherFrom(size_t source, const Receiver& receiver, const Place& place, const Aim& aim,
                     Seen& seen, Gathered& sum) const;

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What gathers direct light (transport/direct_light.h), what it gets, and what it aims at.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <optional>
+#include <vector>
+
+#include "patches/patches.h"
+
+namespace raybundle {
+
+// The largest channel.
+inline float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
+
+// Where direct light is to be known: a whole patch side (the mean over it), or a point on one.
+struct Receiver {
+    uint32_t side = 0;
+    glm::vec3 normal{0.0f};          // unit; a point may have a shading normal
+    std::optional<glm::vec3> point;  // relative to Patches::centre
+    uint32_t seed = 0;               // of its samples
+    // Only the light that lines which end at the first surface do not bring it.
+    bool passingOnly = false;
+    float errorFactor = 1;  // its error may be so many times that of others
+};
+
+// Two receivers beside each other, by their numbers.
+struct ReceiverPair {
+    uint32_t first = 0, second = 0;
+};
+
+// What one receiver got.
+struct Gathered {
+    glm::vec3 irradiance{0.0f};  // W/m^2
+    glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
+    float variance = 0;          // of the brightest channel
+    float contrast = 0;  // standard deviation over the receiver and the sources, W/m^2, that
+                         // shadows make
+    uint64_t rays = 0;
+    uint64_t unblocked = 0;  // sources without noise: wholly visible
+    uint64_t hidden = 0;     // sources that it cannot face, without a sample
+    uint64_t weak = 0;       // sources that took fewer rays since they give little of the light
+    uint64_t inside = 0;     // sources that took fewer rays since it is the inside of a solid
+};
+
+// Standard error that direct light may keep, as a share of the target: errors of receivers are
+// independent, while those of bundles are shared by many.
+constexpr float kDirectShare = 0.75f;
+
+// What a receiver's samples are to reach.
+struct Aim {
+    float tolerance = INFINITY;  // standard error, W/m^2
+    int samples = 0;             // of each source, at least
+    bool isBesideShadow = false;
+};
+
+// After a coarse shot: the receivers that need more samples, and the aims of these.
+//
+// Differs from an equal error for all: where few receivers have noise (the edges of shadows), each
+// may have more of it, as long as all together have little beside the mean light. And samples that
+// agree prove little where a neighbour disagrees: those receivers take more.
+struct Aims {
+    std::vector<uint32_t> receivers;
+    std::vector<Aim> aims;
+};
+Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
+               const std::function<Receiver(size_t)>& receiverAt,
+               const std::vector<ReceiverPair>& neighbours, float targetError);
+
+// Shadow rays per receiver and source at first: of those that can tell from their neighbours whether
+// they are enough, and of others.
+constexpr int kNeighbourSamples = 8, kFirstSamples = 16;
+
+}  // namespace raybundle
