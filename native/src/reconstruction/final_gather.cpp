@@ -14,7 +14,7 @@ namespace {
 
 // Sobol sets, each with its own shift: of all receivers that share in a mean, and of each of them at
 // least. Rays of a set: at first and at most.
-constexpr uint32_t kSets = 8, kFewestSets = 2, kFirstRays = 16, kMostRays = 512;
+constexpr uint32_t kSets = 8, kFewestSets = 2, kFirstRays = 16, kMostRays = 1024;
 // The first rays of all sets times the target: what so few miss is a share of the light around of
 // about one over their number.
 constexpr float kFirstTimesTarget = 2.5f;
@@ -26,7 +26,7 @@ constexpr uint32_t kNearRays = 8;
 constexpr float kNearLengths = 2;
 // The standard error of what is gathered, and how far interpolation may be off the light around,
 // as shares of the error.
-constexpr float kNoiseShare = 0.75f, kInterpolationShare = 1;
+constexpr float kNoiseShare = 0.6f, kInterpolationShare = 1;
 
 double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 
