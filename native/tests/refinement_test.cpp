@@ -13,6 +13,7 @@
 #include <string>
 
 #include "bake/bake.h"
+#include "patches/neighbours.h"
 #include "patches/tiles.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
@@ -214,6 +215,20 @@ void bakeRefined(Bake& bake, const Scene& scene, int threads = 0) {
     // The bundles are given; a low target makes cuts worth it.
     bake.settings.targetError = 0.003f;
     bake.run(scene);
+}
+
+TEST(CutTiles, KeepTheirNeighbours) {
+    const Scene scene = roomWithBoxes(0.5f);
+    Patches patches = subdivide(scene, 0.3f, 1 << 20);
+    auto pairsOf = [&] {
+        std::vector<std::pair<uint32_t, uint32_t>> pairs;
+        for (const TilePair& pair : neighbouringTiles(patches, 0, uint32_t(patches.parents.size())))
+            pairs.emplace_back(pair.first, pair.second);
+        return pairs;
+    };
+    const auto before = pairsOf();
+    cutTiles(scene, patches, mixedLevels(patches.count()));
+    EXPECT_EQ(pairsOf(), before);
 }
 
 TEST(CutTiles, AFurnaceStaysExact) {

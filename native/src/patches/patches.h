@@ -144,9 +144,9 @@ struct Patches {
     }
 };
 
-// Cuts all instances of the scene into patches, kMostPatches at most, with edges of about `patchSize` metres (0: as
-// automaticPatchSizes has it), coarser if there would be more than maxPatches, and gives each its
-// reflectance, emission and opacity (means over its area).
+// Cuts all instances of the scene into patches, kMostPatches at most, with edges of about
+// `patchSize` metres (0: as automaticPatchSizes has it), coarser if there would be more than
+// maxPatches, and gives each its reflectance, emission and opacity (means over its area).
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches);
 
 // Cuts the tiles once more: levels holds one entry a tile, in the order of the patches of an uncut
