@@ -87,6 +87,7 @@ void project(benchmark::State& state, const Patches& patches, float pixelSize) {
     state.counters["lines"] = benchmark::Counter(double(lines), benchmark::Counter::kIsRate);
     state.counters["exchanges"] =
         benchmark::Counter(double(exchanges), benchmark::Counter::kIsRate);
+    state.counters["outlines"] = double(patches.sheets.sheets.size() + patches.sheets.loose.size());
     state.counters["fragments"] =
         benchmark::Counter(double(fragments), benchmark::Counter::kIsRate);
 }

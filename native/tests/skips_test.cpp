@@ -30,6 +30,14 @@ Scene roomOfLamps() {
     return scene;
 }
 
+// The same with a carpet of many faces.
+Scene roomWithCarpet() {
+    Scene scene = roomOfLamps();
+    place(scene, grid("carpet", {0.4f, 0.4f, 0.2f}, {3.0f, 0, 0}, {0, 2.4f, 0}, 12, 10),
+          grey("carpet", 0.4f));
+    return scene;
+}
+
 struct Case {
     const char* name;
     std::string said;  // in the report's list of what was skipped
@@ -78,6 +86,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"reflection", "no surface reflects", 1e-5, [] { return litRoom(0); }},
                     Case{"geometry", "unchanged", 1e-5}, Case{"lights", "lights unchanged", 1e-5},
                     Case{"facing", "face away", 1e-5}, Case{"occluders", "only occlude", 1e-5},
+                    Case{"sheets", "projected as one", 0, roomWithCarpet,
+                         [](Settings& settings) { settings.skipGeometry = 0; }},
                     Case{"lit", "closed form", 0}, Case{"weak", "little of the light", 0},
                     Case{"inside", "inside of a solid", 0},
                     Case{"gather", "whose light interpolation follows", 0, roomOfLamps,

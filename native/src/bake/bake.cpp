@@ -155,6 +155,9 @@ void Bake::runStages(const Scene& scene) {
         if (!trace->tracer) {
             coarse = cutPatches(scene, report);
             trace->startLines(settings);
+            report.skipped.push_back({"projection of faces",
+                                      "they lie in a plane with others like them: projected as one",
+                                      patches.sheets.joined - patches.sheets.sheets.size()});
         }
         SetLights lights = shootSources(scene, coarse, report);
         const Tiles tiles(patches);

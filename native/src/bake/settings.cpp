@@ -38,6 +38,7 @@ const std::vector<Number<int>>& integers() {
         {"skip.geometry", &Settings::skipGeometry, 0, 1},
         {"skip.lights", &Settings::skipLights, 0, 1},
         {"skip.facing", &Settings::skipFacing, 0, 1},
+        {"skip.sheets", &Settings::skipSheets, 0, 1},
         {"skip.occluders", &Settings::skipOccluders, 0, 1},
         {"skip.lit", &Settings::skipLit, 0, 1},
         {"skip.weak", &Settings::skipWeak, 0, 1},

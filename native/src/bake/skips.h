@@ -14,6 +14,7 @@ struct Skips {
     int skipGeometry = 1;    // patches and lines, if geometry is as in the last bake
     int skipLights = 1;      // the first shot, if lights too are as in the last bake
     int skipFacing = 1;      // shadow rays to a source that the receiver cannot face
+    int skipSheets = 1;      // projection of faces that lie in a plane with others of their kind
     int skipOccluders = 1;   // reconstruction of objects that only occlude
     // Within the stated error.
     int skipLit = 1;        // noise of a source wholly visible: its closed form

@@ -46,6 +46,8 @@ Trace::Trace(uint64_t hash, Patches made, const Settings& settings)
 
 void Trace::startLines(const Settings& settings) {
     const ProjectorInput input = projectorInput(settings);
+    if (!settings.skipSheets || input.smallPatches == SmallPatches::ROULETTE || input.singleLine)
+        patches.sheets = withoutSheets(patches);
     counts = LineCounts(patches.sideCount());
     tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                             uint32_t(settings.seed));

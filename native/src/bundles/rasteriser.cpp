@@ -42,15 +42,20 @@ void Rasteriser::begin(const Bundle& bundle) {
     highest = high.z;
     if (windows.empty()) return;
 
-    bounds.resize(patches.parents.size());
-    for (size_t i = 0; i < bounds.size(); ++i) {
-        const Parent& parent = patches.parents[i];
-        Rectangle r{projected[parent.vertex[0]], projected[parent.vertex[0]]};
-        for (int k = 1; k < (parent.isTriangle ? 3 : 4); ++k) {
-            r.low = glm::min(r.low, projected[parent.vertex[k]]);
-            r.high = glm::max(r.high, projected[parent.vertex[k]]);
+    bounds.clear();
+    auto addBounds = [&](int edges, const auto& vertexAt) {
+        Rectangle r{projected[vertexAt(0)], projected[vertexAt(0)]};
+        for (int k = 1; k < edges; ++k) {
+            r.low = glm::min(r.low, projected[vertexAt(k)]);
+            r.high = glm::max(r.high, projected[vertexAt(k)]);
         }
-        bounds[i] = r;
+        bounds.push_back(r);
+    };
+    for (const Sheet& sheet : patches.sheets.sheets)
+        addBounds(int(sheet.outline.size()), [&](int k) { return sheet.outline[size_t(k)][0]; });
+    for (uint32_t i : patches.sheets.loose) {
+        const Parent& parent = patches.parents[i];
+        addBounds(parent.isTriangle ? 3 : 4, [&](int k) { return parent.vertex[size_t(k)]; });
     }
     // The shadows of the boxes do not depend on the shift, or lines near their borders would not be
     // uniform.
@@ -100,17 +105,32 @@ void Rasteriser::findTaken(size_t window) {
     }
 }
 
-bool Rasteriser::findPlane(const Parent& parent, DepthPlane& plane) const {
+bool Rasteriser::findPlane(const glm::vec3& origin, const glm::vec3& a, const glm::vec3& b,
+                           Plane& plane) const {
     // In double from the world's coordinates, so that faces of different objects that coincide have
     // the same depth.
-    const glm::dvec3 normal = glm::cross(glm::dvec3(parent.a), glm::dvec3(parent.b));
+    const glm::dvec3 o(origin), da(a), db(b), normal = glm::cross(da, db);
     const double slant = glm::dot(normal, frame.direction);
     if (slant == 0) return false;
     const double size = double(pixelSize) / zoom;
+    const glm::dvec2 first = (corner + 0.5) * size;  // the centre of pixel (0, 0), metres
     plane.dzdx = -glm::dot(normal, frame.right) / slant * size;
     plane.dzdy = -glm::dot(normal, frame.up) / slant * size;
-    plane.z0 = glm::dot(normal, glm::dvec3(parent.origin)) / slant + (corner.x + 0.5) * plane.dzdx +
-               (corner.y + 0.5) * plane.dzdy;
+    plane.z0 =
+        glm::dot(normal, o) / slant + (corner.x + 0.5) * plane.dzdx + (corner.y + 0.5) * plane.dzdy;
+    // (right, up, direction) is right-handed: the front faces against the direction where the
+    // outline turns clockwise.
+    plane.facing = slant < 0 ? 0 : 1;
+    const glm::dvec2 ea(glm::dot(da, frame.right), glm::dot(da, frame.up)),
+        eb(glm::dot(db, frame.right), glm::dot(db, frame.up));
+    const glm::dvec2 to = first - glm::dvec2(glm::dot(o, frame.right), glm::dot(o, frame.up));
+    const double inverse = 1 / slant;
+    plane.s0 = (to.x * eb.y - to.y * eb.x) * inverse;
+    plane.dsdx = eb.y * inverse * size;
+    plane.dsdy = -eb.x * inverse * size;
+    plane.t0 = (to.y * ea.x - to.x * ea.y) * inverse;
+    plane.dtdx = -ea.y * inverse * size;
+    plane.dtdy = ea.x * inverse * size;
     return true;
 }
 

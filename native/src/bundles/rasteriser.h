@@ -11,8 +11,8 @@
 // other: as a whole, and through each window with its finer pixels. Each point of the plane belongs
 // to one view.
 //
-// Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised; the patch
-// follows from the affine coordinates.
+// Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised, and sheets of
+// them (patches/sheets.h); the patch follows from the affine coordinates.
 #pragma once
 
 #include <algorithm>
@@ -67,28 +67,44 @@ class Rasteriser {
     // As if all patches were opaque.
     template <class Visit>
     void forEachCovered(const Visit& visit) {
-        for (size_t i = 0; i < patches.parents.size(); ++i) {
-            const Parent& parent = patches.parents[i];
-            if (!parent.exchanges) continue;
-            if (smallPatches == SmallPatches::ROULETTE)
-                fillPatches(parent, visit);
-            else if (level == 0 || isInView(bounds[i]))
-                sampleParent(parent, visit);
+        if (smallPatches == SmallPatches::ROULETTE) {
+            for (const Parent& parent : patches.parents)
+                if (parent.exchanges) fillPatches(parent, visit);
+            return;
         }
+        const std::vector<Sheet>& sheets = patches.sheets.sheets;
+        const std::vector<uint32_t>& loose = patches.sheets.loose;
+        for (size_t i = 0; i < sheets.size(); ++i)
+            if (level == 0 || isInView(bounds[i])) sampleSheet(sheets[i], visit);
+        for (size_t i = 0; i < loose.size(); ++i)
+            if (level == 0 || isInView(bounds[sheets.size() + i]))
+                sampleParent(patches.parents[loose[i]], visit);
     }
     template <class Visit>
+    void sampleSheet(const Sheet& sheet, const Visit& visit);
+    template <class Visit>
     void sampleParent(const Parent& parent, const Visit& visit);
+    // Visits the pixels within a convex outline: edge k runs from vertex edge(k)[0] to edge(k)[1],
+    // around the front; origin, a, b: of its affine coordinates; patchAt(s, t): of all patches.
+    template <class EdgeAt, class PatchAt, class Visit>
+    void sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& origin, const glm::vec3& a,
+                       const glm::vec3& b, const PatchAt& patchAt, const Visit& visit);
     // Patch by patch, for ROULETTE.
     template <class Visit>
     void fillPatches(const Parent& parent, const Visit& visit);
 
-    // Depth over the view, metres: at the centre of pixel (0, 0) and its change per pixel.
-    struct DepthPlane {
+    // Over the view, at the centre of pixel (0, 0) and its change per pixel: depth, metres, and the
+    // affine coordinates of a parent or sheet.
+    struct Plane {
         double z0, dzdx, dzdy;
+        double s0, dsdx, dsdy;
+        double t0, dtdx, dtdy;
+        uint32_t facing;  // the side that faces against the direction: 0 for the front
         double at(glm::dvec2 p) const { return z0 + (p.x - 0.5) * dzdx + (p.y - 0.5) * dzdy; }
     };
-    // Of a parent; false where it is seen edge-on.
-    bool findPlane(const Parent& parent, DepthPlane& plane) const;
+    // False where it is seen edge-on.
+    bool findPlane(const glm::vec3& origin, const glm::vec3& a, const glm::vec3& b,
+                   Plane& plane) const;
 
     // On the plane, in pixels of the whole scene's view, before the shift.
     struct Rectangle {
@@ -103,90 +119,119 @@ class Rasteriser {
     // Marks the pixels that belong to finer windows; of windows as fine, to the first.
     void findTaken(size_t window);
 
+    static constexpr int kRun = 64;  // pixels of a row that are looked at together
+
     const Patches& patches;
     const float pixelSize;
     const SmallPatches smallPatches;
     const std::vector<LineWindow> windows;
     int finestLevel = 0;
 
-    Bundle frame{};                           // the bundle in hand
-    uint64_t line = 0;                        // lineName of the bundle and the view
-    int level = 0;                            // of the view
-    double zoom = 1;                          // 2^level
-    glm::dvec2 corner{0.0};                   // of the view, its pixels
-    int width = 0, height = 0;                // of the view, its pixels
-    double lowest = 0, highest = 0;           // depth, metres
-    std::vector<glm::dvec2> projected;        // per vertex: on the plane
-    std::vector<Rectangle> bounds;            // per parent, if there are windows
-    std::vector<Rectangle> openings;          // per window: what of the plane is in it
-    std::vector<uint8_t> taken;               // per pixel of the view; empty: none
-    std::vector<double> depth;                // per vertex, metres
+    Bundle frame{};                     // the bundle in hand
+    uint64_t line = 0;                  // lineName of the bundle and the view
+    int level = 0;                      // of the view
+    double zoom = 1;                    // 2^level
+    glm::dvec2 corner{0.0};             // of the view, its pixels
+    int width = 0, height = 0;          // of the view, its pixels
+    double lowest = 0, highest = 0;     // depth, metres
+    std::vector<glm::dvec2> projected;  // per vertex: on the plane
+    std::vector<Rectangle> bounds;      // per sheet, then per loose parent, if there are windows
+    std::vector<Rectangle> openings;    // per window: what of the plane is in it
+    std::vector<uint8_t> taken;         // per pixel of the view; empty: none
+    std::vector<double> depth;          // per vertex, metres
     std::vector<double> spanLeft, spanRight;  // per row of a parent, pixels
     Roulette roulette;
     PolygonFiller filler;
 };
 
 template <class Visit>
+void Rasteriser::sampleSheet(const Sheet& sheet, const Visit& visit) {
+    sampleOutline(
+        int(sheet.outline.size()), [&](int k) { return sheet.outline[size_t(k)]; }, sheet.origin,
+        sheet.a,
+        sheet
+            .b,  // By value: its members could lie where patches are written, for all the compiler knows.
+        [grid = sheet.grid()](float s, float t) { return grid.patchAt(s, t); }, visit);
+}
+
+template <class Visit>
 void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
     const int sides = parent.isTriangle ? 3 : 4;
-    glm::dvec2 q[4];
+    sampleOutline(
+        sides,
+        [&](int k) {
+            return std::array<uint32_t, 2>{parent.vertex[size_t(k)],
+                                           parent.vertex[size_t((k + 1) % sides)]};
+        },
+        parent.origin, parent.a, parent.b,
+        [&](float s, float t) { return parent.firstPatch + parent.patchAt(s, t); }, visit);
+}
+
+template <class EdgeAt, class PatchAt, class Visit>
+void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& origin,
+                               const glm::vec3& a, const glm::vec3& b, const PatchAt& patchAt,
+                               const Visit& visit) {
     double yMin = std::numeric_limits<double>::max(), yMax = -yMin;
     double zMin = std::numeric_limits<double>::max(), zMax = -zMin;
-    for (int k = 0; k < sides; ++k) {
-        q[k] = inView(parent.vertex[k]);
-        yMin = std::min(yMin, q[k].y);
-        yMax = std::max(yMax, q[k].y);
-        zMin = std::min(zMin, depth[parent.vertex[k]]);
-        zMax = std::max(zMax, depth[parent.vertex[k]]);
+    for (int k = 0; k < edges; ++k) {
+        const uint32_t vertex = edge(k)[0];
+        const double y = inView(vertex).y;
+        yMin = std::min(yMin, y);
+        yMax = std::max(yMax, y);
+        zMin = std::min(zMin, depth[vertex]);
+        zMax = std::max(zMax, depth[vertex]);
     }
-    // Row y belongs to the parent if its centre y + 0.5 lies in [yMin, yMax).
+    // Row y belongs to the outline if its centre y + 0.5 lies in [yMin, yMax).
     const int row0 = std::max(0, int(std::ceil(yMin - 0.5)));
     const int row1 = std::min(height, int(std::ceil(yMax - 0.5)));
     if (row0 >= row1) return;
-    const glm::dvec2 ea = q[1] - q[0], eb = q[sides - 1] - q[0];
-    const double det = ea.x * eb.y - ea.y * eb.x;
-    if (det == 0) return;  // seen edge-on
+    Plane plane;
+    if (!findPlane(origin, a, b, plane)) return;
 
-    // Find the span of each row. An edge is evaluated from its lower end whichever way the parent
-    // turns, so that two parents with a common edge find the same crossing to the last bit.
+    // Find the span of each row. An edge is evaluated from its lower end whichever way the outline
+    // turns, so that two outlines with a common edge find the same crossing to the last bit.
     if (spanLeft.size() < size_t(row1 - row0)) {
         spanLeft.resize(size_t(row1 - row0));
         spanRight.resize(size_t(row1 - row0));
     }
-    for (int k = 0; k < sides; ++k) {
-        glm::dvec2 lower = q[k], upper = q[(k + 1) % sides];
+    for (int k = 0; k < edges; ++k) {
+        const std::array<uint32_t, 2> ends = edge(k);
+        glm::dvec2 lower = inView(ends[0]), upper = inView(ends[1]);
         const bool rising = lower.y < upper.y;
         if (!rising) std::swap(lower, upper);
         const int first = std::max(row0, int(std::ceil(lower.y - 0.5)));
         const int last = std::min(row1, int(std::ceil(upper.y - 0.5)));
         if (first >= last) continue;
         const double slope = (upper.x - lower.x) / (upper.y - lower.y);
-        std::vector<double>& bound = rising == (det > 0) ? spanRight : spanLeft;
+        std::vector<double>& bound = rising == (plane.facing == 1) ? spanRight : spanLeft;
         for (int y = first; y < last; ++y)
             bound[size_t(y - row0)] = lower.x + (y + 0.5 - lower.y) * slope;
     }
 
-    // Affine coordinates at a pixel, and the depth of the parent's plane.
-    const double inverse = 1 / det;
-    const float dsdx = float(eb.y * inverse), dsdy = float(-eb.x * inverse);
-    const float dtdx = float(-ea.y * inverse), dtdy = float(ea.x * inverse);
-    DepthPlane plane;
-    if (!findPlane(parent, plane)) return;
-    // (right, up, direction) is right-handed: det < 0 where the front faces against the direction.
-    const uint32_t facing = det < 0 ? 0 : 1;
+    const float dsdx = float(plane.dsdx), dtdx = float(plane.dtdx);
     for (int y = row0; y < row1; ++y) {
         const double l = spanLeft[size_t(y - row0)], r = spanRight[size_t(y - row0)];
         const int x0 = std::max(0, int(std::ceil(l - 0.5)));
         const int x1 = std::min(width, int(std::ceil(r - 0.5)));
-        const float dy = float(y + 0.5 - q[0].y);
-        for (int x = x0; x < x1; ++x) {
-            const float dx = float(x + 0.5 - q[0].x);
-            const float s = dx * dsdx + dy * dsdy, t = dx * dtdx + dy * dtdy;
-            const double z = std::clamp(plane.z0 + x * plane.dzdx + y * plane.dzdy, zMin, zMax);
-            const uint32_t patch = parent.firstPatch + parent.patchAt(s, t);
-            const uint32_t pixel = uint32_t(y) * uint32_t(width) + uint32_t(x);
-            if (!taken.empty() && taken[pixel]) continue;
-            visit(pixel, z, 2 * patch + facing);
+        const double zRow = plane.z0 + y * plane.dzdy;
+        const float s0 = float(plane.s0 + y * plane.dsdy + x0 * plane.dsdx);
+        const float t0 = float(plane.t0 + y * plane.dtdy + x0 * plane.dtdx);
+        const uint32_t rowStart = uint32_t(y) * uint32_t(width);
+        // Apart from what is visited, so that the compiler makes these loops SIMD.
+        for (int first = x0; first < x1; first += kRun) {
+            const int count = std::min(kRun, x1 - first);
+            uint32_t patch[kRun];
+            double z[kRun];
+            for (int k = 0; k < count; ++k) {
+                const float dx = float(first - x0 + k);
+                patch[k] = patchAt(s0 + dx * dsdx, t0 + dx * dtdx);
+            }
+            for (int k = 0; k < count; ++k)
+                z[k] = std::min(std::max(zRow + (first + k) * plane.dzdx, zMin), zMax);
+            for (int k = 0; k < count; ++k) {
+                const uint32_t pixel = rowStart + uint32_t(first + k);
+                if (taken.empty() || !taken[pixel]) visit(pixel, z[k], 2 * patch[k] + plane.facing);
+            }
         }
     }
 }
@@ -198,12 +243,11 @@ void Rasteriser::fillPatches(const Parent& parent, const Visit& visit) {
     const glm::dvec2 ea = inView(parent.vertex[1]) - q0;
     const glm::dvec2 eb = inView(parent.vertex[size_t(sides) - 1]) - q0;
     const double det = ea.x * eb.y - ea.y * eb.x;
-    DepthPlane plane;
-    if (det == 0 || !findPlane(parent, plane)) return;
-    const uint32_t facing = det < 0 ? 0 : 1;
+    Plane plane;
+    if (det == 0 || !findPlane(parent.origin, parent.a, parent.b, plane)) return;
     auto visitPixel = [&](int x, int y, double z, uint32_t patch) {
         if (x < 0 || y < 0 || x >= width || y >= height) return;
-        visit(uint32_t(y) * uint32_t(width) + uint32_t(x), z, 2 * patch + facing);
+        visit(uint32_t(y) * uint32_t(width) + uint32_t(x), z, 2 * patch + plane.facing);
     };
     const double tileArea = std::abs(det) / (parent.isTriangle ? 2 : 1) / parent.tileCount();
     const glm::vec2 middle(parent.isTriangle ? 1.0f / 3 : 0.5f);

@@ -337,6 +337,7 @@ void fillPatches(const Scene& scene, Patches& patches) {
             patches.area.resize(patches.area.size() + count, tileArea / float(count));
         }
     }
+    patches.sheets = findSheets(patches);
     assignOpacity(scene, patches);
     assignMaterials(scene, patches);
 }

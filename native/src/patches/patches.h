@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "patches/sheets.h"
 #include "scene/scene.h"
 
 namespace raybundle {
@@ -103,6 +104,7 @@ struct Patches {
     std::vector<glm::vec3> vertices;  // metres, relative to centre
     std::vector<Parent> parents;
     std::vector<Cell> cells;
+    Sheets sheets;                   // of the parents
     std::vector<uint32_t> parentOf;  // per patch
     // Per patch, m^2. Of a patch that lets light through only the opaque share counts, as if it had
     // many small holes: a global line meets that share of it, and reflectance and emission are

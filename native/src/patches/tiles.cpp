@@ -9,6 +9,7 @@ namespace raybundle {
 Tiles::Tiles(const Patches& cut) : original(cut) {
     if (cut.count() == cut.tileCount) return;
     uncut.emplace(cut);
+    uncut->sheets = {};
     uncut->opacity.clear();
     uncut->reflectance.clear();
     uncut->emission.clear();

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/sheets.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <unordered_map>
+
+#include "patches/patches.h"
+
+namespace raybundle {
+namespace {
+
+// Share of the longer edge by which the edges of congruent parents may differ.
+constexpr float kCongruence = 1e-4f;
+// How far a vertex may lie from its place on the sheet: across it, as a share of the scene's radius
+// (what rounding to float leaves; a hundredth of what counts as touching), and along it, as a share
+// of the parents' edges.
+constexpr float kFlatness = 1e-6f, kEvenness = 0.01f;
+
+// A parent in a lattice: corner k of its place there (in order around, (0, 0) first) is its vertex
+// (k + turn) % 4.
+struct Place {
+    uint32_t parent = 0;
+    int turn = 0;
+
+    uint32_t vertex(const Patches& patches, int corner) const {
+        return patches.parents[parent].vertex[size_t(corner + turn) % 4];
+    }
+    glm::vec3 position(const Patches& patches, int corner) const {
+        return patches.vertices[vertex(patches, corner)];
+    }
+    // Patches along the lattice's two directions.
+    int countA(const Patches& patches) const {
+        const Parent& p = patches.parents[parent];
+        return turn % 2 ? p.countB : p.countA;
+    }
+    int countB(const Patches& patches) const {
+        const Parent& p = patches.parents[parent];
+        return turn % 2 ? p.countA : p.countB;
+    }
+};
+
+// Where in a lattice.
+using At = std::array<int, 2>;
+struct HashAt {
+    size_t operator()(const At& at) const {
+        return size_t(uint64_t(uint32_t(at[0])) << 32 | uint32_t(at[1])) * 0x9E3779B97F4A7C15u;
+    }
+};
+using Lattice = std::unordered_map<At, Place, HashAt>;
+
+// The steps across a parent's edges, in order around.
+constexpr At kSteps[4] = {{0, -1}, {1, 0}, {0, 1}, {-1, 0}};
+
+class SheetSearch {
+  public:
+    explicit SheetSearch(const Patches& patches) : patches(patches) {}
+
+    Sheets run() {
+        listEdges();
+        isPlaced.assign(patches.parents.size(), false);
+        for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+            if (!patches.parents[i].exchanges) continue;
+            if (!mayJoin(i))
+                result.loose.push_back(i);
+            else if (!isPlaced[i])
+                cutIntoSheets(growFrom(i));
+        }
+        // The order of the faces, in which their vertices lie beside each other.
+        std::sort(result.loose.begin(), result.loose.end());
+        return std::move(result);
+    }
+
+  private:
+    bool mayJoin(uint32_t i) const {
+        const Parent& parent = patches.parents[i];
+        return parent.exchanges && !parent.isTriangle && !parent.cut;
+    }
+
+    // A parent's edge by its two vertices in order around.
+    struct Edge {
+        uint64_t key;
+        uint32_t parent;
+        int side;
+        bool operator<(const Edge& other) const {
+            return key != other.key ? key < other.key : parent < other.parent;
+        }
+    };
+    static uint64_t keyOf(uint32_t from, uint32_t to) { return uint64_t(from) << 32 | to; }
+
+    void listEdges() {
+        for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+            if (!mayJoin(i)) continue;
+            const auto& v = patches.parents[i].vertex;
+            for (int k = 0; k < 4; ++k)
+                edges.push_back({keyOf(v[size_t(k)], v[size_t(k + 1) % 4]), i, k});
+        }
+        tbb::parallel_sort(edges.begin(), edges.end());
+    }
+
+    // The lattice of all parents like this one that are joined to it by edges.
+    Lattice growFrom(uint32_t start) {
+        Lattice lattice;
+        const Place first{start, 0};
+        lattice.emplace(At{0, 0}, first);
+        isPlaced[start] = true;
+        std::vector<At> open{{0, 0}};
+        while (!open.empty()) {
+            const At at = open.back();
+            open.pop_back();
+            const Place place = lattice.at(at);
+            for (int side = 0; side < 4; ++side) {
+                const At next{at[0] + kSteps[side][0], at[1] + kSteps[side][1]};
+                if (lattice.count(next)) continue;
+                const std::optional<Place> found = across(place, side);
+                if (!found || !isCongruent(first, *found)) continue;
+                lattice.emplace(next, *found);
+                isPlaced[found->parent] = true;
+                open.push_back(next);
+            }
+        }
+        return lattice;
+    }
+
+    // What lies across an edge, as part of the same surface.
+    std::optional<Place> across(const Place& place, int side) const {
+        const uint32_t from = place.vertex(patches, side),
+                       to = place.vertex(patches, (side + 1) % 4);
+        const uint64_t key = keyOf(to, from);
+        auto edge = std::lower_bound(edges.begin(), edges.end(), Edge{key, 0, 0});
+        for (; edge != edges.end() && edge->key == key; ++edge)
+            // The edge is side (side + 2) % 4 of its place.
+            if (!isPlaced[edge->parent]) return Place{edge->parent, (edge->side + 6 - side) % 4};
+        return std::nullopt;
+    }
+
+    bool isCongruent(const Place& first, const Place& other) const {
+        if (first.countA(patches) != other.countA(patches) ||
+            first.countB(patches) != other.countB(patches))
+            return false;
+        const glm::vec3 a = edgeA(first), b = edgeB(first);
+        const float off = kCongruence * std::max(glm::length(a), glm::length(b));
+        return glm::distance(a, edgeA(other)) <= off && glm::distance(b, edgeB(other)) <= off;
+    }
+    glm::vec3 edgeA(const Place& p) const {
+        return p.position(patches, 1) - p.position(patches, 0);
+    }
+    glm::vec3 edgeB(const Place& p) const {
+        return p.position(patches, 3) - p.position(patches, 0);
+    }
+
+    // Row by row, the widest rectangles that are left.
+    void cutIntoSheets(Lattice lattice) {
+        std::vector<At> order;
+        for (const auto& entry : lattice) order.push_back(entry.first);
+        std::sort(order.begin(), order.end(), [](const At& p, const At& q) {
+            return p[1] != q[1] ? p[1] < q[1] : p[0] < q[0];
+        });
+        for (const At& low : order) {
+            if (!lattice.count(low)) continue;
+            At high = low;  // the first column and row beyond
+            while (lattice.count({high[0], low[1]})) ++high[0];
+            auto isWhole = [&](int row) {
+                for (int x = low[0]; x < high[0]; ++x)
+                    if (!lattice.count({x, row})) return false;
+                return true;
+            };
+            while (isWhole(high[1])) ++high[1];
+            addSheet(lattice, low, high);
+            for (int y = low[1]; y < high[1]; ++y)
+                for (int x = low[0]; x < high[0]; ++x) lattice.erase({x, y});
+        }
+    }
+
+    void addSheet(const Lattice& lattice, const At& low, const At& high) {
+        const int width = high[0] - low[0], height = high[1] - low[1];
+        auto at = [&](int x, int y) -> const Place& {
+            return lattice.at({low[0] + x, low[1] + y});
+        };
+        Sheet sheet;
+        sheet.origin = at(0, 0).position(patches, 0);
+        sheet.a = at(width - 1, 0).position(patches, 1) - sheet.origin;
+        sheet.b = at(0, height - 1).position(patches, 3) - sheet.origin;
+        bool isOne = width * height > 1;
+        for (int y = 0; y < height && isOne; ++y)
+            for (int x = 0; x < width && isOne; ++x)
+                isOne = fits(sheet, at(x, y), x, y, width, height);
+        if (!isOne) {
+            for (int y = 0; y < height; ++y)
+                for (int x = 0; x < width; ++x) result.loose.push_back(at(x, y).parent);
+            return;
+        }
+
+        const uint32_t countA = uint32_t(at(0, 0).countA(patches)),
+                       countB = uint32_t(at(0, 0).countB(patches));
+        sheet.columns = uint32_t(width) * countA;
+        sheet.rows = uint32_t(height) * countB;
+        sheet.patches.resize(size_t(sheet.columns) * sheet.rows);
+        for (uint32_t row = 0; row < sheet.rows; ++row)
+            for (uint32_t column = 0; column < sheet.columns; ++column)
+                sheet.patches[size_t(row) * sheet.columns + column] = patchOf(
+                    at(int(column / countA), int(row / countB)), column % countA, row % countB);
+
+        auto addEdge = [&](const Place& place, int side) {
+            sheet.outline.push_back(
+                {place.vertex(patches, side), place.vertex(patches, (side + 1) % 4)});
+        };
+        for (int x = 0; x < width; ++x) addEdge(at(x, 0), 0);
+        for (int y = 0; y < height; ++y) addEdge(at(width - 1, y), 1);
+        for (int x = width - 1; x >= 0; --x) addEdge(at(x, height - 1), 2);
+        for (int y = height - 1; y >= 0; --y) addEdge(at(0, y), 3);
+        result.sheets.push_back(std::move(sheet));
+        result.joined += size_t(width) * size_t(height);
+    }
+
+    // Whether the vertices of the parent in column x and row y are where the sheet has them.
+    bool fits(const Sheet& sheet, const Place& place, int x, int y, int width, int height) const {
+        const glm::vec3 a = sheet.a / float(width), b = sheet.b / float(height);
+        const glm::vec3 normal = glm::normalize(glm::cross(sheet.a, sheet.b));
+        constexpr int kCorners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        for (int k = 0; k < 4; ++k) {
+            const glm::vec3 off = place.position(patches, k) - sheet.origin -
+                                  float(x + kCorners[k][0]) * a - float(y + kCorners[k][1]) * b;
+            if (std::abs(glm::dot(off, normal)) > kFlatness * patches.radius ||
+                glm::length(off) > kEvenness * std::min(glm::length(a), glm::length(b)))
+                return false;
+        }
+        return true;
+    }
+
+    // The patch in a column and row of a parent as it lies in the lattice.
+    uint32_t patchOf(const Place& place, uint32_t column, uint32_t row) const {
+        const Parent& parent = patches.parents[place.parent];
+        const uint32_t a = parent.countA, b = parent.countB;
+        // Vertex `turn` is the lattice's (0, 0), from where the parent's own column and row run.
+        switch (place.turn) {
+            case 1:
+                std::swap(column, row);
+                column = a - 1 - column;
+                break;
+            case 2:
+                column = a - 1 - column;
+                row = b - 1 - row;
+                break;
+            case 3:
+                std::swap(column, row);
+                row = b - 1 - row;
+                break;
+            default:
+                break;
+        }
+        return parent.firstPatch + row * a + column;
+    }
+
+    const Patches& patches;
+    std::vector<Edge> edges;  // in order of their keys
+    std::vector<bool> isPlaced;
+    Sheets result;
+};
+
+}  // namespace
+
+Sheets findSheets(const Patches& patches) { return SheetSearch(patches).run(); }
+
+Sheets withoutSheets(const Patches& patches) {
+    Sheets result;
+    for (uint32_t i = 0; i < patches.parents.size(); ++i)
+        if (patches.parents[i].exchanges) result.loose.push_back(i);
+    return result;
+}
+
+}  // namespace raybundle

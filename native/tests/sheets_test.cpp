@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/sheets.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+#include <set>
+#include <utility>
+
+#include "bundles/fragment_lists.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+constexpr size_t kMany = 10000000;
+
+Patches patchesOf(Mesh mesh, float patchSize) {
+    Scene scene;
+    place(scene, std::move(mesh), grey("", 0.5f));
+    return subdivide(scene, patchSize, kMany);
+}
+
+// Starts each face at another of its corners, as subdivided meshes do.
+Mesh turned(Mesh mesh, uint32_t seed) {
+    std::mt19937 random(seed);
+    for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        const auto first = mesh.cornerVertices.begin() + mesh.faceOffsets[f];
+        std::rotate(first, first + random() % 4,
+                    mesh.cornerVertices.begin() + mesh.faceOffsets[f + 1]);
+    }
+    return mesh;
+}
+
+// Drops faces, for holes.
+template <class Drop>
+Mesh without(const Mesh& mesh, const Drop& isDropped) {
+    std::vector<std::vector<int32_t>> faces;
+    for (size_t f = 0; f < mesh.faceCount(); ++f)
+        if (!isDropped(f))
+            faces.emplace_back(mesh.cornerVertices.begin() + mesh.faceOffsets[f],
+                               mesh.cornerVertices.begin() + mesh.faceOffsets[f + 1]);
+    return polygons(mesh.name, mesh.vertices, faces);
+}
+
+// Every patch is in one sheet or belongs to one loose parent, and the sheets know where they are.
+void expectWhole(const Patches& patches) {
+    std::vector<int> found(patches.count(), 0);
+    for (uint32_t parent : patches.sheets.loose)
+        for (uint32_t k = 0; k < patches.parents[parent].patchCount(); ++k)
+            ++found[patches.parents[parent].firstPatch + k];
+    for (const Sheet& sheet : patches.sheets.sheets) {
+        ASSERT_EQ(sheet.patches.size(), size_t(sheet.columns) * sheet.rows);
+        for (uint32_t row = 0; row < sheet.rows; ++row)
+            for (uint32_t column = 0; column < sheet.columns; ++column) {
+                const float s = (float(column) + 0.3f) / float(sheet.columns);
+                const float t = (float(row) + 0.6f) / float(sheet.rows);
+                const uint32_t patch = sheet.grid().patchAt(s, t);
+                ++found[patch];
+                const glm::vec3 point = sheet.origin + s * sheet.a + t * sheet.b;
+                ASSERT_EQ(patches.patchAt(patches.parentOf[patch], point), patch);
+                // And inside of it: patchAt clamps.
+                const glm::vec3 middle = patches.point(patch, {0.5f, 0.5f});
+                const float reach = glm::length(sheet.a) / float(sheet.columns) +
+                                    glm::length(sheet.b) / float(sheet.rows);
+                ASSERT_LT(glm::distance(point, middle), 0.5f * reach);
+            }
+    }
+    for (int count : found) ASSERT_EQ(count, 1);
+}
+
+TEST(Sheets, AGridIsOne) {
+    // 7 x 5 faces of 2 x 3 patches, in a plane at an angle.
+    const Mesh mesh = grid("grid", {1, 2, 3}, {1.3f, 0.2f, 0.4f}, {-0.3f, 1.5f, 0.2f}, 7, 5);
+    for (uint32_t seed : {1u, 2u, 3u}) {
+        const Patches patches = patchesOf(turned(mesh, seed), 0.1f);
+        ASSERT_EQ(patches.sheets.sheets.size(), 1u);
+        EXPECT_TRUE(patches.sheets.loose.empty());
+        EXPECT_EQ(patches.sheets.sheets[0].outline.size(), 2u * (7 + 5));
+        expectWhole(patches);
+    }
+}
+
+TEST(Sheets, HolesAndCornersAreLeftOut) {
+    // A wall with a window, a step at its corner, and a single face beside it.
+    const Mesh wall = grid("wall", {0, 0, 0}, {10, 0, 0}, {0, 0, 6}, 10, 6);
+    const Mesh cut = without(wall, [](size_t f) {
+        const size_t x = f % 10, y = f / 10;
+        return (x >= 3 && x < 6 && y >= 2 && y < 4) || (x == 0 && y > 3);
+    });
+    const Patches patches = patchesOf(turned(cut, 4), 0.5f);
+    expectWhole(patches);
+    EXPECT_LE(patches.sheets.sheets.size() + patches.sheets.loose.size(), 6u);
+}
+
+TEST(Sheets, FacesOfSeveralSizesAreSeveral) {
+    // Columns of two widths: two sheets, each of its own patches.
+    std::vector<glm::vec3> vertices;
+    std::vector<std::vector<int32_t>> faces;
+    const float x[] = {0, 1, 2, 3, 3.5f, 4, 4.5f};
+    for (int j = 0; j < 4; ++j)
+        for (float at : x) vertices.emplace_back(at, float(j), 0);
+    for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 6; ++i)
+            faces.push_back({7 * j + i, 7 * j + i + 1, 7 * j + i + 8, 7 * j + i + 7});
+    const Patches patches = patchesOf(polygons("", vertices, faces), 0.25f);
+    EXPECT_EQ(patches.sheets.sheets.size(), 2u);
+    expectWhole(patches);
+}
+
+TEST(Sheets, BentSurfacesAreNone) {
+    Mesh tube = grid("tube", {0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 16, 4);
+    for (glm::vec3& v : tube.vertices) {
+        const float angle = 3.0f * v.x;
+        v = {std::cos(angle), std::sin(angle), v.z};
+    }
+    const Patches strips = patchesOf(tube, 0.1f);
+    EXPECT_EQ(strips.sheets.sheets.size(), 16u) << "only along the axis it is straight";
+    expectWhole(strips);
+
+    // Bent so little that neighbours are alike, and yet more in all than counts as touching.
+    Mesh sagging = grid("sagging", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 32, 1);
+    for (glm::vec3& v : sagging.vertices) v.z = 2e-5f * std::sin(3.14159265f * v.x);
+    const Patches sagged = patchesOf(sagging, 0.1f);
+    EXPECT_TRUE(sagged.sheets.sheets.empty());
+    expectWhole(sagged);
+
+    const Patches ball = patchesOf(icosphere("ball", 1, 2, false), 0.1f);
+    EXPECT_TRUE(ball.sheets.sheets.empty()) << "triangles";
+    expectWhole(ball);
+}
+
+TEST(Sheets, WhatTouchesItselfIsNotProjectedTwice) {
+    // Two faces on either side of the same edge in the same place, and both windings.
+    const std::vector<glm::vec3> v{{0, 0, 0}, {1, 0, 0}, {2, 0, 0},
+                                   {0, 1, 0}, {1, 1, 0}, {2, 1, 0}};
+    const Patches patches =
+        patchesOf(polygons("", v, {{0, 1, 4, 3}, {1, 2, 5, 4}, {1, 2, 5, 4}, {4, 5, 2, 1}}), 0.25f);
+    expectWhole(patches);
+}
+
+// A closed room whose walls are grids with common vertices along their edges, and a box of grids
+// in it.
+Scene roomOfGrids() {
+    auto cube = [](const std::string& name, float size, int n, bool inward) {
+        std::map<std::array<int, 3>, int32_t> numbers;
+        std::vector<glm::vec3> vertices;
+        std::vector<std::vector<int32_t>> faces;
+        auto vertex = [&](const std::array<int, 3>& at) {
+            const auto [found, isNew] = numbers.emplace(at, int32_t(vertices.size()));
+            if (isNew)
+                vertices.push_back(size * (glm::vec3(at[0], at[1], at[2]) / float(n) - 0.5f));
+            return found->second;
+        };
+        for (int axis = 0; axis < 3; ++axis)
+            for (int high = 0; high < 2; ++high)
+                for (int i = 0; i < n; ++i)
+                    for (int j = 0; j < n; ++j) {
+                        auto at = [&](int di, int dj) {
+                            std::array<int, 3> p;
+                            p[size_t(axis)] = high * n;
+                            p[size_t(axis + 1) % 3] = i + di;
+                            p[size_t(axis + 2) % 3] = j + dj;
+                            return vertex(p);
+                        };
+                        std::vector<int32_t> face{at(0, 0), at(1, 0), at(1, 1), at(0, 1)};
+                        if ((high == 0) != inward) std::reverse(face.begin(), face.end());
+                        faces.push_back(face);
+                    }
+        return polygons(name, vertices, faces);
+    };
+    Scene scene;
+    const glm::dmat4 tilt = glm::dmat4(glm::dmat3(
+        glm::dvec3(0.8, 0.6, 0), glm::dvec3(-0.48, 0.64, 0.6), glm::dvec3(0.36, -0.48, 0.8)));
+    place(scene, turned(cube("room", 2, 9, true), 5), grey("", 0.5f), tilt);
+    place(scene, turned(cube("box", 0.7f, 4, false), 6), grey("", 0.5f));
+    return scene;
+}
+
+TEST(Sheets, BundlesAreTheSame) {
+    const Scene scene = roomOfGrids();
+    Patches whole = subdivide(scene, 0.08f, kMany);
+    ASSERT_EQ(whole.sheets.sheets.size(), 12u);
+    Patches single = whole;
+    single.sheets = withoutSheets(single);
+    FragmentLists bySheet(whole, 0.02f, 1e-4f), byParent(single, 0.02f, 1e-4f);
+    uint64_t all = 0, different = 0;
+    for (const Bundle& bundle : Directions("RANDOM", 7).next(100)) {
+        BundleLines a, b;
+        bySheet.project(bundle, a);
+        byParent.project(bundle, b);
+        ASSERT_EQ(a.lines, b.lines);
+        ASSERT_EQ(a.sky.size(), b.sky.size());
+        for (uint32_t side : a.sky) ASSERT_EQ(side % 2, 1u) << "a line left the closed room";
+        std::map<std::pair<uint32_t, uint32_t>, int> balance;
+        for (const Exchange& e : a.exchanges) {
+            balance[{e.i, e.j}] += int(e.lines);
+            all += e.lines;
+        }
+        for (const Exchange& e : b.exchanges) balance[{e.i, e.j}] -= int(e.lines);
+        for (const auto& [pair, lines] : balance) different += uint64_t(std::abs(lines));
+    }
+    // Where a line meets the border of two patches within rounding (1e-6 of a patch), it may count
+    // for the other one.
+    EXPECT_LT(double(different), 1e-4 * double(all));
+}
+
+}  // namespace
+}  // namespace raybundle
