@@ -21,6 +21,7 @@
 #include "bundles/contacts.h"
 #include "bundles/projector.h"
 #include "bundles/rasteriser.h"
+#include "bundles/run_lengths.h"
 #include "patches/patches.h"
 
 namespace raybundle {
@@ -37,10 +38,6 @@ class FragmentLists : public Projector {
 
   private:
     struct Fragment {
-        // For emplace_back: the copy of a temporary waits for its parts to be stored.
-        Fragment(uint32_t pixel, uint32_t depth, uint32_t side)
-            : pixel(pixel), depth(depth), side(side) {}
-
         uint32_t pixel;
         uint32_t depth;  // quantised over the depth range of the scene
         uint32_t side;   // the side that faces against the direction
@@ -48,22 +45,27 @@ class FragmentLists : public Projector {
 
     // The view that the rasteriser has turned to.
     void projectView(BundleLines& out);
-    void sortIntoLists();
+    // Puts the fragments into the lists of their pixels.
+    void scatter();
     // How much deeper b lies than a, metres; and whether that is so little that they may touch.
     double along(uint64_t a, uint64_t b) const;
     bool areNear(uint64_t a, uint64_t b) const;
     void orderCoinciding(uint64_t* first, uint64_t* last) const;
     void pairLists(BundleLines& out);
+    // A list in order, of which some neighbours may touch.
+    void pairNear(const uint64_t* first, const uint64_t* last, BundleLines& out);
 
     Contacts contacts;
     const bool hasLeaks;  // lines may pass through the surface of a solid: ROULETTE
     Rasteriser rasteriser;
 
-    double depthSteps = 1;  // depth in metres -> quantised depth
-    int64_t nearSteps = 0;  // Contacts::zone in quantised depth
-    std::vector<Fragment> fragments;
+    double depthSteps = 1;            // depth in metres -> quantised depth
+    uint32_t nearSteps = 0;           // Contacts::zone in quantised depth
+    std::vector<Fragment> fragments;  // fragmentCount of them
+    size_t fragmentCount = 0;
     std::vector<uint32_t> begin;  // per pixel, into keys; one more at the end
-    std::vector<uint64_t> keys;   // depth << 32 | side, per pixel in order of depth
+    std::vector<uint64_t> keys;   // depth << 32 | side, per pixel
+    RunLengths runs;
 };
 
 }  // namespace raybundle

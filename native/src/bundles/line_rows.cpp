@@ -41,6 +41,11 @@ template <class Visit>
 void forEachEntry(const BundleLines& bundle, const Visit& visit) {
     bundle.forEachExchange([&](const Exchange& e, uint32_t weight) {
         const uint64_t lines = uint64_t(e.lines) * weight;
+        if (lines <= kMostM) {  // nearly all
+            visit(e.i, e.j << 8 | uint32_t(lines));
+            visit(e.j, e.i << 8 | uint32_t(lines));
+            return;
+        }
         encode(e.j, lines, [&](uint32_t entry) { visit(e.i, entry); });
         encode(e.i, lines, [&](uint32_t entry) { visit(e.j, entry); });
     });

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "bundles/newell_order.h"
-#include "bundles/run_lengths.h"
 
 namespace raybundle {
 namespace {
@@ -81,7 +80,6 @@ void Painter::group(const std::vector<uint32_t>& sorted) {
 
 void Painter::paint(BundleLines& out) {
     pixels.assign(rasteriser.pixelCount(), {0, kEmpty});
-    RunLengths runs(out.exchanges);
     for (const Fragment& f : strokes) {
         Pixel& pixel = pixels[f.pixel];
         if (pixel.side == kEmpty) {
@@ -108,7 +106,7 @@ void Painter::paint(BundleLines& out) {
     }
     for (const Pixel& pixel : pixels)
         if (pixel.side != kEmpty) out.sky.push_back(pixel.side ^ 1);
-    runs.flush();
+    runs.moveTo(out.exchanges);
 }
 
 }  // namespace raybundle

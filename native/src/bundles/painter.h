@@ -22,6 +22,7 @@
 #include "bundles/contacts.h"
 #include "bundles/projector.h"
 #include "bundles/rasteriser.h"
+#include "bundles/run_lengths.h"
 
 namespace raybundle {
 
@@ -66,6 +67,7 @@ class Painter : public Projector {
     std::vector<uint32_t> place;  // per patch: number of fragments, then where the next one goes
     std::vector<uint32_t> drawn;  // patches
     std::vector<Pixel> pixels;
+    RunLengths runs;
 };
 
 }  // namespace raybundle

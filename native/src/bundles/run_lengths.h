@@ -1,43 +1,49 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "bundles/projector.h"
 
 namespace raybundle {
 
-// Collects the exchanges of neighbouring pixels: pixel after pixel the same pair usually occurs
-// again.
+// Collects the exchanges of neighbouring pixels: pixel after pixel the same pair often occurs again.
+// Keeps its memory.
 class RunLengths {
   public:
-    explicit RunLengths(std::vector<Exchange>& out) : out(out) {}
-
     // slot: small; a pair that occurs again should come with the slot of the last time.
     void add(size_t slot, uint32_t i, uint32_t j) {
-        if (i > j) std::swap(i, j);
-        if (slot >= runs.size()) runs.resize(slot + 1, Exchange{0, 0, 0});
-        Exchange& run = runs[slot];
-        if (run.i == i && run.j == j) {
+        const uint32_t low = std::min(i, j), high = std::max(i, j);
+        if (slot >= last.size()) last.resize(slot + 1, 0);
+        Exchange& run = runs[last[slot]];
+        if (run.i == low && run.j == high) {
             ++run.lines;
             return;
         }
-        if (run.lines) out.push_back(run);
-        run = {i, j, 1};
+        if (count == runs.size()) runs.resize(2 * count);
+        last[slot] = count;
+        // Part by part: the copy of a temporary waits for its parts to be stored.
+        Exchange& next = runs[count++];
+        next.i = low;
+        next.j = high;
+        next.lines = 1;
     }
 
-    void flush() {
-        for (const Exchange& run : runs)
-            if (run.lines) out.push_back(run);
-        runs.clear();
+    // Appends all runs to a list and starts anew.
+    void moveTo(std::vector<Exchange>& out) {
+        out.insert(out.end(), runs.begin() + 1, runs.begin() + ptrdiff_t(count));
+        std::fill(last.begin(), last.end(), 0);
+        count = 1;
     }
 
   private:
-    std::vector<Exchange>& out;
-    std::vector<Exchange> runs;  // the open run of each slot
+    // The first is of no pair.
+    std::vector<Exchange> runs{{0, 0, 0}, {0, 0, 0}};
+    size_t count = 1;
+    std::vector<size_t> last;  // per slot: the run in hand
 };
 
 }  // namespace raybundle
