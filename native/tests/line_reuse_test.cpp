@@ -48,7 +48,7 @@ struct System {
             if (lines[i] > 0) body(i, lines[i]);
     }
     std::vector<double> weightedLines() const {
-        const std::vector<float> x = solver().lineWeights(Half::BOTH);
+        const std::vector<float> x = solver().lineWeights(Half::BOTH).x;
         std::vector<double> lines(x.size());
         for (uint32_t i = 0; i < x.size(); ++i) {
             lines[i] = counts.sky[i][0] + counts.sky[i][1];

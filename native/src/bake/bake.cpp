@@ -175,7 +175,7 @@ void Bake::runStages(const Scene& scene) {
             for (const SetLight& light : lights)
                 inputs.push_back({patches, trace->visibility, light.shot, light.worldRadiance,
                                   trace->surrounding.exposed, trace->touchDistance, settings,
-                                  *trace->tracer, trace->counts});
+                                  *trace->tracer, trace->counts, &trace->solutionsOf(light.set)});
             const Transports transports = makeTransports(settings.solver, inputs);
             noise = solveToTarget(scene, tiles, lights, transports, report);
             exposed = trace->exposedShare();
@@ -286,18 +286,26 @@ SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& 
         const Progress share = progress.part(lights.size(), size_t(count) + 1);
         DirectLight direct(scene, patches, visibility, uint32_t(settings.seed), set, settings);
         Trace::Shot& last = trace->shots[set];
-        const uint64_t hash = lightHash(scene, direct, set, settings);
+        const uint64_t hash = lightHash(direct, settings);
         FirstShot shot;
-        if (settings.skipLights && settings.firstShot == "GATHER" && last.hash == hash) {
+        const bool mayKeep = settings.skipLights && settings.firstShot == "GATHER";
+        if (mayKeep && last.hash == hash) {
             report.skipped.push_back({"first shot", "lights unchanged since the last bake", 1});
             shot = last.shot;
         } else {
-            shot = firstShot(settings.firstShot,
-                             {direct, patches, visibility, settings, share, trace->touchDistance,
-                              trace->linesPerBundle(), &trace->visibility,
-                              coarse.empty() ? nullptr : &coarse[lights.size()]});
+            shot = firstShot(
+                settings.firstShot,
+                {direct, patches, visibility, settings, share, trace->touchDistance,
+                 trace->linesPerBundle(), &trace->visibility,
+                 coarse.empty() ? nullptr : &coarse[lights.size()],
+                 mayKeep && last.aims == shotHash(settings) ? last.shot.bySource : nullptr});
             report.shadowRays += shot.rays;
-            if (settings.firstShot == "GATHER") last = {hash, shot};
+            if (shot.bySource && shot.bySource == last.shot.bySource)
+                report.skipped.push_back({"first shot",
+                                          "only strengths of lights changed since the last bake: "
+                                          "what each brought is scaled",
+                                          1});
+            if (settings.firstShot == "GATHER") last = {hash, shotHash(settings), shot};
         }
         report.skipped.push_back(
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});

@@ -5,23 +5,20 @@
 
 namespace raybundle {
 
-uint64_t lightHash(const Scene& scene, const DirectLight& light, int32_t lightSet,
-                   const Settings& settings) {
+uint64_t shotHash(const Settings& settings) {
     Hasher hasher;
-    for (const Light& l : scene.lights)
-        if (l.lightSet == lightSet)
-            hasher.add(l.kind, l.strength, l.position, l.radius, l.pointShape, l.direction, l.angle,
-                       l.axisU, l.axisV, l.areaShape, l.spread, l.castsShadows, l.hasCone,
-                       l.worldToCone, l.coneAngle, l.coneBlend, l.coneDims);
+    hasher.add(settings.targetError, settings.seed, settings.skipFacing, settings.skipLit,
+               settings.skipWeak, settings.skipInside);
+    return hasher.value();
+}
+
+uint64_t lightHash(const DirectLight& light, const Settings& settings) {
+    Hasher hasher;
+    for (const auto& source : light.lightSources()) hasher.add(source->shape, source->magnitude);
     // What is a source and what is not depends on reflectances too.
     hasher.add(light.emission());
     hasher.add(light.bundledEmission());
-    if (scene.worldLightSet == lightSet) {
-        hasher.add(scene.worldRadiance, scene.worldImage.width, scene.worldImage.height);
-        hasher.add(scene.worldImage.pixels);
-    }
-    hasher.add(settings.targetError, settings.seed, settings.skipFacing, settings.skipLit,
-               settings.skipWeak, settings.skipInside);
+    hasher.add(shotHash(settings));
     return hasher.value();
 }
 

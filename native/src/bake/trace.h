@@ -15,6 +15,7 @@
 #include "bundles/line_windows.h"
 #include "patches/patches.h"
 #include "transport/first_shot.h"
+#include "transport/transport.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
@@ -45,6 +46,10 @@ struct Trace {
         return surrounding.exposed.empty() ? counts.exposedShare() : surrounding.exposed;
     }
 
+    LineSolutions& solutionsOf(int32_t lightSet) {
+        return solutions.try_emplace(lightSet, patches.sideCount()).first->second;
+    }
+
     // Through the bounding sphere.
     double linesPerBundle() const;
 
@@ -62,9 +67,11 @@ struct Trace {
 
     struct Shot {
         std::optional<uint64_t> hash;  // lightHash; none: there is no shot
+        uint64_t aims = 0;             // shotHash
         FirstShot shot;
     };
-    std::map<int32_t, Shot> shots;  // the last GATHER of each light set
+    std::map<int32_t, Shot> shots;               // the last GATHER of each light set
+    std::map<int32_t, LineSolutions> solutions;  // of each light set
 };
 
 }  // namespace raybundle

@@ -14,6 +14,8 @@ namespace {
 
 // Emission up to this many times the mean exitance of the scene is left to the bundles.
 constexpr double kBundledEmission = 1.5;
+// Of light that was scaled: an error that has grown by less than this is as it was.
+constexpr float kSameError = 1.1f;
 // Shadow rays per receiver and source for sources of little weight.
 constexpr int kFewSamples = 4;
 constexpr size_t kFewSources = 4;
@@ -154,14 +156,16 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
 void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
                               const std::function<Receiver(size_t)>& receiverAt,
                               const std::vector<Aim>& aims, Seen& seen,
-                              const std::function<void(double)>& progress) const {
+                              const std::function<void(double)>& progress,
+                              LightBySource* bySource) const {
     constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
     for (size_t from = 0; from < these.size(); from += kSlice) {
         progress(0.5 * double(from) / double(these.size()));
         tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
             Gathered& result = results[these[k]];
             const uint64_t before = result.rays;
-            result = gather(receiverAt(these[k]), aims[k], seen);
+            result = gather(receiverAt(these[k]), aims[k], seen,
+                            bySource ? bySource->of(these[k]) : nullptr);
             result.rays += before;
         });
     }
@@ -169,8 +173,8 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<
 
 void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                                 const std::function<Receiver(size_t)>& receiverAt,
-                                const std::function<void(double)>& progress,
-                                bool hasNeighbours) const {
+                                const std::function<void(double)>& progress, bool hasNeighbours,
+                                LightBySource* bySource) const {
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
     for (size_t side = 0; side < bundled.size(); ++side)
@@ -180,21 +184,19 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     Seen seen(sources.size());
     const Aim aim{INFINITY, hasNeighbours ? kNeighbourSamples : kFirstSamples, false};
     gatherThese(coarse.gathered, these, receiverAt, std::vector<Aim>(these.size(), aim), seen,
-                progress);
+                progress, bySource);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }
 
-std::vector<Gathered> DirectLight::gather(size_t count,
-                                          const std::function<Receiver(size_t)>& receiverAt,
-                                          float targetError,
-                                          const std::function<void(double)>& progress,
-                                          CoarseShot first,
-                                          const std::vector<ReceiverPair>& neighbours) const {
+std::vector<Gathered> DirectLight::gather(
+    size_t count, const std::function<Receiver(size_t)>& receiverAt, float targetError,
+    const std::function<void(double)>& progress, CoarseShot first,
+    const std::vector<ReceiverPair>& neighbours, LightBySource* bySource) const {
     if (first.gathered.empty()) {
         first.gathered.resize(count);
         std::vector<uint32_t> these(count);
         std::iota(these.begin(), these.end(), 0u);
-        shootCoarsely(first, these, receiverAt, progress, !neighbours.empty());
+        shootCoarsely(first, these, receiverAt, progress, !neighbours.empty(), bySource);
     }
     std::vector<Gathered> results = std::move(first.gathered);
     if (sources.empty()) return results;
@@ -202,13 +204,44 @@ std::vector<Gathered> DirectLight::gather(size_t count,
     for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
 
     const Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
-    gatherThese(results, further.receivers, receiverAt, further.aims, seen,
-                [&](double done) { progress(0.5 + done); });
+    gatherThese(
+        results, further.receivers, receiverAt, further.aims, seen,
+        [&](double done) { progress(0.5 + done); }, bySource);
+    return results;
+}
+
+std::optional<std::vector<Gathered>> DirectLight::scale(
+    const LightBySource& before, const std::function<Receiver(size_t)>& receiverAt,
+    float targetError, const std::function<void(double)>& progress) const {
+    const auto factors = before.factors(sources);
+    if (!factors) return std::nullopt;
+    auto isOnTop = [&](size_t source, size_t receiver) {
+        return isUnpowered(source, receiverAt(receiver).side);
+    };
+    std::vector<Gathered> results = before.scaled(*factors, isOnTop);
+    // Those that took as many samples as they may did so before.
+    const std::vector<Gathered> then =
+        before.scaled(std::vector<glm::vec3>(sources.size(), glm::vec3(1.0f)), isOnTop);
+    Aims further = aimsAfter(results, patches, receiverAt, {}, targetError);
+    size_t count = 0;
+    for (size_t k = 0; k < further.receivers.size(); ++k) {
+        const Gathered &now = results[further.receivers[k]], &was = then[further.receivers[k]];
+        const float light = brightest(now.irradiance), lightThen = brightest(was.irradiance);
+        if (now.variance * lightThen * lightThen <= kSameError * was.variance * light * light)
+            continue;
+        further.receivers[count] = further.receivers[k];
+        further.aims[count++] = further.aims[k];
+    }
+    further.receivers.resize(count);
+    Seen seen(sources.size());
+    for (std::atomic<bool>& source : seen) source = true;
+    gatherThese(results, further.receivers, receiverAt, further.aims, seen, progress, nullptr);
     return results;
 }
 
 // Each source takes samples until its standard error is below `tolerance`.
-Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen) const {
+Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen,
+                             LightPart* parts) const {
     Gathered sum;
     const Place place(patches, receiver);
     const std::vector<float> weights = unblockedWeights(place);
@@ -224,7 +257,9 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
         else if (share < kMiddleShare)
             own.samples = std::max(kFewSamples, aim.samples / 2);
         if (own.samples < aim.samples) ++sum.weak;
-        gatherFrom(k, receiver, place, own, seen, sum);
+        const LightPart part = gatherFrom(k, receiver, place, own, seen, sum);
+        sum.add(part, isUnpowered(k, receiver.side));
+        if (parts) parts[k] = part;
     }
     return sum;
 }
@@ -329,13 +364,13 @@ void DirectLight::takeSamples(const LightSource& source, const SobolPoints& poin
     if (count > 0) trace();
 }
 
-void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place& place,
-                             const Aim& aim, Seen& seen, Gathered& sum) const {
+LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place& place,
+                                  const Aim& aim, Seen& seen, Gathered& sum) const {
     const float tolerance = aim.tolerance;
     const LightSource& source = *sources[index];
     if (isOutOfSight(source, place)) {
         ++sum.hidden;
-        return;
+        return {};
     }
     // Inside a solid it is dark, unless a source is in there too: look before taking all
     // samples.
@@ -372,8 +407,7 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place
                 next = 4 * all.count;
                 continue;
             }
-            sum.variance += missed * missed;
-            return;
+            return {glm::vec3(0.0f), missed * missed, 0};
         }
         // By the first pass alone, so that the order of the receivers does not matter.
         if (std::isinf(tolerance)) seen[index] = true;
@@ -389,15 +423,15 @@ void DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place
         next = all.count < aim.samples ? aim.samples : 4 * all.count;
     }
     if (closed && all.visible == all.open) ++sum.unblocked;
-    sum.irradiance += all.estimate(closed);
-    // The light that a surface gets without stopping it comes on top of the source's power.
-    if (brightest(source.power()) <= 0 || !source.castsShadows ||
-        !patches.parentAt(receiver.side).stopsDirect)
-        sum.unpowered += all.estimate(closed);
-    sum.variance += variance + closedError * closedError;
     const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
-    sum.contrast += brightest(closed ? *closed : all.open / float(all.count)) *
-                    std::sqrt(visible * (1 - visible));
+    return {all.estimate(closed), variance + closedError * closedError,
+            brightest(closed ? *closed : all.open / float(all.count)) *
+                std::sqrt(visible * (1 - visible))};
+}
+
+bool DirectLight::isUnpowered(size_t source, uint32_t side) const {
+    return brightest(sources[source]->power()) <= 0 || !sources[source]->castsShadows ||
+           !patches.parentAt(side).stopsDirect;
 }
 
 glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
@@ -427,13 +461,12 @@ bool DirectLight::isOutOfSight(const LightSource& source, const Place& place) co
     return skips.skipFacing && source.isOutOfSight(place.middle, place.normal, place.radius);
 }
 
-glm::dvec3 DirectLight::escapedPower() const {
-    glm::dvec3 escaped(0.0);
-    if (sources.empty()) return escaped;
+std::vector<glm::dvec3> DirectLight::escapedShares() const {
+    std::vector<glm::dvec3> shares(sources.size(), glm::dvec3(0.0));
+    if (sources.empty()) return shares;
     const uint32_t rays = std::max(kLeastEscapeRays, kEscapeRays / uint32_t(sources.size()));
     for (size_t k = 0; k < sources.size(); ++k) {
-        const glm::vec3 power = sources[k]->power();
-        if (brightest(power) <= 0 || !sources[k]->castsShadows) continue;
+        if (brightest(sources[k]->power()) <= 0 || !sources[k]->castsShadows) continue;
         tbb::enumerable_thread_specific<glm::dvec3> missed(glm::dvec3(0.0));
         tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
@@ -446,11 +479,9 @@ glm::dvec3 DirectLight::escapedPower() const {
                 missed.local() += double(share) * glm::dvec3(ray.weight);
             }
         });
-        glm::dvec3 sum(0.0);
-        for (const glm::dvec3& part : missed) sum += part;
-        escaped += glm::dvec3(power) * (sum / double(rays));
+        for (const glm::dvec3& part : missed) shares[k] += part / double(rays);
     }
-    return escaped;
+    return shares;
 }
 
 }  // namespace raybundle

@@ -26,6 +26,7 @@
 #include "bake/skips.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
+#include "transport/light_by_source.h"
 #include "transport/light_source.h"
 #include "transport/receiver.h"
 #include "transport/sobol.h"
@@ -57,17 +58,26 @@ class DirectLight {
     // coarsely first, then those again whose error is too large beside the mean light.
     // `progress` gets the share that is done. coarse: what is known of all receivers, or empty.
     // neighbours: if there are any, half as many samples do at first, and receivers whose
-    // neighbours disagree with them about a shadow take more.
+    // neighbours disagree with them about a shadow take more. bySource: gets what came from each
+    // source; null, or of `count` receivers, all of which are gathered here.
     std::vector<Gathered> gather(size_t count, const std::function<Receiver(size_t)>& receiverAt,
                                  float targetError, const std::function<void(double)>& progress,
                                  CoarseShot coarse = {},
-                                 const std::vector<ReceiverPair>& neighbours = {}) const;
+                                 const std::vector<ReceiverPair>& neighbours = {},
+                                 LightBySource* bySource = nullptr) const;
+
+    // The same by what each source gave with other strengths, if that will do: only the receivers
+    // whose error is too large beside the light as it is now gather again.
+    std::optional<std::vector<Gathered>> scale(const LightBySource& before,
+                                               const std::function<Receiver(size_t)>& receiverAt,
+                                               float targetError,
+                                               const std::function<void(double)>& progress) const;
 
     // The first, coarse pass of that, to begin with: gathers at `these` receivers.
     void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                        const std::function<Receiver(size_t)>& receiverAt,
-                       const std::function<void(double)>& progress,
-                       bool hasNeighbours = false) const;
+                       const std::function<void(double)>& progress, bool hasNeighbours = false,
+                       LightBySource* bySource = nullptr) const;
 
     // An unbiased estimate at a point by one sample of each source, W/m^2; index: of the sample.
     glm::vec3 sample(const Receiver& receiver, uint32_t index) const;
@@ -75,8 +85,8 @@ class DirectLight {
     // Whether lines that end at the first surface leave out some of the light of a side's sources.
     bool hasPassingLight(uint32_t side) const;
 
-    // Power of the sources that meets no surface, W; of those that have one.
-    glm::dvec3 escapedPower() const;
+    // Of each source: the power that meets no surface over its power. 0 where it has none.
+    std::vector<glm::dvec3> escapedShares() const;
 
   private:
     struct Block;
@@ -88,10 +98,14 @@ class DirectLight {
     void gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
                      const std::function<Receiver(size_t)>& receiverAt,
                      const std::vector<Aim>& aims, Seen& seen,
-                     const std::function<void(double)>& progress) const;
-    Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen) const;
-    void gatherFrom(size_t source, const Receiver& receiver, const Place& place, const Aim& aim,
-                    Seen& seen, Gathered& sum) const;
+                     const std::function<void(double)>& progress, LightBySource* bySource) const;
+    // parts: per source, to be filled; or null.
+    Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts) const;
+    // Counts what it does in `sum`.
+    LightPart gatherFrom(size_t source, const Receiver& receiver, const Place& place,
+                         const Aim& aim, Seen& seen, Gathered& sum) const;
+    // Whether the light that a side gets from a source comes on top of the source's power.
+    bool isUnpowered(size_t source, uint32_t side) const;
     void takeSamples(const LightSource& source, const SobolPoints& points, uint32_t side,
                      const Place& place, int first, int each, std::array<Block, kBlocks>& blocks,
                      Gathered& sum) const;

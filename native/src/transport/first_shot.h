@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct FirstShot {
     std::vector<glm::vec3> indirect, unshot;
     std::vector<float> error;         // per side, standard error of all irradiance, W/m^2
     std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2
+    std::shared_ptr<const LightBySource> bySource;  // of GATHER: what came from each source
     glm::dvec3 emitted{0.0};  // power of the gathered sources, W; without a power: what arrives
     glm::dvec3 escaped{0.0};  // part of it that meets no surface, W
     uint64_t rays = 0;
@@ -47,6 +49,9 @@ struct FirstShotInput {
     // The coarse shot of the sides of the tiles, perhaps before some were cut: what
     // GATHER begins with. Null: it makes its own.
     const CoarseShot* fromTiles = nullptr;
+    // Of the last GATHER of the same patches to the same error, to be scaled if the strengths of
+    // sources are all that has changed; or null.
+    std::shared_ptr<const LightBySource> before = nullptr;
 };
 
 // The first shots, one a row of the table.

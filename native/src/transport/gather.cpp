@@ -7,6 +7,9 @@
 // Differs: the thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer
 // it is. Gathering spends its rays where the light is to be known (transport/direct_light.h).
 #include <cmath>
+#include <functional>
+#include <memory>
+#include <optional>
 
 #include "patches/neighbours.h"
 #include "transport/first_shot.h"
@@ -36,6 +39,27 @@ std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
     return pairs;
 }
 
+// By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
+CoarseShot coarseOfPatches(const FirstShotInput& input,
+                           const std::function<Receiver(size_t)>& receiverAt,
+                           const std::function<void(double)>& report) {
+    CoarseShot coarse;
+    if (!input.fromTiles) return coarse;
+    const Patches& patches = input.patches;
+    coarse.seen = input.fromTiles->seen;
+    coarse.gathered.resize(patches.sideCount());
+    std::vector<uint32_t> cut;
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        if (patches.level(side / 2) > 0)
+            cut.push_back(side);
+        else
+            coarse.gathered[side] =
+                input.fromTiles->gathered[2 * patches.tileOf(side / 2) + side % 2];
+    }
+    input.light.shootCoarsely(coarse, cut, receiverAt, report);
+    return coarse;
+}
+
 }  // namespace
 
 FirstShot gather(const FirstShotInput& input) {
@@ -56,36 +80,36 @@ FirstShot gather(const FirstShotInput& input) {
             receiver.errorFactor = std::ldexp(1.0f, level);
         return receiver;
     };
-    CoarseShot coarse;
-    if (input.fromTiles) {
-        coarse.seen = input.fromTiles->seen;
-        coarse.gathered.resize(n);
-        std::vector<uint32_t> cut;
-        for (uint32_t side = 0; side < n; ++side) {
-            if (patches.level(side / 2) > 0)
-                cut.push_back(side);
-            else
-                coarse.gathered[side] =
-                    input.fromTiles->gathered[2 * patches.tileOf(side / 2) + side % 2];
-        }
-        light.shootCoarsely(coarse, cut, receiverAt, report);
+    const float target = input.settings.targetError;
+    std::optional<std::vector<Gathered>> results;
+    if (input.before && (results = light.scale(*input.before, receiverAt, target, report))) {
+        shot.bySource = input.before;
+    } else {
+        auto bySource = std::make_shared<LightBySource>(light.lightSources(), n);
+        bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
+        results =
+            light.gather(n, receiverAt, target, report, coarseOfPatches(input, receiverAt, report),
+                         neighbouringSides(patches), bySource->isWhole ? bySource.get() : nullptr);
+        bySource->escapedShares = light.escapedShares();
+        shot.bySource = std::move(bySource);
     }
-    const std::vector<Gathered> results =
-        light.gather(n, receiverAt, input.settings.targetError, report, std::move(coarse),
-                     neighbouringSides(patches));
     for (size_t side = 0; side < n; ++side) {
-        shot.irradiance[side] = results[side].irradiance;
-        shot.emitted += double(patches.area[side / 2]) * glm::dvec3(results[side].unpowered);
-        shot.error[side] = std::sqrt(results[side].variance);
-        shot.rays += results[side].rays;
-        shot.unblockedSides += results[side].unblocked;
-        shot.hiddenSides += results[side].hidden;
-        shot.weakSides += results[side].weak;
-        shot.insideSides += results[side].inside;
+        const Gathered& result = (*results)[side];
+        shot.irradiance[side] = result.irradiance;
+        shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
+        shot.error[side] = std::sqrt(result.variance);
+        shot.rays += result.rays;
+        shot.unblockedSides += result.unblocked;
+        shot.hiddenSides += result.hidden;
+        shot.weakSides += result.weak;
+        shot.insideSides += result.inside;
     }
-    for (const auto& source : light.lightSources())
-        if (source->castsShadows) shot.emitted += glm::dvec3(source->power());
-    shot.escaped = light.escapedPower();
+    const auto& sources = light.lightSources();
+    for (size_t k = 0; k < sources.size(); ++k) {
+        const glm::dvec3 power(sources[k]->power());
+        if (sources[k]->castsShadows) shot.emitted += power;
+        shot.escaped += power * shot.bySource->escapedShares[k];
+    }
     input.progress.report(RB_STAGE_FIRST_SHOT, 1);
     return shot;
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 
+#include "bake/hasher.h"
 #include "transport/area_spread.h"
 #include "transport/mesh_source.h"
 #include "transport/sphere_sampling.h"
@@ -299,6 +300,31 @@ class AreaSource : public LightSource {
     float area;
 };
 
+// LightSource::shape of a lamp.
+uint64_t shapeOf(const Light& l) {
+    Hasher hasher;
+    hasher.add(l.kind, l.position, l.radius, l.pointShape, l.direction, l.angle, l.axisU, l.axisV,
+               l.areaShape, l.spread, l.castsShadows, l.hasCone, l.worldToCone, l.coneAngle,
+               l.coneBlend, l.coneDims);
+    return hasher.value();
+}
+
+// The same of emissive faces.
+uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents,
+                 const std::vector<glm::vec3>& emission, const glm::vec3& strength) {
+    Hasher hasher;
+    hasher.add(parents);
+    for (uint32_t p : parents) {
+        const Parent& parent = patches.parents[p];
+        for (uint32_t k = 0; k < 2 * parent.patchCount(); ++k)
+            for (int c = 0; c < 3; ++c) {
+                const float e = emission[2 * parent.firstPatch + k][c];
+                hasher.add(e > 0 ? e / strength[c] : 0.0f);
+            }
+    }
+    return hasher.value();
+}
+
 }  // namespace
 
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
@@ -321,12 +347,20 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
                     sources.push_back(std::make_unique<AreaSource>(light, patches.centre));
                 break;
         }
-        if (sources.size() > before) sources.back()->castsShadows = light.castsShadows;
+        if (sources.size() == before) continue;
+        sources.back()->castsShadows = light.castsShadows;
+        sources.back()->magnitude = light.strength;
+        sources.back()->shape = shapeOf(light);
     }
 
     if (scene.worldLightSet == lightSet && !scene.worldImage.pixels.empty() &&
-        scene.worldImage.meanRadiance() != glm::vec3(0.0f))
+        scene.worldImage.meanRadiance() != glm::vec3(0.0f)) {
+        Hasher hasher;
+        hasher.add(scene.worldImage.width, scene.worldImage.height);
+        hasher.add(scene.worldImage.pixels);
         sources.push_back(std::make_unique<WorldSource>(scene.worldImage));
+        sources.back()->shape = hasher.value();
+    }
 
     std::map<std::pair<uint32_t, int32_t>, std::vector<uint32_t>>
         groups;  // by instance and material
@@ -351,8 +385,12 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
                 varies = varies || emission[side] != emission[first + k % 2];
             }
         }
+        const glm::vec3 strength = glm::max(most[0], most[1]);
+        const uint64_t shape = shapeOf(patches, parents, emission, strength);
         sources.push_back(std::make_unique<MeshSource>(patches, std::move(parents), most,
                                                        varies ? &emission : nullptr));
+        sources.back()->magnitude = strength;
+        sources.back()->shape = shape;
     }
     return sources;
 }

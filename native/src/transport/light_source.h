@@ -92,6 +92,10 @@ class LightSource {
     bool castsShadows = true;
     // Whether many samples may miss it although it is seen.
     bool isNarrow = false;
+    // What its light is proportional to, by channel, and all else that its light depends on (a hash;
+    // not comparable between two geometries).
+    glm::vec3 magnitude{1.0f};
+    uint64_t shape = 0;
 
     // A ray of the source's light into such a scene; u uniform in [0, 1)^4. Not called when
     // shootingPower() is zero.

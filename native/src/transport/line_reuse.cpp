@@ -108,18 +108,22 @@ LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const Fir
       hasEmission(std::any_of(shot.emission.begin(), shot.emission.end(),
                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
 
-std::vector<float> LineReuse::lineWeights(Half half) const {
+LineWeights LineReuse::lineWeights(Half half) const {
     const size_t n = counts.sideCount();
-    std::vector<float> x(n, 1.0f);
-    if (half != Half::BOTH) return x;
+    LineWeights weights{std::vector<float>(n, 1.0f), std::vector<float>(n)};
+    auto& [x, m] = weights;
+    if (half != Half::BOTH) {
+        for (size_t i = 0; i < n; ++i) m[i] = float(linesOf(counts.total[i], half));
+        return weights;
+    }
     const std::vector<float> exposed = exposedShare();
     double lines = 0, area = 0;
     for (size_t i = 0; i < n; ++i) {
         lines += linesOf(counts.total[i], half);
         area += double(patches.area[i / 2] * exposed[i]);
     }
-    std::vector<float> next(n);
     for (const float power : kBalancePowers) {
+        std::vector<float>& next = m;
         forEachSide(n, [&](size_t i) {
             const float row = weightedLines(counts, half, i, x);
             const float wanted = float(patches.area[i / 2] * exposed[i] * lines / area);
@@ -129,23 +133,17 @@ std::vector<float> LineReuse::lineWeights(Half half) const {
         });
         x.swap(next);
     }
-    return x;
+    forEachSide(n, [&](size_t i) { m[i] = x[i] * weightedLines(counts, half, i, x); });
+    return weights;
 }
 
-Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const {
+Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
+                            const LineWeights& weights) const {
     const size_t n = counts.sideCount();
     Irradiance result(n);
     const HandOver first = handOver(patches, shot, exposedShare());
-    const std::vector<float> x = lineWeights(half);
-    std::vector<float> m(n);  // weighted lines of each side
-    PaddedField scaled(n);    // what the matrix multiplies next
-    forEachSide(n, [&](size_t i) { scaled[i] = Padded::Constant(x[i]); });
-    forEachSide(n, [&](size_t i) {
-        m[i] =
-            half == Half::BOTH
-                ? x[i] * (rowTimes(counts, half, i, scaled).x + float(linesOf(counts.sky[i], half)))
-                : float(linesOf(counts.total[i], half));
-    });
+    const std::vector<float>&x = weights.x, &m = weights.m;
+    PaddedField scaled(n);  // what the matrix multiplies next
 
     // Direct light.
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
@@ -171,8 +169,14 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
         scaled[i] = padded(lineScale[i] * z[i]);
     });
     const glm::dvec3 enough = dot(product, product) * double(tolerance) * double(tolerance);
+    // Of all multiples of the guess the best, in the measure of conjugate gradients: after a change
+    // of one lamp's colour that is the solution.
+    forEachSide(n,
+                [&](size_t i) { p[i] = z[i] - lineScale[i] * rowTimes(counts, half, i, scaled); });
+    const glm::vec3 share(ratio(dot(z, product), dot(z, p)));
     forEachSide(n, [&](size_t i) {
-        r[i] = product[i] - (z[i] - lineScale[i] * rowTimes(counts, half, i, scaled));
+        z[i] *= share;
+        r[i] = product[i] - share * p[i];
         p[i] = r[i];
     });
 

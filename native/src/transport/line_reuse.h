@@ -42,16 +42,21 @@ class LineReuse {
               const glm::vec3& worldRadiance, const std::vector<float>& exposed);
 
     // Solves until the residual is below `tolerance` of the right-hand side in every channel.
-    // `reflected` (R, per side, W/m^2) holds the first guess and takes the solution.
-    Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const;
+    // `reflected` (R, per side, W/m^2) holds the first guess, which any multiple of is as good as
+    // itself, and takes the solution. weights: of the same half.
+    Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected,
+                     const LineWeights& weights) const;
+    Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const {
+        return solve(half, tolerance, reflected, lineWeights(half));
+    }
 
     // The share of each side that nothing covers.
     std::vector<float> exposedShare() const {
         return exposed.empty() ? counts.exposedShare() : exposed;
     }
 
-    // The factors x_i of the lines of each side in a solve: 1 for a half, balanced for both.
-    std::vector<float> lineWeights(Half half) const;
+    // For a solve: 1 for a half, balanced for both.
+    LineWeights lineWeights(Half half) const;
 
     // Adds local rays (cosine distribution, weighted like the lines the side has) to the irradiance
     // of wanted sides that have fewer than `minLines` lines, and to that of other such sides that

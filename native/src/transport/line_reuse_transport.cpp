@@ -33,9 +33,9 @@ class LineReuseTransport : public Transport {
     explicit LineReuseTransport(const TransportInput& input)
         : input(input),
           solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed),
-          limit(size_t(input.settings.memoryLimit * 1e6)) {
-        for (auto& field : reflected) field.resize(input.patches.sideCount());
-    }
+          limit(size_t(input.settings.memoryLimit * 1e6)),
+          own(input.patches.sideCount()),
+          last(input.solutions ? *input.solutions : own) {}
 
     // Shares the lines from here on with a transport of another light, which must not advance by
     // itself and must live as long.
@@ -78,14 +78,18 @@ class LineReuseTransport : public Transport {
 
     Irradiance irradiance(Half half, float tolerance) override {
         if (streaming[0]) return streamed(half);
-        std::vector<glm::vec3>& guess = reflected[size_t(half)];
+        const uint32_t bundles = input.counts.bundles;
+        std::vector<glm::vec3>& guess = last.reflected[size_t(half)];
         if (!input.settings.skipWarmStart)
             std::fill(guess.begin(), guess.end(), glm::vec3(0.0f));
-        else if (half == Half::BOTH)
+        else if (half == Half::BOTH && last.bundles != bundles)
             for (size_t i = 0; i < guess.size(); ++i)
-                guess[i] = 0.5f * (reflected[0][i] + reflected[1][i]);
+                guess[i] = 0.5f * (last.reflected[0][i] + last.reflected[1][i]);
         ++solves;
-        return solver.solve(half, tolerance, guess);
+        if (half != Half::BOTH) return solver.solve(half, tolerance, guess);
+        if (last.bundles != bundles) last.weights = solver.lineWeights(half);
+        last.bundles = bundles;
+        return solver.solve(half, tolerance, guess, last.weights);
     }
 
     Irradiance finish(float tolerance, const std::vector<bool>& wanted, Report& report) override {
@@ -94,9 +98,9 @@ class LineReuseTransport : public Transport {
         if (input.settings.skipWarmStart && solves > 2)
             report.skipped.push_back(
                 {"iterations of a solve", "it starts from the last solution", solves - 2});
-        const size_t starved = solver.gatherStarvedSides(input.visibility, kStarvedLines,
-                                                         uint32_t(input.settings.seed), wanted,
-                                                         reflected[size_t(Half::BOTH)], result);
+        const size_t starved = solver.gatherStarvedSides(
+            input.visibility, kStarvedLines, uint32_t(input.settings.seed), wanted,
+            last.reflected[size_t(Half::BOTH)], result);
         if (starved)
             report.skipped.push_back({"bundles on small patches",
                                       "too few lines met them: they gathered with local rays",
@@ -123,7 +127,8 @@ class LineReuseTransport : public Transport {
     void startStreaming() {
         first = handOver(input.patches, input.shot, solver.exposedShare());
         for (uint32_t half = 0; half < 2; ++half) {
-            const Irradiance start = solver.solve(Half(half), kStartTolerance, reflected[half]);
+            const Irradiance start =
+                solver.solve(Half(half), kStartTolerance, last.reflected[half]);
             const size_t n = input.patches.sideCount();
             std::vector<float> lines(n);
             std::vector<glm::vec3> direct(n), indirect(n);
@@ -150,7 +155,7 @@ class LineReuseTransport : public Transport {
         Irradiance result(input.patches.sideCount());
         result.gathered = result.direct = first.gathered;
         result.indirect = first.indirect;
-        std::vector<glm::vec3>& exitance = reflected[size_t(half)];
+        std::vector<glm::vec3>& exitance = last.reflected[size_t(half)];
         std::fill(exitance.begin(), exitance.end(), glm::vec3(0.0f));
         for (int h = 0; h < 2; ++h) {
             if (half != Half::BOTH && h != int(half)) continue;
@@ -166,8 +171,9 @@ class LineReuseTransport : public Transport {
 
     const TransportInput input;
     const LineReuse solver;
-    const size_t limit;                   // bytes
-    std::vector<glm::vec3> reflected[3];  // per half and for both: the last solution
+    const size_t limit;  // bytes
+    LineSolutions own;
+    LineSolutions& last;
     uint64_t solves = 0;
     std::array<std::optional<StreamingReuse>, 2> streaming;  // per half, once the limit is reached
     HandOver first;                                          // while streaming

@@ -34,18 +34,39 @@ struct ReceiverPair {
     uint32_t first = 0, second = 0;
 };
 
+// What one receiver got from one source.
+struct LightPart {
+    glm::vec3 irradiance{0.0f};  // W/m^2
+    float variance = 0;          // of the brightest channel
+    float contrast = 0;          // standard deviation over the receiver that shadows make, W/m^2
+
+    // From a source so many times as strong. The samples have the colour of the light.
+    LightPart scaled(const glm::vec3& factor) const {
+        const glm::vec3 light = factor * irradiance;
+        const float most = brightest(irradiance) > 0 ? brightest(light) / brightest(irradiance)
+                                                     : brightest(factor);
+        return {light, most * most * variance, most * contrast};
+    }
+};
+
 // What one receiver got.
 struct Gathered {
     glm::vec3 irradiance{0.0f};  // W/m^2
     glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
     float variance = 0;          // of the brightest channel
-    float contrast = 0;  // standard deviation over the receiver and the sources, W/m^2, that
-                         // shadows make
+    float contrast = 0;          // sum over the sources
     uint64_t rays = 0;
     uint64_t unblocked = 0;  // sources without noise: wholly visible
     uint64_t hidden = 0;     // sources that it cannot face, without a sample
     uint64_t weak = 0;       // sources that took fewer rays since they give little of the light
     uint64_t inside = 0;     // sources that took fewer rays since it is the inside of a solid
+
+    void add(const LightPart& part, bool isUnpowered) {
+        irradiance += part.irradiance;
+        if (isUnpowered) unpowered += part.irradiance;
+        variance += part.variance;
+        contrast += part.contrast;
+    }
 };
 
 // Standard error that direct light may keep, as a share of the target: errors of receivers are

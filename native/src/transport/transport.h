@@ -36,6 +36,23 @@ struct Irradiance {
 // Which bundles an estimate looks at.
 enum class Half { FIRST = 0, SECOND = 1, BOTH = 2 };
 
+// The factors x_i of the lines of each side, and how many lines each has with them: m_i.
+struct LineWeights {
+    std::vector<float> x, m;
+};
+
+// What LINE_REUSE found by the lines of a trace, for solves to start from: of other light too, for
+// the first solve of a bake.
+struct LineSolutions {
+    explicit LineSolutions(size_t sides = 0) {
+        for (auto& field : reflected) field.resize(sides);
+    }
+
+    std::vector<glm::vec3> reflected[3];  // per half and for both, per side: exitance, W/m^2
+    LineWeights weights;                  // for both
+    uint32_t bundles = 0;                 // that those for both are of; 0: there are none
+};
+
 // What transports are made of. References must outlive them.
 struct TransportInput {
     const Patches& patches;
@@ -47,6 +64,8 @@ struct TransportInput {
     const Settings& settings;
     BundleTracer& tracer;
     LineCounts& counts;  // of the bundles traced so far; LINE_REUSE alone adds to it
+    // Of the light of the same set, per side of these patches; null: none are kept.
+    LineSolutions* solutions = nullptr;
 };
 
 class Transport {
