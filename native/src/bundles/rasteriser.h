@@ -157,14 +157,19 @@ void Rasteriser::sampleSheet(const Sheet& sheet, const Visit& visit) {
 template <class Visit>
 void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
     const int sides = parent.isTriangle ? 3 : 4;
-    sampleOutline(
-        sides,
-        [&](int k) {
-            return std::array<uint32_t, 2>{parent.vertex[size_t(k)],
-                                           parent.vertex[size_t((k + 1) % sides)]};
-        },
-        parent.origin, parent.a, parent.b,
-        [&](float s, float t) { return parent.firstPatch + parent.patchAt(s, t); }, visit);
+    auto edge = [&](int k) {
+        return std::array<uint32_t, 2>{parent.vertex[size_t(k)],
+                                       parent.vertex[size_t((k + 1) % sides)]};
+    };
+    const uint32_t first = parent.firstPatch;
+    if (parent.patchCount() == 1)
+        sampleOutline(
+            sides, edge, parent.origin, parent.a, parent.b, [first](float, float) { return first; },
+            visit);
+    else
+        sampleOutline(
+            sides, edge, parent.origin, parent.a, parent.b,
+            [&, first](float s, float t) { return first + parent.patchAt(s, t); }, visit);
 }
 
 template <class EdgeAt, class PatchAt, class Visit>
