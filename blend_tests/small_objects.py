@@ -78,15 +78,22 @@ def open_scene(name: str) -> None:
 def squared_vertex_error(objects: list[bpy.types.Object], light: Light, references: list[Light]
                          ) -> float:
     """Relative, off contact edges, without the noise of the two independent references."""
+    off = [{name: light[name] - values for name, values in reference.items()}
+           for reference in references]
+    return max(0.0, mean_product(objects, off, references))
+
+
+def mean_product(objects: list[bpy.types.Object], factors: list[Light], references: list[Light]
+                 ) -> float:
+    """Of two values at the corners, off contact edges, over that of the two references."""
     off_contacts = off_contact_edges(bakeable_objects(bpy.context))
     product = scale = 0.0
     for item in objects:
         first, second = (reference[item.name] for reference in references)
         area = corner_areas(item) * off_contacts[item.name] * is_defined(item, first)
-        off = (light[item.name] - first) * (light[item.name] - second)
-        product += area @ off.sum(axis=1)
+        product += area @ (factors[0][item.name] * factors[1][item.name]).sum(axis=1)
         scale += area @ (first * second).sum(axis=1)
-    return max(0.0, product / scale)
+    return product / scale
 
 
 def time_ratio(name: str, options: argparse.Namespace, reconstruction: str) -> float:

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights in place of emissive faces give the same light where Cycles samples the faces well."""
+
+import bpy
+import numpy as np
+import pytest
+from area_lamps import area_lamps
+from cycles_comparison import square
+from cycles_reference import bake_objects
+
+SAMPLES = 1024
+
+
+@pytest.mark.parametrize("sides", [4, 24])
+def test_far_from_a_lamp(new_object, new_material, sides):
+    floor = new_object("Floor", *square(2.0, 4), new_material("White", (0.8, 0.8, 0.8)))
+    # Clockwise: its front looks down, and nothing looks at its back.
+    corners = [(0.2 * np.cos(angle), 0.2 * np.sin(angle), 2.0)
+               for angle in -2.0 * np.pi * np.arange(sides) / sides]
+    material = bpy.data.materials.new("Lamp")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    emission = tree.nodes.new('ShaderNodeEmission')
+    emission.inputs['Color'].default_value = (1.0, 0.5, 0.2, 1.0)
+    emission.inputs['Strength'].default_value = 30.0
+    tree.links.new(emission.outputs[0],
+                   tree.nodes.new('ShaderNodeOutputMaterial').inputs['Surface'])
+    new_object("Lamp", corners, [tuple(range(sides))], material)
+    bpy.context.view_layer.update()
+
+    meshes = bake_objects([floor], SAMPLES, 0)["Floor"].mean(axis=0)
+    with area_lamps():
+        lights = bake_objects([floor], SAMPLES, 1)["Floor"].mean(axis=0)
+    # Noise of each: about 0.1 %. A disk for 24 corners: less than that.
+    assert np.allclose(lights, meshes, rtol=0.005)
+    assert np.allclose(bake_objects([floor], SAMPLES, 0)["Floor"].mean(axis=0), meshes, rtol=1e-6)
+    assert not [item for item in bpy.data.objects if item.type == 'LIGHT']
