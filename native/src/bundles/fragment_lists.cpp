@@ -109,23 +109,28 @@ void FragmentLists::orderCoinciding(uint64_t* first, uint64_t* last) const {
 }
 
 void FragmentLists::pairLists(BundleLines& out) {
-    for (size_t p = 0; p + 1 < begin.size(); ++p) {
-        uint64_t* const first = keys.data() + begin[p + 1];
-        uint64_t* const last = keys.data() + (p + 2 < begin.size() ? begin[p + 2] : keys.size());
+    const size_t pixels = begin.size() - 1;
+    sky.resize(2 * pixels);
+    uint32_t* nextSky = sky.data();
+    uint64_t* first = keys.data();
+    for (size_t p = 0; p < pixels; ++p) {
+        uint64_t* const last = keys.data() + (p + 1 < pixels ? begin[p + 2] : keys.size());
         if (first == last) continue;
         sort(first, last);
         bool anyNear = false;
         for (const uint64_t* k = first; k + 1 < last; ++k) anyNear |= areNear(k[0], k[1]);
         if (anyNear) orderCoinciding(first, last);
-        ++out.lines;
-        out.sky.push_back(sideOf(*first));
-        out.sky.push_back(sideOf(last[-1]) ^ 1);
+        *nextSky++ = sideOf(*first);
+        *nextSky++ = sideOf(last[-1]) ^ 1;
         if (anyNear || hasLeaks)
             pairNear(first, last, out);
         else  // the far side of the nearer surface sees the near side of the farther one
             for (const uint64_t* k = first; k + 1 < last; ++k)
                 runs.add(size_t(k - first), sideOf(k[0]) ^ 1, sideOf(k[1]));
+        first = last;
     }
+    out.lines += size_t(nextSky - sky.data()) / 2;
+    out.sky.insert(out.sky.end(), sky.data(), nextSky);
     runs.moveTo(out.exchanges);
 }
 

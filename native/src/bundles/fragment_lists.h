@@ -66,6 +66,7 @@ class FragmentLists : public Projector {
     std::vector<uint32_t> begin;  // per pixel, into keys; one more at the end
     std::vector<uint64_t> keys;   // depth << 32 | side, per pixel
     RunLengths runs;
+    std::vector<uint32_t> sky;  // of the view in hand
 };
 
 }  // namespace raybundle

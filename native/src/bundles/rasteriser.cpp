@@ -9,6 +9,14 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
       pixelSize(pixelSize),
       smallPatches(smallPatches),
       windows(std::move(windows)) {
+    std::vector<bool> isUsed(patches.vertices.size(), smallPatches == SmallPatches::ROULETTE);
+    for (const Sheet& sheet : patches.sheets.sheets)
+        for (const auto& edge : sheet.outline) isUsed[edge[0]] = true;
+    for (uint32_t i : patches.sheets.loose)
+        for (int k = 0; k < (patches.parents[i].isTriangle ? 3 : 4); ++k)
+            isUsed[patches.parents[i].vertex[size_t(k)]] = true;
+    for (uint32_t v = 0; v < isUsed.size(); ++v)
+        if (isUsed[v]) vertices.push_back(v);
     for (const LineWindow& window : this->windows)
         finestLevel = std::max(finestLevel, window.level);
 }
@@ -17,12 +25,11 @@ void Rasteriser::begin(const Bundle& bundle) {
     frame = bundle;
     if (!patches.opacity.empty()) line = lineName(bundle);
     if (smallPatches == SmallPatches::ROULETTE) roulette.begin(bundle);
-    const size_t n = patches.vertices.size();
-    projected.resize(n);
-    depth.resize(n);
+    projected.resize(patches.vertices.size());
+    depth.resize(patches.vertices.size());
     const double perPixel = 1 / double(pixelSize);
     glm::dvec3 low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
-    for (size_t v = 0; v < n; ++v) {
+    for (uint32_t v : vertices) {
         const glm::dvec3 p(patches.vertices[v]);
         const glm::dvec3 q(glm::dot(p, frame.right) * perPixel, glm::dot(p, frame.up) * perPixel,
                            glm::dot(p, frame.direction));

@@ -134,6 +134,7 @@ class Rasteriser {
     glm::dvec2 corner{0.0};             // of the view, its pixels
     int width = 0, height = 0;          // of the view, its pixels
     double lowest = 0, highest = 0;     // depth, metres
+    std::vector<uint32_t> vertices;     // all but those inside of sheets
     std::vector<glm::dvec2> projected;  // per vertex: on the plane
     std::vector<Rectangle> bounds;      // per sheet, then per loose parent, if there are windows
     std::vector<Rectangle> openings;    // per window: what of the plane is in it
