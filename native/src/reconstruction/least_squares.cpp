@@ -22,17 +22,56 @@ constexpr double kTolerance = 1e-6;
 constexpr double kSettled = 1e-4;
 constexpr int kMaxSweeps = 100;
 
-using Triplets = std::vector<Eigen::Triplet<double>>;
+// A symmetric matrix as the sum of small ones. Each entry is kept once, however many add to it: a
+// list of all that is added would take ten times the memory.
+class SymmetricSum {
+  public:
+    explicit SymmetricSum(size_t size) : rows(size) {}
 
-// Adds weight * stencil * stencil^T.
-template <size_t N>
-void addSquare(Triplets& triplets, const std::array<uint32_t, N>& node,
-               const std::array<double, N>& stencil, double weight) {
-    for (size_t a = 0; a < N; ++a)
-        for (size_t b = 0; b < N; ++b)
-            if (stencil[a] != 0 && stencil[b] != 0)
-                triplets.emplace_back(node[a], node[b], weight * stencil[a] * stencil[b]);
-}
+    // To (i, j) and, if they differ, to (j, i).
+    void add(uint32_t i, uint32_t j, double value) {
+        std::vector<Entry>& row = rows[std::max(i, j)];
+        const uint32_t column = std::min(i, j);
+        const auto found = std::find_if(row.begin(), row.end(),
+                                        [&](const Entry& e) { return e.column == column; });
+        if (found != row.end())
+            found->value += value;
+        else
+            row.push_back({column, value});
+    }
+
+    // weight * stencil * stencil^T; a node may occur several times.
+    template <size_t N>
+    void addSquare(const std::array<uint32_t, N>& node, const std::array<double, N>& stencil,
+                   double weight) {
+        for (size_t a = 0; a < N; ++a)
+            for (size_t b = 0; b <= a; ++b)
+                if (const double value = weight * stencil[a] * stencil[b])
+                    add(node[a], node[b], a != b && node[a] == node[b] ? 2 * value : value);
+    }
+
+    Eigen::SparseMatrix<double> matrix() const {
+        const Eigen::Index n = Eigen::Index(rows.size());
+        Eigen::SparseMatrix<double> lower(n, n);
+        std::vector<int> counts(rows.size(), 0);
+        for (const auto& row : rows)
+            for (const Entry& entry : row) ++counts[entry.column];
+        lower.reserve(counts);
+        // In the order of rows, so that columns are.
+        for (Eigen::Index i = 0; i < n; ++i)
+            for (const Entry& entry : rows[size_t(i)])
+                lower.insertBackUncompressed(i, entry.column) = entry.value;
+        lower.makeCompressed();
+        return lower.selfadjointView<Eigen::Lower>();
+    }
+
+  private:
+    struct Entry {
+        uint32_t column;
+        double value;
+    };
+    std::vector<std::vector<Entry>> rows;  // of the lower triangle
+};
 
 // The nodes of a cell; a triangle repeats its first, with weight 0 wherever it is used.
 std::array<uint32_t, 4> nodesOf(const Cell& cell, const SmoothRegions& regions) {
@@ -79,7 +118,7 @@ EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
 // two sides of a covered strip (a wall on a floor) has nothing to do with each other.
 void addRegularization(const Patches& patches, const InstanceRange& range,
                        const SmoothRegions& regions, const std::vector<double>& openness,
-                       double weight, Triplets& triplets) {
+                       double weight, SymmetricSum& sum) {
     for (const SmoothEdge& edge : regions.edges) {
         const Cell& cell0 = patches.cells[edge.cell[0]];
         const Cell& cell1 = patches.cells[edge.cell[1]];
@@ -98,14 +137,13 @@ void addRegularization(const Patches& patches, const InstanceRange& range,
         const double height = 0.5 * (s0.height + s1.height);
         const double open = std::min(openness[edge.cell[0] - range.firstCell],
                                      openness[edge.cell[1] - range.firstCell]);
-        addSquare(triplets, node, stencil,
-                  weight * open * (areaOf(cell0) + areaOf(cell1)) * height * height);
+        sum.addSquare(node, stencil,
+                      weight * open * (areaOf(cell0) + areaOf(cell1)) * height * height);
     }
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
         if (!patches.cells[c].isTriangle())
-            addSquare(triplets, nodesOf(patches.cells[c], regions),
-                      std::array<double, 4>{1, -1, 1, -1},
-                      weight * openness[c - range.firstCell] * areaOf(patches.cells[c]));
+            sum.addSquare(nodesOf(patches.cells[c], regions), std::array<double, 4>{1, -1, 1, -1},
+                          weight * openness[c - range.firstCell] * areaOf(patches.cells[c]));
 }
 
 // Brings a solution of the normal equations within its bounds by projected Gauss-Seidel sweeps: the
@@ -146,7 +184,7 @@ std::vector<std::vector<glm::vec3>> leastSquares(
     const std::vector<const std::vector<glm::vec3>*>& fields) {
     const size_t columns = 3 * fields.size();
     const Eigen::Index nodes = regions.nodeCount;
-    Triplets triplets;
+    SymmetricSum sum(regions.nodeCount);
     Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));
     Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));
     Eigen::VectorXd weightSum = Eigen::VectorXd::Zero(nodes);
@@ -187,10 +225,12 @@ std::vector<std::vector<glm::vec3>> leastSquares(
             }
         }
         for (int a = 0; a < 4; ++a)
-            for (int b = 0; b < 4; ++b)
-                if (square[a][b] != 0) triplets.emplace_back(node[a], node[b], square[a][b]);
+            for (int b = 0; b <= a; ++b)
+                if (square[a][b] != 0)
+                    sum.add(node[a], node[b],
+                            a != b && node[a] == node[b] ? 2 * square[a][b] : square[a][b]);
     }
-    addRegularization(patches, range, regions, openness, double(regularization), triplets);
+    addRegularization(patches, range, regions, openness, double(regularization), sum);
 
     // At a contact the exposed part of a face is small, and its slope uncertain: the value there
     // stays within what is seen around it.
@@ -204,10 +244,9 @@ std::vector<std::vector<glm::vec3>> leastSquares(
         if (weightSum[v] > 0)
             mean.row(v) = rhs.row(v) / weightSum[v];
         else
-            triplets.emplace_back(v, v, 1.0);
+            sum.add(uint32_t(v), uint32_t(v), 1);
     }
-    Eigen::SparseMatrix<double> matrix(nodes, nodes);
-    matrix.setFromTriplets(triplets.begin(), triplets.end());
+    const Eigen::SparseMatrix<double> matrix = sum.matrix();
 
     std::vector<std::vector<glm::vec3>> result(fields.size(),
                                                std::vector<glm::vec3>(size_t(nodes)));
