@@ -19,6 +19,9 @@ namespace {
 using Field = std::vector<glm::vec3>;  // per side
 
 constexpr int kMaxIterations = 1000;
+// A guess whose squared residual is this many times what is allowed is the solution of a solve to
+// about the same tolerance.
+constexpr double kSameSolution = 1.2;
 constexpr size_t kGrain = 2048;  // sides per task
 constexpr int kMaxSweeps = 64;   // over the starved sides
 constexpr float kSettled = 1e-5f;
@@ -171,8 +174,10 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
     const glm::dvec3 enough = dot(product, product) * double(tolerance) * double(tolerance);
     // Of all multiples of the guess the best, in the measure of conjugate gradients: after a change
     // of one lamp's colour that is the solution.
-    forEachSide(n,
-                [&](size_t i) { p[i] = z[i] - lineScale[i] * rowTimes(counts, half, i, scaled); });
+    Field brought(n, glm::vec3(0.0f));  // by the lines, over x_i
+    if (dot(z, z) != glm::dvec3(0.0))
+        forEachSide(n, [&](size_t i) { brought[i] = rowTimes(counts, half, i, scaled); });
+    forEachSide(n, [&](size_t i) { p[i] = z[i] - lineScale[i] * brought[i]; });
     const glm::vec3 share(ratio(dot(z, product), dot(z, p)));
     forEachSide(n, [&](size_t i) {
         z[i] *= share;
@@ -182,8 +187,9 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
 
     // Conjugate gradients, each channel with its own coefficients.
     glm::dvec3 rr = dot(r, r);
-    int iterations = 0;
-    while (glm::any(glm::greaterThan(rr, enough)) && iterations < kMaxIterations) {
+    const bool isSolved = !glm::any(glm::greaterThan(rr, kSameSolution * enough));
+    for (int iteration = 0; !isSolved && iteration < kMaxIterations; ++iteration) {
+        if (!glm::any(glm::greaterThan(rr, enough))) break;
         forEachSide(n, [&](size_t i) { scaled[i] = padded(lineScale[i] * p[i]); });
         forEachSide(n, [&](size_t i) {
             product[i] = p[i] - lineScale[i] * rowTimes(counts, half, i, scaled);
@@ -197,7 +203,6 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
         const glm::vec3 beta(ratio(next, rr));
         forEachSide(n, [&](size_t i) { p[i] = r[i] + beta * p[i]; });
         rr = next;
-        ++iterations;
     }
 
     forEachSide(n, [&](size_t i) {
@@ -205,8 +210,9 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
         scaled[i] = padded(x[i] * reflected[i]);
     });
     forEachSide(n, [&](size_t i) {
+        brought[i] = isSolved ? share * brought[i] : rowTimes(counts, half, i, scaled);
         result.indirect[i] = first.indirect[i];
-        if (m[i] > 0) result.indirect[i] += x[i] * rowTimes(counts, half, i, scaled) / m[i];
+        if (m[i] > 0) result.indirect[i] += x[i] * brought[i] / m[i];
     });
     return result;
 }
