@@ -4,6 +4,7 @@
 // of other surfaces and the world where interpolation does not follow it (final_gather.h).
 #pragma once
 
+#include <atomic>
 #include <optional>
 #include <vector>
 
@@ -60,7 +61,7 @@ class CornerGather {
     std::vector<size_t> first;                   // per instance, into corners
     std::vector<std::vector<Gathered>> sources;  // per light and corner
     std::vector<FinalGather> others;             // per light; none where it is switched off
-    size_t smooth = 0;
+    std::atomic<size_t> smooth = 0;
 };
 
 }  // namespace raybundle

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/reconstruction.h"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
 #include <optional>
 
 #include "reconstruction/area_average.h"
@@ -13,6 +17,7 @@ namespace {
 
 // An object whose front gets less than this share of the light of its back is probably inside out.
 constexpr double kInsideOut = 1e-3;
+constexpr size_t kTogether = 16;  // objects
 
 using Field = std::vector<glm::vec3>;
 
@@ -106,10 +111,9 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
 
     std::vector<InstanceLight> result(scene.instances.size());
     report.objects.resize(scene.instances.size());
-    size_t occluders = 0;
-    for (size_t i = 0; i < scene.instances.size(); ++i) {
-        const double share = double(i) / double(scene.instances.size());
-        progress.report(RB_STAGE_RECONSTRUCTION, isPoint ? 0.5 + 0.5 * share : share);
+    std::atomic<size_t> occluders = 0;
+    std::vector<std::string> warnings(scene.instances.size());
+    auto reconstructInstance = [&](size_t i) {
         const Instance& instance = scene.instances[i];
         const Mesh& mesh = scene.meshes[instance.mesh];
         InstanceLight& out = result[i];
@@ -118,7 +122,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         out.isBaked = instance.role == RB_ROLE_BAKE;
         if (!out.isBaked && settings.skipOccluders) {
             ++occluders;
-            continue;
+            return;
         }
         if (out.isBaked) report.objects[i].status = "baked";
         out.cornerVertices = mesh.cornerVertices;
@@ -164,18 +168,26 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
 
         if (out.isBaked && isInsideOut(patches, ranges[i], instance.side, lights)) {
             report.objects[i].status = "baked; no light on this side";
-            report.warnings.push_back("object \"" + instance.name +
-                                      "\": the baked sides of its faces get no light but the other "
-                                      "sides do; flip its normals or choose the other side");
+            warnings[i] = "object \"" + instance.name +
+                          "\": the baked sides of its faces get no light but the other sides do; "
+                          "flip its normals or choose the other side";
         }
+    };
+    // Some at a time, so that this thread can report, and cancel, between them.
+    for (size_t i = 0; i < scene.instances.size(); i += kTogether) {
+        const double share = double(i) / double(scene.instances.size());
+        progress.report(RB_STAGE_RECONSTRUCTION, isPoint ? 0.5 + 0.5 * share : share);
+        tbb::parallel_for(i, std::min(i + kTogether, scene.instances.size()), reconstructInstance);
     }
+    for (const std::string& warning : warnings)
+        if (!warning.empty()) report.warnings.push_back(warning);
     if (atCorners) {
         report.shadowRays += atCorners->shadowRays();
         report.skipped.push_back({"final gather", "corners whose light interpolation follows",
                                   atCorners->smoothNodes()});
     }
     if (occluders)
-        report.skipped.push_back({"reconstruction", "objects that only occlude", occluders});
+        report.skipped.push_back({"reconstruction", "objects that only occlude", occluders.load()});
     progress.report(RB_STAGE_RECONSTRUCTION, 1);
     return result;
 }
