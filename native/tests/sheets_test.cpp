@@ -210,5 +210,17 @@ TEST(Sheets, BundlesAreTheSame) {
     EXPECT_LT(double(different), 1e-4 * double(all));
 }
 
+TEST(Sheets, NothingThatExchangesMakesNoLines) {
+    Scene scene = closedCube(0.5f);
+    scene.instances[0].exchanges = false;
+    const Patches patches = subdivide(scene, 0.25f, kMany);
+    EXPECT_TRUE(patches.sheets.sheets.empty());
+    EXPECT_TRUE(patches.sheets.loose.empty());
+    BundleLines lines;
+    FragmentLists(patches, 0.1f, 1e-4f).project(Directions("RANDOM", 3).next(2).front(), lines);
+    EXPECT_EQ(lines.lines, 0u);
+    EXPECT_TRUE(lines.sky.empty());
+}
+
 }  // namespace
 }  // namespace raybundle

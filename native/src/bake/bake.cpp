@@ -173,9 +173,11 @@ void Bake::runStages(const Scene& scene) {
         } else {
             std::vector<TransportInput> inputs;
             for (const SetLight& light : lights)
-                inputs.push_back({patches, trace->visibility, light.shot, light.worldRadiance,
-                                  trace->surrounding.exposed, trace->touchDistance, settings,
-                                  *trace->tracer, trace->counts, &trace->solutionsOf(light.set)});
+                inputs.push_back(
+                    {patches, trace->visibility, light.shot, light.worldRadiance,
+                     trace->surrounding.exposed, trace->touchDistance, settings, *trace->tracer,
+                     trace->counts,
+                     settings.solver == "LINE_REUSE" ? &trace->solutionsOf(light.set) : nullptr});
             const Transports transports = makeTransports(settings.solver, inputs);
             noise = solveToTarget(scene, tiles, lights, transports, report);
             exposed = trace->exposedShare();

@@ -38,6 +38,7 @@ void Rasteriser::begin(const Bundle& bundle) {
         projected[v] = glm::dvec2(q);
         depth[v] = q.z;
     }
+    if (vertices.empty()) low = high = glm::dvec3(0.0);
     // Move the view to the scene by whole pixels, so that its corner does not undo the random
     // shift.
     level = 0;

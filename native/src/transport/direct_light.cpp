@@ -14,7 +14,7 @@ namespace {
 
 // Emission up to this many times the mean exitance of the scene is left to the bundles.
 constexpr double kBundledEmission = 1.5;
-// Of light that was scaled: an error that has grown by less than this is as it was.
+// Of light that was scaled: a squared relative error that has grown by less than this is as it was.
 constexpr float kSameError = 1.1f;
 // Shadow rays per receiver and source for sources of little weight.
 constexpr int kFewSamples = 4;

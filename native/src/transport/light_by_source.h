@@ -4,8 +4,8 @@
 // nothing else changed since the last bake, what a source brought is scaled and not shot again.
 //
 // What differs from shooting again: each source has the samples that it needed beside the others
-// as they were. Receivers that need more of them now are found by their error and shot again, all
-// are where a source has become much more of the light.
+// as they were. Receivers that need more of them now are found by their error and shot again, for
+// this bake alone; all are where a source has become much more of the light.
 #pragma once
 
 #include <cstddef>

@@ -34,7 +34,7 @@ class LineReuseTransport : public Transport {
         : input(input),
           solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed),
           limit(size_t(input.settings.memoryLimit * 1e6)),
-          own(input.patches.sideCount()),
+          own(input.solutions ? 0 : input.patches.sideCount()),
           last(input.solutions ? *input.solutions : own) {}
 
     // Shares the lines from here on with a transport of another light, which must not advance by
