@@ -164,30 +164,42 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
     forEachSide(n, [&](size_t i) {
         scale[i] = m[i] > 0 ? glm::sqrt(patches.reflectance[i] / m[i]) : glm::vec3(0.0f);
         lineScale[i] = x[i] * scale[i];
-        for (int c = 0; c < 3; ++c) z[i][c] = scale[i][c] > 0 ? reflected[i][c] / scale[i][c] : 0;
+        for (int c = 0; c < 3; ++c) {
+            if (!(scale[i][c] > 0)) reflected[i][c] = 0;
+            z[i][c] = scale[i][c] > 0 ? reflected[i][c] / scale[i][c] : 0;
+        }
         // The right-hand side, until the loop: unshot and what the lines brought, over the scale.
         const glm::vec3 unshot = patches.reflectance[i] * (result.direct[i] - first.gathered[i]);
         for (int c = 0; c < 3; ++c)
             product[i][c] = scale[i][c] > 0 ? (first.unshot[i][c] + unshot[c]) / scale[i][c] : 0;
-        scaled[i] = padded(lineScale[i] * z[i]);
+        // Lines' product with the guess, to the last bit as at the end of the solve that found it.
+        scaled[i] = padded(x[i] * reflected[i]);
     });
     const glm::dvec3 enough = dot(product, product) * double(tolerance) * double(tolerance);
-    // Of all multiples of the guess the best, in the measure of conjugate gradients: after a change
-    // of one lamp's colour that is the solution.
     Field brought(n, glm::vec3(0.0f));  // by the lines, over x_i
     if (dot(z, z) != glm::dvec3(0.0))
         forEachSide(n, [&](size_t i) { brought[i] = rowTimes(counts, half, i, scaled); });
-    forEachSide(n, [&](size_t i) { p[i] = z[i] - lineScale[i] * brought[i]; });
-    const glm::vec3 share(ratio(dot(z, product), dot(z, p)));
     forEachSide(n, [&](size_t i) {
-        z[i] *= share;
-        r[i] = product[i] - share * p[i];
-        p[i] = r[i];
+        p[i] = z[i] - lineScale[i] * brought[i];
+        r[i] = product[i] - p[i];
     });
+    glm::dvec3 rr = dot(r, r);
+    auto isNearly = [&] { return !glm::any(glm::greaterThan(rr, kSameSolution * enough)); };
+    glm::vec3 share(1.0f);
+    if (!isNearly()) {
+        // Of all multiples of the guess the best, in the measure of conjugate gradients: after a
+        // change of one lamp's colour that is the solution.
+        share = glm::vec3(ratio(dot(z, product), dot(z, p)));
+        forEachSide(n, [&](size_t i) {
+            z[i] *= share;
+            r[i] = product[i] - share * p[i];
+        });
+        rr = dot(r, r);
+    }
+    const bool isSolved = isNearly();
+    p = r;
 
     // Conjugate gradients, each channel with its own coefficients.
-    glm::dvec3 rr = dot(r, r);
-    const bool isSolved = !glm::any(glm::greaterThan(rr, kSameSolution * enough));
     for (int iteration = 0; !isSolved && iteration < kMaxIterations; ++iteration) {
         if (!glm::any(glm::greaterThan(rr, enough))) break;
         forEachSide(n, [&](size_t i) { scaled[i] = padded(lineScale[i] * p[i]); });
@@ -205,8 +217,9 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
         rr = next;
     }
 
+    // A solution that is one already stays as it is, to the last bit.
     forEachSide(n, [&](size_t i) {
-        reflected[i] = scale[i] * z[i];
+        reflected[i] = isSolved && share == glm::vec3(1.0f) ? reflected[i] : scale[i] * z[i];
         scaled[i] = padded(x[i] * reflected[i]);
     });
     forEachSide(n, [&](size_t i) {
