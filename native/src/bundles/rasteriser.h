@@ -147,12 +147,10 @@ class Rasteriser {
 
 template <class Visit>
 void Rasteriser::sampleSheet(const Sheet& sheet, const Visit& visit) {
-    sampleOutline(
-        int(sheet.outline.size()), [&](int k) { return sheet.outline[size_t(k)]; }, sheet.origin,
-        sheet.a,
-        sheet
-            .b,  // By value: its members could lie where patches are written, for all the compiler knows.
-        [grid = sheet.grid()](float s, float t) { return grid.patchAt(s, t); }, visit);
+    auto edge = [&](int k) { return sheet.outline[size_t(k)]; };
+    // By value: the sheet could lie where patches are written, for all the compiler knows.
+    auto patchAt = [grid = sheet.grid()](float s, float t) { return grid.patchAt(s, t); };
+    sampleOutline(int(sheet.outline.size()), edge, sheet.origin, sheet.a, sheet.b, patchAt, visit);
 }
 
 template <class Visit>
