@@ -16,9 +16,9 @@ namespace {
 // Share of the longer edge by which the edges of congruent parents may differ.
 constexpr float kCongruence = 1e-4f;
 // How far a vertex may lie from its place on the sheet: across it, as a share of the scene's radius
-// (what rounding to float leaves; a hundredth of what counts as touching), and along it, as a share
+// (what rounding to float leaves, some units in the last place), and along it, as a share
 // of the parents' edges.
-constexpr float kFlatness = 1e-6f, kEvenness = 0.01f;
+constexpr float kFlatness = 3e-7f, kEvenness = 0.01f;
 
 // A parent in a lattice: corner k of its place there (in order around, (0, 0) first) is its vertex
 // (k + turn) % 4.
