@@ -213,15 +213,13 @@ std::vector<Gathered> DirectLight::gather(
 std::optional<std::vector<Gathered>> DirectLight::scale(
     const LightBySource& before, const std::function<Receiver(size_t)>& receiverAt,
     float targetError, const std::function<void(double)>& progress) const {
-    const auto factors = before.factors(sources);
-    if (!factors) return std::nullopt;
-    auto isOnTop = [&](size_t source, size_t receiver) {
+    const auto matches = before.match(sources);
+    if (!matches) return std::nullopt;
+    std::vector<Gathered> results = before.scaled(*matches, [&](size_t source, size_t receiver) {
         return isUnpowered(source, receiverAt(receiver).side);
-    };
-    std::vector<Gathered> results = before.scaled(*factors, isOnTop);
+    });
     // Those that took as many samples as they may did so before.
-    const std::vector<Gathered> then =
-        before.scaled(std::vector<glm::vec3>(sources.size(), glm::vec3(1.0f)), isOnTop);
+    const std::vector<Gathered> then = before.asItWas();
     Aims further = aimsAfter(results, patches, receiverAt, {}, targetError);
     size_t count = 0;
     for (size_t k = 0; k < further.receivers.size(); ++k) {

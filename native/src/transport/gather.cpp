@@ -81,16 +81,22 @@ FirstShot gather(const FirstShotInput& input) {
         return receiver;
     };
     const float target = input.settings.targetError;
+    const auto& sources = light.lightSources();
+    std::vector<glm::dvec3> escapedShares(sources.size(), glm::dvec3(0.0));
     std::optional<std::vector<Gathered>> results;
     if (input.before && (results = light.scale(*input.before, receiverAt, target, report))) {
         shot.bySource = input.before;
+        const auto matches = *input.before->match(sources);
+        for (size_t k = 0; k < matches.size(); ++k)
+            if (const auto source = matches[k].source)
+                escapedShares[*source] = input.before->escapedShares[k];
     } else {
-        auto bySource = std::make_shared<LightBySource>(light.lightSources(), n);
+        auto bySource = std::make_shared<LightBySource>(sources, n);
         bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
         results =
             light.gather(n, receiverAt, target, report, coarseOfPatches(input, receiverAt, report),
                          neighbouringSides(patches), bySource->isWhole ? bySource.get() : nullptr);
-        bySource->escapedShares = light.escapedShares();
+        escapedShares = bySource->escapedShares = light.escapedShares();
         shot.bySource = std::move(bySource);
     }
     for (size_t side = 0; side < n; ++side) {
@@ -104,11 +110,10 @@ FirstShot gather(const FirstShotInput& input) {
         shot.weakSides += result.weak;
         shot.insideSides += result.inside;
     }
-    const auto& sources = light.lightSources();
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::dvec3 power(sources[k]->power());
         if (sources[k]->castsShadows) shot.emitted += power;
-        shot.escaped += power * shot.bySource->escapedShares[k];
+        shot.escaped += power * escapedShares[k];
     }
     input.progress.report(RB_STAGE_FIRST_SHOT, 1);
     return shot;

@@ -29,27 +29,39 @@ class LightBySource {
     // Of a receiver: an entry a source.
     LightPart* of(size_t receiver) { return parts.data() + receiver * magnitudes.size(); }
 
-    // See DirectLight.
+    // See DirectLight; in the order of the sources that it was made of.
     std::vector<glm::dvec3> escapedShares;
     // Whether all of it was filled in.
     bool isWhole = false;
 
-    // How many times as strong the sources are now; none if anything else in them differs, or if
-    // one has become much more of the light.
-    std::optional<std::vector<glm::vec3>> factors(
+    // What has become of a source: which one it is now, and how many times as strong. One that is
+    // gone is dark.
+    struct Match {
+        std::optional<size_t> source;
+        glm::vec3 factor{0.0f};
+    };
+    // Of each source; none if anything but strengths differs, or if one has become much more of the
+    // light.
+    std::optional<std::vector<Match>> match(
         const std::vector<std::unique_ptr<LightSource>>& now) const;
 
-    // The light at all receivers with these factors. isUnpowered(source, receiver): see Gathered.
+    // The light at all receivers. isUnpowered(source, receiver), of sources as they are now: see
+    // Gathered.
     template <class IsUnpowered>
-    std::vector<Gathered> scaled(const std::vector<glm::vec3>& factors,
+    std::vector<Gathered> scaled(const std::vector<Match>& matches,
                                  const IsUnpowered& isUnpowered) const {
-        std::vector<Gathered> results(parts.size() / magnitudes.size());
+        std::vector<Gathered> results(parts.size() / matches.size());
         for (size_t receiver = 0; receiver < results.size(); ++receiver)
-            for (size_t k = 0; k < magnitudes.size(); ++k)
-                results[receiver].add(parts[receiver * magnitudes.size() + k].scaled(factors[k]),
-                                      isUnpowered(k, receiver));
+            for (size_t k = 0; k < matches.size(); ++k)
+                if (const auto source = matches[k].source)
+                    results[receiver].add(
+                        parts[receiver * matches.size() + k].scaled(matches[k].factor),
+                        isUnpowered(*source, receiver));
         return results;
     }
+
+    // Per receiver: all its light as it was, and the variance of that.
+    std::vector<Gathered> asItWas() const;
 
   private:
     std::vector<uint64_t> shapes;       // per source
