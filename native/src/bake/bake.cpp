@@ -29,7 +29,7 @@ namespace raybundle {
 namespace {
 
 // Relative residual of the last solve: a share of the noise, within these bounds.
-constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 5e-5;
+constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
 // The lines' noise on the patches of any one window may be this many times the target.
 constexpr double kWindowTargets = 1.1;
 // Bundles whose noise is less than this share of the target have done their part.
