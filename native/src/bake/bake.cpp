@@ -28,8 +28,9 @@
 namespace raybundle {
 namespace {
 
-// Relative residual of the last solve: a share of the noise, within these bounds.
-constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 2e-4;
+// Relative residual of the last solve: a share of the noise, within these bounds. The upper one
+// keeps a relit bake, whose solves start elsewhere, within 1e-5 of a new one.
+constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
 // The lines' noise on the patches of any one window may be this many times the target.
 constexpr double kWindowTargets = 1.1;
 // Bundles whose noise is less than this share of the target have done their part.
