@@ -40,14 +40,20 @@ class SymmetricSum {
             row.push_back({column, value});
     }
 
-    // weight * stencil * stencil^T; a node may occur several times.
+    // valueAt(a, b), symmetric, at (node[a], node[b]); a node may occur several times.
+    template <size_t N, class ValueAt>
+    void add(const std::array<uint32_t, N>& node, const ValueAt& valueAt) {
+        for (size_t a = 0; a < N; ++a)
+            for (size_t b = 0; b <= a; ++b)
+                if (const double value = valueAt(a, b); value != 0)
+                    add(node[a], node[b], a != b && node[a] == node[b] ? 2 * value : value);
+    }
+
+    // weight * stencil * stencil^T.
     template <size_t N>
     void addSquare(const std::array<uint32_t, N>& node, const std::array<double, N>& stencil,
                    double weight) {
-        for (size_t a = 0; a < N; ++a)
-            for (size_t b = 0; b <= a; ++b)
-                if (const double value = weight * stencil[a] * stencil[b])
-                    add(node[a], node[b], a != b && node[a] == node[b] ? 2 * value : value);
+        add(node, [&](size_t a, size_t b) { return weight * stencil[a] * stencil[b]; });
     }
 
     Eigen::SparseMatrix<double> matrix() const {
@@ -224,11 +230,7 @@ std::vector<std::vector<glm::vec3>> leastSquares(
                 }
             }
         }
-        for (int a = 0; a < 4; ++a)
-            for (int b = 0; b <= a; ++b)
-                if (square[a][b] != 0)
-                    sum.add(node[a], node[b],
-                            a != b && node[a] == node[b] ? 2 * square[a][b] : square[a][b]);
+        sum.add(node, [&](size_t a, size_t b) { return square[a][b]; });
     }
     addRegularization(patches, range, regions, openness, double(regularization), sum);
 

@@ -210,12 +210,12 @@ std::vector<Gathered> DirectLight::gather(
     return results;
 }
 
-std::optional<std::vector<Gathered>> DirectLight::scale(
-    const LightBySource& before, const std::function<Receiver(size_t)>& receiverAt,
-    float targetError, const std::function<void(double)>& progress) const {
-    const auto matches = before.match(sources);
-    if (!matches) return std::nullopt;
-    std::vector<Gathered> results = before.scaled(*matches, [&](size_t source, size_t receiver) {
+std::vector<Gathered> DirectLight::scale(const LightBySource& before,
+                                         const std::vector<LightBySource::Match>& matches,
+                                         const std::function<Receiver(size_t)>& receiverAt,
+                                         float targetError,
+                                         const std::function<void(double)>& progress) const {
+    std::vector<Gathered> results = before.scaled(matches, [&](size_t source, size_t receiver) {
         return isUnpowered(source, receiverAt(receiver).side);
     });
     // Those that took as many samples as they may did so before.

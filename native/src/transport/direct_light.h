@@ -66,12 +66,13 @@ class DirectLight {
                                  const std::vector<ReceiverPair>& neighbours = {},
                                  LightBySource* bySource = nullptr) const;
 
-    // The same by what each source gave with other strengths, if that will do: only the receivers
-    // whose error is too large beside the light as it is now gather again.
-    std::optional<std::vector<Gathered>> scale(const LightBySource& before,
-                                               const std::function<Receiver(size_t)>& receiverAt,
-                                               float targetError,
-                                               const std::function<void(double)>& progress) const;
+    // The same by what each source gave with other strengths: only the receivers whose error is too
+    // large beside the light as it is now gather again. matches: of `before` with these sources.
+    std::vector<Gathered> scale(const LightBySource& before,
+                                const std::vector<LightBySource::Match>& matches,
+                                const std::function<Receiver(size_t)>& receiverAt,
+                                float targetError,
+                                const std::function<void(double)>& progress) const;
 
     // The first, coarse pass of that, to begin with: gathers at `these` receivers.
     void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,

@@ -83,12 +83,12 @@ FirstShot gather(const FirstShotInput& input) {
     const float target = input.settings.targetError;
     const auto& sources = light.lightSources();
     std::vector<glm::dvec3> escapedShares(sources.size(), glm::dvec3(0.0));
-    std::optional<std::vector<Gathered>> results;
-    if (input.before && (results = light.scale(*input.before, receiverAt, target, report))) {
+    std::vector<Gathered> results;
+    if (const auto matches = input.before ? input.before->match(sources) : std::nullopt) {
+        results = light.scale(*input.before, *matches, receiverAt, target, report);
         shot.bySource = input.before;
-        const auto matches = *input.before->match(sources);
-        for (size_t k = 0; k < matches.size(); ++k)
-            if (const auto source = matches[k].source)
+        for (size_t k = 0; k < matches->size(); ++k)
+            if (const auto source = (*matches)[k].source)
                 escapedShares[*source] = input.before->escapedShares[k];
     } else {
         auto bySource = std::make_shared<LightBySource>(sources, n);
@@ -100,7 +100,7 @@ FirstShot gather(const FirstShotInput& input) {
         shot.bySource = std::move(bySource);
     }
     for (size_t side = 0; side < n; ++side) {
-        const Gathered& result = (*results)[side];
+        const Gathered& result = results[side];
         shot.irradiance[side] = result.irradiance;
         shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
         shot.error[side] = std::sqrt(result.variance);
