@@ -105,6 +105,23 @@ def new_light():
     return create
 
 
+@pytest.fixture
+def new_world():
+    """(radiance) -> the Background node of the scene's new world, of strength 1."""
+
+    def create(radiance=(0.05, 0.05, 0.05)):
+        world = bpy.data.worlds.new("World")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        bpy.context.scene.world = world
+        node = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
+        node.inputs['Color'].default_value = (*radiance, 1.0)
+        node.inputs['Strength'].default_value = 1.0
+        return node
+
+    return create
+
+
 CUBE_VERTICES = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 # Normals point outwards.
 CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

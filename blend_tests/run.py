@@ -2,6 +2,8 @@
 """Runs pytest inside Blender, from the repository root:
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/run.py -- [pytest arguments]
+
+or with the Python of an environment that has Blender as a module, bpy.
 """
 
 import sys

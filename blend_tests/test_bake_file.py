@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.needs_library
+pytestmark = [pytest.mark.needs_library,
+              pytest.mark.skipif(not bpy.app.binary_path, reason="Blender is a module here")]
 
 SCRIPT = Path(__file__).parent.parent / "addon" / "bake_file.py"
 

@@ -223,12 +223,8 @@ def test_light_with_a_shadow(stage, new_light, kind, energy, values, rotation):
     stage.compare()
 
 
-def test_world_with_a_shadow(stage):
-    world = bpy.data.worlds.new("World")
-    world.use_nodes = True
-    bpy.context.scene.world = world
-    node = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
-    node.inputs['Color'].default_value = (0.4, 0.6, 0.9, 1.0)
+def test_world_with_a_shadow(stage, new_world):
+    new_world((0.4, 0.6, 0.9))
     stage.add_blocker()
     stage.compare()
 

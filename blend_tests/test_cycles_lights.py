@@ -139,7 +139,8 @@ def set_shadows(light, value):
 
 
 def compare_parts(items):
-    direct, both = cycles_light(items, ("DIRECT",)), cycles_light(items)
+    direct, both = (cycles_light(items, passes, samples=SAMPLES)
+                    for passes in (("DIRECT",), ("DIRECT", "INDIRECT")))
     assert_same_mean(raybundle_light(items), both)
     assert_same_mean(raybundle_light(items, 'DIRECT'), direct, scale=both)
 
@@ -160,27 +161,36 @@ def test_light_without_shadows(room, new_light, kind, values):
 def test_visibility_to_a_lamp(room, new_light, which, flag):
     new_light("Light", 'POINT', 100.0, (0.5, 0.0, 1.8), shadow_soft_size=0.1)
     setattr(room[which], flag, flag.startswith('is_'))
-    compare_parts(room)
+    if is_black_in_cycles(room[which]):
+        compare_named(room, room[which], "shadow catcher")
+    else:
+        compare_parts(room)
 
 
 @pytest.mark.parametrize("flag", ['visible_diffuse', 'visible_shadow'])
-def test_visibility_to_the_world(room, flag):
-    world = bpy.data.worlds.new("World")
-    world.color = (0.4, 0.6, 0.9)
-    bpy.context.scene.world = world
+def test_visibility_to_the_world(room, new_world, flag):
+    new_world((0.4, 0.6, 0.9))
     setattr(room[1], flag, False)
     compare_parts(room)
+
+
+def is_black_in_cycles(item):
+    return item.is_holdout or item.is_shadow_catcher and bpy.app.version >= (4, 0, 0)
+
+
+def compare_named(items, black, what):
+    """Cycles bakes one of the objects black; to the others it is an object like others."""
+    report = raybundle.bake(bpy.context)
+    assert any(f'"{black.name}"' in text and what in text for text in report.warnings)
+    expected = cycles_light(items)
+    assert (expected.pop(black.name) == 0.0).all()
+    assert_same_mean(raybundle_light(items), expected)
 
 
 def test_holdout_is_named(room, new_light):
     new_light("Light", 'POINT', 100.0, (0.5, 0.0, 1.8), shadow_soft_size=0.1)
     room[2].is_holdout = True
-    report = raybundle.bake(bpy.context)
-    assert any('"Board"' in text and "holdout" in text for text in report.warnings)
-    # To the others it is an object like others.
-    expected = cycles_light(room)
-    del expected["Board"]
-    assert_same_mean(raybundle_light(room), expected)
+    compare_named(room, room[2], "holdout")
 
 
 @pytest.mark.parametrize("change", [
@@ -188,11 +198,11 @@ def test_holdout_is_named(room, new_light):
     lambda light: setattr(light, 'hide_render', True),
     lambda light: setattr(light.data.cycles, 'is_portal', True)])
 def test_light_that_gives_no_light(floor, new_light, change):
-    light = new_light("Light", 'AREA', 100.0, (0.0, 0.0, 1.5))
-    change(light)
+    # Another light, since Cycles (4.2, 5.0) crashes on bakes without any.
+    new_light("Other", 'POINT', 10.0, (0.5, 0.0, 1.5), shadow_soft_size=0.1)
+    change(new_light("Light", 'AREA', 10.0, (0.0, 0.0, 1.5)))
     bpy.context.view_layer.update()
-    assert (raybundle_light([floor])["Floor"] == 0.0).all()
-    assert (cycles_light([floor])["Floor"] == 0.0).all()
+    compare(floor)
 
 
 def test_lamp_that_diffuse_light_does_not_see(floor, new_object, new_material):
@@ -223,13 +233,8 @@ def test_light_with_nodes(floor, new_light):
     compare(floor)
 
 
-def test_world(floor):
-    world = bpy.data.worlds.new("World")
-    world.use_nodes = True
-    bpy.context.scene.world = world
-    node = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
-    node.inputs['Color'].default_value = (0.3, 0.5, 0.9, 1.0)
-    node.inputs['Strength'].default_value = 1.5
+def test_world(floor, new_world):
+    new_world((0.3, 0.5, 0.9)).inputs['Strength'].default_value = 1.5
     compare(floor)
 
 

@@ -328,7 +328,7 @@ def clear_glass(tree):
 @pytest.mark.parametrize("build", [leaf_by_alpha, leaf_by_mix, transparent, half_mixed],
                          ids=lambda build: build.__name__)
 @pytest.mark.parametrize("by", ['LAMP', 'WORLD'])
-def test_veil(floor, new_object, new_light, build, by):
+def test_veil(floor, new_object, new_light, new_world, build, by):
     veil = place_canopy(new_object, build)
     veil.location, veil.rotation_euler = (0.3, 0.2, 0.6), (0.0, 0.0, 0.0)
     veil.scale = (0.7, 0.7, 1.0)
@@ -336,13 +336,8 @@ def test_veil(floor, new_object, new_light, build, by):
     if by == 'LAMP':
         new_light("Lamp", 'AREA', 40.0, (0.1, -0.2, 1.6), shape='SQUARE', size=0.8)
     else:
-        world = bpy.data.worlds.new("World")
-        world.use_nodes = True
-        bpy.context.scene.world = world
+        new_world((0.4, 0.6, 0.9))
     bpy.context.view_layer.update()
-    if by == 'WORLD':
-        node = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
-        node.inputs['Color'].default_value = (0.4, 0.6, 0.9, 1.0)
     compare(floor)
 
 

@@ -59,7 +59,7 @@ def test_parts_sum_up_to_the_whole(room):
     both, direct, indirect = (raybundle_light(room, output)
                               for output in ('LIGHTING', 'DIRECT', 'INDIRECT'))
     for name, light in both.items():
-        assert light == pytest.approx(direct[name] + indirect[name], abs=1e-5 * light.max())
+        assert light == pytest.approx(direct[name] + indirect[name], abs=1e-5 * float(light.max()))
 
 
 # --------------------------------------------------------------------------------------------------

@@ -90,7 +90,7 @@ def compare(court):
     shown = {name: f"{a.mean():.4f} {b.mean():.4f}" for name, (a, b) in pairs.items()}
     assert max(differences.values()) < 0.01, f"ours and Cycles: {shown}"
     total = np.mean([pair[0] for pair in pairs.values()], axis=0)
-    assert total == pytest.approx(mean, rel=0.01, abs=0.003 * mean.max())
+    assert total == pytest.approx(mean, rel=0.01, abs=0.003 * float(mean.max()))
 
 
 class Tree:
@@ -243,8 +243,10 @@ def test_the_sun_of_a_sky_is_a_light(elevation):
     sun, = scene.lights
     assert math.asin(sun.direction[2]) == pytest.approx(elevation, abs=5e-4)
     assert sun.angle == pytest.approx(math.radians(0.545), rel=1e-3)
-    # What is left is smooth.
-    assert scene.world_image.max() < 100.0 * mean_radiance(scene).max()
+    # What is left is smooth; the sky of 5.0 glows more about a low sun. The disc would be 1e5 times
+    # as bright as the mean.
+    brightest = 100.0 if bpy.app.version < (5, 0, 0) else 200.0
+    assert scene.world_image.max() < brightest * mean_radiance(scene).max()
 
 
 def test_nothing_is_left_behind_and_the_evaluation_is_kept(monkeypatch):

@@ -245,8 +245,9 @@ class _Exporter:
             parent = instance.parent.name if instance.parent else item.name
             self._instance_counts[parent, item.name] += 1
             role = 'OCCLUDE'
-        if original.is_holdout:
-            self.result.warnings.add(f'"{item.name}" is a holdout: Cycles bakes it black, here it '
+        if original.is_holdout or original.is_shadow_catcher and bpy.app.version >= (4, 0, 0):
+            what = "holdout" if original.is_holdout else "shadow catcher"
+            self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, here it '
                                      f'is an object like others')
         # Cycles has the flags of the instancer too.
         shown = (item, instance.parent) if instance.is_instance and instance.parent else (item,)
