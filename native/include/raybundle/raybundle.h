@@ -87,8 +87,8 @@ RB_API rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, in
                              const float* rgb, rb_image_extension extension, int32_t* image);
 
 /* Adds a material. reflectance and emission hold six floats: RGB of the front side, then of the
- * back side. reflectance is the diffuse albedo; values of 1 or more are clamped to 0.999 with a
- * warning in the report. emission is the exitance in W/m^2 (pi times the radiance). Id in
+ * back side. reflectance is the albedo; all of it spreads as if it were diffuse. Values of 1 or more
+ * are clamped to 0.999 with a warning in the report. emission is the exitance in W/m^2 (pi times the radiance). Id in
  * *material. */
 RB_API rb_error rb_add_material(rb_scene scene, const char* name, const float reflectance[6],
                                 const float emission[6], int32_t* material);
@@ -109,6 +109,12 @@ RB_API rb_error rb_set_material_emission_image(rb_scene scene, int32_t material,
                                                const float weight[6]);
 RB_API rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t material,
                                                        const float weight[6]);
+
+/* How much of the reflectance is diffuse, which is what outputs with colour show: scale times it
+ * plus offset (six floats each: RGB of the front side, then of the back side), but at least 0 and at
+ * most all. The rest is gloss. Without it all is diffuse. */
+RB_API rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float scale[6],
+                                        const float offset[6]);
 
 /* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.
  * Reflectance and emission remain those of the whole surface, so reflectance is at most the

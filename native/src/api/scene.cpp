@@ -95,6 +95,20 @@ rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t material
     });
 }
 
+rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float scale[6],
+                                 const float offset[6]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(scale, "scale");
+        need(offset, "offset");
+        needFinite(scale, 6, "scale");
+        needFinite(offset, 6, "offset");
+        Material& target = scene->scene.material(material);
+        target.diffuseScale = {vec3(scale), vec3(scale + 3)};
+        target.diffuseOffset = {vec3(offset), vec3(offset + 3)};
+    });
+}
+
 rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity) {
     return guarded([&] {
         need(scene, "scene");

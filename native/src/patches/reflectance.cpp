@@ -172,4 +172,21 @@ void assignMaterials(const Scene& scene, Patches& patches) {
     });
 }
 
+std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& patches) {
+    std::vector<glm::vec3> diffuse(patches.sideCount());
+    tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
+        const Parent& parent = patches.parents[i];
+        const Material& material =
+            scene.materialOf(scene.meshes[scene.instances[parent.instance].mesh], parent.face);
+        const uint32_t first = 2 * parent.firstPatch;
+        for (uint32_t side = first; side < first + 2 * parent.patchCount(); ++side) {
+            const glm::vec3 all = patches.opacityOf(side / 2) * patches.reflectance[side];
+            diffuse[side] =
+                glm::clamp(material.diffuseScale[side % 2] * all + material.diffuseOffset[side % 2],
+                           glm::vec3(0.0f), all);
+        }
+    });
+    return diffuse;
+}
+
 }  // namespace raybundle

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <glm/glm.hpp>
+#include <vector>
+
 #include "patches/patches.h"
 #include "scene/scene.h"
 
@@ -16,5 +19,9 @@ void assignOpacity(const Scene& scene, Patches& patches);
 // Gives every side of every patch its reflectance and emission. Images and corner colours are
 // averaged over the area of the patch: a lookup at one point would alias.
 void assignMaterials(const Scene& scene, Patches& patches);
+
+// Per side: how much of its reflectance is diffuse, of the whole patch, what lets light through
+// included.
+std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& patches);
 
 }  // namespace raybundle

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <optional>
 
+#include "patches/reflectance.h"
 #include "reconstruction/area_average.h"
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/least_squares.h"
@@ -37,7 +38,8 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
     return lit[side] < kInsideOut * lit[1 - side];
 }
 
-// The light of one set on the sides, as it goes into a reconstruction.
+// The light of one set on the sides, as it goes into a reconstruction: of exitance what COMBINED
+// shows, without gloss.
 struct SideLight {
     const Irradiance& irradiance;
     Field emission;  // W/m^2
@@ -45,7 +47,8 @@ struct SideLight {
     Field carried;   // direct light without that of the sources, W/m^2
 };
 
-std::vector<SideLight> sideLights(const Patches& patches, const SetLights& lights) {
+std::vector<SideLight> sideLights(const Patches& patches, const Field& reflectance,
+                                  const SetLights& lights) {
     std::vector<SideLight> result;
     for (const SetLight& light : lights) {
         const Irradiance& h = light.irradiance;
@@ -54,8 +57,8 @@ std::vector<SideLight> sideLights(const Patches& patches, const SetLights& light
             // Of the whole patch, what lets light through included.
             const float opacity = patches.opacityOf(uint32_t(side / 2));
             out.emission[side] *= opacity;
-            out.exitance[side] = out.emission[side] + opacity * patches.reflectance[side] *
-                                                          (h.direct[side] + h.indirect[side]);
+            out.exitance[side] =
+                out.emission[side] + reflectance[side] * (h.direct[side] + h.indirect[side]);
             out.carried[side] = h.direct[side] - h.gathered[side];
         }
         result.push_back(std::move(out));
@@ -98,11 +101,8 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                                        const Settings& settings, const Progress& progress,
                                        Report& report) {
     const bool isPoint = settings.reconstruction == "POINT";
-    const std::vector<SideLight> onSides = sideLights(patches, lights);
-    // Of the whole patch, what lets light through included.
-    Field reflectance = patches.reflectance;
-    for (size_t side = 0; side < reflectance.size(); ++side)
-        reflectance[side] *= patches.opacityOf(uint32_t(side / 2));
+    const Field reflectance = diffuseReflectances(scene, patches);
+    const std::vector<SideLight> onSides = sideLights(patches, reflectance, lights);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
     std::optional<CornerGather> atCorners;
     if (isPoint)

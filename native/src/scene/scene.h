@@ -21,8 +21,7 @@ struct Image {
     std::vector<glm::vec3> pixels;
 };
 
-// Reflectance (diffuse albedo) and emission (exitance, W/m^2) of the front [0] and the back [1]
-// side. The optional image and corner colours, each times its weight, are added to both
+// Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The optional image and corner colours, each times its weight, are added to both
 // reflectances.
 struct Material {
     std::string name;
@@ -37,6 +36,9 @@ struct Material {
     std::array<glm::vec3, 2> emissionImageWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
     bool emissionUsesCornerColors = false;
     std::array<glm::vec3, 2> emissionColorWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
+    // What of the reflectance is diffuse and no gloss: scale times it plus offset.
+    std::array<glm::vec3, 2> diffuseScale{glm::vec3(1.0f), glm::vec3(1.0f)};
+    std::array<glm::vec3, 2> diffuseOffset{glm::vec3(0.0f), glm::vec3(0.0f)};
     // Share of the light that does not pass straight through, and an image (its mean channel) that
     // multiplies it. Reflectance and emission are those of the whole, what passes through included.
     float opacity = 1;
