@@ -79,6 +79,7 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_add_material(scene, "", kGrey, nullptr, &id), "emission");
     expectInvalid(rb_add_material(scene, "", kGrey, kBlack, nullptr), "material");
     expectInvalid(rb_set_material_diffuse(scene, 0, nullptr, kBlack), "scale");
+    expectInvalid(rb_set_material_grazing(scene, 0, nullptr), "grazing");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, nullptr), "offset");
     expectInvalid(rb_add_mesh(scene, "", nullptr, 8, kCorners, 24, kFaces, 6, nullptr, &id),
                   "vertices");
@@ -118,6 +119,8 @@ TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
         expectInvalid(rb_set_material_opacity_image(scene, material, bad),
                       "image " + std::to_string(bad));
         expectInvalid(rb_set_material_opacity(scene, bad, 0.5f), "material " + std::to_string(bad));
+        expectInvalid(rb_set_material_grazing(scene, bad, kGrey),
+                      "material " + std::to_string(bad));
         expectInvalid(rb_set_material_diffuse(scene, bad, kGrey, kBlack),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_corner_colors(scene, bad, kOne),
@@ -206,6 +209,7 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     expectInvalid(rb_add_material(scene, "fog", negative, kBlack, &id), "fog");
     expectInvalid(rb_add_material(scene, "fog", kGrey, negative, &id), "fog");
     expectInvalid(rb_set_material_diffuse(scene, 0, bad, kBlack), "scale");
+    expectInvalid(rb_set_material_grazing(scene, 0, bad), "grazing");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, bad), "offset");
     const float infinite[3] = {0, INFINITY, 0}, zero[3] = {0, 0, 0};
     expectInvalid(rb_add_point_light(scene, "bulb", infinite, kOne, 0, RB_POINT_DISK, &id), "bulb");

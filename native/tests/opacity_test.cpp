@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Surfaces that let light through, gloss, and emission that varies over a surface.
+// Surfaces that let light through, and emission that varies over a surface.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -63,29 +63,6 @@ TEST(Opacity, AFurnaceWithAHalfTransparentShellIsExact) {
         bake.settings.reconstruction = reconstruction;
         expectFurnace(bake, reconstruction);
     }
-}
-
-// Gloss carries light on, so that the light is that of the furnace, and is not in what leaves.
-TEST(Gloss, IsNoPartOfWhatLeaves) {
-    for (float opacity : {1.0f, 0.5f})
-        for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
-            Scene scene = furnaceWithShell(opacity);
-            Material& shell = scene.materials.back();
-            for (int side : {0, 1}) {
-                shell.diffuseScale[side] = glm::vec3(0.8f);
-                shell.diffuseOffset[side] = glm::vec3(-0.04f);
-            }
-            Bake bake;
-            setQuick(bake);
-            bake.settings.reconstruction = reconstruction;
-            bake.run(scene);
-            for (int32_t instance : {0, 1})
-                for (const glm::vec3& light : cornerLight(bake, instance, RB_OUTPUT_LIGHTING))
-                    EXPECT_NEAR(double(light.x) * kPi, 1, 1e-4);
-            const double diffuse = 0.8 * 0.3 * double(opacity) - 0.04;
-            for (const glm::vec3& light : cornerLight(bake, 1, RB_OUTPUT_COMBINED))
-                EXPECT_NEAR(double(light.x) * kPi, 0.7 * double(opacity) + diffuse, 1e-4);
-        }
 }
 
 TEST(Opacity, AFurnaceIsExactWithEveryProjector) {

@@ -112,9 +112,15 @@ RB_API rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t m
 
 /* How much of the reflectance is diffuse, which is what outputs with colour show: scale times it
  * plus offset (six floats each: RGB of the front side, then of the back side), but at least 0 and at
- * most all. The rest is gloss. Without it all is diffuse. */
+ * most 1. The rest is gloss. Without it all is diffuse. */
 RB_API rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float scale[6],
                                         const float offset[6]);
+
+/* How much less of the light that comes from straight above is reflected than of light from
+ * everywhere, which reflectance is for (six floats, likewise). Light of the sources at an angle of
+ * cosine c is reflected by reflectance + grazing * (21 (1 - c)^5 - 1), with first shot GATHER.
+ * Without it 0. */
+RB_API rb_error rb_set_material_grazing(rb_scene scene, int32_t material, const float grazing[6]);
 
 /* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.
  * Reflectance and emission remain those of the whole surface, so reflectance is at most the

@@ -109,6 +109,15 @@ rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float s
     });
 }
 
+rb_error rb_set_material_grazing(rb_scene scene, int32_t material, const float grazing[6]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(grazing, "grazing");
+        needFinite(grazing, 6, "grazing");
+        scene->scene.material(material).grazing = {vec3(grazing), vec3(grazing + 3)};
+    });
+}
+
 rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity) {
     return guarded([&] {
         need(scene, "scene");

@@ -31,11 +31,12 @@ void balanceEnergy(const Patches& patches, const SetLight& light,
             continue;
         }
         const glm::vec3 total = irradiance.direct[side] + irradiance.indirect[side];
+        const glm::vec3 reflected =
+            patches.reflectance[side] * (total - irradiance.gathered[side]) +
+            shotReflectance(patches, shot, side) * irradiance.gathered[side];
         emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
-        absorbed += exposed * power(patches, side, (1.0f - patches.reflectance[side]) * total);
-        escaped +=
-            exposed *
-            power(patches, side, open * (shot.emission[side] + patches.reflectance[side] * total));
+        absorbed += exposed * power(patches, side, total - reflected);
+        escaped += exposed * power(patches, side, open * (shot.emission[side] + reflected));
     }
     report.emitted += sum(emitted);
     report.absorbed += sum(absorbed);

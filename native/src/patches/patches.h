@@ -112,6 +112,7 @@ struct Patches {
     std::vector<float> area;
     std::vector<float> opacity;          // per patch; empty where all are opaque
     std::vector<glm::vec3> reflectance;  // per side
+    std::vector<glm::vec3> grazing;      // per side, see Material; empty where all are 0
     std::vector<glm::vec3> emission;     // per side, W/m^2
     double totalArea = 0;                // of all patches, one side, m^2
     float size = 0;                      // target edge of a tile, metres

@@ -149,6 +149,11 @@ void assignOpacity(const Scene& scene, Patches& patches) {
 void assignMaterials(const Scene& scene, Patches& patches) {
     patches.reflectance.resize(patches.sideCount());
     patches.emission.resize(patches.sideCount());
+    constexpr std::array<glm::vec3, 2> kNone{glm::vec3(0.0f), glm::vec3(0.0f)};
+    const bool hasGrazing =
+        std::any_of(scene.materials.begin(), scene.materials.end(),
+                    [&](const Material& material) { return material.grazing != kNone; });
+    patches.grazing.assign(hasGrazing ? patches.sideCount() : 0, glm::vec3(0.0f));
     tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
         const Parent& parent = patches.parents[i];
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
@@ -164,6 +169,7 @@ void assignMaterials(const Scene& scene, Patches& patches) {
                 patches.reflectance[2 * p + side] =
                     glm::clamp(scale * (material.reflectance[side] + varying.reflectance), 0.0f,
                                kMaxReflectance);
+                if (hasGrazing) patches.grazing[2 * p + side] = scale * material.grazing[side];
                 patches.emission[2 * p + side] =
                     scale *
                     glm::max(material.emission[side] + varying.emission[side], glm::vec3(0.0f));
@@ -183,7 +189,7 @@ std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& pa
             const glm::vec3 all = patches.opacityOf(side / 2) * patches.reflectance[side];
             diffuse[side] =
                 glm::clamp(material.diffuseScale[side % 2] * all + material.diffuseOffset[side % 2],
-                           glm::vec3(0.0f), all);
+                           0.0f, 1.0f);
         }
     });
     return diffuse;

@@ -16,7 +16,7 @@ bool isEmptySpace(const Material& material);
 // its area. Once, before assignMaterials; lines depend on it.
 void assignOpacity(const Scene& scene, Patches& patches);
 
-// Gives every side of every patch its reflectance and emission. Images and corner colours are
+// Gives every side of every patch its reflectance, grazing and emission. Images and corner colours are
 // averaged over the area of the patch: a lookup at one point would alias.
 void assignMaterials(const Scene& scene, Patches& patches);
 

@@ -43,8 +43,11 @@ FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
       targetError(targetError),
       error(targetError * meanLight) {
     for (size_t side = 0; side < reflected.size(); ++side)
-        reflected[side] = patches.reflectance[side] *
-                          (light.irradiance.direct[side] + light.irradiance.indirect[side]);
+        reflected[side] =
+            patches.reflectance[side] *
+                (light.irradiance.direct[side] - light.irradiance.gathered[side] +
+                 light.irradiance.indirect[side]) +
+            shotReflectance(patches, light.shot, side) * light.irradiance.gathered[side];
 }
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
@@ -102,7 +105,7 @@ void FinalGather::addRays(const Receiver& receiver, uint32_t set, uint32_t first
         if (distance >= width(*hit)) continue;
         const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
                            hash(receiver.seed, kSets + set)};
-        sum.reflected += patches.reflectance[*hit] *
+        sum.reflected += shotReflectance(patches, light.shot, *hit) *
                          (light.direct.sample(met, i) - light.irradiance.gathered[*hit]);
     }
 }

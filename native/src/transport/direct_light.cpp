@@ -78,11 +78,13 @@ double meanExitance(const Scene& scene, const Patches& patches,
 struct DirectLight::Block {
     glm::vec3 open{0.0f};     // sum of the samples as if unblocked
     glm::vec3 visible{0.0f};  // sum of those that are not blocked
+    float grazing = 0;        // the same, of their brightest channels times grazingShare
     int count = 0;
 
     void add(const Block& other) {
         open += other.open;
         visible += other.visible;
+        grazing += other.grazing;
         count += other.count;
     }
     // The closed form times the visible share; the plain mean where there is no closed form.
@@ -335,11 +337,16 @@ void DirectLight::takeSamples(const LightSource& source, const SobolPoints& poin
     std::array<ShadowRay, Visibility::kPacket> rays;
     std::array<std::pair<glm::vec3, Block*>, Visibility::kPacket> held;
     int count = 0;
+    auto see = [&](Block& block, const glm::vec3& irradiance, const glm::vec3& direction) {
+        block.visible += irradiance;
+        block.grazing += brightest(irradiance) * grazingShare(glm::dot(direction, place.normal));
+    };
     auto trace = [&] {
         std::array<float, Visibility::kPacket> shares;
         visibility.visibleShares(side, rays.data(), count, shares.data());
         for (int k = 0; k < count; ++k)
-            held[size_t(k)].second->visible += shares[size_t(k)] * held[size_t(k)].first;
+            see(*held[size_t(k)].second, shares[size_t(k)] * held[size_t(k)].first,
+                rays[size_t(k)].direction);
         sum.rays += uint64_t(count);
         count = 0;
     };
@@ -352,7 +359,7 @@ void DirectLight::takeSamples(const LightSource& source, const SobolPoints& poin
         if (brightest(sample.irradiance) <= 0) continue;
         block.open += sample.irradiance;
         if (!source.castsShadows) {
-            block.visible += sample.irradiance;
+            see(block, sample.irradiance, sample.direction);
             continue;
         }
         held[size_t(count)] = {sample.irradiance, &block};
@@ -405,7 +412,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                 next = 4 * all.count;
                 continue;
             }
-            return {glm::vec3(0.0f), missed * missed, 0};
+            return {glm::vec3(0.0f), missed * missed, 0, 0};
         }
         // By the first pass alone, so that the order of the receivers does not matter.
         if (std::isinf(tolerance)) seen[index] = true;
@@ -422,9 +429,11 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     }
     if (closed && all.visible == all.open) ++sum.unblocked;
     const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
-    return {all.estimate(closed), variance + closedError * closedError,
+    const glm::vec3 irradiance = all.estimate(closed);
+    return {irradiance, variance + closedError * closedError,
             brightest(closed ? *closed : all.open / float(all.count)) *
-                std::sqrt(visible * (1 - visible))};
+                std::sqrt(visible * (1 - visible)),
+            brightest(irradiance) * all.grazing / brightest(all.visible)};
 }
 
 bool DirectLight::isUnpowered(size_t source, uint32_t side) const {

@@ -20,6 +20,12 @@ constexpr Kind kKinds[] = {
 
 }  // namespace
 
+glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t side) {
+    if (patches.grazing.empty() || shot.obliqueness.empty()) return patches.reflectance[side];
+    return glm::clamp(patches.reflectance[side] + shot.obliqueness[side] * patches.grazing[side],
+                      0.0f, 1.0f);
+}
+
 FirstShot firstShot(const std::string& kind, const FirstShotInput& input) {
     const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
                                   [&](const Kind& k) { return kind == k.name; });

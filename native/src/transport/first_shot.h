@@ -24,6 +24,9 @@ struct FirstShot {
     // Where the first shot went on with reflected light: irradiance from it, and the reflected
     // exitance that is left to the transport, per side, W/m^2; else both are empty.
     std::vector<glm::vec3> indirect, unshot;
+    // Per side, of GATHER: how much more light comes at grazing angles than of light from
+    // everywhere: 21 times the mean of (1 - cosine)^5, less 1; -1 is light from straight above.
+    std::vector<float> obliqueness;
     std::vector<float> error;         // per side, standard error of all irradiance, W/m^2
     std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2
     std::shared_ptr<const LightBySource> bySource;  // of GATHER: what came from each source
@@ -65,6 +68,9 @@ FirstShot extendedFirstShot(const FirstShotInput& input);
 // area that they take, 0 to 1.
 double localToGlobalRatio(double intersections, double meanReflectance, double sourceReflectance,
                           double share);
+
+// What a side reflects of the first shot's light.
+glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t side);
 
 // A first shot by the name of its row.
 FirstShot firstShot(const std::string& kind, const FirstShotInput& input);

@@ -15,6 +15,13 @@
 
 namespace raybundle {
 
+// What surfaces that mirror at grazing angles have more of there, by Schlick: (1 - cosine)^5. In
+// light from everywhere its mean is 1 / 21.
+inline float grazingShare(float cosine) {
+    const float rest = 1 - std::min(std::max(cosine, 0.0f), 1.0f), square = rest * rest;
+    return square * square * rest;
+}
+
 // The largest channel.
 inline float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
@@ -39,13 +46,14 @@ struct LightPart {
     glm::vec3 irradiance{0.0f};  // W/m^2
     float variance = 0;          // of the brightest channel
     float contrast = 0;          // standard deviation over the receiver that shadows make, W/m^2
+    float grazing = 0;  // the brightest channel times the mean of (1 - cosine)^5, see FirstShot
 
     // From a source so many times as strong. The samples have the colour of the light.
     LightPart scaled(const glm::vec3& factor) const {
         const glm::vec3 light = factor * irradiance;
         const float most = brightest(irradiance) > 0 ? brightest(light) / brightest(irradiance)
                                                      : brightest(factor);
-        return {light, most * most * variance, most * contrast};
+        return {light, most * most * variance, most * contrast, most * grazing};
     }
 };
 
@@ -54,7 +62,9 @@ struct Gathered {
     glm::vec3 irradiance{0.0f};  // W/m^2
     glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
     float variance = 0;          // of the brightest channel
-    float contrast = 0;          // sum over the sources
+    float contrast = 0;          // sums over the sources: of theirs
+    float grazing = 0;           // of theirs
+    float brightness = 0;        // of their brightest channels
     uint64_t rays = 0;
     uint64_t unblocked = 0;  // sources without noise: wholly visible
     uint64_t hidden = 0;     // sources that it cannot face, without a sample
@@ -66,6 +76,8 @@ struct Gathered {
         if (isUnpowered) unpowered += part.irradiance;
         variance += part.variance;
         contrast += part.contrast;
+        grazing += part.grazing;
+        brightness += brightest(part.irradiance);
     }
 };
 

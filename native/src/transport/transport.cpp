@@ -31,8 +31,9 @@ HandOver handOver(const Patches& patches, const FirstShot& shot,
         light.gathered[i] = concentrated * shot.irradiance[i];
         if (!shot.indirect.empty()) light.indirect[i] = concentrated * shot.indirect[i];
         if (!patches.parentAt(uint32_t(i)).exchanges) continue;
-        light.unshot[i] = shot.unshot.empty() ? patches.reflectance[i] * light.gathered[i]
-                                              : concentrated * shot.unshot[i];
+        light.unshot[i] = shot.unshot.empty()
+                              ? shotReflectance(patches, shot, i) * light.gathered[i]
+                              : concentrated * shot.unshot[i];
     }
     return light;
 }

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Reflectance that is not diffuse: it carries light on, leaves outputs with colour alone, and is
+// more where the light of the sources comes in at grazing angles.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bake/bake.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+TEST(Gloss, IsNoPartOfWhatLeaves) {
+    for (float opacity : {1.0f, 0.5f})
+        for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
+            // A furnace: the exitance of the room is 1.
+            Scene scene = closedCube(0.6f, 0.4f);
+            Material shell = grey("shell", 0.3f * opacity, 0.7f * opacity);
+            shell.reflectance[1] = shell.reflectance[0];
+            shell.emission[1] = shell.emission[0];
+            shell.opacity = opacity;
+            for (int side : {0, 1}) {
+                shell.diffuseScale[side] = glm::vec3(0.8f);
+                shell.diffuseOffset[side] = glm::vec3(-0.04f);
+            }
+            place(scene, box("shell", {0.25f, 0.25f, 0.25f}, {0.7f, 0.75f, 0.8f}, false), shell);
+            Bake bake;
+            setQuick(bake);
+            bake.settings.reconstruction = reconstruction;
+            bake.run(scene);
+            for (int32_t instance : {0, 1})
+                for (const glm::vec3& light : cornerLight(bake, instance, RB_OUTPUT_LIGHTING))
+                    EXPECT_NEAR(double(light.x) * kPi, 1, 1e-4);
+            const double diffuse = 0.8 * 0.3 * double(opacity) - 0.04;
+            for (const glm::vec3& light : cornerLight(bake, 1, RB_OUTPUT_COMBINED))
+                EXPECT_NEAR(double(light.x) * kPi, 0.7 * double(opacity) + diffuse, 1e-4);
+        }
+}
+
+// A floor under a sun whose light passes the black board above it.
+Scene boardOverFloor(double cosine, float grazing) {
+    Scene scene;
+    Material white = grey("white", 0.5f);
+    white.grazing[0] = glm::vec3(grazing);
+    place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), white);
+    place(scene, rectangle("board", {-1, -1, 0.8f}, {0, 2, 0}, {2, 0, 0}), grey("black", 0));
+    Light sun = sunLight({std::sqrt(1 - cosine * cosine), 0, cosine}, glm::dvec3(3));
+    sun.castsShadows = false;
+    scene.addLight(sun);
+    return scene;
+}
+
+TEST(Gloss, MoreIsReflectedAtGrazingAngles) {
+    for (double cosine : {0.95, 0.5, 0.1}) {
+        Bake matt, gloss;
+        setQuick(matt);
+        setQuick(gloss);
+        matt.run(boardOverFloor(cosine, 0));
+        gloss.run(boardOverFloor(cosine, 0.03f));
+        const auto before = cornerLight(matt, 1, RB_OUTPUT_INDIRECT);
+        const auto after = cornerLight(gloss, 1, RB_OUTPUT_INDIRECT);
+        const double more = 0.03 * (21 * std::pow(1 - cosine, 5) - 1) / 0.5;
+        for (size_t corner = 0; corner < before.size(); ++corner) {
+            ASSERT_GT(before[corner].x, 0);
+            EXPECT_NEAR(double(after[corner].x / before[corner].x), 1 + more, 1e-4) << cosine;
+        }
+    }
+}
+
+Scene paintedRoom(float grazing) {
+    Scene scene = roomWithBoxes(0.6f);
+    for (Material& material : scene.materials) material.grazing[0] = glm::vec3(grazing);
+    scene.addLight(pointLight({1, 1, 2}, {3, 5, 2}));
+    return scene;
+}
+
+TEST(Gloss, EnergyIsBalancedAndPaintIsChangedWithoutANewShot) {
+    Bake again, fresh;
+    setQuick(again);
+    setQuick(fresh);
+    again.run(paintedRoom(0));
+    again.run(paintedRoom(0.05f));
+    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "lights unchanged"));
+    fresh.run(paintedRoom(0.05f));
+    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
+    EXPECT_LT(reportOf(fresh)["energy"]["balance_error"].get<double>(), 1e-3);
+    again.run(paintedRoom(0));
+    EXPECT_GT(difference(everything(again), everything(fresh)), 1e-3);
+}
+
+}  // namespace
+}  // namespace raybundle
