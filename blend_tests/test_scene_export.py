@@ -15,11 +15,11 @@ from mathutils import Matrix
 from raybundle.corner_map import CORNER_CODE, VERTEX_CODE, build_corner_map
 from raybundle.light_export import (area_light_radiance,
                                     sun_irradiance_factor)
-from raybundle.node_reader import principled_albedo
+from raybundle.principled import principled_albedo
 from raybundle.scene_export import export_scene
 
-# Of the Principled shader as it is made.
-ALBEDO = principled_albedo(0.5)
+# Diffuse part of a Principled shader of roughness 0.5, without specular reflection.
+ALBEDO = principled_albedo(0.5, 0.0, 1.5, False, 0.5, True).diffuse
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
 
@@ -321,9 +321,20 @@ def exported_material(material):
 
 @pytest.fixture
 def principled():
+    """Without specular reflection."""
     material = bpy.data.materials.new("Principled")
     material.use_nodes = True
+    set_specular(material, 0.0)
     return material
+
+
+def set_specular(material, value):
+    inputs = shader_of(material).inputs
+    (inputs.get('Specular IOR Level') or inputs['Specular']).default_value = value
+
+
+def diffuse_of(material, side=0):
+    return (material.diffuse_scale * material.reflectance + material.diffuse_offset)[side]
 
 
 def shader_of(material):
@@ -351,10 +362,15 @@ def test_principled(principled):
     shader.inputs['Transmission Weight' if new else 'Transmission'].default_value = 0.5
     shader.inputs['Emission Color' if new else 'Emission'].default_value = (1.0, 0.5, 0.0, 1.0)
     shader.inputs['Emission Strength'].default_value = 3.0
-    material, _ = exported_material(principled)
+    material, result = exported_material(principled)
+    base = np.array([0.8, 0.4, 0.2])
+    albedo = principled_albedo(0.5, 0.0, shader.inputs['IOR'].default_value,
+                               shader.distribution == 'MULTI_GGX', base, True)
+    assert any('"Principled"' in text and "mirrors" in text for text in result.warnings)
     for side in range(2):
         assert material.reflectance[side] == pytest.approx(
-            ALBEDO * np.array([0.2, 0.1, 0.05]))
+            0.25 * ALBEDO * base + 0.5 * (albedo.metal * base + albedo.metal_edge))
+        assert diffuse_of(material, side) == pytest.approx(0.25 * albedo.shown * base)
         assert material.emission[side] == pytest.approx([3 * math.pi, 1.5 * math.pi, 0.0])
 
 
@@ -569,6 +585,66 @@ def test_a_bake_is_kept_until_something_changes(principled, monkeypatch):
     shader_of(principled).location.x += 10.0
     bpy.context.scene.raybundle.target_error = 0.01
     assert not bakes_again()
+
+
+def test_gloss_is_reflected_and_not_diffuse(principled):
+    set_specular(principled, 0.5)
+    shader = shader_of(principled)
+    base = np.array([0.8, 0.4, 0.0])
+    shader.inputs['Base Color'].default_value = (*base, 1.0)
+    albedo = principled_albedo(0.5, 0.5, shader.inputs['IOR'].default_value,
+                               shader.distribution == 'MULTI_GGX', base, True)
+    material, result = exported_material(principled)
+    assert result.warnings == []
+    # Of F0 = 0.04 or a little less.
+    assert 0.04 < albedo.specular < 0.07
+    assert material.reflectance[0] == pytest.approx(albedo.diffuse * base + albedo.specular)
+    assert diffuse_of(material) == pytest.approx(albedo.shown * base)
+    bpy.context.scene.cycles.caustics_reflective = False
+    assert exported_material(principled)[0].reflectance[0] == pytest.approx(albedo.diffuse * base)
+
+
+def test_gloss_beside_an_image(principled):
+    set_specular(principled, 0.5)
+    values = np.zeros((2, 2, 3), np.float32)
+    values[0, 1] = 0.5
+    tree = principled.node_tree
+    texture = tree.nodes.new('ShaderNodeTexImage')
+    texture.image = new_image(values, True)
+    tree.links.new(texture.outputs['Color'], shader_of(principled).inputs['Base Color'])
+    material, _ = exported_material(principled)
+    dark, bright = (material.reflectance[0] + material.image_weight * value for value in (0, 0.5))
+    assert (dark > 0.03).all()
+    scale, offset = material.diffuse_scale[0], material.diffuse_offset[0]
+    assert scale * dark + offset == pytest.approx(np.zeros(3))
+    assert (scale * bright + offset > 0.45).all() and (scale * bright + offset < 0.51).all()
+
+
+def test_gloss_of_what_cycles_bakes(principled):
+    add_noise(principled)
+    matt = exported_material(principled)[0]
+    assert matt.diffuse_scale == pytest.approx(np.full((2, 3), matt.diffuse_scale[0, 0]))
+    set_specular(principled, 0.5)
+    shader_of(principled).inputs['Metallic'].default_value = 0.2
+    material, result = exported_material(principled)
+    pixels = result.scene.images[material.image].pixels
+    whole = pixels[pixels > 0.02].mean()
+    diffuse = material.diffuse_scale.mean() * whole + material.diffuse_offset.mean()
+    # Noise lies about 0.5; of the base colour 80 % are diffuse.
+    assert 0.3 < diffuse / 0.8 < 0.7 and diffuse < 0.85 * whole
+
+
+def test_gloss_alone(principled):
+    tree = principled.node_tree
+    node = tree.nodes.new('ShaderNodeBsdfGlossy')
+    node.inputs['Color'].default_value = (0.8, 0.4, 0.2, 1.0)
+    node.inputs['Roughness'].default_value = 0.0
+    output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
+    tree.links.new(node.outputs[0], output.inputs['Surface'])
+    material, result = exported_material(principled)
+    assert material.reflectance[0] == pytest.approx([0.8, 0.4, 0.2], rel=1e-3)
+    assert (diffuse_of(material) == 0.0).all()
+    assert any("mirrors" in text for text in result.warnings)
 
 
 def test_alpha_is_opacity(principled):

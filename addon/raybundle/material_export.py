@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials -> diffuse reflectance and emission of both sides, and the colours that vary."""
+"""Materials -> reflectance and emission of both sides, and the colours that vary."""
 
 from __future__ import annotations
 
@@ -38,12 +38,32 @@ def _share_coordinates(surface: Surface) -> bool:
         first.uv_layer == second.uv_layer and np.allclose(first.uv_matrix, second.uv_matrix))
 
 
-class MaterialExporter:
-    """Adds each material, and each image it uses, once to the scene."""
+def _diffuse_of(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """scale and offset, (3,) each: the surface's diffuse colour is scale * reflectance + offset."""
+    whole, diffuse = surface.reflectance, surface.diffuse
+    if diffuse.texture is not None and diffuse.texture.same_as(whole.texture):
+        scale = _ratio(diffuse.texture_weight, whole.texture_weight)
+    elif diffuse.attribute is not None and diffuse.attribute == whole.attribute:
+        scale = _ratio(diffuse.attribute_weight, whole.attribute_weight)
+    else:
+        return _ratio(diffuse.mean(), whole.mean()), np.zeros(3)
+    return scale, diffuse.constant - scale * whole.constant
 
-    def __init__(self, scene: SceneData, warnings: Warnings) -> None:
+
+def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    return np.divide(part, whole, out=np.zeros(3), where=whole > 0.0)
+
+
+class MaterialExporter:
+    """Adds each material, and each image it uses, once to the scene.
+
+    mirrors: whether diffuse light sees gloss, Reflective Caustics of Cycles.
+    """
+
+    def __init__(self, scene: SceneData, warnings: Warnings, mirrors: bool = True) -> None:
         self.scene = scene
         self.warnings = warnings
+        self.mirrors = mirrors
         self.images = ImagePixels()
         self._materials: dict[bpy.types.Material | None, MaterialExport] = {}
         self._unread: dict[bpy.types.Material, str | None] = {}
@@ -70,7 +90,7 @@ class MaterialExporter:
         """A material as Cycles baked it for the faces of one object (surface_bake.py)."""
         # What both ways only approximate is still named.
         approximated = Warnings()
-        self._surface(material, False, approximated, [])
+        surface = self._surface(material, False, approximated, [])
         for text in (*approximated, baked.message):
             self.warnings.add(text)
         index = {}
@@ -84,7 +104,9 @@ class MaterialExporter:
             material.name, np.zeros((2, 3)), np.zeros((2, 3)), index['reflectance'], np.ones(3),
             emission_image=index.get('radiance'),
             emission_image_weight=np.full((2, 3), np.pi) if glows else None,
-            opacity_image=index.get('opacity')))
+            opacity_image=index.get('opacity'), diffuse_scale=np.tile(baked.diffuse_scale, (2, 1)),
+            diffuse_offset=np.tile(baked.diffuse_offset, (2, 1)),
+            grazing=np.tile(surface.grazing, (2, 1))))
         return MaterialExport(len(self.scene.materials) - 1, baked_uvs=True)
 
     def _export(self, material: bpy.types.Material | None) -> MaterialExport:
@@ -95,8 +117,8 @@ class MaterialExporter:
             # The native library lays an image on both sides alike.
             self.warnings.add(f'material "{name}": an image or attribute differs between the '
                               f'sides: its mean is used')
-            sides = [replace(side, reflectance=ColorExpression(side.reflectance.mean()))
-                     for side in sides]
+            sides = [replace(side, reflectance=ColorExpression(side.reflectance.mean()),
+                             diffuse=ColorExpression(side.diffuse.mean())) for side in sides]
         varying = sides[0].reflectance
         texture, attribute = varying.texture, varying.attribute
         # An image is read at one place for both: where emission has another one, its mean counts.
@@ -115,6 +137,7 @@ class MaterialExporter:
         if np.ptp(transmittance) > 1e-3:
             self.warnings.add(f'material "{name}": what it lets through differs between colours '
                               f'or sides: its mean is used')
+        scale, offset = (np.array(values) for values in zip(*map(_diffuse_of, sides)))
         data = MaterialData(
             name,
             np.maximum([side.reflectance.constant for side in sides], 0.0),
@@ -127,7 +150,8 @@ class MaterialExporter:
             np.pi * np.array([glow.texture_weight for glow in glows]) if glow_texture else None,
             (np.pi * np.array([glow.attribute_weight for glow in glows])
              if glow_attribute is not None else None),
-            1.0 - float(transmittance.mean()))
+            1.0 - float(transmittance.mean()), diffuse_scale=scale, diffuse_offset=offset,
+            grazing=np.array([side.grazing for side in sides]))
         self.scene.materials.append(data)
         return MaterialExport(len(self.scene.materials) - 1, texture or glow_texture,
                               glow_attribute if attribute is None else attribute)
@@ -136,16 +160,17 @@ class MaterialExporter:
                  warnings: Warnings, unread: list[str] | None = None) -> Surface:
         """unread: gets what is inexact, which then is no warning."""
         if material is None:
-            return Surface(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
+            return Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
         # From 5.0 on every material has nodes and use_nodes only warns.
         if bpy.app.version < (5, 0, 0) and not material.use_nodes or material.node_tree is None:
-            return Surface(ColorExpression(np.array(material.diffuse_color[:3])))
+            return Surface.matt(ColorExpression(np.array(material.diffuse_color[:3])))
         output = output_node(material.node_tree)
         if output is None:
             warnings.add(f'material "{material.name}" has no output node: it is black')
             return Surface()
         reader = NodeReader(f'material "{material.name}"', self.images, warnings, backfacing,
-                            None if unread is None else Warnings(), varying_emission=True)
+                            None if unread is None else Warnings(), varying_emission=True,
+                            mirrors=self.mirrors)
         surface = reader.surface(output.inputs['Surface'])
         if unread is not None:
             unread += reader.unread

@@ -106,6 +106,8 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_material_corner_colors': (_handle, _int, _floats),
     'rb_set_material_emission_image': (_handle, _int, _int, _floats),
     'rb_set_material_emission_corner_colors': (_handle, _int, _floats),
+    'rb_set_material_diffuse': (_handle, _int, _floats, _floats),
+    'rb_set_material_grazing': (_handle, _int, _floats),
     'rb_set_material_opacity': (_handle, _int, _float),
     'rb_set_material_opacity_image': (_handle, _int, _int),
     'rb_add_mesh': (_handle, _text, _floats, _size, _ints, _size, _ints, _size, _ints, _out(_int)),
@@ -348,6 +350,18 @@ class Scene(_Handle):
         weight = _float_array(weight, (2, 3), "weight")
         self._library.rb_set_material_emission_corner_colors(
             self._pointer, material, _as_floats(weight))
+
+    def set_material_diffuse(self, material: int, scale: np.ndarray, offset: np.ndarray) -> None:
+        """(2, 3) each: of the reflectance, scale times it plus offset is diffuse, the rest gloss."""
+        scale = _float_array(scale, (2, 3), "scale")
+        offset = _float_array(offset, (2, 3), "offset")
+        self._library.rb_set_material_diffuse(
+            self._pointer, material, _as_floats(scale), _as_floats(offset))
+
+    def set_material_grazing(self, material: int, grazing: np.ndarray) -> None:
+        """(2, 3): what light from straight above lacks of the reflectance."""
+        grazing = _float_array(grazing, (2, 3), "grazing")
+        self._library.rb_set_material_grazing(self._pointer, material, _as_floats(grazing))
 
     def set_material_opacity(self, material: int, opacity: float) -> None:
         """opacity: 0 to 1, share of the light that does not pass straight through."""

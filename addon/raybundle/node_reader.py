@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Node trees of materials, lights and the world -> colours and shaders of the simple kind that
-radiosity needs: diffuse reflectance and emission.
+radiosity needs: reflectance, what of it is diffuse, and emission. Gloss spreads as if it were
+diffuse.
 
 A tree is read from its output towards its inputs. What cannot be read takes the value of the socket
 (or the mean of the image) and is named in the warnings.
@@ -10,14 +11,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
 from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
+from .gloss import GlossAlbedo, gloss_albedo
 from .image_export import ImagePixels, sphere_mean
+from .principled import GLOSS_SOCKETS, METAL_IOR, principled_albedo
 from .scene_data import Warnings
 
 # Values of the Light Path node as diffuse light sees a surface.
@@ -43,6 +46,11 @@ _MATH: dict[str, Callable[[float, float], float]] = {
 }
 
 
+# Shaders that are gloss alone.
+GLOSSY = ('BSDF_GLOSSY', 'BSDF_ANISOTROPIC', 'BSDF_METALLIC')
+MIRRORS = "mirrors: what it mirrors spreads here as if it were diffuse"
+
+
 @dataclass(frozen=True)
 class Surface:
     """What a shader is to diffuse light, seen from one side."""
@@ -50,6 +58,14 @@ class Surface:
     reflectance: ColorExpression = field(default_factory=ColorExpression)
     radiance: ColorExpression = field(default_factory=ColorExpression)
     transmittance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) straight through
+    # What of the reflectance is a diffuse colour.
+    diffuse: ColorExpression = field(default_factory=ColorExpression)
+    # (3,): what light from straight above lacks of it.
+    grazing: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @staticmethod
+    def matt(color: ColorExpression) -> Surface:
+        return Surface(color, diffuse=color)
 
     @property
     def emission(self) -> np.ndarray:
@@ -58,7 +74,8 @@ class Surface:
 
     def scaled(self, factor: float) -> Surface:
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
-                       self.transmittance * factor)
+                       self.transmittance * factor, self.diffuse.scaled(factor),
+                       self.grazing * factor)
 
 
 @dataclass(frozen=True)
@@ -76,18 +93,20 @@ class NodeReader:
 
     What is only approximated goes to the warnings. What a node does and the reader cannot express
     goes to `inexact`, for there is another way to it (surface_bake.py); by default it is a warning
-    too. varying_emission: whether emission may be more than a constant.
+    too. varying_emission: whether emission may be more than a constant. mirrors: whether diffuse
+    light sees gloss.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
                  backfacing: bool = False, inexact: Warnings | None = None,
-                 varying_emission: bool = False) -> None:
+                 varying_emission: bool = False, mirrors: bool = True) -> None:
         self.owner = owner  # what warnings name, such as 'material "Wall"'
         self.images = images
         self.warnings = warnings
         self.backfacing = backfacing
         self.inexact = warnings if inexact is None else inexact
         self.varying_emission = varying_emission
+        self.mirrors = mirrors
         self.unread: list[str] = []  # what is inexact, without the consequences
 
     # ----------------------------------------------------------------------------------------------
@@ -102,9 +121,12 @@ class NodeReader:
         if node is None:
             return Surface()
         if node.type == 'BSDF_DIFFUSE':
-            return Surface(self.color(node.inputs['Color'], path))
+            return Surface.matt(self.color(node.inputs['Color'], path))
         if node.type == 'BSDF_PRINCIPLED':
             return self._principled(node, path)
+        if node.type in GLOSSY:
+            self._warn(node, MIRRORS)
+            return self._glossy(node, path)
         if node.type in ('EMISSION', 'BACKGROUND'):
             strength = self.value(node.inputs['Strength'], path)
             return Surface(
@@ -125,7 +147,7 @@ class NodeReader:
             return self._sum([self.surface(socket, path) for socket in node.inputs], node)
         if node.type == 'SUBSURFACE_SCATTERING':
             self._warn(node, "is read as a diffuse surface")
-            return Surface(self.color(node.inputs['Color'], path))
+            return Surface.matt(self.color(node.inputs['Color'], path))
         self._warn(node, "is not diffuse: it reflects nothing and stops the light")
         return Surface()
 
@@ -133,9 +155,6 @@ class NodeReader:
         # Sockets were renamed in 4.0.
         transmission = _input(node, 'Transmission Weight', 'Transmission')
         emission = _input(node, 'Emission Color', 'Emission')
-        diffuse = self._albedo(node, path)
-        for socket in (node.inputs['Metallic'], transmission):
-            diffuse *= 1.0 - float(np.clip(self.value(socket, path), 0.0, 1.0))
         alpha = float(np.clip(self.value(node.inputs['Alpha'], path), 0.0, 1.0))
         strength = self.value(node.inputs['Emission Strength'], path)
         radiance = ColorExpression()
@@ -145,17 +164,39 @@ class NodeReader:
         transmittance = WHITE * (1.0 - alpha)
         metallic = float(np.clip(self.value(node.inputs['Metallic'], path), 0.0, 1.0))
         if metallic > 0.0:
-            self._warn(node, "is metallic: that part of it reflects nothing")
+            self._warn(node, MIRRORS)
         through = float(np.clip(self.value(transmission, path), 0.0, 1.0)) * (1.0 - metallic)
         if through > 0.0:
             self._warn(node, "lets light through: it goes straight on here")
             transmittance = transmittance + alpha * through * np.clip(base.mean(), 0.0, 1.0)
-        return Surface(base.scaled(diffuse * alpha), radiance.scaled(alpha), transmittance)
+        mean = np.clip(base.mean(), 0.0, 1.0)
+        albedo = principled_albedo(
+            *(self._usual(_input(node, *names), path, usual) for names, usual in GLOSS_SOCKETS),
+            node.distribution == 'MULTI_GGX', mean, self.mirrors)
+        opaque = 1.0 - metallic - through
+        reflectance = base.scaled(opaque * albedo.diffuse + metallic * albedo.metal).plus(
+            ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
+        grazing = (opaque * (mean * albedo.diffuse_grazing + albedo.specular_grazing)
+                   + metallic * albedo.metal_grazing)
+        return Surface(reflectance.scaled(alpha), radiance.scaled(alpha), transmittance,
+                       base.scaled(opaque * albedo.shown * alpha), alpha * grazing * WHITE)
 
-    def _albedo(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> float:
-        source = _follow(node.inputs['Roughness'], path)
-        # One that varies counts as half rough.
-        return principled_albedo(0.5 if source.node else _default_value(source.socket))
+    def _glossy(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
+        if not self.mirrors:
+            return Surface()
+        color = self.color(_input(node, 'Color', 'Base Color'), path)
+        names, usual = GLOSS_SOCKETS[0]
+        albedo = glossy_albedo(node, self._usual(_input(node, *names), path, usual))
+        mean = np.maximum(np.clip(color.mean(), 0.0, 1.0), 1e-6)
+        return Surface(color.scaled(albedo.of(mean, node.distribution == 'MULTI_GGX') / mean))
+
+    def _usual(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...],
+               usual: float) -> float:
+        """A value that is no reason to ask Cycles: where it varies it is the usual one."""
+        source = _follow(socket, path)
+        if source.node is None:
+            return _default_value(source.socket)
+        return source.output.default_value if source.node.type == 'VALUE' else usual
 
     def _transmitted(self, node: bpy.types.Node, socket: bpy.types.NodeSocket,
                      path: tuple[bpy.types.Node, ...]) -> np.ndarray:
@@ -169,7 +210,9 @@ class NodeReader:
         for part in parts:
             total = Surface(self._plus(total.reflectance, part.reflectance, node),
                             self._plus(total.radiance, part.radiance, node),
-                            total.transmittance + part.transmittance)
+                            total.transmittance + part.transmittance,
+                            total.diffuse.plus(part.diffuse).simplified(),
+                            total.grazing + part.grazing)
         return total
 
     # ----------------------------------------------------------------------------------------------
@@ -381,16 +424,11 @@ class NodeReader:
 _VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')
 
 
-def principled_albedo(roughness: float) -> float:
-    """Of Principled's diffuse part over its base colour: mean over all directions.
-
-    Before Blender 4.0 that part is Burley's, which reflects more where it is rough: Burley,
-    "Physically-Based Shading at Disney" (2012). The parabola is within 1e-4 of the integral.
-    """
-    if bpy.app.version >= (4, 0, 0):
-        return 1.0
-    roughness = min(max(roughness, 0.0), 1.0)
-    return 0.95295 + roughness * (0.10870 + 0.00352 * roughness)
+def glossy_albedo(node: bpy.types.Node, roughness: float) -> GlossAlbedo:
+    """Of a Glossy shader (or a metal's, whose edge is as bright as it can be) of white colour."""
+    albedo = gloss_albedo(0.0 if node.distribution == 'SHARP' else roughness, METAL_IOR,
+                          correlated=bpy.app.version >= (4, 0, 0))
+    return albedo if node.type == 'BSDF_METALLIC' else replace(albedo, edge=0.0)
 
 
 def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:

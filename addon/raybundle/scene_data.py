@@ -22,7 +22,7 @@ class ImageData:
 
 @dataclass(frozen=True)
 class MaterialData:
-    """Diffuse reflectance and emission of the front side (row 0) and the back side (row 1)."""
+    """Reflectance and emission of the front side (row 0) and the back side (row 1)."""
 
     name: str
     reflectance: np.ndarray  # (2, 3)
@@ -35,6 +35,11 @@ class MaterialData:
     emission_color_weight: np.ndarray | None = None  # (2, 3), W/m^2, of the corner colours
     opacity: float = 1.0  # share of the light that does not pass straight through
     opacity_image: int | None = None  # multiplies it, by the mean of its channels
+    # (2, 3) each: scale * reflectance + offset is diffuse, the rest gloss.
+    diffuse_scale: np.ndarray = field(default_factory=lambda: np.ones((2, 3)))
+    diffuse_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    # (2, 3): what light from straight above lacks of the reflectance.
+    grazing: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
 
 
 @dataclass(frozen=True)

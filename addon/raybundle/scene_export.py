@@ -133,7 +133,9 @@ class _Exporter:
         self.context = context
         self.selected = selected
         self.result = SceneExport()
-        self.materials = MaterialExporter(self.result.scene, self.result.warnings)
+        cycles = getattr(context.scene, 'cycles', None)  # missing where that add-on is off
+        self.materials = MaterialExporter(self.result.scene, self.result.warnings,
+                                          getattr(cycles, 'caustics_reflective', True))
         self.members = LightSetMembers(list(light_sets), self.result.scene)
         self._baked: dict[bpy.types.Object, BakedSurface] = {}
         self._meshes: dict[tuple, int | MeshError] = {}

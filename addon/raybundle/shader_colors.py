@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Node trees rewritten so that they emit one of their own properties, for Cycles to evaluate.
 
-Each shader gives way to an emission shader of its diffuse reflectance, its radiance or its
-transmittance; mixes and sums of shaders stay as they are, because all three are linear in them.
-The tables say the same as node_reader.py; here whatever is linked to a socket stays linked.
+Each shader gives way to an emission shader of its reflectance, what of that is diffuse, its
+radiance or its transmittance; mixes and sums of shaders stay as they are, because all of these are
+linear in them. The tables say the same as node_reader.py; here whatever is linked to a socket stays
+linked, but for those that gloss depends on (principled.py).
 """
 
 from __future__ import annotations
@@ -11,9 +12,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import bpy
+import numpy as np
 
-REFLECTANCE, RADIANCE, TRANSMITTANCE = 'REFLECTANCE', 'RADIANCE', 'TRANSMITTANCE'
-PROPERTIES = (REFLECTANCE, RADIANCE, TRANSMITTANCE)
+from .node_reader import GLOSSY, glossy_albedo
+from .principled import GLOSS_SOCKETS, PrincipledAlbedo, principled_albedo
+
+REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE = (
+    'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE')
+# DIFFUSE is the reflectance where nothing has gloss.
+PROPERTIES = (REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE)
+_USUAL_COLOR = 0.5  # of a metal whose colour varies
 
 # A value of the rewritten tree: an output of a node, or a constant.
 _Value = object
@@ -22,13 +30,16 @@ _Value = object
 class ShaderColors:
     """Rewrites trees that nobody else uses; copies of groups are in `groups`, to be removed."""
 
-    def __init__(self, wanted: str, light_path: dict[str, float], backfacing: bool = False) -> None:
+    def __init__(self, wanted: str, light_path: dict[str, float], backfacing: bool = False,
+                 mirrors: bool = True) -> None:
         self.wanted = wanted
+        self.mirrors = mirrors  # whether diffuse light sees gloss
         self.light_path = light_path  # values of the Light Path node's outputs; others are 0
         self.backfacing = backfacing
         self.groups: list[bpy.types.NodeTree] = []
         self.found = False  # whether any shader may have the property
         self.has_backfacing = False
+        self.has_gloss = False
 
     def rewrite(self, tree: bpy.types.NodeTree) -> None:
         for node in list(tree.nodes):
@@ -50,10 +61,11 @@ class ShaderColors:
                 self._rewrite_shader(tree, node)
 
     def _rewrite_shader(self, tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
+        self.has_gloss |= node.type == 'BSDF_PRINCIPLED' or node.type in GLOSSY
         build = _SHADERS.get((node.type, self.wanted))
         # A muted shader passes nothing on.
         if build is not None and not node.mute:
-            color = build(_Formula(tree), node)
+            color = build(_Formula(tree, self.mirrors), node)
             if not isinstance(color, tuple) or any(color):
                 self.found = True
                 emission = tree.nodes.new('ShaderNodeEmission')
@@ -94,8 +106,9 @@ def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: _Value) 
 class _Formula:
     """Adds the nodes of a formula to a tree; constants stay constants."""
 
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
+    def __init__(self, tree: bpy.types.NodeTree, mirrors: bool) -> None:
         self.tree = tree
+        self.mirrors = mirrors
 
     def value(self, node: bpy.types.Node, *names: str) -> _Value:
         """A number, clamped to 0 to 1, by the first of the names that exists."""
@@ -164,11 +177,52 @@ def _emission(formula: _Formula, node: bpy.types.Node) -> _Value:
 _TRANSMISSION = ('Transmission Weight', 'Transmission')
 
 
+def _usual(formula: _Formula, node: bpy.types.Node, names: tuple[str, ...], usual: float) -> float:
+    value = formula.raw(node, *names)
+    return usual if isinstance(value, bpy.types.NodeSocket) else value
+
+
+def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlbedo:
+    base = formula.raw(node, 'Base Color')
+    return principled_albedo(
+        *(_usual(formula, node, names, usual) for names, usual in GLOSS_SOCKETS),
+        node.distribution == 'MULTI_GGX',
+        float(np.mean(base)) if isinstance(base, tuple) else _USUAL_COLOR, formula.mirrors)
+
+
+def _principled_shares(formula: _Formula, node: bpy.types.Node) -> tuple[_Value, _Value]:
+    """What is neither metal nor lets light through, and metal."""
+    alpha, metallic = formula.value(node, 'Alpha'), formula.value(node, 'Metallic')
+    opaque = formula.times(formula.rest(metallic),
+                           formula.rest(formula.value(node, *_TRANSMISSION)))
+    return formula.times(opaque, alpha), formula.times(metallic, alpha)
+
+
 def _principled_reflectance(formula: _Formula, node: bpy.types.Node) -> _Value:
-    share = formula.times(formula.rest(formula.value(node, 'Metallic')),
-                          formula.rest(formula.value(node, *_TRANSMISSION)))
+    albedo, base = _principled_albedo(formula, node), formula.raw(node, 'Base Color')
+    opaque, metal = _principled_shares(formula, node)
+    white = (1.0, 1.0, 1.0)
+    return formula.plus(
+        formula.plus(formula.scaled(base, formula.times(opaque, albedo.diffuse)),
+                     formula.scaled(base, formula.times(metal, float(albedo.metal)))),
+        formula.plus(formula.scaled(white, formula.times(opaque, albedo.specular)),
+                     formula.scaled(white, formula.times(metal, float(albedo.metal_edge)))))
+
+
+def _principled_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
+    opaque, _ = _principled_shares(formula, node)
     return formula.scaled(formula.raw(node, 'Base Color'),
-                          formula.times(share, formula.value(node, 'Alpha')))
+                          formula.times(opaque, _principled_albedo(formula, node).shown))
+
+
+def _glossy(formula: _Formula, node: bpy.types.Node) -> _Value:
+    if not formula.mirrors:
+        return (0.0, 0.0, 0.0)
+    color = formula.raw(node, 'Base Color' if 'Base Color' in node.inputs else 'Color')
+    mean = float(np.mean(color)) if isinstance(color, tuple) else _USUAL_COLOR
+    albedo = glossy_albedo(node, _usual(formula, node, *GLOSS_SOCKETS[0]))
+    return formula.scaled(color, float(albedo.of(mean, node.distribution == 'MULTI_GGX'))
+                          / max(mean, 1e-6))
 
 
 def _principled_radiance(formula: _Formula, node: bpy.types.Node) -> _Value:
@@ -188,13 +242,17 @@ def _principled_transmittance(formula: _Formula, node: bpy.types.Node) -> _Value
 # The colour of a property, by kind of shader; a shader that is not here has none of it.
 _SHADERS: dict[tuple[str, str], Callable[[_Formula, bpy.types.Node], _Value]] = {
     ('BSDF_DIFFUSE', REFLECTANCE): _color,
+    ('BSDF_DIFFUSE', DIFFUSE): _color,
     ('SUBSURFACE_SCATTERING', REFLECTANCE): _color,
+    ('SUBSURFACE_SCATTERING', DIFFUSE): _color,
     ('EMISSION', RADIANCE): _emission,
     ('BSDF_TRANSPARENT', TRANSMITTANCE): _color,
     ('BSDF_GLASS', TRANSMITTANCE): _color,
     ('BSDF_REFRACTION', TRANSMITTANCE): _color,
     ('BSDF_TRANSLUCENT', TRANSMITTANCE): _color,
     ('BSDF_PRINCIPLED', REFLECTANCE): _principled_reflectance,
+    ('BSDF_PRINCIPLED', DIFFUSE): _principled_diffuse,
     ('BSDF_PRINCIPLED', RADIANCE): _principled_radiance,
     ('BSDF_PRINCIPLED', TRANSMITTANCE): _principled_transmittance,
+    **{(kind, REFLECTANCE): _glossy for kind in GLOSSY},
 }

@@ -23,11 +23,14 @@ import numpy as np
 from .face_atlas import BORDER, FaceAtlas, face_atlas
 from .material_fingerprint import material_fingerprint
 from .node_reader import LIGHT_PATH
-from .shader_colors import PROPERTIES, RADIANCE, REFLECTANCE, TRANSMITTANCE, ShaderColors
+from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSMITTANCE,
+                            ShaderColors)
 
 # Within a pixel.
 _SAMPLES = 4
 _UV_MAP = "Raybundle Bake"
+# Where pixels are compared, between the middle of a face (0) and its corners (1).
+_PLACES = (0.2, 0.5, 0.8)
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,9 @@ class BakedMaterial:
     reflectance: np.ndarray
     radiance: np.ndarray | None  # None: emits nothing
     opacity: np.ndarray | None  # None: lets nothing through
+    # (3,) each: scale * reflectance + offset is diffuse, as nearly as that goes for all its pixels.
+    diffuse_scale: np.ndarray
+    diffuse_offset: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -102,7 +108,7 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
             slots: list[int], pixel: float) -> bytes:
     content = hashlib.blake2b(digest_size=16)
     depsgraph = context.evaluated_depsgraph_get()
-    content.update(repr((slots, round(pixel, 9), context.scene.frame_current,
+    content.update(repr((slots, round(pixel, 9), context.scene.frame_current, _mirrors(context),
                          [tuple(row) for row in item.evaluated_get(depsgraph).matrix_world],
                          tuple(item.color), item.pass_index,
                          tuple(mesh.texspace_location), tuple(mesh.texspace_size))).encode())
@@ -160,6 +166,8 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
     images = {}
     with _stage(context, item, mesh) as stage:
         for wanted_property in PROPERTIES:
+            if wanted_property == DIFFUSE and not stage.has_gloss:
+                continue
             sides = []
             for backfacing in (False, True):
                 colors = stage.bake(wanted_property, set(reasons), atlas, backfacing)
@@ -175,11 +183,46 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
         through = np.clip(images[TRANSMITTANCE], 0.0, 1.0).mean(axis=2, keepdims=True)
         opacity = np.repeat(1.0 - through, 3, axis=2)
     black = np.zeros((atlas.height, atlas.width, 3), np.float32)
+    whole = images.get(REFLECTANCE, black)
+    diffuse = images.get(DIFFUSE, black) if stage.has_gloss else whole
+    sizes = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get('loop_total', sizes)
     return BakedSurface(atlas.uvs, {
         slot: BakedMaterial(f'material "{item.material_slots[slot].material.name}": baked by '
                             f'Cycles on "{item.name}", because of {reason}',
-                            images.get(REFLECTANCE, black), images.get(RADIANCE), opacity)
+                            whole, images.get(RADIANCE), opacity,
+                            *_line_through(*_pixels(atlas, sizes, slots == slot, whole, diffuse)))
         for slot, reason in reasons.items()})
+
+
+def _pixels(atlas: FaceAtlas, sizes: np.ndarray, faces: np.ndarray, *images: np.ndarray
+            ) -> list[np.ndarray]:
+    """(n, 3) of each image, at some places in each of the faces (a mask)."""
+    firsts = np.cumsum(sizes) - sizes
+    centres = np.repeat(np.add.reduceat(atlas.uvs, firsts) / sizes[:, None], sizes, axis=0)
+    inside = np.repeat(faces, sizes)
+    places = np.concatenate([centres[inside] + share * (atlas.uvs - centres)[inside]
+                             for share in _PLACES])
+    column, row = (np.clip((places[:, k] * size).astype(int), 0, size - 1)
+                   for k, size in enumerate((atlas.width, atlas.height)))
+    return [image[row, column].astype(np.float64) for image in images]
+
+
+def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """scale and offset, (3,) each, of y over x, both (n, 3), by least squares; a line through zero
+    where x hardly varies."""
+    means = x.mean(axis=0), y.mean(axis=0)
+    spread = ((x - means[0])**2).sum(axis=0)
+    varies = spread > 1e-6 * (x**2).sum(axis=0)
+    scale = np.where(
+        varies, ((x - means[0]) * (y - means[1])).sum(axis=0) / np.where(varies, spread, 1.0),
+        means[1] / np.maximum(means[0], 1e-9))
+    return scale, np.where(varies, means[1] - scale * means[0], 0.0)
+
+
+def _mirrors(context: bpy.types.Context) -> bool:
+    """Reflective Caustics; Cycles' settings are missing where that add-on is off."""
+    return getattr(getattr(context.scene, 'cycles', None), 'caustics_reflective', True)
 
 
 def _atlas(mesh: bpy.types.Mesh, matrix: np.ndarray, wanted: np.ndarray, pixel: float
@@ -201,6 +244,7 @@ class _Stage:
                  scene: bpy.types.Scene, item: bpy.types.Object) -> None:
         self.context, self.source, self.scene, self.item = context, source, scene, item
         self.has_backfacing = False
+        self.has_gloss = False
 
     def bake(self, wanted: str, slots: set[int], atlas: FaceAtlas, backfacing: bool
              ) -> np.ndarray | None:
@@ -232,13 +276,14 @@ class _Stage:
             if index in slots:
                 material = slot.material.copy()
                 made.append(material)
-                colors = ShaderColors(wanted, LIGHT_PATH, backfacing)
+                colors = ShaderColors(wanted, LIGHT_PATH, backfacing, _mirrors(self.context))
                 try:
                     colors.rewrite(material.node_tree)
                 finally:
                     made += colors.groups
                 found |= colors.found
                 self.has_backfacing |= colors.has_backfacing
+                self.has_gloss |= colors.has_gloss
             else:
                 material = bpy.data.materials.new(_UV_MAP)
                 made.append(material)
