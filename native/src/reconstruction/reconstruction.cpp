@@ -10,6 +10,7 @@
 #include "patches/reflectance.h"
 #include "reconstruction/area_average.h"
 #include "reconstruction/corner_gather.h"
+#include "reconstruction/face_slopes.h"
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
 
@@ -157,6 +158,9 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                 const Field& reflectances = nodes.back();
                 for (size_t v = 0; v < direct.size(); ++v)
                     exitance[v] = emission[v] + reflectances[v] * (direct[v] + indirect[v]);
+            } else if (settings.reconstruction == "LEAST_SQUARES") {
+                addFaceSlopes(patches, ranges[i], regions, instance.side, reflectance, lights[k],
+                              settings.targetError, direct, exitance);
             }
             CornerLight light = cornerLight(regions, direct, indirect, exitance);
             if (k == 0)

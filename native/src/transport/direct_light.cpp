@@ -35,6 +35,8 @@ constexpr float kSmooth = 1.1f;
 // A patch smaller than this share of its distance from a source needs one point only: the error is
 // about a quarter of its square, 0.3 %.
 constexpr float kFar = 0.1f;
+// Points of a source by which its light at the corners of a face is compared: the same for all.
+constexpr uint32_t kSlopeSamples = 32;
 // For the power balance: rays of all sources together, and of each at least.
 constexpr uint32_t kEscapeRays = 16384, kLeastEscapeRays = 1024;
 
@@ -456,6 +458,31 @@ glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
         sum += share * sample.irradiance;
     }
     return sum;
+}
+
+void DirectLight::unblocked(uint32_t side, const glm::vec3* points, size_t count, float even,
+                            glm::vec3* light) const {
+    const Place place(patches, {side, patches.normal(side), std::nullopt, side});
+    std::fill(light, light + count, glm::vec3(0.0f));
+    // The same for all sources, so that sets of them get the same in one bake and in several.
+    const SobolPoints samples(hash(seed, side));
+    for (const auto& source : sources) {
+        if (isOutOfSight(*source, place)) continue;
+        const bool isEven = place.radius < even * source->distance(place.centroid());
+        auto at = [&](const glm::vec3& point) {
+            if (const auto closed = source->irradiance(point, place.normal)) return *closed;
+            glm::vec3 sum(0.0f);
+            for (uint32_t i = 0; i < kSlopeSamples; ++i)
+                sum += source->sample(point, place.normal, {samples[i].z, samples[i].w}).irradiance;
+            return sum / float(kSlopeSamples);
+        };
+        if (isEven) {
+            const glm::vec3 middle = at(place.centroid());
+            for (size_t k = 0; k < count; ++k) light[k] += middle;
+        } else {
+            for (size_t k = 0; k < count; ++k) light[k] += at(points[k]);
+        }
+    }
 }
 
 bool DirectLight::hasPassingLight(uint32_t side) const {

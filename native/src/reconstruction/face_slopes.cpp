@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/face_slopes.h"
+
+#include <algorithm>
+#include <array>
+
+namespace raybundle {
+
+void addFaceSlopes(const Patches& patches, const InstanceRange& range, const SmoothRegions& regions,
+                   rb_side side, const std::vector<glm::vec3>& reflectance, const SetLight& light,
+                   float targetError, std::vector<glm::vec3>& direct,
+                   std::vector<glm::vec3>& exitance) {
+    if (light.direct.lightSources().empty()) return;
+    std::vector<uint32_t> cells(regions.nodeCount, 0), patchesOf(range.lastCell - range.firstCell);
+    auto forEachNode = [&](const Cell& cell, const auto& visit) {
+        for (int k = 0; k < 4; ++k)
+            if (cell.corner[k] >= 0) visit(k, regions.nodeOf[size_t(cell.corner[k])]);
+    };
+    for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+        forEachNode(patches.cells[c], [&](int, uint32_t node) { ++cells[node]; });
+    for (uint32_t p = range.firstParent; p < range.lastParent; ++p)
+        patchesOf[patches.parents[p].cell - range.firstCell] += patches.parents[p].patchCount();
+
+    for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+        const Parent& parent = patches.parents[p];
+        const Cell& cell = patches.cells[parent.cell];
+        if (patchesOf[parent.cell - range.firstCell] != 1) continue;
+        bool isAlone = true;
+        std::array<glm::vec3, 4> points, values;
+        std::array<uint32_t, 4> nodes;
+        size_t count = 0;
+        forEachNode(cell, [&](int k, uint32_t node) {
+            isAlone = isAlone && cells[node] == 1;
+            points[count] = cell.position(k);
+            nodes[count++] = node;
+        });
+        const uint32_t at = 2 * parent.firstPatch + uint32_t(side);
+        const glm::vec3 gathered = light.irradiance.gathered[at];
+        if (!isAlone || gathered == glm::vec3(0.0f)) continue;
+        // Slopes that make less than a part of the target error are no matter.
+        light.direct.unblocked(at, points.data(), count, 0.25f * targetError, values.data());
+        glm::vec3 mean(0.0f), share(0.0f);
+        for (size_t k = 0; k < count; ++k) mean += values[k] / float(count);
+        for (int c = 0; c < 3; ++c)
+            if (mean[c] > 0) share[c] = std::min(1.0f, gathered[c] / mean[c]);
+        for (size_t k = 0; k < count; ++k) {
+            const glm::vec3 slope = glm::max(share * (values[k] - mean), -gathered);
+            direct[nodes[k]] += slope;
+            exitance[nodes[k]] += reflectance[at] * slope;
+        }
+    }
+}
+
+}  // namespace raybundle
