@@ -620,6 +620,26 @@ def test_gloss_beside_an_image(principled):
     assert (scale * bright + offset > 0.45).all() and (scale * bright + offset < 0.51).all()
 
 
+def test_all_of_a_matt_material_is_diffuse(principled):
+    tree = principled.node_tree
+    texture = tree.nodes.new('ShaderNodeTexImage')
+    texture.image = new_image(np.full((2, 2, 3), 0.25, np.float32), True)
+    # White less the image: a negative weight.
+    mix = tree.nodes.new('ShaderNodeMixRGB')
+    mix.blend_type = 'SUBTRACT'
+    mix.inputs['Fac'].default_value = 1.0
+    mix.inputs['Color1'].default_value = (1.0, 1.0, 1.0, 1.0)
+    tree.links.new(texture.outputs['Color'], mix.inputs['Color2'])
+    shader = tree.nodes.new('ShaderNodeBsdfDiffuse')
+    tree.links.new(mix.outputs[0], shader.inputs['Color'])
+    output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
+    tree.links.new(shader.outputs[0], output.inputs['Surface'])
+    material, _ = exported_material(principled)
+    assert (material.image_weight < 0.0).all()
+    assert material.diffuse_scale == pytest.approx(np.ones((2, 3)))
+    assert material.diffuse_offset == pytest.approx(np.zeros((2, 3)))
+
+
 def test_gloss_of_what_cycles_bakes(principled):
     add_noise(principled)
     matt = exported_material(principled)[0]

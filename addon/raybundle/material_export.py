@@ -41,7 +41,7 @@ def _share_coordinates(surface: Surface) -> bool:
 def _diffuse_of(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """scale and offset, (3,) each: the surface's diffuse colour is scale * reflectance + offset."""
     whole, diffuse = surface.reflectance, surface.diffuse
-    if diffuse.texture is not None and diffuse.texture.same_as(whole.texture):
+    if diffuse.texture and whole.texture and diffuse.texture.same_as(whole.texture):
         scale = _ratio(diffuse.texture_weight, whole.texture_weight)
     elif diffuse.attribute is not None and diffuse.attribute == whole.attribute:
         scale = _ratio(diffuse.attribute_weight, whole.attribute_weight)
@@ -51,7 +51,7 @@ def _diffuse_of(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    return np.divide(part, whole, out=np.zeros(3), where=whole > 0.0)
+    return np.divide(part, whole, out=np.zeros(3), where=whole != 0.0)
 
 
 class MaterialExporter:
