@@ -275,6 +275,36 @@ def test_smooth_and_flat_normals(new_object):
     positions = smooth.vertices[smooth.corner_vertices]
     # The mean of three faces points along the diagonal; normals may be stored in 16 bits.
     assert smooth.corner_normals == pytest.approx(positions / math.sqrt(3.0), abs=1e-4)
+    # Some faces smooth: these have the normals of their vertices, the others their own.
+    item.data.polygons.foreach_set('use_smooth', [True, False] * 3)
+    item.data.update()
+    bpy.context.view_layer.update()
+    mixed = export().scene.meshes[0]
+    assert mixed.face_smooth.tolist() == [True, False] * 3
+    is_smooth = np.repeat(mixed.face_smooth, 4)[:, None]
+    assert mixed.corner_normals == pytest.approx(
+        np.where(is_smooth, smooth.corner_normals, flat), abs=1e-4)
+
+
+@pytest.mark.skipif(bpy.app.version >= (4, 1, 0), reason="edges split normals by themselves")
+def test_auto_smooth_splits_the_normals_of_sharp_edges(new_object):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    flat = export().scene.meshes[0].corner_normals
+    item.data.polygons.foreach_set('use_smooth', [True] * 6)
+    item.data.use_auto_smooth, item.data.auto_smooth_angle = True, math.radians(30.0)
+    item.data.update()
+    bpy.context.view_layer.update()
+    assert export().scene.meshes[0].corner_normals == pytest.approx(flat, abs=1e-4)
+
+
+def test_meshes_with_the_same_counts_stay_apart_and_copies_do_not(new_object):
+    stretched = [(2.0 * x, y, z) for x, y, z in CUBE_VERTICES]
+    for name, vertices in (("A", CUBE_VERTICES), ("B", stretched), ("C", CUBE_VERTICES),
+                           ("D", stretched)):
+        new_object(name, vertices, CUBE_FACES)
+    result = export().scene
+    assert [item.mesh for item in result.instances] == [0, 1, 0, 1]
+    assert len(result.meshes) == 2
 
 
 # --------------------------------------------------------------------------------------------------

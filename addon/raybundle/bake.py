@@ -18,7 +18,7 @@ from . import bake_cache, color_attribute, native
 from .bake_report import BakeError, BakeReport, ObjectReport
 from .corner_map import CornerMap, grouped_mean
 from .light_sets import LightSet, read_light_sets
-from .mesh_export import read
+from .mesh_export import corner_vertices
 from .native import ErrorCode, Progress, RaybundleError
 from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings
@@ -211,8 +211,7 @@ def _read_results(native_bake: native.Bake, export: SceneExport,
                 target.instance, settings.output, mesh.corner_count, light_set))
             if settings.domain == 'POINT':
                 original = target.object.data
-                light = grouped_mean(light, read(original.loops, 'vertex_index', np.int32),
-                                     len(original.vertices))
+                light = grouped_mean(light, corner_vertices(original), len(original.vertices))
             return light
 
         error = None
@@ -232,8 +231,7 @@ def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
         squares = grouped_mean(squares, mesh.corner_vertices, len(mesh.vertices))
     elif domain == 'POINT':
         original = target.object.data
-        squares = grouped_mean(squares, read(original.loops, 'vertex_index', np.int32),
-                               len(original.vertices))
+        squares = grouped_mean(squares, corner_vertices(original), len(original.vertices))
     return np.sqrt(squares[:, 0])
 
 

@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
 
-from .mesh_export import read, topology, vertex_positions
+from .mesh_export import corner_vertices, read, topology, vertex_positions
 
 VERTEX_CODE = ".raybundle_vertex"
 CORNER_CODE = ".raybundle_corner"
@@ -83,8 +83,8 @@ def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> Cor
     count = len(original.loops)
     if same_topology(original, evaluated):
         return CornerMap(count)
-    original_vertices = read(original.loops, 'vertex_index', np.int32)
-    evaluated_vertices = read(evaluated.loops, 'vertex_index', np.int32)
+    original_vertices = corner_vertices(original)
+    evaluated_vertices = corner_vertices(evaluated)
     corners = _decoded(evaluated, CORNER_CODE, len(evaluated.loops), count)
     vertices = _decoded(evaluated, VERTEX_CODE, len(evaluated.vertices), len(original.vertices))
     corner_origin_vertices = vertices[evaluated_vertices]
@@ -176,7 +176,7 @@ def _nearest_corners(original: bpy.types.Mesh, evaluated: bpy.types.Mesh, corner
 
 def _points_inside_faces(mesh: bpy.types.Mesh) -> np.ndarray:
     """(c, 3), each corner drawn a little into its face: corners of one vertex differ by face."""
-    positions = vertex_positions(mesh)[read(mesh.loops, 'vertex_index', np.int32)]
+    positions = vertex_positions(mesh)[corner_vertices(mesh)]
     sizes = read(mesh.polygons, 'loop_total', np.int32)
     faces = np.repeat(np.arange(len(sizes)), sizes)
     centres = grouped_mean(positions, faces, len(sizes))[faces]

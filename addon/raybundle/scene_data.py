@@ -56,6 +56,11 @@ class MeshData:
     corner_colors: np.ndarray | None = None  # (c, 3) float32, linear RGB
 
     @property
+    def counts(self) -> tuple[int, int, int]:
+        """Of vertices, corners and faces."""
+        return len(self.vertices), self.corner_count, self.face_count
+
+    @property
     def corner_count(self) -> int:
         return len(self.corner_vertices)
 

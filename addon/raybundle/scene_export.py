@@ -139,7 +139,8 @@ class _Exporter:
         self.members = LightSetMembers(list(light_sets), self.result.scene)
         self._baked: dict[bpy.types.Object, BakedSurface] = {}
         self._meshes: dict[tuple, int | MeshError] = {}
-        self._mesh_digests: dict[bytes, int] = {}
+        # Of the exported ones, by counts and digest; None: of one that needed no digest yet.
+        self._alike: dict[tuple[int, int, int], dict[bytes | None, int]] = {}
         self._instance_counts: Counter[tuple[str, str]] = Counter()
         self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
         self._placed: set[tuple[str, int, bytes]] = set()
@@ -278,8 +279,10 @@ class _Exporter:
             try:
                 if key not in self._meshes:
                     self._meshes[key] = self._exported(item, mesh)
-                if needs_map and not isinstance(self._meshes[key], MeshError):
-                    self._corner_maps[original] = self._corner_map(original, mesh)
+                index = self._meshes[key]
+                if needs_map and not isinstance(index, MeshError):
+                    self._corner_maps[original] = self._corner_map(
+                        original, mesh, self.result.scene.meshes[index])
             finally:
                 item.to_mesh_clear()
         return self._meshes[key]
@@ -303,14 +306,28 @@ class _Exporter:
 
     def _unique(self, data: MeshData) -> int:
         """Copies of a mesh count as the same one, such as those that an earlier bake made."""
-        digest = data.digest()
-        if digest not in self._mesh_digests:
-            self._mesh_digests[digest] = len(self.result.scene.meshes)
-            self.result.scene.meshes.append(data)
-        return self._mesh_digests[digest]
+        meshes = self.result.scene.meshes
+        alike = self._alike.setdefault(data.counts, {})
+        if not alike:
+            # Most differ by their counts: nothing to digest.
+            digest = None
+        else:
+            if None in alike:
+                first = alike.pop(None)
+                alike[meshes[first].digest()] = first
+            digest = data.digest()
+        if digest not in alike:
+            alike[digest] = len(meshes)
+            meshes.append(data)
+        return alike[digest]
 
-    def _corner_map(self, original: bpy.types.Object, evaluated: bpy.types.Mesh) -> CornerMap:
-        corner_map = build_corner_map(original.data, evaluated)
+    def _corner_map(self, original: bpy.types.Object, evaluated: bpy.types.Mesh,
+                    data: MeshData) -> CornerMap:
+        mesh = original.data
+        if not original.modifiers and data.counts == (len(mesh.vertices), len(mesh.loops),
+                                                      len(mesh.polygons)):
+            return CornerMap(len(mesh.loops))
+        corner_map = build_corner_map(mesh, evaluated)
         if corner_map.filled:
             self.result.warnings.add(
                 f'"{original.name}": its modifiers keep no trace of {corner_map.filled} of its '

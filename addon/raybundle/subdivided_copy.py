@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from .mesh_export import read
+from .mesh_export import corner_vertices, read
 from .native import Subdivision
 from .scene_data import MeshData
 
@@ -39,21 +39,21 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
     """No edge of the result is longer than max_edge (m) in the world; transform: (3, 4)."""
     world = mesh.vertices @ transform[:, :3].T + transform[:, 3]
     with Subdivision(world, mesh.corner_vertices, mesh.face_offsets, max_edge) as subdivision:
-        corner_vertices = subdivision.triangles.reshape(-1)
+        vertices_of_corners = subdivision.triangles.reshape(-1)
         result = SubdividedMesh(mesh, subdivision.source_faces,
                                 subdivision.source_corners.reshape(-1, 3),
                                 subdivision.source_weights.reshape(-1, 3))
         vertex_count = len(subdivision.vertices)
     # Interpolate in object space, rather than invert a transform that may be flat.
     vertices = np.zeros((vertex_count, 3), np.float32)
-    vertices[corner_vertices] = result.interpolated(mesh.vertices[mesh.corner_vertices])
+    vertices[vertices_of_corners] = result.interpolated(mesh.vertices[mesh.corner_vertices])
     normals = result.interpolated(mesh.corner_normals)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
     return replace(result, data=replace(
         mesh,
         vertices=vertices,
-        corner_vertices=corner_vertices,
-        face_offsets=np.arange(0, len(corner_vertices) + 1, 3, dtype=np.int32),
+        corner_vertices=vertices_of_corners,
+        face_offsets=np.arange(0, len(vertices_of_corners) + 1, 3, dtype=np.int32),
         face_materials=mesh.face_materials[result.source_faces],
         corner_normals=normals.astype(np.float32),
         # The edges of the source are gone; its normals still part what is sharp and not flat.
@@ -195,10 +195,10 @@ def _carry_uv_layers(source: bpy.types.Mesh, mesh: bpy.types.Mesh, subdivided: S
 
 def _carry_color_attributes(source: bpy.types.Mesh, mesh: bpy.types.Mesh,
                             subdivided: SubdividedMesh) -> None:
-    corner_vertices = read(source.loops, 'vertex_index', np.int32)
+    vertices = corner_vertices(source)
     for attribute in source.color_attributes:
         colors = read(attribute.data, 'color', np.float32, 4)
         if attribute.domain == 'POINT':
-            colors = colors[corner_vertices]
+            colors = colors[vertices]
         new = mesh.color_attributes.new(attribute.name, attribute.data_type, 'CORNER')
         new.data.foreach_set('color', subdivided.interpolated(colors).astype(np.float32).ravel())
