@@ -29,7 +29,11 @@ constexpr float kMissed = 0.37f;
 // true error is 0.8 of the stated one in the edge of a plate's shadow (first_shot_test.cpp).
 constexpr float kMissedEdge = 0.2f;
 // A receiver that is in the dark after so many samples of a source that surrounds it stays there.
-constexpr int kDarkSamples = 256;
+// One whose neighbours are too, after fewer.
+constexpr int kDarkSamples = 256, kDarkSamplesOfDark = 64;
+// Receivers that learn together what they see of such a source: at first, and then by more samples.
+constexpr size_t kWideCluster = 128, kNearCluster = 16;
+constexpr float kNearPower = 0.9f;
 // A closed form whose largest value is so many times its smallest on a patch takes more points.
 constexpr float kSmooth = 1.1f;
 // A patch smaller than this share of its distance from a source needs one point only: the error is
@@ -160,8 +164,8 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
 void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
                               const std::function<Receiver(size_t)>& receiverAt,
                               const std::vector<Aim>& aims, Seen& seen,
-                              const std::function<void(double)>& progress,
-                              LightBySource* bySource) const {
+                              const std::function<void(double)>& progress, LightBySource* bySource,
+                              std::vector<Sightings>* sightings) const {
     constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
     for (size_t from = 0; from < these.size(); from += kSlice) {
         progress(0.5 * double(from) / double(these.size()));
@@ -169,7 +173,8 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<
             Gathered& result = results[these[k]];
             const uint64_t before = result.rays;
             result = gather(receiverAt(these[k]), aims[k], seen,
-                            bySource ? bySource->of(these[k]) : nullptr);
+                            bySource ? bySource->of(these[k]) : nullptr,
+                            sightings ? &(*sightings)[these[k]] : nullptr);
             result.rays += before;
         });
     }
@@ -178,7 +183,7 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<
 void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                                 const std::function<Receiver(size_t)>& receiverAt,
                                 const std::function<void(double)>& progress, bool hasNeighbours,
-                                LightBySource* bySource) const {
+                                LightBySource* bySource, std::vector<Sightings>* sightings) const {
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
     for (size_t side = 0; side < bundled.size(); ++side)
@@ -188,7 +193,7 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     Seen seen(sources.size());
     const Aim aim{INFINITY, hasNeighbours ? kNeighbourSamples : kFirstSamples, false};
     gatherThese(coarse.gathered, these, receiverAt, std::vector<Aim>(these.size(), aim), seen,
-                progress, bySource);
+                progress, bySource, sightings);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }
 
@@ -196,22 +201,74 @@ std::vector<Gathered> DirectLight::gather(
     size_t count, const std::function<Receiver(size_t)>& receiverAt, float targetError,
     const std::function<void(double)>& progress, CoarseShot first,
     const std::vector<ReceiverPair>& neighbours, LightBySource* bySource) const {
+    std::vector<Sightings> sightings;
     if (first.gathered.empty()) {
+        if (surrounding()) sightings.resize(count);
         first.gathered.resize(count);
         std::vector<uint32_t> these(count);
         std::iota(these.begin(), these.end(), 0u);
-        shootCoarsely(first, these, receiverAt, progress, !neighbours.empty(), bySource);
+        shootCoarsely(first, these, receiverAt, progress, !neighbours.empty(), bySource,
+                      sightings.empty() ? nullptr : &sightings);
     }
     std::vector<Gathered> results = std::move(first.gathered);
     if (sources.empty()) return results;
     Seen seen(sources.size());
     for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
 
-    const Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
+    Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
+    const auto outlooks = lookAround(further, results, receiverAt, std::move(sightings));
     gatherThese(
         results, further.receivers, receiverAt, further.aims, seen,
-        [&](double done) { progress(0.5 + done); }, bySource);
+        [&](double done) { progress(0.5 + done); }, bySource, nullptr);
     return results;
+}
+
+std::array<Outlooks, 2> DirectLight::lookAround(Aims& further, std::vector<Gathered>& results,
+                                                const std::function<Receiver(size_t)>& receiverAt,
+                                                std::vector<Sightings> sightings) const {
+    if (sightings.empty()) return {};
+    const LightSource& source = *surrounding();
+    std::vector<uint32_t> these;
+    std::vector<Aim*> aims;
+    for (size_t k = 0; k < further.aims.size(); ++k)
+        if (sightings[further.receivers[k]].seenShare() < kWellSeen) {
+            these.push_back(further.receivers[k]);
+            aims.push_back(&further.aims[k]);
+        }
+    std::array<Outlooks, 2> outlooks;
+    outlooks[0] =
+        Outlooks(source.parts(), these, receiverAt, patches, sightings, kWideCluster, 0.5f);
+    size_t count = 0;
+    for (size_t k = 0; k < these.size(); ++k) {
+        aims[k]->outlook = outlooks[0].of(k);
+        if (aims[k]->outlook->isDark) continue;
+        these[count] = these[k];
+        aims[count++] = aims[k];
+    }
+    these.resize(count);
+    tbb::parallel_for(size_t(0), count, [&](size_t k) {
+        Gathered& result = results[these[k]];
+        sightings[these[k]] = {};
+        look(source, receiverAt(these[k]), *aims[k]->outlook, sightings[these[k]], result);
+    });
+    outlooks[1] =
+        Outlooks(source.parts(), these, receiverAt, patches, sightings, kNearCluster, kNearPower);
+    for (size_t k = 0; k < count; ++k) aims[k]->outlook = outlooks[1].of(k);
+    return outlooks;
+}
+
+void DirectLight::look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,
+                       Sightings& sightings, Gathered& sum) const {
+    const Place place(patches, receiver);
+    const std::vector<float> sumOfSeen = source.sumOfSeen(place.normal, outlook.seen);
+    std::array<Block, kBlocks> blocks;
+    takeSamples(
+        source,
+        [&](const glm::vec3&, glm::vec2 uv) {
+            return source.sampleSeen(place.normal, uv, sumOfSeen);
+        },
+        SobolPoints(hash(seed, ~receiver.seed)), receiver.side, place, 0,
+        Sightings::kMost / int(kBlocks), blocks, &sightings, sum);
 }
 
 std::vector<Gathered> DirectLight::scale(const LightBySource& before,
@@ -237,13 +294,14 @@ std::vector<Gathered> DirectLight::scale(const LightBySource& before,
     further.receivers.resize(count);
     Seen seen(sources.size());
     for (std::atomic<bool>& source : seen) source = true;
-    gatherThese(results, further.receivers, receiverAt, further.aims, seen, progress, nullptr);
+    gatherThese(results, further.receivers, receiverAt, further.aims, seen, progress, nullptr,
+                nullptr);
     return results;
 }
 
 // Each source takes samples until its standard error is below `tolerance`.
-Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen,
-                             LightPart* parts) const {
+Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,
+                             Sightings* sightings) const {
     Gathered sum;
     const Place place(patches, receiver);
     const std::vector<float> weights = unblockedWeights(place);
@@ -259,7 +317,7 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
         else if (share < kMiddleShare)
             own.samples = std::max(kFewSamples, aim.samples / 2);
         if (own.samples < aim.samples) ++sum.weak;
-        const LightPart part = gatherFrom(k, receiver, place, own, seen, sum);
+        const LightPart part = gatherFrom(k, receiver, place, own, seen, sightings, sum);
         sum.add(part, isUnpowered(k, receiver.side));
         if (parts) parts[k] = part;
     }
@@ -333,11 +391,18 @@ std::vector<float> DirectLight::unblockedWeights(const Place& place) const {
 }
 
 // Samples [first, first + kBlocks * each), `each` to a block: consecutive ones are stratified.
-void DirectLight::takeSamples(const LightSource& source, const SobolPoints& points, uint32_t side,
-                              const Place& place, int first, int each,
-                              std::array<Block, kBlocks>& blocks, Gathered& sum) const {
+template <class SampleAt>
+void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleAt,
+                              const SobolPoints& points, uint32_t side, const Place& place,
+                              int first, int each, std::array<Block, kBlocks>& blocks,
+                              Sightings* sightings, Gathered& sum) const {
     std::array<ShadowRay, Visibility::kPacket> rays;
-    std::array<std::pair<glm::vec3, Block*>, Visibility::kPacket> held;
+    struct Held {
+        glm::vec3 irradiance;
+        Block* block;
+        uint32_t part;
+    };
+    std::array<Held, Visibility::kPacket> held;
     int count = 0;
     auto see = [&](Block& block, const glm::vec3& irradiance, const glm::vec3& direction) {
         block.visible += irradiance;
@@ -346,16 +411,17 @@ void DirectLight::takeSamples(const LightSource& source, const SobolPoints& poin
     auto trace = [&] {
         std::array<float, Visibility::kPacket> shares;
         visibility.visibleShares(side, rays.data(), count, shares.data());
-        for (int k = 0; k < count; ++k)
-            see(*held[size_t(k)].second, shares[size_t(k)] * held[size_t(k)].first,
-                rays[size_t(k)].direction);
+        for (size_t k = 0; k < size_t(count); ++k) {
+            see(*held[k].block, shares[k] * held[k].irradiance, rays[k].direction);
+            if (sightings) sightings->add(held[k].part, shares[k] > 0);
+        }
         sum.rays += uint64_t(count);
         count = 0;
     };
     for (int i = 0; i < int(kBlocks) * each; ++i) {
         const glm::vec4 u = points[uint32_t(first + i)];
         const glm::vec3 point = place.at({u.x, u.y});
-        const LightSample sample = source.sample(point, place.normal, {u.z, u.w});
+        const LightSample sample = sampleAt(point, glm::vec2(u.z, u.w));
         Block& block = blocks[size_t(i / each)];
         ++block.count;
         if (brightest(sample.irradiance) <= 0) continue;
@@ -364,7 +430,7 @@ void DirectLight::takeSamples(const LightSource& source, const SobolPoints& poin
             see(block, sample.irradiance, sample.direction);
             continue;
         }
-        held[size_t(count)] = {sample.irradiance, &block};
+        held[size_t(count)] = {sample.irradiance, &block, sample.part};
         rays[size_t(count++)] = {point, sample.direction, sample.distance};
         if (count == Visibility::kPacket) trace();
     }
@@ -372,9 +438,14 @@ void DirectLight::takeSamples(const LightSource& source, const SobolPoints& poin
 }
 
 LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place& place,
-                                  const Aim& aim, Seen& seen, Gathered& sum) const {
+                                  const Aim& aim, Seen& seen, Sightings* sightings,
+                                  Gathered& sum) const {
     const float tolerance = aim.tolerance;
     const LightSource& source = *sources[index];
+    const bool hasParts = !source.parts().empty();
+    const Outlook* const outlook = hasParts ? aim.outlook : nullptr;
+    const int darkSamples = outlook && outlook->isDark ? kDarkSamplesOfDark : kDarkSamples;
+    const bool isGuided = outlook && !outlook->seen.empty();
     if (isOutOfSight(source, place)) {
         ++sum.hidden;
         return {};
@@ -390,12 +461,19 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     const SobolPoints points(hash(seed, hash(receiver.seed, uint32_t(index))));
     std::optional<glm::vec3> closed;
     float closedError = 0, variance = 0;
+    const std::vector<float> sumOfSeen =
+        isGuided ? source.sumOfSeen(place.normal, outlook->seen) : std::vector<float>();
+    auto sampleAt = [&](const glm::vec3& point, glm::vec2 uv) {
+        return isGuided ? source.sampleSeen(place.normal, uv, sumOfSeen)
+                        : source.sample(point, place.normal, uv);
+    };
     for (;;) {
-        takeSamples(source, points, receiver.side, place, all.count,
-                    (next - all.count) / int(kBlocks), blocks, sum);
+        takeSamples(source, sampleAt, points, receiver.side, place, all.count,
+                    (next - all.count) / int(kBlocks), blocks, hasParts ? sightings : nullptr, sum);
         all = {};
         for (const Block& block : blocks) all.add(block);
-        if (skips.skipLit && !closed && (brightest(all.open) <= 0 || brightest(all.visible) > 0))
+        if (skips.skipLit && !closed && !isGuided &&
+            (brightest(all.open) <= 0 || brightest(all.visible) > 0))
             closed = closedMean(source, place, tolerance, closedError);
         // No sample faced the receiver: few of them may, beside a source of many faces.
         if (brightest(all.open) <= 0 && all.count < source.mostSamples() &&
@@ -410,7 +488,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                                                                      : 0;
         const float missed = part * brightest(all.open) / (float(all.count) * float(all.count));
         if (isDark) {
-            if (missed > tolerance && all.count < kDarkSamples && seen[index]) {
+            if (missed > tolerance && all.count < darkSamples && seen[index]) {
                 next = 4 * all.count;
                 continue;
             }
@@ -427,7 +505,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
         if (all.count >= aim.samples &&
             (variance <= tolerance * tolerance || all.count >= source.mostSamples()))
             break;
-        next = all.count < aim.samples ? aim.samples : 4 * all.count;
+        next = all.count < aim.samples ? aim.samples : (isGuided ? 2 : 4) * all.count;
     }
     if (closed && all.visible == all.open) ++sum.unblocked;
     const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
@@ -436,6 +514,12 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
             brightest(closed ? *closed : all.open / float(all.count)) *
                 std::sqrt(visible * (1 - visible)),
             brightest(irradiance) * all.grazing / brightest(all.visible)};
+}
+
+const LightSource* DirectLight::surrounding() const {
+    for (const auto& source : sources)
+        if (!source->parts().empty()) return source.get();
+    return nullptr;
 }
 
 bool DirectLight::isUnpowered(size_t source, uint32_t side) const {

@@ -28,6 +28,7 @@
 #include "scene/scene.h"
 #include "transport/light_by_source.h"
 #include "transport/light_source.h"
+#include "transport/outlook.h"
 #include "transport/receiver.h"
 #include "transport/sobol.h"
 #include "visibility/visibility.h"
@@ -56,6 +57,7 @@ class DirectLight {
 
     // Gathers at `count` receivers to about `targetError` relative standard error each: all
     // coarsely first, then those again whose error is too large beside the mean light.
+    // Of a source that surrounds them (transport/outlook.h) they then sample what is seen there.
     // `progress` gets the share that is done. coarse: what is known of all receivers, or empty.
     // neighbours: if there are any, half as many samples do at first, and receivers whose
     // neighbours disagree with them about a shadow take more. bySource: gets what came from each
@@ -74,11 +76,13 @@ class DirectLight {
                                 float targetError,
                                 const std::function<void(double)>& progress) const;
 
-    // The first, coarse pass of that, to begin with: gathers at `these` receivers.
+    // The first, coarse pass of that, to begin with: gathers at `these` receivers. sightings: per
+    // receiver, to be filled; or null.
     void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                        const std::function<Receiver(size_t)>& receiverAt,
                        const std::function<void(double)>& progress, bool hasNeighbours = false,
-                       LightBySource* bySource = nullptr) const;
+                       LightBySource* bySource = nullptr,
+                       std::vector<Sightings>* sightings = nullptr) const;
 
     // An unbiased estimate at a point by one sample of each source, W/m^2; index: of the sample.
     glm::vec3 sample(const Receiver& receiver, uint32_t index) const;
@@ -104,17 +108,29 @@ class DirectLight {
     void gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
                      const std::function<Receiver(size_t)>& receiverAt,
                      const std::vector<Aim>& aims, Seen& seen,
-                     const std::function<void(double)>& progress, LightBySource* bySource) const;
-    // parts: per source, to be filled; or null.
-    Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts) const;
+                     const std::function<void(double)>& progress, LightBySource* bySource,
+                     std::vector<Sightings>* sightings) const;
+    // parts: per source, to be filled; or null. sightings: likewise, of the source with parts.
+    Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,
+                    Sightings* sightings) const;
     // Counts what it does in `sum`.
     LightPart gatherFrom(size_t source, const Receiver& receiver, const Place& place,
-                         const Aim& aim, Seen& seen, Gathered& sum) const;
+                         const Aim& aim, Seen& seen, Sightings* sightings, Gathered& sum) const;
     // Whether the light that a side gets from a source comes on top of the source's power.
     bool isUnpowered(size_t source, uint32_t side) const;
-    void takeSamples(const LightSource& source, const SobolPoints& points, uint32_t side,
-                     const Place& place, int first, int each, std::array<Block, kBlocks>& blocks,
-                     Gathered& sum) const;
+    // sampleAt(point, uv): a sample of the source.
+    template <class SampleAt>
+    void takeSamples(const LightSource& source, const SampleAt& sampleAt, const SobolPoints& points,
+                     uint32_t side, const Place& place, int first, int each,
+                     std::array<Block, kBlocks>& blocks, Sightings* sightings, Gathered& sum) const;
+    const LightSource* surrounding() const;  // the source that has parts, if there is one
+    // Gives the aims of receivers that see little of it their outlooks, which are returned: from
+    // the sightings of all of them, and then from samples by these. Counts the rays in `results`.
+    std::array<Outlooks, 2> lookAround(Aims& further, std::vector<Gathered>& results,
+                                       const std::function<Receiver(size_t)>& receiverAt,
+                                       std::vector<Sightings> sightings) const;
+    void look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,
+              Sightings& sightings, Gathered& sum) const;
     std::optional<glm::vec3> closedMean(const LightSource& source, const Place& place,
                                         float tolerance, float& error) const;
     std::optional<glm::vec3> quadrature(const LightSource& source, const Place& place, int parts,

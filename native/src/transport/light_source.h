@@ -21,6 +21,7 @@ struct LightSample {
     glm::vec3 direction{0.0f};   // unit vector towards the sampled point
     float distance = 0;          // metres; infinite for suns
     glm::vec3 irradiance{0.0f};  // W/m^2, divided by the sample's probability; 0: receives nothing
+    uint32_t part = 0;           // of the source, if it has any
 };
 
 // A ray that leaves a source with an equal share of its power.
@@ -53,6 +54,9 @@ inline LightSample surfaceSample(const glm::vec3& point, const glm::vec3& normal
     return sample;
 }
 
+// Per part of a source.
+using PartNeighbours = std::vector<std::vector<uint32_t>>;
+
 class LightSource {
   public:
     virtual ~LightSource() = default;
@@ -60,6 +64,26 @@ class LightSource {
     // Samples the source from a point with a unit normal; uv uniform in [0, 1)^2.
     virtual LightSample sample(const glm::vec3& point, const glm::vec3& normal,
                                glm::vec2 uv) const = 0;
+
+    // The parts of the source, each of which may be visible or not (transport/outlook.h): of each
+    // those that it touches. Empty: none are told apart.
+    virtual const PartNeighbours& parts() const {
+        static const PartNeighbours kNone;
+        return kNone;
+    }
+
+    // Per part: the sum up to it of what a plane with that normal gets from it without occluders,
+    // times the share of the part that is seen.
+    virtual std::vector<float> sumOfSeen(const glm::vec3& /*normal*/,
+                                         const std::vector<float>& /*seen*/) const {
+        return {};
+    }
+
+    // A sample in proportion to that, of the same expectation.
+    virtual LightSample sampleSeen(const glm::vec3& /*normal*/, glm::vec2 /*uv*/,
+                                   const std::vector<float>& /*sumOfSeen*/) const {
+        return {};
+    }
 
     // Irradiance without occluders in closed form, W/m^2, if the source has one.
     virtual std::optional<glm::vec3> irradiance(const glm::vec3& point,

@@ -36,6 +36,8 @@ struct Receiver {
     float errorFactor = 1;  // its error may be so many times that of others
 };
 
+struct Outlook;
+
 // Two receivers beside each other, by their numbers.
 struct ReceiverPair {
     uint32_t first = 0, second = 0;
@@ -90,6 +92,8 @@ struct Aim {
     float tolerance = INFINITY;  // standard error, W/m^2
     int samples = 0;             // of each source, at least
     bool isBesideShadow = false;
+    const Outlook* outlook =
+        nullptr;  // on the source that surrounds the receiver, if that is known
 };
 
 // After a coarse shot: the receivers that need more samples, and the aims of these.

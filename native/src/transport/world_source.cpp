@@ -17,11 +17,16 @@ namespace {
 constexpr double kLeastVariation = 1e-5;
 constexpr double kFlat = 0.06;  // radians
 
+// Of a part, sr, if it has children: some 500 of them.
+constexpr float kPartSolidAngle = 0.03f;
+
 // Of the cosine that a region may have at most: what its samples take for sure.
 constexpr float kLeastAbove = 1e-3f;
 // Reach of regions that no horizon leaves whole.
 constexpr float kMoreThanHalf = 2;
 
+constexpr float kTouching = 1.01f;  // for rounding
+constexpr float kBelowOne = 0.9999999f;
 constexpr float kCover = 1.001f;  // radius of the disk that rays start from over the scene's
 
 float sum(const glm::vec3& v) { return v.x + v.y + v.z; }
@@ -69,6 +74,36 @@ WorldSource::WorldSource(const WorldImage& given) : image(refined(given)) {
     leastVariation = float(kLeastVariation * 4 * glm::pi<double>()) * sum(image.meanRadiance());
     build(0, uint32_t(image.width), 0, uint32_t(image.height));
     regions.shrink_to_fit();
+    findParts(0);
+    findPartNeighbours();
+}
+
+void WorldSource::findParts(uint32_t index) {
+    Region& region = regions[index];
+    if (region.second == 0 || region.solidAngle <= kPartSolidAngle) {
+        region.part = int32_t(partRegions.size());
+        partRegions.push_back(index);
+        return;
+    }
+    findParts(index + 1);
+    findParts(region.second);
+}
+
+void WorldSource::findPartNeighbours() {
+    // Touching corners are as far from each other as from both middles.
+    auto halfDiagonal = [&](const Region& region) {
+        return std::asin(std::min(region.reach, 1.0f));
+    };
+    partNeighbours.resize(partRegions.size());
+    for (uint32_t a = 0; a < partRegions.size(); ++a)
+        for (uint32_t b = a + 1; b < partRegions.size(); ++b) {
+            const Region &one = regions[partRegions[a]], &other = regions[partRegions[b]];
+            const float reach = kTouching * (halfDiagonal(one) + halfDiagonal(other));
+            if (glm::dot(one.axis, other.axis) < std::cos(std::min(reach, glm::pi<float>())))
+                continue;
+            partNeighbours[a].push_back(b);
+            partNeighbours[b].push_back(a);
+        }
 }
 
 // Appends the region and what is in it; children first looked at, then left out where they differ
@@ -158,46 +193,32 @@ void WorldSource::setPixel(Region& region) const {
         region.moments[size_t(c)] = glm::vec3(double(radiance[c]) * directions);
 }
 
-// Walks from the root to a region without children; weights(region, wa, wb) tells those of its
-// children.
 template <class Weights>
-WorldSource::Choice WorldSource::choose(glm::vec2 uv, Weights weights) const {
-    Choice choice{&regions[0], uv, 1};
+WorldSource::Choice WorldSource::choose(const Region& from, glm::vec2 uv, float probability,
+                                        Weights weights) const {
+    Choice choice{&from, uv, probability, from.part};
     while (choice.region->second != 0) {
         const Region &a = regions[firstChild(*choice.region)], &b = regions[choice.region->second];
         float wa = 0, wb = 0;
         weights(*choice.region, wa, wb);
-        if (!(wa + wb > 0)) return {nullptr, uv, 0};
+        if (!(wa + wb > 0)) return {nullptr, uv, 0, -1};
         const float p = wa / (wa + wb);
         float& u = choice.region->cutsColumns ? choice.uv.x : choice.uv.y;
         const bool isFirst = u < p;
-        u = std::min(isFirst ? u / p : (u - p) / (1 - p), 0.9999999f);
+        u = std::min(isFirst ? u / p : (u - p) / (1 - p), kBelowOne);
         choice.probability *= isFirst ? p : 1 - p;
         choice.region = isFirst ? &a : &b;
+        if (choice.region->part >= 0) choice.part = choice.region->part;
     }
     return choice;
 }
 
-// Uniform by solid angle.
-glm::vec3 WorldSource::directionIn(const Region& region, glm::vec2 uv, glm::vec3& radiance) const {
-    const double x = region.x0 + double(uv.x) * (region.x1 - region.x0);
-    const double z = height[region.y0] + double(uv.y) * (height[region.y1] - height[region.y0]);
-    const auto above =
-        std::upper_bound(height.begin() + region.y0 + 1, height.begin() + region.y1, z);
-    const size_t row = size_t(above - height.begin()) - 1;
-    const size_t column = std::min(size_t(x), size_t(region.x1) - 1);
-    radiance = image.pixels[row * size_t(image.width) + column];
-    const double azimuth = glm::pi<double>() * (1 - 2 * x / image.width);
-    const double r = std::sqrt(std::max(0.0, 1 - z * z));
-    return glm::vec3(r * std::cos(azimuth), r * std::sin(azimuth), z);
-}
-
-LightSample WorldSource::sample(const glm::vec3&, const glm::vec3& normal, glm::vec2 uv) const {
-    LightSample sample;
-    sample.distance = std::numeric_limits<float>::infinity();
+// By radiance times cosine.
+WorldSource::Choice WorldSource::chooseFacing(const Region& from, glm::vec2 uv, float probability,
+                                              const glm::vec3& normal) const {
     const Facing& facing = facingOf(normal);
     bool isCut = true;
-    const Choice choice = choose(uv, [&](const Region& region, float& wa, float& wb) {
+    return choose(from, uv, probability, [&](const Region& region, float& wa, float& wb) {
         isCut = isCut && isCutBy(region, normal);
         const uint32_t first = firstChild(region);
         wa = isCut ? facing.weight[first] : glm::dot(normal, regions[first].moment);
@@ -205,12 +226,62 @@ LightSample WorldSource::sample(const glm::vec3&, const glm::vec3& normal, glm::
         wa = std::max(0.0f, wa);
         wb = std::max(0.0f, wb);
     });
-    if (!choice.region) return sample;
-    glm::vec3 radiance;
-    sample.direction = directionIn(*choice.region, choice.uv, radiance);
-    const float c = std::max(0.0f, glm::dot(normal, sample.direction));
-    sample.irradiance = radiance * (c * choice.region->solidAngle / choice.probability);
+}
+
+// Uniform by solid angle.
+glm::vec3 WorldSource::directionIn(const Region& region, glm::vec2 uv) const {
+    const double x = region.x0 + double(uv.x) * (region.x1 - region.x0);
+    const double z = height[region.y0] + double(uv.y) * (height[region.y1] - height[region.y0]);
+    const double azimuth = glm::pi<double>() * (1 - 2 * x / image.width);
+    const double r = std::sqrt(std::max(0.0, 1 - z * z));
+    return glm::vec3(r * std::cos(azimuth), r * std::sin(azimuth), z);
+}
+
+// A region without children has the same radiance everywhere.
+LightSample WorldSource::sampleOf(const Choice& choice, const glm::vec3& normal,
+                                  const glm::vec3& direction) {
+    LightSample sample;
+    sample.distance = std::numeric_limits<float>::infinity();
+    sample.direction = direction;
+    sample.part = uint32_t(choice.part);
+    const float c = std::max(0.0f, glm::dot(normal, direction));
+    sample.irradiance = choice.region->flux * (c / choice.probability);
     return sample;
+}
+
+LightSample WorldSource::sample(const glm::vec3&, const glm::vec3& normal, glm::vec2 uv) const {
+    const Choice choice = chooseFacing(regions[0], uv, 1, normal);
+    return choice.region ? sampleOf(choice, normal, directionIn(*choice.region, choice.uv))
+                         : LightSample{};
+}
+
+std::vector<float> WorldSource::sumOfSeen(const glm::vec3& normal,
+                                          const std::vector<float>& seen) const {
+    const Facing& facing = facingOf(normal);
+    std::vector<float> sums(partRegions.size());
+    float sum = 0;
+    for (size_t k = 0; k < partRegions.size(); ++k) {
+        const Region& region = regions[partRegions[k]];
+        const float s = glm::dot(normal, region.axis);
+        if (region.strength > 0 && s > -region.reach)
+            sum += seen[k] * std::max(0.0f, s >= region.reach ? glm::dot(normal, region.moment)
+                                                              : facing.weight[partRegions[k]]);
+        sums[k] = sum;
+    }
+    return sums;
+}
+
+LightSample WorldSource::sampleSeen(const glm::vec3& normal, glm::vec2 uv,
+                                    const std::vector<float>& sumOfSeen) const {
+    const float all = sumOfSeen.back(), u = uv.x * all;
+    const size_t part =
+        size_t(std::upper_bound(sumOfSeen.begin(), sumOfSeen.end(), u) - sumOfSeen.begin());
+    if (part >= partRegions.size()) return {};
+    const float before = part > 0 ? sumOfSeen[part - 1] : 0, own = sumOfSeen[part] - before;
+    uv.x = std::min((u - before) / own, kBelowOne);
+    const Choice choice = chooseFacing(regions[partRegions[part]], uv, own / all, normal);
+    return choice.region ? sampleOf(choice, normal, directionIn(*choice.region, choice.uv))
+                         : LightSample{};
 }
 
 bool WorldSource::isCutBy(const Region& region, const glm::vec3& normal) const {
@@ -281,20 +352,20 @@ glm::vec3 WorldSource::shootingPower(float sceneRadius) const {
 
 EmittedRay WorldSource::emit(const glm::vec4& u, float sceneRadius) const {
     EmittedRay ray;
-    const Choice choice = choose({u.x, u.y}, [&](const Region& region, float& wa, float& wb) {
-        wa = regions[firstChild(region)].strength;
-        wb = regions[region.second].strength;
-    });
-    glm::vec3 radiance;
-    const glm::vec3 towards = directionIn(*choice.region, choice.uv, radiance);
+    const Choice choice =
+        choose(regions[0], {u.x, u.y}, 1, [&](const Region& region, float& wa, float& wb) {
+            wa = regions[firstChild(region)].strength;
+            wb = regions[region.second].strength;
+        });
+    const glm::vec3 towards = directionIn(*choice.region, choice.uv);
     const auto [x, y] = frame(towards);
     const glm::vec2 d = onDisk({u.z, u.w});
     ray.origin = kCover * sceneRadius * (towards + d.x * x + d.y * y);
     ray.direction = -towards;
     for (int c = 0; c < 3; ++c)
-        ray.weight[c] = regions[0].flux[c] > 0 ? radiance[c] * choice.region->solidAngle /
-                                                     (choice.probability * regions[0].flux[c])
-                                               : 0;
+        ray.weight[c] = regions[0].flux[c] > 0
+                            ? choice.region->flux[c] / (choice.probability * regions[0].flux[c])
+                            : 0;
     return ray;
 }
 

@@ -35,9 +35,14 @@ class WorldSource : public LightSource {
                        glm::vec2 uv) const override;
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& normal) const override;
+    const PartNeighbours& parts() const override { return partNeighbours; }
+    std::vector<float> sumOfSeen(const glm::vec3& normal,
+                                 const std::vector<float>& seen) const override;
+    LightSample sampleSeen(const glm::vec3& normal, glm::vec2 uv,
+                           const std::vector<float>& sumOfSeen) const override;
     bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal, float radius) const override;
     float distance(const glm::vec3& point) const override;
-    int mostSamples() const override { return 4096; }
+    int mostSamples() const override { return 1024; }
     bool surrounds() const override { return true; }
     glm::vec3 power() const override { return glm::vec3(0.0f); }
     glm::vec3 shootingPower(float sceneRadius) const override;
@@ -52,6 +57,7 @@ class WorldSource : public LightSource {
         uint32_t x0 = 0, x1 = 0, y0 = 0, y1 = 0;
         uint32_t second = 0;       // child; the first child is the next region. 0: no children
         bool cutsColumns = false;  // the children lie side by side, else one above the other
+        int32_t part = -1;         // that it is, if it is one
         float solidAngle = 0;      // sr
         float reach = 0;           // sine of the angle from the axis to the farthest direction
         glm::vec3 axis{0.0f};      // its middle
@@ -68,6 +74,7 @@ class WorldSource : public LightSource {
         const Region* region;
         glm::vec2 uv;
         float probability;
+        int32_t part;
     };
 
     // The light as a plane sees it: neighbouring receivers have it in common.
@@ -79,11 +86,18 @@ class WorldSource : public LightSource {
     };
 
     Extremes build(uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1);
+    void findParts(uint32_t region);
+    void findPartNeighbours();
     void measure(Region& region) const;
     void setPixel(Region& region) const;
+    // Walks from a region to one without children; weights(region, wa, wb) tells those of its own.
     template <class Weights>
-    Choice choose(glm::vec2 uv, Weights weights) const;
-    glm::vec3 directionIn(const Region& region, glm::vec2 uv, glm::vec3& radiance) const;
+    Choice choose(const Region& from, glm::vec2 uv, float probability, Weights weights) const;
+    Choice chooseFacing(const Region& from, glm::vec2 uv, float probability,
+                        const glm::vec3& normal) const;
+    static LightSample sampleOf(const Choice& choice, const glm::vec3& normal,
+                                const glm::vec3& direction);
+    glm::vec3 directionIn(const Region& region, glm::vec2 uv) const;
     glm::vec3 look(uint32_t index, const glm::vec3& normal, std::vector<float>& weights) const;
     const Facing& facingOf(const glm::vec3& normal) const;
     bool isCutBy(const Region& region, const glm::vec3& normal) const;
@@ -96,6 +110,8 @@ class WorldSource : public LightSource {
     std::vector<double> cosine, sine;  // of the azimuth of the left edge of each column, and last
     float leastVariation = 0;          // of a region with children, W/m^2
     std::vector<Region> regions;
+    std::vector<uint32_t> partRegions;  // that together are all of the source
+    PartNeighbours partNeighbours;
 
     mutable tbb::enumerable_thread_specific<Facing> facing;  // of the last receiver
 };
