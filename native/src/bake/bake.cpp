@@ -31,8 +31,8 @@ namespace {
 // Relative residual of the last solve: a share of the noise, within these bounds. The upper one
 // keeps a relit bake, whose solves start elsewhere, within 1e-5 of a new one.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
-// The lines' noise on the patches of any one window may be this many times the target.
-constexpr double kWindowTargets = 1.1;
+// The lines' noise on the patches in windows may be this many times the target.
+constexpr double kWindowTargets = 0.75;
 // Bundles whose noise is less than this share of the target have done their part.
 constexpr double kFewNoise = 0.3;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
@@ -401,7 +401,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
 
         const auto worst = std::max_element(errors.begin(), errors.end());
         const double onSmall =
-            worstWindowNoise(tiles.patches(), trace->density.windowOf, halves, tileWeight);
+            windowNoise(tiles.patches(), trace->density.windowOf, halves, tileWeight);
         const double excess = std::max(*worst, onSmall / kWindowTargets) / settings.targetError;
         if (excess <= 1 && settings.skipBundles) {
             report.skipped.push_back(

@@ -5,29 +5,51 @@
 #include <cmath>
 
 namespace raybundle {
+namespace {
+// A window darker than this share of the scene may have the noise of one that bright.
+constexpr double kDarkShare = 0.25;
+}  // namespace
 
-double worstWindowNoise(const Patches& patches, const std::vector<int32_t>& windowOf,
-                        const std::vector<std::array<Irradiance, 2>>& halves,
-                        const std::vector<float>& weight) {
+double windowNoise(const Patches& patches, const std::vector<int32_t>& windowOf,
+                   const std::vector<std::array<Irradiance, 2>>& halves,
+                   const std::vector<float>& weight) {
+    struct Sums {
+        double noise = 0, signal = 0, weight = 0, sides = 0;
+    };
     if (windowOf.empty()) return 0;
-    std::vector<double> noise, signal;  // per window
+    std::vector<Sums> windows;
+    Sums all;
     for (size_t side = 0; side < weight.size(); ++side) {
-        const int32_t window = windowOf[patches.parentOf[side / 2]];
-        if (window < 0 || !(weight[side] > 0)) continue;
-        noise.resize(std::max(noise.size(), size_t(window) + 1));
-        signal.resize(noise.size());
+        if (!(weight[side] > 0)) continue;
         glm::dvec3 a(0.0), b(0.0);
         for (const std::array<Irradiance, 2>& half : halves) {
             a += glm::dvec3(half[0].direct[side] + half[0].indirect[side]);
             b += glm::dvec3(half[1].direct[side] + half[1].indirect[side]);
         }
-        noise[size_t(window)] += double(weight[side]) * glm::dot(a - b, a - b);
-        signal[size_t(window)] += double(weight[side]) * glm::dot(a + b, a + b);
+        const double w = double(weight[side]), signal = w * glm::dot(a + b, a + b);
+        all.signal += signal;
+        all.weight += w;
+        const int32_t window = windowOf[patches.parentOf[side / 2]];
+        if (window < 0) continue;
+        windows.resize(std::max(windows.size(), size_t(window) + 1));
+        Sums& sums = windows[size_t(window)];
+        sums.noise += w * glm::dot(a - b, a - b);
+        sums.signal += signal;
+        sums.weight += w;
+        ++sums.sides;
     }
-    double worst = 0;
-    for (size_t k = 0; k < noise.size(); ++k)
-        if (signal[k] > 0) worst = std::max(worst, std::sqrt(noise[k] / signal[k]));
-    return worst;
+    Sums inWindows;
+    double squares = 0;
+    for (const Sums& sums : windows) {
+        const double least = kDarkShare * kDarkShare * all.signal / all.weight * sums.weight;
+        if (sums.sides == 0 || !(std::max(sums.signal, least) > 0)) continue;
+        squares += sums.sides * sums.noise / std::max(sums.signal, least);
+        inWindows.sides += sums.sides;
+        inWindows.noise += sums.noise;
+        inWindows.signal += sums.signal;
+    }
+    if (!(inWindows.signal > 0)) return 0;
+    return std::sqrt(std::max(inWindows.noise / inWindows.signal, squares / inWindows.sides));
 }
 
 }  // namespace raybundle

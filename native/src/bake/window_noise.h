@@ -13,10 +13,13 @@
 
 namespace raybundle {
 
-// Largest relative noise of any window, by half the difference of two halves. windowOf: see
-// LineDensity. halves: of each light set, which are added up. weight: per side, of what is wanted.
-double worstWindowNoise(const Patches& patches, const std::vector<int32_t>& windowOf,
-                        const std::vector<std::array<Irradiance, 2>>& halves,
-                        const std::vector<float>& weight);
+// The relative noise in windows, by half the difference of two halves: of all of them together, or
+// the quadratic mean over their sides of their window's, whichever is larger. Not the worst window:
+// a few strips of a bevel beside a lamp are not what a bake waits for.
+// windowOf: see LineDensity. halves: of each light set, which are added up. weight: per side, of
+// what is wanted.
+double windowNoise(const Patches& patches, const std::vector<int32_t>& windowOf,
+                   const std::vector<std::array<Irradiance, 2>>& halves,
+                   const std::vector<float>& weight);
 
 }  // namespace raybundle

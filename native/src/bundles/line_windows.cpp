@@ -19,6 +19,9 @@ constexpr double kFewPixels = 0.35, kLeastFinerShare = 0.2;
 // Pixels of all windows along a direction, in the mean: finer levels are left out beyond it.
 constexpr double kMostWindowPixels = 1 << 17;
 constexpr size_t kMostWindows = 24, kLeastPatches = 64;
+// Where a window has more pixels for each of the patches that it is made for, these are slivers or
+// far apart.
+constexpr double kMostPixelsEach = 64;
 // What a window costs besides its pixels, in pixels: looking whether the parents meet it.
 constexpr double kWindowCost = 500, kParentCost = 1.0 / 32;
 constexpr double kWorthSplitting = 0.97;  // share of the cost that splitting must come below
@@ -200,8 +203,11 @@ class Planner {
                 return around;
             }
         }
-        if (pixels + pixelsOf(box, level) > kMostWindowPixels) return kNoWindow;
-        pixels += pixelsOf(box, level);
+        const double own = pixelsOf(box, level);
+        if (pixels + own > kMostWindowPixels ||
+            own > kMostPixelsEach * double(clustering.patchCount(members)))
+            return kNoWindow;
+        pixels += own;
         density.windows.push_back({box.low, box.high, level});
         madeFor.push_back(clustering.patchCount(members));
         const int32_t window = int32_t(density.windows.size()) - 1;
