@@ -31,8 +31,6 @@ namespace {
 // Relative residual of the last solve: a share of the noise, within these bounds. The upper one
 // keeps a relit bake, whose solves start elsewhere, within 1e-5 of a new one.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
-// The lines' noise on the patches in windows may be this many times the target.
-constexpr double kWindowTargets = 0.75;
 // Bundles whose noise is less than this share of the target have done their part.
 constexpr double kFewNoise = 0.3;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
@@ -402,13 +400,13 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
         const auto worst = std::max_element(errors.begin(), errors.end());
         const double onSmall =
             windowNoise(tiles.patches(), trace->density.windowOf, halves, tileWeight);
-        const double excess = std::max(*worst, onSmall / kWindowTargets) / settings.targetError;
+        const double excess = std::max(*worst, onSmall) / settings.targetError;
         if (excess <= 1 && settings.skipBundles) {
             report.skipped.push_back(
                 {"bundles", "the noise is at its target", most - std::min(most, bundles)});
             break;
         }
-        if (onSmall <= kWindowTargets * settings.targetError &&
+        if (onSmall <= settings.targetError &&
             noise.ofBundles() < kFewNoise * settings.targetError) {
             report.warnings.push_back(
                 "the noise is " + std::to_string(100 * *worst) + " % and not below " +

@@ -56,6 +56,9 @@ class LineCounts {
     // lines.
     std::vector<float> exposedShare() const;
 
+    // Whether some lines stand for several of the finest ones.
+    bool hasDensities() const { return !met.empty(); }
+
     // Lines of a side that ended on others or left the scene, each counted once whatever its
     // density: how much the counts of that side can be trusted.
     double linesMet(uint32_t side) const;

@@ -42,6 +42,8 @@ struct CoarseShot {
     double bundled = 0;      // about the irradiance that emission left to the bundles makes, W/m^2
 };
 
+struct ReceiverPlace;
+
 class DirectLight {
   public:
     // The light of a set, or what belongs to none. Everything passed must outlive the object.
@@ -100,7 +102,7 @@ class DirectLight {
 
   private:
     struct Block;
-    struct Place;
+    using Place = ReceiverPlace;
     static constexpr size_t kBlocks = 4;          // of a receiver's samples, to see how they differ
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
 
