@@ -21,6 +21,8 @@ constexpr float kSameError = 1.1f;
 // Receivers that learn together what they see of such a source: at first, and then by more samples.
 constexpr size_t kWideCluster = 128, kNearCluster = 16;
 constexpr float kNearPower = 0.9f;
+// Of more receivers than this what they see is not kept: 130 bytes each, and 2 kB a cluster.
+constexpr size_t kMostLookingAround = 1 << 19;
 // Points of a source by which its light at the corners of a face is compared: the same for all.
 constexpr uint32_t kSlopeSamples = 32;
 // For the power balance: rays of all sources together, and of each at least.
@@ -131,7 +133,7 @@ std::vector<Gathered> DirectLight::gather(
     const std::vector<ReceiverPair>& neighbours, LightBySource* bySource) const {
     std::vector<Sightings> sightings;
     if (first.gathered.empty()) {
-        if (surrounding()) sightings.resize(count);
+        if (surrounding() && count <= kMostLookingAround) sightings.resize(count);
         first.gathered.resize(count);
         std::vector<uint32_t> these(count);
         std::iota(these.begin(), these.end(), 0u);
