@@ -10,7 +10,8 @@
 // Differs:
 // - Blocks are clusters of receivers that are near and face alike, and distributions are over the
 //   parts of one source, each of which keeps a least share: samples stay without bias.
-// - Learnt once, from the samples of the coarse shot, as counts: the same for any number of threads.
+// - Learnt twice, and then kept: from the coarse shot's samples by wide clusters, and from more
+//   samples by near ones. As counts, so that the number of threads does not matter.
 #pragma once
 
 #include <algorithm>
@@ -58,9 +59,8 @@ struct Outlook {
     // Per part of the source: how many samples it should get for its light; above 0. Empty: all
     // alike.
     std::vector<float> seen;
-    uint32_t samples = 0;  // by which that is known
-    float mean = 0;        // share of them that were visible
-    bool isDark = true;    // none was
+    float mean = 0;      // share of the samples that were visible
+    bool isDark = true;  // none was
 };
 
 class Outlooks {
