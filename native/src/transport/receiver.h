@@ -92,8 +92,8 @@ struct Aim {
     float tolerance = INFINITY;  // standard error, W/m^2
     int samples = 0;             // of each source, at least
     bool isBesideShadow = false;
-    const Outlook* outlook =
-        nullptr;  // on the source that surrounds the receiver, if that is known
+    // On the source that surrounds the receiver, if that is known.
+    const Outlook* outlook = nullptr;
 };
 
 // After a coarse shot: the receivers that need more samples, and the aims of these.
