@@ -81,6 +81,7 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_set_material_diffuse(scene, 0, nullptr, kBlack), "scale");
     expectInvalid(rb_set_material_grazing(scene, 0, nullptr), "grazing");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, nullptr), "offset");
+    expectInvalid(rb_set_material_translucence(scene, 0, nullptr, -1, nullptr), "translucence");
     expectInvalid(rb_add_mesh(scene, "", nullptr, 8, kCorners, 24, kFaces, 6, nullptr, &id),
                   "vertices");
     expectInvalid(rb_add_mesh(scene, "", kVertices, 8, nullptr, 24, kFaces, 6, nullptr, &id),
@@ -123,6 +124,12 @@ TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_diffuse(scene, bad, kGrey, kBlack),
                       "material " + std::to_string(bad));
+        expectInvalid(rb_set_material_translucence(scene, bad, kGrey, -1, nullptr),
+                      "material " + std::to_string(bad));
+        // -1 is none.
+        if (bad != -1)
+            expectInvalid(rb_set_material_translucence(scene, material, kGrey, bad, kGlow),
+                          "image " + std::to_string(bad));
         expectInvalid(rb_set_material_corner_colors(scene, bad, kOne),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_mesh_uvs(scene, bad, kVertices, 24), "mesh " + std::to_string(bad));
@@ -211,6 +218,7 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     expectInvalid(rb_set_material_diffuse(scene, 0, bad, kBlack), "scale");
     expectInvalid(rb_set_material_grazing(scene, 0, bad), "grazing");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, bad), "offset");
+    expectInvalid(rb_set_material_translucence(scene, 0, bad, -1, nullptr), "translucence");
     const float infinite[3] = {0, INFINITY, 0}, zero[3] = {0, 0, 0};
     expectInvalid(rb_add_point_light(scene, "bulb", infinite, kOne, 0, RB_POINT_DISK, &id), "bulb");
     expectInvalid(rb_add_point_light(scene, "bulb", kOne, negative + 2, 0, RB_POINT_DISK, &id),

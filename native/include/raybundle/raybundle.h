@@ -128,6 +128,15 @@ RB_API rb_error rb_set_material_grazing(rb_scene scene, int32_t material, const 
 RB_API rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity);
 RB_API rb_error rb_set_material_opacity_image(rb_scene scene, int32_t material, int32_t image);
 
+/* The share of the light that passes through the surface and leaves it on the other side as if that
+ * side reflected it (six floats: what leaves the front, RGB, then the back). Outputs with colour show
+ * it too. An image, or -1, adds image_weight (likewise six floats; NULL without an image) times it,
+ * averaged over each patch. Together with the reflectance at most 0.999, else clamped; without it 0.
+ * Only the solver LINE_REUSE carries this light. */
+RB_API rb_error rb_set_material_translucence(rb_scene scene, int32_t material,
+                                             const float translucence[6], int32_t image,
+                                             const float image_weight[6]);
+
 /* Adds a mesh of planar or nearly planar n-gons, which may be concave.
  *   vertices         3 * vertex_count floats, object space, metres
  *   corner_vertices  corner_count vertex indices, face after face

@@ -137,6 +137,24 @@ rb_error rb_set_material_opacity_image(rb_scene scene, int32_t material, int32_t
     });
 }
 
+rb_error rb_set_material_translucence(rb_scene scene, int32_t material, const float translucence[6],
+                                      int32_t image, const float image_weight[6]) {
+    return guarded([&] {
+        need(scene, "scene");
+        need(translucence, "translucence");
+        needFinite(translucence, 6, "translucence");
+        Material& target = scene->scene.material(material);
+        if (image != -1) {
+            scene->scene.checkImage(image);
+            need(image_weight, "image_weight");
+            needFinite(image_weight, 6, "image_weight");
+            target.translucenceImageWeight = {vec3(image_weight), vec3(image_weight + 3)};
+        }
+        target.translucence = {vec3(translucence), vec3(translucence + 3)};
+        target.translucenceImage = image;
+    });
+}
+
 rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices, size_t vertex_count,
                      const int32_t* corner_vertices, size_t corner_count,
                      const int32_t* face_offsets, size_t face_count, const int32_t* face_materials,

@@ -22,6 +22,7 @@
 #include "patches/refinement.h"
 #include "patches/reflectance.h"
 #include "reconstruction/reconstruction.h"
+#include "reconstruction/shown_light.h"
 #include "reconstruction/stated_error.h"
 #include "transport/set_light.h"
 
@@ -84,6 +85,16 @@ void warnOfVisibility(const Scene& scene, const SetLights& lights, const Setting
     }
 }
 
+// Names the materials whose light through them the solver does not carry.
+void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& report) {
+    if (settings.solver == "LINE_REUSE") return;
+    for (const Material& material : scene.materials)
+        if (material.isTranslucent())
+            report.warnings.push_back("material \"" + material.name + "\": " + settings.solver +
+                                      " does not carry on the light that passes through it; "
+                                      "LINE_REUSE does");
+}
+
 // Per side, m^2: the whole area of those that have a result, else 0.
 std::vector<float> wantedArea(const Scene& scene, const Patches& patches) {
     bool anyBaked = false;
@@ -105,7 +116,7 @@ bool isFirstShotAll(const Patches& patches, const SetLights& lights) {
     auto areBlack = [&](const std::vector<glm::vec3>& values) {
         return std::all_of(values.begin(), values.end(), isBlack);
     };
-    return areBlack(patches.reflectance) &&
+    return areBlack(patches.reflectance) && areBlack(patches.translucence) &&
            std::all_of(lights.begin(), lights.end(), [&](const SetLight& light) {
                return areBlack(light.shot.emission) && isBlack(light.worldRadiance);
            });
@@ -160,7 +171,9 @@ void Bake::runStages(const Scene& scene) {
         }
         SetLights lights = shootSources(scene, coarse, report);
         const Tiles tiles(patches);
+        const ShownLight shown(scene, patches);
         warnOfVisibility(scene, lights, settings, report);
+        warnOfTranslucence(scene, settings, report);
         SideNoise noise(tiles.sideCount());
         exposed.assign(patches.sideCount(), 1.0f);
         const bool dark = isDark(scene, lights, report);
@@ -178,7 +191,7 @@ void Bake::runStages(const Scene& scene) {
                      trace->counts,
                      settings.solver == "LINE_REUSE" ? &trace->solutionsOf(light.set) : nullptr});
             const Transports transports = makeTransports(settings.solver, inputs);
-            noise = solveToTarget(scene, tiles, lights, transports, report);
+            noise = solveToTarget(scene, tiles, shown, lights, transports, report);
             exposed = trace->exposedShare();
             for (const SetLight& light : lights)
                 balanceEnergy(patches, light, exposed, transports.front()->openShare(), report);
@@ -187,11 +200,11 @@ void Bake::runStages(const Scene& scene) {
         irradiance = sumOf(lights);
 
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
-        light = reconstruct(scene, patches, trace->visibility, trace->touchDistance, lights,
+        light = reconstruct(scene, patches, trace->visibility, trace->touchDistance, lights, shown,
                             exposed, settings, progress, report);
         const std::vector<float> weight = exposedArea(patches, exposed);
         stateErrors(scene, tiles, instanceRanges(scene, patches),
-                    meanOver(tiles, irradiance, weight),
+                    meanOver(tiles, shown.of(irradiance, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
                     settings.targetError, light, report);
     }
@@ -355,8 +368,8 @@ SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, SetLights&
 
 // Adds bundles by doubling until the difference of the two halves' estimates meets the target, in
 // the light of all and in that of each light set.
-SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights& lights,
-                              const Transports& transports, Report& report) {
+SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
+                              SetLights& lights, const Transports& transports, Report& report) {
     Transport& transport = *transports.front();  // traces for all
     const Patches& patches = trace->patches;
     const size_t n = patches.sideCount();
@@ -364,7 +377,8 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
     const std::vector<float> area = wantedArea(scene, patches);
     std::vector<float> weight(n, 0);
     std::vector<bool> wantedSides(n);
-    for (size_t side = 0; side < n; ++side) wantedSides[side] = area[side] > 0;
+    for (size_t side = 0; side < n; ++side)
+        wantedSides[side] = area[side] > 0 || (area[side ^ 1] > 0 && !shown.isOwnAlone(side ^ 1));
     std::vector<std::vector<float>> errorOfSets;
     for (const SetLight& light : lights) errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
     std::vector<float> tileWeight(tiles.sideCount(), 0);
@@ -391,7 +405,9 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, SetLights&
             for (int h = 0; h < 2; ++h)
                 halves[k][h] = meanOver(
                     tiles,
-                    transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError),
+                    shown.of(
+                        transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError),
+                        exposed),
                     weight);
         noise.look(halves, bundles, transport.bias());
         errors = noise.relative();

@@ -15,6 +15,7 @@
 #include "bundles/line_counts.h"
 #include "patches/tiles.h"
 #include "reconstruction/instance_light.h"
+#include "reconstruction/shown_light.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
 #include "transport/transport.h"
@@ -60,8 +61,8 @@ class Bake {
                            Report& report);
     SideNoise keepFirstShot(const Scene& scene, const Tiles& tiles, SetLights& lights,
                             Report& report);
-    SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, SetLights& lights,
-                            const Transports& transports, Report& report);
+    SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
+                            SetLights& lights, const Transports& transports, Report& report);
 
     std::unique_ptr<Trace> trace;  // of the last run's geometry
     Irradiance irradiance;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "transport/translucence.h"
+
 namespace raybundle {
 namespace {
 
@@ -30,10 +32,11 @@ void balanceEnergy(const Patches& patches, const SetLight& light,
             absorbed += exposed * power(patches, side, irradiance.gathered[side]);
             continue;
         }
-        const glm::vec3 total = irradiance.direct[side] + irradiance.indirect[side];
+        const glm::vec3 total = irradiance.all(side);
         const glm::vec3 reflected =
             patches.reflectance[side] * (total - irradiance.gathered[side]) +
-            shotReflectance(patches, shot, side) * irradiance.gathered[side];
+            shotReflectance(patches, shot, side) * irradiance.gathered[side] +
+            passedOn(patches, exposedShare, side, irradiance.all(side ^ 1));
         emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
         absorbed += exposed * power(patches, side, total - reflected);
         escaped += exposed * power(patches, side, open * (shot.emission[side] + reflected));
@@ -61,7 +64,7 @@ double leakedShare(const Scene& scene, const Patches& patches, const std::vector
 double errorByWrongExchanges(const Patches& patches, double share) {
     double reflectance = 0, area = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const glm::vec3& rho = patches.reflectance[side];
+        const glm::vec3 rho = patches.reflectance[side] + patches.translucenceOf(side);
         reflectance += double(patches.area[side / 2] * std::max({rho.x, rho.y, rho.z}));
         area += double(patches.area[side / 2]);
     }

@@ -10,14 +10,16 @@
 namespace raybundle {
 namespace {
 
-// What decides which lines pass through surfaces; nothing where all are opaque.
+// What decides which lines pass through surfaces, and where light gets in; nothing where all are
+// opaque.
 void addOpacity(const Scene& scene, Hasher& hasher) {
-    if (std::all_of(scene.materials.begin(), scene.materials.end(),
-                    [](const Material& material) { return material.isOpaque(); }))
+    if (std::all_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
+            return material.isOpaque() && !material.isTranslucent();
+        }))
         return;
     for (const Material& material : scene.materials) {
         const bool isEmpty = isEmptySpace(material);
-        hasher.add(material.opacity, isEmpty);
+        hasher.add(material.opacity, isEmpty, material.isTranslucent());
         if (material.opacityImage >= 0)
             hasher.add(scene.images[size_t(material.opacityImage)].pixels);
     }

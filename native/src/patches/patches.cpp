@@ -154,7 +154,9 @@ class Subdivision {
             for (size_t f = 0; f < mesh.faceCount(); ++f)
                 if (!cutFace(uint32_t(i), int32_t(f), sizes[i])) ++degenerate;
             for (size_t p = firstParent; p < patches.parents.size(); ++p)
-                patches.parents[p].isSolid = closed[size_t(patches.parents[p].face)];
+                patches.parents[p].isSolid =
+                    closed[size_t(patches.parents[p].face)] &&
+                    !scene.materialOf(mesh, size_t(patches.parents[p].face)).isTranslucent();
             for (size_t p = firstParent; p < patches.parents.size(); ++p) {
                 patches.parents[p].stopsDirect = scene.instances[i].stopsDirect;
                 patches.parents[p].exchanges = scene.instances[i].exchanges;

@@ -114,9 +114,12 @@ struct Patches {
     std::vector<glm::vec3> reflectance;  // per side
     std::vector<glm::vec3> grazing;      // per side, see Material; empty where all are 0
     std::vector<glm::vec3> emission;     // per side, W/m^2
-    double totalArea = 0;                // of all patches, one side, m^2
-    float size = 0;                      // target edge of a tile, metres
-    float finest = 0;                    // the same where it is least (patch_size.h)
+    // Per side: what leaves it of the light that arrives at the other side of the patch; empty where
+    // all are 0.
+    std::vector<glm::vec3> translucence;
+    double totalArea = 0;  // of all patches, one side, m^2
+    float size = 0;        // target edge of a tile, metres
+    float finest = 0;      // the same where it is least (patch_size.h)
     size_t tileCount = 0;
     std::vector<std::string> warnings;
     size_t degenerateFaces = 0;  // left out
@@ -125,6 +128,9 @@ struct Patches {
     // Share of the light that a patch stops.
     float opacityOf(uint32_t patch) const { return opacity.empty() ? 1.0f : opacity[patch]; }
     size_t sideCount() const { return 2 * area.size(); }
+    glm::vec3 translucenceOf(size_t side) const {
+        return translucence.empty() ? glm::vec3(0.0f) : translucence[side];
+    }
     // Unit normal of a side.
     glm::vec3 normal(uint32_t side) const {
         const glm::vec3& front = parents[parentOf[side / 2]].normal;

@@ -40,12 +40,14 @@ bool hasImage(const Mesh& mesh, int image) { return image >= 0 && !mesh.uvs.empt
 // Means over a patch of what a material's images and corner colours add or multiply.
 struct Varying {
     glm::vec3 reflectance{0.0f};
+    std::array<glm::vec3, 2> translucence{glm::vec3(0.0f), glm::vec3(0.0f)};
     std::array<glm::vec3, 2> emission{glm::vec3(0.0f), glm::vec3(0.0f)};
     float opacity = 1;
 };
 
 bool varies(const Mesh& mesh, const Material& m) {
     return hasImage(mesh, m.image) || hasImage(mesh, m.emissionImage) ||
+           hasImage(mesh, m.translucenceImage) ||
            ((m.usesCornerColors || m.emissionUsesCornerColors) && !mesh.cornerColors.empty());
 }
 
@@ -62,7 +64,8 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
     const bool hasColors = !mesh.cornerColors.empty();
 
     int samples = kMinSamples;
-    for (int index : {material.image, material.emissionImage, material.opacityImage}) {
+    for (int index : {material.image, material.emissionImage, material.opacityImage,
+                      material.translucenceImage}) {
         if (!hasImage(mesh, index)) continue;
         const Image& image = scene.images[size_t(index)];
         glm::vec2 low(INFINITY), high(-INFINITY);
@@ -80,7 +83,7 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
     grid.isTriangle = parent.isTriangle;
     grid.countA = grid.countB = uint16_t(samples);
     const glm::vec2 centroid = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
-    glm::vec3 image(0.0f), emissionImage(0.0f), color(0.0f);
+    glm::vec3 image(0.0f), emissionImage(0.0f), translucenceImage(0.0f), color(0.0f);
     float opacity = 0;
     for (uint32_t k = 0; k < grid.patchCount(); ++k) {
         const glm::vec3 point = patches.point(patch, grid.pointOn(k, centroid));
@@ -89,6 +92,8 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
         };
         if (hasImage(mesh, material.image)) image += at(material.image);
         if (hasImage(mesh, material.emissionImage)) emissionImage += at(material.emissionImage);
+        if (hasImage(mesh, material.translucenceImage))
+            translucenceImage += at(material.translucenceImage);
         if (hasImage(mesh, material.opacityImage))
             opacity += glm::dot(at(material.opacityImage), glm::vec3(1.0f / 3));
         if (hasColors) color += interpolate(mesh.cornerColors, point);
@@ -100,6 +105,8 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
         means.reflectance += perSample * material.cornerColorWeight * color;
     for (size_t side = 0; side < 2; ++side) {
         means.emission[side] = perSample * material.emissionImageWeight[side] * emissionImage;
+        means.translucence[side] =
+            perSample * material.translucenceImageWeight[side] * translucenceImage;
         if (material.emissionUsesCornerColors)
             means.emission[side] += perSample * material.emissionColorWeight[side] * color;
     }
@@ -113,7 +120,7 @@ bool isEmptySpace(const Material& m) {
     constexpr glm::vec3 kBlack(0.0f);
     return m.reflectance[0] == kBlack && m.reflectance[1] == kBlack && m.emission[0] == kBlack &&
            m.emission[1] == kBlack && m.image < 0 && m.emissionImage < 0 && !m.usesCornerColors &&
-           !m.emissionUsesCornerColors;
+           !m.emissionUsesCornerColors && !m.isTranslucent();
 }
 
 void assignOpacity(const Scene& scene, Patches& patches) {
@@ -154,6 +161,10 @@ void assignMaterials(const Scene& scene, Patches& patches) {
         std::any_of(scene.materials.begin(), scene.materials.end(),
                     [&](const Material& material) { return material.grazing != kNone; });
     patches.grazing.assign(hasGrazing ? patches.sideCount() : 0, glm::vec3(0.0f));
+    const bool hasTranslucence =
+        std::any_of(scene.materials.begin(), scene.materials.end(),
+                    [](const Material& material) { return material.isTranslucent(); });
+    patches.translucence.assign(hasTranslucence ? patches.sideCount() : 0, glm::vec3(0.0f));
     tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
         const Parent& parent = patches.parents[i];
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
@@ -170,6 +181,10 @@ void assignMaterials(const Scene& scene, Patches& patches) {
                     glm::clamp(scale * (material.reflectance[side] + varying.reflectance), 0.0f,
                                kMaxReflectance);
                 if (hasGrazing) patches.grazing[2 * p + side] = scale * material.grazing[side];
+                if (hasTranslucence)
+                    patches.translucence[2 * p + side] = glm::clamp(
+                        scale * (material.translucence[side] + varying.translucence[side]),
+                        glm::vec3(0.0f), kMaxReflectance - patches.reflectance[2 * p + side]);
                 patches.emission[2 * p + side] =
                     scale *
                     glm::max(material.emission[side] + varying.emission[side], glm::vec3(0.0f));

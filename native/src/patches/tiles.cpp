@@ -13,6 +13,7 @@ Tiles::Tiles(const Patches& cut) : original(cut) {
     uncut->opacity.clear();
     uncut->reflectance.clear();
     uncut->grazing.clear();
+    uncut->translucence.clear();
     uncut->emission.clear();
     uncut->parentOf.clear();
     for (size_t i = 0; i < cut.parents.size(); ++i) {

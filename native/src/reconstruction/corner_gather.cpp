@@ -39,11 +39,11 @@ double meanLight(const Scene& scene, const Patches& patches,
 }  // namespace
 
 CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                           float touchDistance, const SetLights& lights,
+                           float touchDistance, const SetLights& lights, const ShownLight& shown,
                            const std::vector<InstanceRange>& ranges,
                            const std::vector<float>& exposed, const Settings& settings,
                            const Progress& progress)
-    : scene(scene), ranges(ranges), exposed(exposed), skips(settings) {
+    : scene(scene), shown(shown), ranges(ranges), exposed(exposed), skips(settings) {
     // Whether another surface lies against the corner, though not against all of its patch.
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
@@ -66,14 +66,34 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
             if (isFree[c]) corners.push_back(all[c]);
     }
     first.push_back(corners.size());
+    // After the corners, the other sides of those that show their light.
+    std::vector<uint32_t> behind;
+    for (size_t c = 0; c < corners.size(); ++c)
+        if (!showsOwnAlone(c)) behind.push_back(uint32_t(c));
+    auto receiverAt = [&](size_t k) {
+        if (k < corners.size()) return corners[k].receiver;
+        Receiver other = corners[behind[k - corners.size()]].receiver;
+        other.side ^= 1;
+        other.normal = -other.normal;
+        return other;
+    };
     for (size_t k = 0; k < lights.size(); ++k) {
         const Progress part = progress.part(k, lights.size());
-        sources.push_back(lights[k].direct.gather(
-            corners.size(), [&](size_t c) { return corners[c].receiver; }, settings.targetError,
-            [&](double done) { part.report(RB_STAGE_RECONSTRUCTION, done); }));
+        const std::vector<Gathered> gathered = lights[k].direct.gather(
+            corners.size() + behind.size(), receiverAt, settings.targetError,
+            [&](double done) { part.report(RB_STAGE_RECONSTRUCTION, done); });
+        std::vector<glm::vec3>& light = sources.emplace_back();
+        for (size_t c = 0; c < corners.size(); ++c) light.push_back(gathered[c].irradiance);
+        for (size_t b = 0; b < behind.size(); ++b) {
+            glm::vec3& own = light[behind[b]];
+            own = shown.of(corners[behind[b]].receiver.side, own,
+                           gathered[corners.size() + b].irradiance, exposed);
+        }
+        for (const Gathered& one : gathered) rays += one.rays;
         const double mean = meanLight(scene, patches, ranges, exposed, lights[k].irradiance);
         if (settings.finalGather && mean > 0)
-            others.emplace_back(patches, visibility, lights[k], float(mean), settings.targetError);
+            others.emplace_back(patches, visibility, lights[k], exposed, float(mean),
+                                settings.targetError);
     }
 }
 
@@ -87,12 +107,15 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
                             light.carried, light.indirect);
         std::vector<uint8_t> isNear(end - begin);
         tbb::parallel_for(begin, end, [&](size_t c) {
-            isNear[c - begin] =
-                !wanted[regions.nodeOf[corners[c].corner]] && gather.isNear(corners[c].receiver);
+            isNear[c - begin] = showsOwnAlone(c) && !wanted[regions.nodeOf[corners[c].corner]] &&
+                                gather.isNear(corners[c].receiver);
         });
         if (!skips.skipGather) wanted.assign(wanted.size(), true);
         for (size_t c = begin; c < end; ++c)
             if (isNear[c - begin]) wanted[regions.nodeOf[corners[c].corner]] = true;
+        // What comes from behind is not gathered.
+        for (size_t c = begin; c < end; ++c)
+            if (!showsOwnAlone(c)) wanted[regions.nodeOf[corners[c].corner]] = false;
         std::vector<std::vector<FinalGather::Share>> receivers(regions.nodeCount);
         for (size_t c = begin; c < end; ++c) {
             const uint32_t node = regions.nodeOf[corners[c].corner];
@@ -111,17 +134,10 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
         });
         smooth += size_t(std::count(wanted.begin(), wanted.end(), false));
     }
-    const auto means = nodeMeans(instance, regions, cornerAngles,
-                                 [&](size_t c) { return sources[k][c].irradiance; });
+    const auto means =
+        nodeMeans(instance, regions, cornerAngles, [&](size_t c) { return sources[k][c]; });
     for (size_t node = 0; node < means.size(); ++node)
         if (means[node]) light.direct[node] = light.carried[node] + *means[node];
-}
-
-uint64_t CornerGather::shadowRays() const {
-    uint64_t sum = 0;
-    for (const std::vector<Gathered>& light : sources)
-        for (const Gathered& gathered : light) sum += gathered.rays;
-    return sum;
 }
 
 template <class LightOf>

@@ -14,6 +14,7 @@
 #include "reconstruction/corner_receivers.h"
 #include "reconstruction/final_gather.h"
 #include "reconstruction/least_squares.h"
+#include "reconstruction/shown_light.h"
 #include "reconstruction/smooth_regions.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
@@ -23,11 +24,11 @@ namespace raybundle {
 
 class CornerGather {
   public:
-    // Gathers the light of the sources, of all light sets. exposed: per side, the share of it that
+    // Gathers the light of the sources, of all light sets, on both sides where both show. exposed: per side, the share of it that
     // nothing covers; surfaces not further apart than touchDistance (m) touch. References must
     // outlive the object.
     CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                 float touchDistance, const SetLights& lights,
+                 float touchDistance, const SetLights& lights, const ShownLight& shown,
                  const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,
                  const Settings& settings, const Progress& progress);
 
@@ -42,7 +43,7 @@ class CornerGather {
     void improve(size_t instance, size_t k, const SmoothRegions& regions,
                  const std::vector<float>& cornerAngles, NodeLight& light);
 
-    uint64_t shadowRays() const;
+    uint64_t shadowRays() const { return rays; }
     // Nodes so far where interpolation was good enough.
     size_t smoothNodes() const { return smooth; }
 
@@ -53,14 +54,20 @@ class CornerGather {
                                                     const std::vector<float>& cornerAngles,
                                                     const LightOf& lightOf) const;
 
+    bool showsOwnAlone(size_t corner) const {
+        return shown.isOwnAlone(corners[corner].receiver.side);
+    }
+
     const Scene& scene;
+    const ShownLight& shown;
     const std::vector<InstanceRange>& ranges;
     const std::vector<float>& exposed;
     const Skips skips;
     std::vector<CornerReceiver> corners;
-    std::vector<size_t> first;                   // per instance, into corners
-    std::vector<std::vector<Gathered>> sources;  // per light and corner
-    std::vector<FinalGather> others;             // per light; none where it is switched off
+    std::vector<size_t> first;                    // per instance, into corners
+    std::vector<std::vector<glm::vec3>> sources;  // per light and corner: irradiance, W/m^2
+    uint64_t rays = 0;                            // for them
+    std::vector<FinalGather> others;              // per light; none where it is switched off
     std::atomic<size_t> smooth = 0;
 };
 

@@ -7,7 +7,7 @@
 namespace raybundle {
 
 void addFaceSlopes(const Patches& patches, const InstanceRange& range, const SmoothRegions& regions,
-                   rb_side side, const std::vector<glm::vec3>& reflectance, const SetLight& light,
+                   rb_side side, const std::vector<glm::vec3>& color, const SetLight& light,
                    float targetError, std::vector<glm::vec3>& direct,
                    std::vector<glm::vec3>& exitance) {
     if (light.direct.lightSources().empty()) return;
@@ -36,7 +36,10 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
         });
         const uint32_t at = 2 * parent.firstPatch + uint32_t(side);
         const glm::vec3 gathered = light.irradiance.gathered[at];
-        if (!isAlone || gathered == glm::vec3(0.0f)) continue;
+        // Of what shows both sides' light the slopes would be those of both.
+        if (!isAlone || gathered == glm::vec3(0.0f) ||
+            patches.translucenceOf(at) != glm::vec3(0.0f))
+            continue;
         // Slopes that make less than a part of the target error are no matter.
         light.direct.unblocked(at, points.data(), count, 0.25f * targetError, values.data());
         glm::vec3 mean(0.0f), share(0.0f);
@@ -46,7 +49,7 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
         for (size_t k = 0; k < count; ++k) {
             const glm::vec3 slope = glm::max(share * (values[k] - mean), -gathered);
             direct[nodes[k]] += slope;
-            exitance[nodes[k]] += reflectance[at] * slope;
+            exitance[nodes[k]] += color[at] * slope;
         }
     }
 }

@@ -8,6 +8,7 @@
 
 #include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
+#include "transport/translucence.h"
 
 namespace raybundle {
 namespace {
@@ -33,7 +34,8 @@ double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 }  // namespace
 
 FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
-                         const SetLight& light, float meanLight, float targetError)
+                         const SetLight& light, const std::vector<float>& exposed, float meanLight,
+                         float targetError)
     : patches(patches),
       visibility(visibility),
       light(light),
@@ -47,7 +49,8 @@ FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
             patches.reflectance[side] *
                 (light.irradiance.direct[side] - light.irradiance.gathered[side] +
                  light.irradiance.indirect[side]) +
-            shotReflectance(patches, light.shot, side) * light.irradiance.gathered[side];
+            shotReflectance(patches, light.shot, side) * light.irradiance.gathered[side] +
+            passedOn(patches, exposed, side, light.irradiance.all(side ^ 1));
 }
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
@@ -136,6 +139,9 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
+        // What comes from behind is not gathered.
+        if (patches.translucenceOf(2 * parent.firstPatch + uint32_t(side)) != glm::vec3(0.0f))
+            continue;
         const glm::vec2 centroid = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t at = 2 * (parent.firstPatch + k) + uint32_t(side);

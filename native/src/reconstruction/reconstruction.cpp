@@ -7,11 +7,11 @@
 #include <atomic>
 #include <optional>
 
-#include "patches/reflectance.h"
 #include "reconstruction/area_average.h"
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/face_slopes.h"
 #include "reconstruction/least_squares.h"
+#include "reconstruction/shown_light.h"
 #include "reconstruction/smooth_regions.h"
 
 namespace raybundle {
@@ -25,41 +25,40 @@ using Field = std::vector<glm::vec3>;
 
 double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
 
-bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side side,
-                 const SetLights& lights) {
-    double lit[2] = {0, 0};
-    for (uint32_t p = range.firstParent; p < range.lastParent; ++p)
-        for (uint32_t k = 0; k < 2 * patches.parents[p].patchCount(); ++k) {
-            const uint32_t at = 2 * patches.parents[p].firstPatch + k;
-            glm::dvec3 total(0.0);
-            for (const SetLight& light : lights)
-                total += light.irradiance.direct[at] + light.irradiance.indirect[at];
-            lit[at % 2] += double(patches.area[at / 2]) * sum(total);
-        }
-    return lit[side] < kInsideOut * lit[1 - side];
-}
-
 // The light of one set on the sides, as it goes into a reconstruction: of exitance what COMBINED
 // shows, without gloss.
 struct SideLight {
-    const Irradiance& irradiance;
+    Irradiance shown;
     Field emission;  // W/m^2
     Field exitance;  // emission included, W/m^2
     Field carried;   // direct light without that of the sources, W/m^2
 };
 
-std::vector<SideLight> sideLights(const Patches& patches, const Field& reflectance,
-                                  const SetLights& lights) {
+bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side side,
+                 const std::vector<SideLight>& lights) {
+    double lit[2] = {0, 0};
+    for (uint32_t p = range.firstParent; p < range.lastParent; ++p)
+        for (uint32_t k = 0; k < 2 * patches.parents[p].patchCount(); ++k) {
+            const uint32_t at = 2 * patches.parents[p].firstPatch + k;
+            glm::dvec3 total(0.0);
+            for (const SideLight& light : lights) total += light.shown.all(at);
+            lit[at % 2] += double(patches.area[at / 2]) * sum(total);
+        }
+    return lit[side] < kInsideOut * lit[1 - side];
+}
+
+std::vector<SideLight> sideLights(const Patches& patches, const ShownLight& shown,
+                                  const std::vector<float>& exposed, const SetLights& lights) {
     std::vector<SideLight> result;
     for (const SetLight& light : lights) {
-        const Irradiance& h = light.irradiance;
-        SideLight out{h, light.direct.emission(), Field(h.direct.size()), Field(h.direct.size())};
+        SideLight out{shown.of(light.irradiance, exposed), light.direct.emission(),
+                      Field(patches.sideCount()), Field(patches.sideCount())};
+        const Irradiance& h = out.shown;
         for (size_t side = 0; side < h.direct.size(); ++side) {
             // Of the whole patch, what lets light through included.
             const float opacity = patches.opacityOf(uint32_t(side / 2));
             out.emission[side] *= opacity;
-            out.exitance[side] =
-                out.emission[side] + reflectance[side] * (h.direct[side] + h.indirect[side]);
+            out.exitance[side] = out.emission[side] + shown.color()[side] * h.all(side);
             out.carried[side] = h.direct[side] - h.gathered[side];
         }
         result.push_back(std::move(out));
@@ -98,16 +97,15 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
 
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
                                        const Visibility& visibility, float touchDistance,
-                                       const SetLights& lights, const std::vector<float>& exposed,
-                                       const Settings& settings, const Progress& progress,
-                                       Report& report) {
+                                       const SetLights& lights, const ShownLight& shown,
+                                       const std::vector<float>& exposed, const Settings& settings,
+                                       const Progress& progress, Report& report) {
     const bool isPoint = settings.reconstruction == "POINT";
-    const Field reflectance = diffuseReflectances(scene, patches);
-    const std::vector<SideLight> onSides = sideLights(patches, reflectance, lights);
+    const std::vector<SideLight> onSides = sideLights(patches, shown, exposed, lights);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
     std::optional<CornerGather> atCorners;
     if (isPoint)
-        atCorners.emplace(scene, patches, visibility, touchDistance, lights, ranges, exposed,
+        atCorners.emplace(scene, patches, visibility, touchDistance, lights, shown, ranges, exposed,
                           settings, progress.part(0, 2));
 
     std::vector<InstanceLight> result(scene.instances.size());
@@ -131,14 +129,14 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         out.cornerAngles = cornerAngles(mesh);
         const SmoothRegions regions =
             smoothRegions(mesh, patches.cells, ranges[i].firstCell, ranges[i].lastCell);
-        // Three fields of each light, one after the other; for POINT the reflectance is the last.
+        // Three fields of each light, one after the other; for POINT the colour is the last.
         std::vector<const Field*> fields;
         for (const SideLight& light : onSides)
-            fields.insert(fields.end(), {&light.irradiance.direct, &light.irradiance.indirect,
+            fields.insert(fields.end(), {&light.shown.direct, &light.shown.indirect,
                                          isPoint ? &light.carried : &light.exitance});
         for (const SideLight& light : onSides)
             if (isPoint) fields.push_back(&light.emission);
-        if (isPoint) fields.push_back(&reflectance);
+        if (isPoint) fields.push_back(&shown.color());
         std::vector<Field> nodes =
             settings.reconstruction == "AREA_AVERAGE"
                 ? areaAverage(patches, ranges[i], regions, instance.side, exposed, fields)
@@ -155,11 +153,11 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                 indirect = std::move(atNodes.indirect);
                 exitance.resize(direct.size());
                 const Field& emission = nodes[3 * lights.size() + k];
-                const Field& reflectances = nodes.back();
+                const Field& colors = nodes.back();
                 for (size_t v = 0; v < direct.size(); ++v)
-                    exitance[v] = emission[v] + reflectances[v] * (direct[v] + indirect[v]);
+                    exitance[v] = emission[v] + colors[v] * (direct[v] + indirect[v]);
             } else if (settings.reconstruction == "LEAST_SQUARES") {
-                addFaceSlopes(patches, ranges[i], regions, instance.side, reflectance, lights[k],
+                addFaceSlopes(patches, ranges[i], regions, instance.side, shown.color(), lights[k],
                               settings.targetError, direct, exitance);
             }
             CornerLight light = cornerLight(regions, direct, indirect, exitance);
@@ -170,7 +168,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         }
         for (const CornerLight& light : out.sets) out.add(light);
 
-        if (out.isBaked && isInsideOut(patches, ranges[i], instance.side, lights)) {
+        if (out.isBaked && isInsideOut(patches, ranges[i], instance.side, onSides)) {
             report.objects[i].status = "baked; no light on this side";
             warnings[i] = "object \"" + instance.name +
                           "\": the baked sides of its faces get no light but the other sides do; "

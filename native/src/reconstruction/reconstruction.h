@@ -21,6 +21,7 @@
 #include "patches/patches.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/least_squares.h"
+#include "reconstruction/shown_light.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
 #include "visibility/visibility.h"
@@ -35,8 +36,8 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
 // touchDistance (m) touch. Adds the objects, warnings and skips to the report.
 std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
                                        const Visibility& visibility, float touchDistance,
-                                       const SetLights& lights, const std::vector<float>& exposed,
-                                       const Settings& settings, const Progress& progress,
-                                       Report& report);
+                                       const SetLights& lights, const ShownLight& shown,
+                                       const std::vector<float>& exposed, const Settings& settings,
+                                       const Progress& progress, Report& report);
 
 }  // namespace raybundle

@@ -46,7 +46,17 @@ struct Material {
     float opacity = 1;
     int opacityImage = -1;
 
+    // What leaves each side of the light that arrives at the other, and an image that, times its
+    // weights, is added.
+    std::array<glm::vec3, 2> translucence{glm::vec3(0.0f), glm::vec3(0.0f)};
+    int translucenceImage = -1;
+    std::array<glm::vec3, 2> translucenceImageWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
+
     bool isOpaque() const { return opacity >= 1 && opacityImage < 0; }
+    bool isTranslucent() const {
+        return translucenceImage >= 0 || translucence[0] != glm::vec3(0.0f) ||
+               translucence[1] != glm::vec3(0.0f);
+    }
 };
 
 // N-gons over shared vertices, in object space. A corner is a position in cornerVertices; face f

@@ -37,7 +37,8 @@ double meanExitance(const Scene& scene, const Patches& patches,
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         emitted += patches.area[side / 2] * brightest(emission[side]);
         if (side % 2 == 0)
-            reflectance += patches.area[side / 2] * brightest(patches.reflectance[side]);
+            reflectance += patches.area[side / 2] *
+                           brightest(patches.reflectance[side] + patches.translucenceOf(side));
     }
     const double area = patches.totalArea;
     for (const Light& light : scene.lights) {

@@ -12,6 +12,7 @@
 
 #include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
+#include "transport/translucence.h"
 
 namespace raybundle {
 namespace {
@@ -19,6 +20,7 @@ namespace {
 using Field = std::vector<glm::vec3>;  // per side
 
 constexpr int kMaxIterations = 1000;
+constexpr int kMaxPasses = 200;  // through translucent patches
 // A guess whose squared residual is this many times what is allowed is the solution of a solve to
 // about the same tolerance.
 constexpr double kSameSolution = 1.2;
@@ -147,6 +149,29 @@ LineWeights LineReuse::lineWeights(Half half) const {
 
 Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
                             const LineWeights& weights) const {
+    if (patches.translucence.empty())
+        return solveReflected(half, tolerance, reflected, weights, {});
+    const std::vector<float> exposed = exposedShare();
+    const size_t n = counts.sideCount();
+    HandOver first = handOver(patches, shot, exposed);
+    Irradiance light(n);
+    light.direct = std::move(first.gathered);
+    light.indirect = std::move(first.indirect);
+    Field passed(n), next(n);
+    for (int pass = 0; pass < kMaxPasses; ++pass) {
+        forEachSide(n,
+                    [&](size_t i) { next[i] = passedOn(patches, exposed, i, light.all(i ^ 1)); });
+        passed.swap(next);
+        forEachSide(n, [&](size_t i) { next[i] -= passed[i]; });
+        const glm::dvec3 enough = dot(passed, passed) * double(tolerance) * double(tolerance);
+        if (pass > 0 && !glm::any(glm::greaterThan(dot(next, next), enough))) break;
+        light = solveReflected(half, tolerance, reflected, weights, passed);
+    }
+    return light;
+}
+
+Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflected,
+                                     const LineWeights& weights, const Field& passed) const {
     const size_t n = counts.sideCount();
     Irradiance result(n);
     const HandOver first = handOver(patches, shot, exposedShare());
@@ -163,6 +188,14 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
         if (hasEmission) sum += rowTimes(counts, half, i, scaled);
         result.direct[i] += x[i] * sum / m[i];
     });
+    Field passedBrought(passed.size());  // by the lines, W/m^2
+    if (!passed.empty()) {
+        forEachSide(n, [&](size_t i) { scaled[i] = padded(x[i] * passed[i]); });
+        forEachSide(n, [&](size_t i) {
+            passedBrought[i] =
+                m[i] > 0 ? x[i] * rowTimes(counts, half, i, scaled) / m[i] : glm::vec3(0.0f);
+        });
+    }
 
     // The scaling, the right-hand side and the first residual.
     Field scale(n), lineScale(n), z(n), r(n), p(n), product(n);
@@ -174,7 +207,9 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
             z[i][c] = scale[i][c] > 0 ? reflected[i][c] / scale[i][c] : 0;
         }
         // The right-hand side, until the loop: unshot and what the lines brought, over the scale.
-        const glm::vec3 unshot = patches.reflectance[i] * (result.direct[i] - first.gathered[i]);
+        glm::vec3 carried = result.direct[i] - first.gathered[i];
+        if (!passed.empty()) carried += passedBrought[i];
+        const glm::vec3 unshot = patches.reflectance[i] * carried;
         for (int c = 0; c < 3; ++c)
             product[i][c] = scale[i][c] > 0 ? (first.unshot[i][c] + unshot[c]) / scale[i][c] : 0;
         // Lines' product with the guess, to the last bit as at the end of the solve that found it.
@@ -231,6 +266,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
         brought[i] = isSolved ? share * brought[i] : rowTimes(counts, half, i, scaled);
         result.indirect[i] = first.indirect[i];
         if (m[i] > 0) result.indirect[i] += x[i] * brought[i] / m[i];
+        if (!passed.empty()) result.indirect[i] += passedBrought[i];
     });
     return result;
 }
@@ -292,7 +328,11 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
     }
 
     // Starved sides may see each other: sweep until their reflected light has settled.
+    const std::vector<float> exposed = exposedShare();
     Field known = reflected, next(starved.size());
+    if (!patches.translucence.empty())
+        for (size_t i = 0; i < known.size(); ++i)
+            known[i] += passedOn(patches, exposed, i, irradiance.all(i ^ 1));
     for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
         tbb::parallel_for(size_t(0), starved.size(), [&](size_t k) {
             const uint32_t side = starved[k];
@@ -307,6 +347,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
         });
         glm::vec3 change(0.0f), most(0.0f);
         for (size_t k = 0; k < starved.size(); ++k) {
+            next[k] += passedOn(patches, exposed, starved[k], irradiance.all(starved[k] ^ 1));
             change = glm::max(change, glm::abs(next[k] - known[starved[k]]));
             most = glm::max(most, next[k]);
             known[starved[k]] = next[k];

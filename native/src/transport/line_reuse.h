@@ -12,6 +12,10 @@
 // and positive definite, unit diagonal, solved by conjugate gradients for the three channels at
 // once.
 //
+// Light that passes through translucent patches is one more source: R_i + tau_i H_k, k the other side
+// of the patch, is what leaves side i. Solving for R with the H_k of the last solve, again and again,
+// splits the whole system regularly, and so converges: no light is gained on the way.
+//
 // Sources: thesis section 2.3.2 (eq. 2.30: F = r_ij / r_i) and 2.1.4 (the radiosity system).
 // Differs:
 // - The thesis never solves on the counts; it transports power while it traces. Each line is used
@@ -44,6 +48,8 @@ class LineReuse {
     // Solves until the residual is below `tolerance` of the right-hand side in every channel.
     // `reflected` (R, per side, W/m^2) holds the first guess, which any multiple of is as good as
     // itself, and takes the solution. weights: of the same half.
+    // Where patches are translucent, it is solved again with what they passed on until that has
+    // settled: R is without it.
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected,
                      const LineWeights& weights) const;
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const {
@@ -67,6 +73,11 @@ class LineReuse {
                               Irradiance& irradiance) const;
 
   private:
+    // passed: per side, exitance that is known besides; empty: none.
+    Irradiance solveReflected(Half half, float tolerance, std::vector<glm::vec3>& reflected,
+                              const LineWeights& weights,
+                              const std::vector<glm::vec3>& passed) const;
+
     const Patches& patches;
     const LineCounts& counts;
     const FirstShot& shot;

@@ -14,6 +14,7 @@
 
 #include "transport/line_reuse.h"
 #include "transport/streaming_reuse.h"
+#include "transport/translucence.h"
 #include "transport/transport.h"
 
 namespace raybundle {
@@ -125,7 +126,12 @@ class LineReuseTransport : public Transport {
 
   private:
     void startStreaming() {
-        first = handOver(input.patches, input.shot, solver.exposedShare());
+        const std::vector<float> exposed = solver.exposedShare();
+        first = handOver(input.patches, input.shot, exposed);
+        std::vector<glm::vec3> source = first.unshot;
+        for (size_t i = 0; i < source.size(); ++i)
+            source[i] +=
+                passedOn(input.patches, exposed, i, first.gathered[i ^ 1] + first.indirect[i ^ 1]);
         for (uint32_t half = 0; half < 2; ++half) {
             const Irradiance start =
                 solver.solve(Half(half), kStartTolerance, last.reflected[half]);
@@ -138,7 +144,7 @@ class LineReuseTransport : public Transport {
                 indirect[i] = start.indirect[i] - first.indirect[i];
             }
             streaming[half].emplace(input.patches, input.counts.bundles / 2, lines, direct,
-                                    indirect, first.unshot, input.shot.emission,
+                                    indirect, source, exposed, input.shot.emission,
                                     glm::pi<float>() * input.worldRadiance);
         }
     }

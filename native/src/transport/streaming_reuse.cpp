@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "transport/translucence.h"
+
 namespace raybundle {
 namespace {
 
@@ -11,17 +13,16 @@ constexpr float kMostReflectance = 0.95f;
 
 }  // namespace
 
-StreamingReuse::StreamingReuse(const Patches& patches, uint32_t bundles,
-                               const std::vector<float>& lineCount,
-                               const std::vector<glm::vec3>& direct,
-                               const std::vector<glm::vec3>& indirect,
-                               const std::vector<glm::vec3>& source,
-                               const std::vector<glm::vec3>& emission,
-                               const glm::vec3& worldExitance)
+StreamingReuse::StreamingReuse(
+    const Patches& patches, uint32_t bundles, const std::vector<float>& lineCount,
+    const std::vector<glm::vec3>& direct, const std::vector<glm::vec3>& indirect,
+    const std::vector<glm::vec3>& source, const std::vector<float>& exposed,
+    const std::vector<glm::vec3>& emission, const glm::vec3& worldExitance)
     : patches(patches),
       emission(emission),
       worldExitance(worldExitance),
       source(source),
+      exposed(exposed),
       bundles(bundles),
       totalWeight(bundles),
       directSum(lineCount.size()),
@@ -37,7 +38,8 @@ StreamingReuse::StreamingReuse(const Patches& patches, uint32_t bundles,
         reflectance = std::max({reflectance, rho.x, rho.y, rho.z});
         directSum[i] = lines[i] * glm::dvec3(direct[i]);
         indirectSum[i] = lines[i] * glm::dvec3(indirect[i]);
-        exitance[i] = source[i] + rho * (direct[i] + indirect[i]);
+        exitance[i] = source[i] + rho * (direct[i] + indirect[i]) +
+                      passedOn(patches, exposed, i, direct[i ^ 1] + indirect[i ^ 1]);
     }
     steps = 1 / (1 - double(std::min(reflectance, kMostReflectance)));
 }
@@ -48,6 +50,12 @@ void StreamingReuse::meet(uint32_t side, double lineCount) {
         met.push_back(side);
     }
     lines[side] += lineCount;
+}
+
+void StreamingReuse::updateExitance(size_t side) {
+    const size_t other = side ^ 1;
+    exitance[side] = source[side] + patches.reflectance[side] * (direct(side) + indirect(side)) +
+                     passedOn(patches, exposed, side, direct(other) + indirect(other));
 }
 
 void StreamingReuse::add(const BundleLines& bundle) {
@@ -71,7 +79,8 @@ void StreamingReuse::add(const BundleLines& bundle) {
     });
     for (uint32_t side : met) {
         indirectSum[side] += newest * arriving[side];
-        exitance[side] = source[side] + patches.reflectance[side] * (direct(side) + indirect(side));
+        updateExitance(side);
+        if (!patches.translucence.empty()) updateExitance(side ^ 1);
         arriving[side] = glm::dvec3(0.0);
         isMet[side] = false;
     }

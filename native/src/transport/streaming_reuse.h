@@ -28,11 +28,11 @@ class StreamingReuse {
   public:
     // One half, started from the solution on `bundles` bundles. Per side: lines (m_i of those
     // bundles), direct and indirect (irradiance by their lines, W/m^2). source: exitance that is
-    // there without lines; emission and worldExitance: what lines bring straight, W/m^2.
+    // there without lines; exposed: per side, the share of it that nothing covers; emission and worldExitance: what lines bring straight, W/m^2.
     StreamingReuse(const Patches& patches, uint32_t bundles, const std::vector<float>& lines,
                    const std::vector<glm::vec3>& direct, const std::vector<glm::vec3>& indirect,
-                   const std::vector<glm::vec3>& source, const std::vector<glm::vec3>& emission,
-                   const glm::vec3& worldExitance);
+                   const std::vector<glm::vec3>& source, const std::vector<float>& exposed,
+                   const std::vector<glm::vec3>& emission, const glm::vec3& worldExitance);
 
     void add(const BundleLines& bundle);
 
@@ -46,11 +46,13 @@ class StreamingReuse {
         return b > 0 ? glm::vec3(a / b) : glm::vec3(0.0f);
     }
     void meet(uint32_t side, double lineCount);
+    void updateExitance(size_t side);
 
     const Patches& patches;
     const std::vector<glm::vec3>& emission;
     const glm::dvec3 worldExitance;
     std::vector<glm::vec3> source;
+    const std::vector<float> exposed;
     double steps;        // a
     double bundles;      // n
     double totalWeight;  // of all bundles so far

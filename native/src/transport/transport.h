@@ -31,6 +31,8 @@ struct Irradiance {
     std::vector<glm::vec3> direct;    // straight from sources, emission and world
     std::vector<glm::vec3> gathered;  // part of it: from the sources of the first shot
     std::vector<glm::vec3> indirect;  // after one reflection or more
+
+    glm::vec3 all(size_t side) const { return direct[side] + indirect[side]; }
 };
 
 // Which bundles an estimate looks at.

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What outputs show of the light on patches: that of the front, and where a patch is translucent the
+// mean of both sides, weighted by what the side sends of each; times its colour it is what the side
+// sends without gloss.
+//
+// Source: measured against Cycles' Diffuse bake, which counts Translucent BSDFs among the diffuse.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "patches/patches.h"
+#include "scene/scene.h"
+#include "transport/transport.h"
+
+namespace raybundle {
+
+class ShownLight {
+  public:
+    // patches must outlive the object.
+    ShownLight(const Scene& scene, const Patches& patches);
+
+    // Per side: the diffuse reflectance and the translucence of the whole patch, what lets light
+    // straight through included.
+    const std::vector<glm::vec3>& color() const { return colors; }
+
+    // Whether every side shows its own light alone.
+    bool isOwnAlone() const { return patches.translucence.empty(); }
+    bool isOwnAlone(size_t side) const { return patches.translucenceOf(side) == glm::vec3(0.0f); }
+
+    // Of light that arrives at a side and at the other side of its patch, both W/m^2; exposed: per
+    // side, the share of it that nothing covers.
+    glm::vec3 of(size_t side, const glm::vec3& own, const glm::vec3& others,
+                 const std::vector<float>& exposed) const;
+    // The same on all sides.
+    Irradiance of(Irradiance light, const std::vector<float>& exposed) const;
+
+  private:
+    const Patches& patches;
+    std::vector<glm::vec3> colors;
+    std::vector<glm::vec3> othersShare;  // per side, of what it sends; empty where it is 0
+};
+
+}  // namespace raybundle

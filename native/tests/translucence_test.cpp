@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Light that passes diffusely through surfaces, against closed forms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "bake/bake.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle::test {
+namespace {
+
+Material translucent(float reflectance, float translucence, float emission = 0) {
+    Material material = grey("paper", reflectance, emission, emission);
+    material.translucence = {glm::vec3(translucence), glm::vec3(translucence)};
+    return material;
+}
+
+// A cube in a white world of exitance kWorld. From outside it sees nothing else; inside all sides
+// get the same from each other, so that H_in = rho H_in + tau kWorld.
+constexpr float kWorld = 2;
+
+Scene paperCube(float reflectance, float translucence) {
+    Scene scene;
+    place(scene, box("cube", glm::vec3(0), glm::vec3(1), true),
+          translucent(reflectance, translucence));
+    scene.worldRadiance = glm::vec3(kWorld / float(kPi));
+    return scene;
+}
+
+// Irradiance, W/m^2, of all corners of an instance.
+void expectLight(const Bake& bake, int32_t instance, rb_output output, double irradiance,
+                 double tolerance) {
+    for (const glm::vec3& v : bake.instanceLight(instance).perCorner(output))
+        EXPECT_NEAR(double(v.x) * kPi, irradiance, tolerance * irradiance);
+}
+
+class Translucence : public ::testing::TestWithParam<const char*> {
+  protected:
+    Translucence() {
+        bake.settings.reconstruction = GetParam();
+        bake.settings.patchSize = 0.2f;
+    }
+    Bake bake;
+};
+
+// In a closed furnace every line brings the same light, so that there is no noise but rounding and
+// the residual of the solve.
+TEST_P(Translucence, LightInsideAPaperCubeIsThatOfTheClosedForm) {
+    for (const auto& [rho, tau] :
+         {std::pair(0.5f, 0.3f), std::pair(0.0f, 0.6f), std::pair(0.2f, 0.7f)}) {
+        bake.run(paperCube(rho, tau));
+        const double inside = tau * kWorld / (1 - rho);
+        // What the front shows is the light of both sides by what it sends of each.
+        const double sent = rho * inside + tau * kWorld;
+        expectLight(bake, 0, RB_OUTPUT_LIGHTING, sent / (rho + tau), 1e-3);
+        expectLight(bake, 0, RB_OUTPUT_COMBINED, sent, 1e-3);
+        for (size_t side = 0; side < bake.patches().sideCount(); side += 2)
+            EXPECT_NEAR(bake.patchIrradiance().all(side).x, inside, 1e-3 * inside);
+    }
+}
+
+// A room cut in two by a wall: what it reflects and passes on together is what the other walls
+// reflect, so that the light is the same everywhere: B = E / (1 - rho).
+TEST_P(Translucence, TwoHalvesOfAFurnaceAreOne) {
+    Scene scene = closedCube(0.6f, 1);
+    const int32_t wall = place(
+        scene, grid("wall", glm::vec3(0.4f, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), 2, 2),
+        translucent(0.25f, 0.35f, 1));
+    bake.run(scene);
+    expectLight(bake, 0, RB_OUTPUT_COMBINED, 2.5, 1e-3);
+    expectLight(bake, wall, RB_OUTPUT_COMBINED, 2.5, 1e-3);
+}
+
+// The sun from behind: no noise, nothing else in the scene.
+TEST_P(Translucence, ASheetShowsTheSunBehindIt) {
+    Scene scene;
+    const int32_t sheet =
+        place(scene, grid("sheet", glm::vec3(0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), 2, 2),
+              translucent(0.2f, 0.3f));
+    scene.addLight(sunLight({0, 0.6, -0.8}, glm::dvec3(5)));
+    bake.run(scene);
+    expectLight(bake, sheet, RB_OUTPUT_DIRECT, 0.6 * 4, 1e-4);
+    expectLight(bake, sheet, RB_OUTPUT_COMBINED, 0.3 * 4, 1e-4);
+}
+
+// A sheet that reflects nothing over a floor that reflects nothing: what the floor gets is tau times
+// the sun's light times their form factor.
+TEST_P(Translucence, AFloorGetsTheSunThroughASheet) {
+    Scene scene;
+    const int32_t floor =
+        place(scene, grid("floor", glm::vec3(0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), 8, 8),
+              grey("floor", 0));
+    place(scene, rectangle("sheet", glm::vec3(0, 0, 1), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)),
+          translucent(0, 0.5f), glm::dmat4(1), RB_ROLE_OCCLUDE);
+    scene.addLight(sunLight({0, 0, 1}, glm::dvec3(4)));
+    bake.settings.targetError = 0.005f;
+    bake.settings.maxBundles = 4096;
+    bake.run(scene);
+    double sum = 0, area = 0;
+    const Patches& patches = bake.patches();
+    for (size_t side = 0; side < patches.sideCount(); side += 2) {
+        if (int32_t(patches.parentAt(uint32_t(side)).instance) != floor) continue;
+        sum += double(patches.area[side / 2] * bake.patchIrradiance().all(side).x);
+        area += double(patches.area[side / 2]);
+    }
+    // The stated noise is 0.5 %; the mean over the floor has less.
+    const double exact = 0.5 * 4 * parallelRectangles(1, 1, 1);
+    EXPECT_NEAR(sum / area, exact, 0.01 * exact);
+}
+
+INSTANTIATE_TEST_SUITE_P(Reconstructions, Translucence,
+                         ::testing::Values("LEAST_SQUARES", "AREA_AVERAGE", "POINT"),
+                         [](const auto& one) { return std::string(one.param); });
+
+TEST(TranslucenceOfMaterials, EnergyIsBalanced) {
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.run(paperCube(0.4f, 0.5f));
+    const auto energy = reportOf(bake)["energy"];
+    EXPECT_NEAR(double(energy["absorbed"]) + double(energy["escaped"]), double(energy["emitted"]),
+                1e-3 * double(energy["emitted"]));
+}
+
+// Reflectance and translucence together must not make light.
+TEST(TranslucenceOfMaterials, TooMuchIsClamped) {
+    Bake bake;
+    bake.settings.patchSize = 0.2f;
+    bake.run(paperCube(0.8f, 0.5f));
+    const float inside = bake.patchIrradiance().all(0).x;
+    EXPECT_NEAR(inside, 0.199 * kWorld / 0.2, 0.01);
+}
+
+// As in the closed form above.
+TEST(TranslucenceOfMaterials, ACubeStaysExactBeyondTheMemoryLimit) {
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.settings.memoryLimit = 1;
+    bake.settings.minBundles = bake.settings.maxBundles = 512;
+    bake.run(paperCube(0.5f, 0.3f));
+    ASSERT_TRUE(mentions(reportOf(bake)["warnings"], "memory_limit"));
+    expectLight(bake, 0, RB_OUTPUT_COMBINED, 0.5 * 1.2 + 0.3 * kWorld, 1e-3);
+}
+
+TEST(TranslucenceOfMaterials, AnExtendedFirstShotGoesThroughToo) {
+    Scene scene = paperCube(0.5f, 0.3f);
+    scene.worldRadiance = glm::vec3(0.0f);
+    // Shines on five walls from within, and through them out; nothing comes back.
+    scene.addLight(pointLight(glm::dvec3(0.5), glm::dvec3(1)));
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.settings.targetError = 0.005f;
+    auto meanOutside = [&](const std::string& firstShot) {
+        bake.settings.firstShot = firstShot;
+        bake.run(scene);
+        double sum = 0;
+        for (const glm::vec3& v : bake.instanceLight(0).perCorner(RB_OUTPUT_COMBINED))
+            sum += double(v.x) / 24;
+        return sum;
+    };
+    const double gathered = meanOutside("GATHER");
+    EXPECT_NEAR(meanOutside("EXTENDED"), gathered, 0.01 * gathered);
+}
+
+TEST(TranslucenceOfMaterials, AnImageVariesIt) {
+    Scene scene = paperCube(0, 0.6f);
+    scene.meshes[0].uvs.assign(24, glm::vec2(0.5f));
+    scene.images.push_back({"half", 1, 1, RB_IMAGE_REPEAT, {glm::vec3(0.5f)}});
+    Material& paper = scene.materials[0];
+    paper.translucence = {glm::vec3(0.1f), glm::vec3(0.1f)};
+    paper.translucenceImage = 0;
+    paper.translucenceImageWeight = {glm::vec3(1.0f), glm::vec3(1.0f)};
+    Bake bake;
+    bake.settings.patchSize = 0.2f;
+    bake.run(scene);
+    EXPECT_NEAR(bake.patchIrradiance().all(0).x, 0.6 * kWorld, 1e-3);
+}
+
+// Half of the light goes straight through: H_in = 0.5 kWorld + rho H_in + tau kWorld, for reflectance
+// and translucence are those of the whole. The noise in the mean over all walls is below 1 %.
+TEST(TranslucenceOfMaterials, ItIsThatOfTheWholeSurfaceHolesIncluded) {
+    Scene scene = paperCube(0.2f, 0.2f);
+    scene.materials[0].opacity = 0.5f;
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.settings.targetError = 0.005f;
+    bake.run(scene);
+    double sum = 0, area = 0;
+    for (size_t side = 0; side < bake.patches().sideCount(); side += 2) {
+        sum += double(bake.patches().area[side / 2] * bake.patchIrradiance().all(side).x);
+        area += double(bake.patches().area[side / 2]);
+    }
+    EXPECT_NEAR(sum / area, 0.7 * kWorld / 0.8, 0.01 * kWorld);
+}
+
+TEST(TranslucenceOfMaterials, OtherSolversSayThatTheyDoNotCarryIt) {
+    Bake bake;
+    bake.settings.patchSize = 0.2f;
+    bake.settings.solver = "MULTIPATH";
+    bake.settings.directions = "RANDOM";
+    bake.run(paperCube(0.5f, 0.3f));
+    EXPECT_NE(bake.reportJson().find("material \\\"paper\\\": MULTIPATH does not carry on"),
+              std::string::npos)
+        << bake.reportJson();
+}
+
+}  // namespace
+}  // namespace raybundle::test
