@@ -242,6 +242,16 @@ def compare_sent(canopy):
     assert np.abs(found - sent).max() < MEAN_TOLERANCE * sent.max()
 
 
+def compare_lighting(item):
+    """Without colour, as the mean over the corners that are not near the edge."""
+    inside = np.abs(corner_positions(item)).max(axis=1) < 0.9
+    truth = bake_objects([item], SAMPLES, 0)[item.name][inside].mean(axis=0)
+    raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=1024)
+    found = read_colors(item)[inside].mean(axis=0)
+    print(f"lighting: {np.round(100 * (found / truth - 1), 2)} %")
+    assert np.abs(found - truth).max() < MEAN_TOLERANCE * truth.max()
+
+
 def corner_positions(item):
     return np.array([item.data.vertices[loop.vertex_index].co for loop in item.data.loops])
 
@@ -363,8 +373,38 @@ def clear_glass(tree):
     return tree.add('BsdfRefraction', Color=(0.7, 0.7, 0.7, 1.0), IOR=1.0, Roughness=0.0)
 
 
-@pytest.mark.parametrize("build", [leaf_by_alpha, leaf_by_mix, transparent, half_mixed],
-                         ids=lambda build: build.__name__)
+def paper(tree):
+    return tree.add('BsdfTranslucent', Color=RED)
+
+
+def translucent_leaf(tree):
+    color = tree.image(checker(4))
+    return tree.add('MixShader', _0=0.4, _1=tree.add('BsdfDiffuse', Color=color),
+                    _2=tree.add('BsdfTranslucent', Color=color))
+
+
+def translucent_leaf_by_alpha(tree):
+    node = tree.image(checker(16, (1, 1, 1, 1), (0, 0, 0, 1)))
+    leaf = tree.add('AddShader', _0=tree.add('BsdfDiffuse', Color=(0.1, 0.4, 0.1, 1.0)),
+                    _1=tree.add('BsdfTranslucent', Color=(0.5, 0.4, 0.1, 1.0)))
+    return tree.add('MixShader', _0=node, _1=tree.add('BsdfTransparent'), _2=leaf)
+
+
+def painted_paper(tree):
+    return tree.add('BsdfTranslucent', Color=tree.add('VertexColor', {'layer_name': "Paint"}))
+
+
+def checkered_paper(tree):
+    where = tree.add('TexCoord').outputs['Object']
+    return tree.add('BsdfTranslucent', Color=tree.add(
+        'TexChecker', Vector=where, Color1=RED, Color2=BLUE, Scale=5.0).outputs['Color'])
+
+
+TRANSLUCENT = (paper, translucent_leaf, translucent_leaf_by_alpha, painted_paper, checkered_paper)
+
+
+@pytest.mark.parametrize("build", (leaf_by_alpha, leaf_by_mix, transparent, half_mixed)
+                         + TRANSLUCENT, ids=lambda build: build.__name__)
 @pytest.mark.parametrize("by", ['LAMP', 'WORLD'])
 def test_veil(floor, new_object, new_light, new_world, build, by):
     veil = place_canopy(new_object, build)
@@ -377,6 +417,9 @@ def test_veil(floor, new_object, new_light, new_world, build, by):
         new_world((0.4, 0.6, 0.9))
     bpy.context.view_layer.update()
     compare(floor)
+    if build in (paper, translucent_leaf):
+        compare_sent(veil)
+        compare_lighting(veil)
 
 
 def test_glass_is_named(floor, new_object, new_light):

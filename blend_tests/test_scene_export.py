@@ -736,6 +736,28 @@ def test_glass_lets_light_through_and_is_named(new_material):
     assert '"Window"' in result.warnings[0] and "Glass" in result.warnings[0]
 
 
+def test_translucence_is_laid_out_like_the_reflectance(new_material):
+    material = new_material("Leaf")
+    tree = material.node_tree
+    texture = tree.nodes.new('ShaderNodeTexImage')
+    texture.image = new_image(np.full((2, 2, 3), 0.5), True)
+    shaders = [tree.nodes.new(f'ShaderNodeBsdf{kind}') for kind in ('Diffuse', 'Translucent')]
+    for shader in shaders:
+        tree.links.new(texture.outputs['Color'], shader.inputs['Color'])
+    mix = tree.nodes.new('ShaderNodeMixShader')
+    mix.inputs[0].default_value = 0.25
+    for k, shader in enumerate(shaders):
+        tree.links.new(shader.outputs[0], mix.inputs[1 + k])
+    output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
+    tree.links.new(mix.outputs[0], output.inputs['Surface'])
+    exported, result = exported_material(material)
+    assert result.warnings == []
+    assert exported.image == exported.translucence_image == 0
+    assert exported.image_weight == pytest.approx([0.75] * 3)
+    assert exported.translucence_image_weight == pytest.approx(np.full((2, 3), 0.25))
+    assert not exported.translucence.any() and exported.opacity == 1.0
+
+
 def test_two_materials_by_face(new_object, new_material):
     item = new_object("Box", CUBE_VERTICES, CUBE_FACES, new_material("Red", (1, 0, 0)))
     item.data.materials.append(new_material("Blue", (0, 0, 1)))

@@ -28,14 +28,18 @@ class MaterialExport:
     baked_uvs: bool = False  # the images are laid out by surface_bake.py
 
 
-def _share_coordinates(surface: Surface) -> bool:
-    """Whether what varies of reflectance and emission is read at one place."""
-    names = surface.reflectance.attribute, surface.radiance.attribute
-    if None not in names and names[0] != names[1]:
+def _share_coordinates(*colors: ColorExpression) -> bool:
+    """Whether what varies of colours is read at one place."""
+    if len({color.attribute for color in colors if color.attribute is not None}) > 1:
         return False
-    first, second = surface.reflectance.texture, surface.radiance.texture
-    return first is None or second is None or (
-        first.uv_layer == second.uv_layer and np.allclose(first.uv_matrix, second.uv_matrix))
+    first, *others = [color.texture for color in colors if color.texture] or [None]
+    return all(other.uv_layer == first.uv_layer
+               and np.allclose(other.uv_matrix, first.uv_matrix) for other in others)
+
+
+def _is_laid_out(translucence: ColorExpression, *others: ColorExpression) -> bool:
+    """Whether what varies of the translucence is an image read where the other colours are."""
+    return translucence.attribute is None and _share_coordinates(translucence, *others)
 
 
 def _diffuse_of(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
@@ -81,8 +85,11 @@ class MaterialExporter:
         key = material.original
         if key not in self._unread:
             surface = self._surface(material, False, Warnings(), unread := [])
-            if not unread and not _share_coordinates(surface):
+            if not unread and not _share_coordinates(surface.reflectance, surface.radiance):
                 unread.append("its emission, which varies in another way than its reflectance")
+            if not unread and not _is_laid_out(surface.translucence, surface.reflectance,
+                                               surface.radiance):
+                unread.append("its translucence, which varies in another way than its reflectance")
             self._unread[key] = unread[0] if unread else None
         return self._unread[key]
 
@@ -95,7 +102,7 @@ class MaterialExporter:
             self.warnings.add(text)
         index = {}
         for name, pixels in (('reflectance', baked.reflectance), ('radiance', baked.radiance),
-                             ('opacity', baked.opacity)):
+                             ('opacity', baked.opacity), ('translucence', baked.translucence)):
             if pixels is not None:
                 index[name] = len(self.scene.images)
                 self.scene.images.append(ImageData(f"{material.name} ({name})", pixels, 'EXTEND'))
@@ -106,7 +113,9 @@ class MaterialExporter:
             emission_image_weight=np.full((2, 3), np.pi) if glows else None,
             opacity_image=index.get('opacity'), diffuse_scale=np.tile(baked.diffuse_scale, (2, 1)),
             diffuse_offset=np.tile(baked.diffuse_offset, (2, 1)),
-            grazing=np.tile(surface.grazing, (2, 1))))
+            grazing=np.tile(surface.grazing, (2, 1)),
+            translucence_image=index.get('translucence'),
+            translucence_image_weight=None if baked.translucence is None else np.ones((2, 3))))
         return MaterialExport(len(self.scene.materials) - 1, baked_uvs=True)
 
     def _export(self, material: bpy.types.Material | None) -> MaterialExport:
@@ -128,11 +137,21 @@ class MaterialExporter:
                               None)
         if (any(glow.texture and not glow.texture.same_as(glow_texture) for glow in glows)
                 or any(glow.attribute not in (None, glow_attribute) for glow in glows)
-                or not all(map(_share_coordinates, sides))):
+                or not all(_share_coordinates(side.reflectance, side.radiance)
+                           for side in sides)):
             self.warnings.add(f'material "{name}": its emission and its reflectance vary in '
                               f'different ways: the emission has its mean')
             glows = [ColorExpression(glow.mean()) for glow in glows]
             glow_texture = glow_attribute = None
+        passed = [side.translucence for side in sides]
+        passed_texture = next((color.texture for color in passed if color.texture), None)
+        if (not all(_is_laid_out(color, varying, *glows) for color in passed)
+                or any(color.texture and not color.texture.same_as(passed_texture)
+                       for color in passed)):
+            self.warnings.add(f'material "{name}": its translucence and its reflectance vary in '
+                              f'different ways: the translucence has its mean')
+            passed = [ColorExpression(color.mean()) for color in passed]
+            passed_texture = None
         transmittance = np.clip([side.transmittance for side in sides], 0.0, 1.0)
         if np.ptp(transmittance) > 1e-3:
             self.warnings.add(f'material "{name}": what it lets through differs between colours '
@@ -151,9 +170,14 @@ class MaterialExporter:
             (np.pi * np.array([glow.attribute_weight for glow in glows])
              if glow_attribute is not None else None),
             1.0 - float(transmittance.mean()), diffuse_scale=scale, diffuse_offset=offset,
-            grazing=np.array([side.grazing for side in sides]))
+            grazing=np.array([side.grazing for side in sides]),
+            translucence=np.array([color.constant for color in passed]),
+            translucence_image=self._image_index(passed_texture) if passed_texture else None,
+            translucence_image_weight=(np.array([color.texture_weight for color in passed])
+                                       if passed_texture else None))
         self.scene.materials.append(data)
-        return MaterialExport(len(self.scene.materials) - 1, texture or glow_texture,
+        return MaterialExport(len(self.scene.materials) - 1,
+                              texture or glow_texture or passed_texture,
                               glow_attribute if attribute is None else attribute)
 
     def _surface(self, material: bpy.types.Material | None, backfacing: bool,

@@ -108,6 +108,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_material_emission_corner_colors': (_handle, _int, _floats),
     'rb_set_material_diffuse': (_handle, _int, _floats, _floats),
     'rb_set_material_grazing': (_handle, _int, _floats),
+    'rb_set_material_translucence': (_handle, _int, _floats, _int, _floats),
     'rb_set_material_opacity': (_handle, _int, _float),
     'rb_set_material_opacity_image': (_handle, _int, _int),
     'rb_add_mesh': (_handle, _text, _floats, _size, _ints, _size, _ints, _size, _ints, _out(_int)),
@@ -362,6 +363,20 @@ class Scene(_Handle):
         """(2, 3): what light from straight above lacks of the reflectance."""
         grazing = _float_array(grazing, (2, 3), "grazing")
         self._library.rb_set_material_grazing(self._pointer, material, _as_floats(grazing))
+
+    def set_material_translucence(self, material: int, translucence: np.ndarray,
+                                  image: int | None = None,
+                                  image_weight: np.ndarray | None = None) -> None:
+        """(2, 3) each: what leaves the front, and the back, of the light on the other side; the
+        image, times its weight, is added."""
+        translucence = _float_array(translucence, (2, 3), "translucence")
+        weight = None
+        if image is not None:
+            image_weight = _float_array(image_weight, (2, 3), "image_weight")
+            weight = _as_floats(image_weight)
+        self._library.rb_set_material_translucence(
+            self._pointer, material, _as_floats(translucence), -1 if image is None else image,
+            weight)
 
     def set_material_opacity(self, material: int, opacity: float) -> None:
         """opacity: 0 to 1, share of the light that does not pass straight through."""

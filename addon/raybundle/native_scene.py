@@ -26,6 +26,10 @@ def build_native_scene(data: SceneData) -> native.Scene:
             scene.set_material_emission_corner_colors(identifier, material.emission_color_weight)
         scene.set_material_diffuse(identifier, material.diffuse_scale, material.diffuse_offset)
         scene.set_material_grazing(identifier, material.grazing)
+        scene.set_material_translucence(
+            identifier, material.translucence,
+            None if material.translucence_image is None else images[material.translucence_image],
+            material.translucence_image_weight)
         scene.set_material_opacity(identifier, material.opacity)
         if material.opacity_image is not None:
             scene.set_material_opacity_image(identifier, images[material.opacity_image])

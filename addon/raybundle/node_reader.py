@@ -62,6 +62,8 @@ class Surface:
     diffuse: ColorExpression = field(default_factory=ColorExpression)
     # (3,): what light from straight above lacks of it.
     grazing: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # What leaves it, diffusely, of the light on the other side.
+    translucence: ColorExpression = field(default_factory=ColorExpression)
 
     @staticmethod
     def matt(color: ColorExpression) -> Surface:
@@ -75,7 +77,7 @@ class Surface:
     def scaled(self, factor: float) -> Surface:
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
                        self.transmittance * factor, self.diffuse.scaled(factor),
-                       self.grazing * factor)
+                       self.grazing * factor, self.translucence.scaled(factor))
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,9 @@ class NodeReader:
                 radiance=self._emission_color(node.inputs['Color'], path).scaled(strength))
         if node.type == 'BSDF_TRANSPARENT':
             return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
-        if node.type in ('BSDF_GLASS', 'BSDF_REFRACTION', 'BSDF_TRANSLUCENT'):
+        if node.type == 'BSDF_TRANSLUCENT':
+            return Surface(translucence=self.color(node.inputs['Color'], path))
+        if node.type in ('BSDF_GLASS', 'BSDF_REFRACTION'):
             self._warn(node, "lets light through: it goes straight on here, and nothing is "
                              "reflected")
             return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
@@ -212,7 +216,8 @@ class NodeReader:
                             self._plus(total.radiance, part.radiance, node),
                             total.transmittance + part.transmittance,
                             total.diffuse.plus(part.diffuse).simplified(),
-                            total.grazing + part.grazing)
+                            total.grazing + part.grazing,
+                            self._plus(total.translucence, part.translucence, node))
         return total
 
     # ----------------------------------------------------------------------------------------------

@@ -40,6 +40,10 @@ class MaterialData:
     diffuse_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
     # (2, 3): what light from straight above lacks of the reflectance.
     grazing: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    # (2, 3): what leaves a side, diffusely, of the light that arrives at the other.
+    translucence: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    translucence_image: int | None = None
+    translucence_image_weight: np.ndarray | None = None  # (2, 3)
 
 
 @dataclass(frozen=True)

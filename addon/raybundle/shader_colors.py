@@ -2,7 +2,7 @@
 """Node trees rewritten so that they emit one of their own properties, for Cycles to evaluate.
 
 Each shader gives way to an emission shader of its reflectance, what of that is diffuse, its
-radiance or its transmittance; mixes and sums of shaders stay as they are, because all of these are
+radiance, its transmittance or its translucence; mixes and sums of shaders stay as they are, because all of these are
 linear in them. The tables say the same as node_reader.py; here whatever is linked to a socket stays
 linked, but for those that gloss depends on (principled.py).
 """
@@ -17,10 +17,10 @@ import numpy as np
 from .node_reader import GLOSSY, glossy_albedo
 from .principled import GLOSS_SOCKETS, PrincipledAlbedo, principled_albedo
 
-REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE = (
-    'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE')
+REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
+    'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
 # DIFFUSE is the reflectance where nothing has gloss.
-PROPERTIES = (REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE)
+PROPERTIES = (REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE)
 _USUAL_COLOR = 0.5  # of a metal whose colour varies
 
 # A value of the rewritten tree: an output of a node, or a constant.
@@ -249,7 +249,7 @@ _SHADERS: dict[tuple[str, str], Callable[[_Formula, bpy.types.Node], _Value]] = 
     ('BSDF_TRANSPARENT', TRANSMITTANCE): _color,
     ('BSDF_GLASS', TRANSMITTANCE): _color,
     ('BSDF_REFRACTION', TRANSMITTANCE): _color,
-    ('BSDF_TRANSLUCENT', TRANSMITTANCE): _color,
+    ('BSDF_TRANSLUCENT', TRANSLUCENCE): _color,
     ('BSDF_PRINCIPLED', REFLECTANCE): _principled_reflectance,
     ('BSDF_PRINCIPLED', DIFFUSE): _principled_diffuse,
     ('BSDF_PRINCIPLED', RADIANCE): _principled_radiance,

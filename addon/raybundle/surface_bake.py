@@ -23,8 +23,8 @@ import numpy as np
 from .face_atlas import BORDER, FaceAtlas, face_atlas
 from .material_fingerprint import material_fingerprint
 from .node_reader import LIGHT_PATH
-from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSMITTANCE,
-                            ShaderColors)
+from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSLUCENCE,
+                            TRANSMITTANCE, ShaderColors)
 
 # Within a pixel.
 _SAMPLES = 4
@@ -40,7 +40,8 @@ class BakedMaterial:
     message: str  # what was done and why
     reflectance: np.ndarray
     radiance: np.ndarray | None  # None: emits nothing
-    opacity: np.ndarray | None  # None: lets nothing through
+    opacity: np.ndarray | None  # None: lets nothing straight through
+    translucence: np.ndarray | None  # None: lets nothing through diffusely
     # (3,) each: scale * reflectance + offset is diffuse, as nearly as that goes for all its pixels.
     diffuse_scale: np.ndarray
     diffuse_offset: np.ndarray
@@ -190,7 +191,7 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
     return BakedSurface(atlas.uvs, {
         slot: BakedMaterial(f'material "{item.material_slots[slot].material.name}": baked by '
                             f'Cycles on "{item.name}", because of {reason}',
-                            whole, images.get(RADIANCE), opacity,
+                            whole, images.get(RADIANCE), opacity, images.get(TRANSLUCENCE),
                             *_line_through(*_pixels(atlas, sizes, slots == slot, whole, diffuse)))
         for slot, reason in reasons.items()})
 
