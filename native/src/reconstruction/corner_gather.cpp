@@ -55,11 +55,11 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
     for (size_t i = 0; i < ranges.size(); ++i) {
         first.push_back(corners.size());
         if (scene.instances[i].role != RB_ROLE_BAKE) continue;
-        const std::vector<CornerReceiver> all =
-            cornerReceivers(scene, patches, uint32_t(i), ranges[i]);
+        std::vector<CornerReceiver> all = cornerReceivers(scene, patches, uint32_t(i), ranges[i]);
         std::vector<uint8_t> isFree(all.size());
         tbb::parallel_for(size_t(0), all.size(), [&](size_t c) {
             const Receiver& receiver = all[c].receiver;
+            leaveGap(all[c], patches, visibility);
             isFree[c] = exposed[receiver.side] > kHalfCovered && !isTouched(receiver);
         });
         for (size_t c = 0; c < all.size(); ++c)
@@ -108,7 +108,7 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
         std::vector<uint8_t> isNear(end - begin);
         tbb::parallel_for(begin, end, [&](size_t c) {
             isNear[c - begin] = showsOwnAlone(c) && !wanted[regions.nodeOf[corners[c].corner]] &&
-                                gather.isNear(corners[c].receiver);
+                                (corners[c].isBesideGap || gather.isNear(corners[c].receiver));
         });
         if (!skips.skipGather) wanted.assign(wanted.size(), true);
         for (size_t c = begin; c < end; ++c)
