@@ -234,5 +234,25 @@ TEST(BakeSameness, ARigidMotionDiffersByTheNoise) {
     EXPECT_LT(noise(bakeQuick(still), bakeQuick(moved)), 0.1);
 }
 
+// What light may be off is a share of the light that is shown: a bright yard around a room would
+// leave that as noisy as the yard is.
+TEST(Bake, TheSunOnTheOutsideOfARoomChangesNothingInside) {
+    Bake dim, bright;
+    for (Bake* bake : {&dim, &bright}) {
+        Scene scene = litRoom();
+        scene.addLight(
+            sunLight(glm::normalize(glm::dvec3(1, 2, 3)), glm::dvec3(bake == &bright ? 1000 : 1)));
+        setQuick(*bake);
+        // Else a lamp beside the bright sun takes fewer samples at first.
+        bake->settings.skipWeak = false;
+        bake->run(scene);
+    }
+    // The same samples, and solves to 1e-5 of the light on all fronts, which are inside.
+    for (size_t side = 0; side < dim.patches().sideCount(); side += 2) {
+        const float light = dim.patchIrradiance().all(side).x;
+        EXPECT_NEAR(bright.patchIrradiance().all(side).x, light, 1e-3f * light);
+    }
+}
+
 }  // namespace
 }  // namespace raybundle

@@ -96,16 +96,10 @@ void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& re
 }
 
 // Per side, m^2: the whole area of those that have a result, else 0.
-std::vector<float> wantedArea(const Scene& scene, const Patches& patches) {
-    bool anyBaked = false;
-    for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
-    std::vector<float> area(patches.sideCount(), 0);
-    for (size_t side = 0; side < area.size(); ++side) {
-        const Instance& instance =
-            scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
-        if (!anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side)))
-            area[side] = patches.area[side / 2];
-    }
+std::vector<float> wantedArea(const Patches& patches, const ShownLight& shown) {
+    std::vector<float> area(patches.sideCount());
+    for (size_t side = 0; side < area.size(); ++side)
+        area[side] = shown.isResult(side) ? patches.area[side / 2] : 0.0f;
     return area;
 }
 
@@ -169,9 +163,9 @@ void Bake::runStages(const Scene& scene) {
                                       "they lie in a plane with others like them: projected as one",
                                       patches.sheets.joined - patches.sheets.sheets.size()});
         }
-        SetLights lights = shootSources(scene, coarse, report);
-        const Tiles tiles(patches);
         const ShownLight shown(scene, patches);
+        SetLights lights = shootSources(scene, shown, coarse, report);
+        const Tiles tiles(patches);
         warnOfVisibility(scene, lights, settings, report);
         warnOfTranslucence(scene, settings, report);
         SideNoise noise(tiles.sideCount());
@@ -181,7 +175,7 @@ void Bake::runStages(const Scene& scene) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
         } else if (settings.skipReflection && isFirstShotAll(patches, lights)) {
             report.skipped.push_back({"bundles and solve", "no surface reflects light", 1});
-            noise = keepFirstShot(scene, tiles, lights, report);
+            noise = keepFirstShot(tiles, shown, lights, report);
         } else {
             std::vector<TransportInput> inputs;
             for (const SetLight& light : lights)
@@ -189,7 +183,8 @@ void Bake::runStages(const Scene& scene) {
                     {patches, trace->visibility, light.shot, light.worldRadiance,
                      trace->surrounding.exposed, trace->touchDistance, settings, *trace->tracer,
                      trace->counts,
-                     settings.solver == "LINE_REUSE" ? &trace->solutionsOf(light.set) : nullptr});
+                     settings.solver == "LINE_REUSE" ? &trace->solutionsOf(light.set) : nullptr,
+                     &shown.sides()});
             const Transports transports = makeTransports(settings.solver, inputs);
             noise = solveToTarget(scene, tiles, shown, lights, transports, report);
             exposed = trace->exposedShare();
@@ -289,18 +284,19 @@ std::vector<CoarseShot> Bake::shootCoarsely(const Scene& scene, Report& report) 
 }
 
 // The first shot of each light set, and of what belongs to none.
-SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& coarse,
-                             Report& report) {
+SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
+                             const std::vector<CoarseShot>& coarse, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
     const Patches& patches = trace->patches;
     const Visibility& visibility = trace->visibilityOfLights();
+    const uint64_t aims = shotHash(settings, shown.sides());
     SetLights lights;
     const int32_t count = int32_t(scene.lightSets.size());
     for (int32_t set = kNoLightSet; set < count; ++set) {
         const Progress share = progress.part(lights.size(), size_t(count) + 1);
         DirectLight direct(scene, patches, visibility, uint32_t(settings.seed), set, settings);
         Trace::Shot& last = trace->shots[set];
-        const uint64_t hash = lightHash(direct, settings);
+        const uint64_t hash = lightHash(direct, aims);
         FirstShot shot;
         const bool mayKeep = settings.skipLights && settings.firstShot == "GATHER";
         if (mayKeep && last.hash == hash) {
@@ -312,14 +308,14 @@ SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& 
                 {direct, patches, visibility, settings, share, trace->touchDistance,
                  trace->linesPerBundle(), &trace->visibility,
                  coarse.empty() ? nullptr : &coarse[lights.size()],
-                 mayKeep && last.aims == shotHash(settings) ? last.shot.bySource : nullptr});
+                 mayKeep && last.aims == aims ? last.shot.bySource : nullptr, &shown.sides()});
             report.shadowRays += shot.rays;
             if (shot.bySource && shot.bySource == last.shot.bySource)
                 report.skipped.push_back({"first shot",
                                           "only strengths of lights changed since the last bake: "
                                           "what each brought is scaled",
                                           1});
-            if (settings.firstShot == "GATHER") last = {hash, shotHash(settings), shot};
+            if (settings.firstShot == "GATHER") last = {hash, aims, shot};
         }
         report.skipped.push_back(
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
@@ -336,14 +332,14 @@ SetLights Bake::shootSources(const Scene& scene, const std::vector<CoarseShot>& 
 }
 
 // The result where bundles have nothing to bring; some of them tell what is covered.
-SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, SetLights& lights,
+SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLights& lights,
                               Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
     const Patches& patches = trace->patches;
     exposed = trace->surrounding.exposed;
     if (exposed.empty())
         exposed = surroundings(trace->exactInput(settings), uint32_t(settings.seed)).exposed;
-    std::vector<float> weight = wantedArea(scene, patches);
+    std::vector<float> weight = wantedArea(patches, shown);
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exposed[side];
     const std::vector<float> tileWeight = tiles.sum(weight);
     std::vector<std::vector<float>> errorOfSets;
@@ -374,11 +370,8 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     const Patches& patches = trace->patches;
     const size_t n = patches.sideCount();
     // Sides whose noise counts: those with a result, by the area that is exposed as far as known.
-    const std::vector<float> area = wantedArea(scene, patches);
+    const std::vector<float> area = wantedArea(patches, shown);
     std::vector<float> weight(n, 0);
-    std::vector<bool> wantedSides(n);
-    for (size_t side = 0; side < n; ++side)
-        wantedSides[side] = area[side] > 0 || (area[side ^ 1] > 0 && !shown.isOwnAlone(side ^ 1));
     std::vector<std::vector<float>> errorOfSets;
     for (const SetLight& light : lights) errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
     std::vector<float> tileWeight(tiles.sideCount(), 0);
@@ -452,7 +445,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     for (size_t k = 0; k < lights.size(); ++k) {
         Report unsaid;  // of the lines, which the first has said for all
         lights[k].irradiance =
-            transports[k]->finish(tolerance, wantedSides, k == 0 ? report : unsaid);
+            transports[k]->finish(tolerance, shown.sides(), k == 0 ? report : unsaid);
     }
 
     if (const uint64_t cycles = trace->tracer->cycleCount())

@@ -57,9 +57,9 @@ class Bake {
     void makePatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> shootCoarsely(const Scene& scene, Report& report);
-    SetLights shootSources(const Scene& scene, const std::vector<CoarseShot>& coarse,
-                           Report& report);
-    SideNoise keepFirstShot(const Scene& scene, const Tiles& tiles, SetLights& lights,
+    SetLights shootSources(const Scene& scene, const ShownLight& shown,
+                           const std::vector<CoarseShot>& coarse, Report& report);
+    SideNoise keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLights& lights,
                             Report& report);
     SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
                             SetLights& lights, const Transports& transports, Report& report);

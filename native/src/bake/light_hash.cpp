@@ -5,20 +5,21 @@
 
 namespace raybundle {
 
-uint64_t shotHash(const Settings& settings) {
+uint64_t shotHash(const Settings& settings, const std::vector<bool>& isShown) {
     Hasher hasher;
+    hasher.add(std::vector<uint8_t>(isShown.begin(), isShown.end()));
     hasher.add(settings.targetError, settings.seed, settings.skipFacing, settings.skipLit,
                settings.skipWeak, settings.skipInside);
     return hasher.value();
 }
 
-uint64_t lightHash(const DirectLight& light, const Settings& settings) {
+uint64_t lightHash(const DirectLight& light, uint64_t aims) {
     Hasher hasher;
     for (const auto& source : light.lightSources()) hasher.add(source->shape, source->magnitude);
     // What is a source and what is not depends on reflectances too.
     hasher.add(light.emission());
     hasher.add(light.bundledEmission());
-    hasher.add(shotHash(settings));
+    hasher.add(aims);
     return hasher.value();
 }
 

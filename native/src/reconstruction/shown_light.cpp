@@ -4,10 +4,30 @@
 #include "patches/reflectance.h"
 
 namespace raybundle {
+namespace {
+
+std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
+    bool anyBaked = false;
+    for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
+    std::vector<bool> isResult(patches.sideCount());
+    for (size_t side = 0; side < isResult.size(); ++side) {
+        const Instance& instance = scene.instances[patches.parentAt(uint32_t(side)).instance];
+        isResult[side] =
+            !anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side));
+    }
+    return isResult;
+}
+
+}  // namespace
 
 ShownLight::ShownLight(const Scene& scene, const Patches& patches)
-    : patches(patches), colors(diffuseReflectances(scene, patches)) {
+    : patches(patches),
+      results(resultSides(scene, patches)),
+      shown(results),
+      colors(diffuseReflectances(scene, patches)) {
     if (isOwnAlone()) return;
+    for (size_t side = 0; side < shown.size(); ++side)
+        if (results[side ^ 1] && !isOwnAlone(side ^ 1)) shown[side] = true;
     othersShare.resize(colors.size());
     for (size_t side = 0; side < colors.size(); ++side) {
         const glm::vec3 through =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What outputs show of the light on patches: that of the front, and where a patch is translucent the
+// What outputs show of the light on patches, and on which: that of the front, and where a patch is translucent the
 // mean of both sides, weighted by what the side sends of each; times its colour it is what the side
 // sends without gloss.
 //
@@ -25,6 +25,11 @@ class ShownLight {
     // straight through included.
     const std::vector<glm::vec3>& color() const { return colors; }
 
+    // Whether a side has a result; all have where none is asked for.
+    bool isResult(size_t side) const { return results[side]; }
+    // Per side: whether its light shows, on itself or on the other side of its patch.
+    const std::vector<bool>& sides() const { return shown; }
+
     // Whether every side shows its own light alone.
     bool isOwnAlone() const { return patches.translucence.empty(); }
     bool isOwnAlone(size_t side) const { return patches.translucenceOf(side) == glm::vec3(0.0f); }
@@ -38,6 +43,7 @@ class ShownLight {
 
   private:
     const Patches& patches;
+    std::vector<bool> results, shown;
     std::vector<glm::vec3> colors;
     std::vector<glm::vec3> othersShare;  // per side, of what it sends; empty where it is 0
 };

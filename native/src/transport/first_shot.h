@@ -55,6 +55,8 @@ struct FirstShotInput {
     // Of the last GATHER of the same patches to the same error, to be scaled if the strengths of
     // sources are all that has changed; or null.
     std::shared_ptr<const LightBySource> before = nullptr;
+    // Per side: whether its light is shown, and not only that of what it lights; null: all is.
+    const std::vector<bool>* isShown = nullptr;
 };
 
 // The first shots, one a row of the table.

@@ -17,6 +17,10 @@
 namespace raybundle {
 namespace {
 
+// So many times the error of a result may be that of light on other sides: what it lights gets it
+// from many of them.
+constexpr float kOthersError = 2;
+
 // The sides of neighbouring tiles; the patches of a cut one stand beside each other.
 std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
     std::vector<uint32_t> firstOf;  // per tile; one more at the end
@@ -79,6 +83,10 @@ FirstShot gather(const FirstShotInput& input) {
         // other tiles have.
         if (const int level = patches.level(uint32_t(side / 2)); level > 0)
             receiver.errorFactor = std::ldexp(1.0f, level);
+        if (input.isShown && !(*input.isShown)[side]) {
+            receiver.isShown = false;
+            receiver.errorFactor *= kOthersError;
+        }
         return receiver;
     };
     const float target = input.settings.targetError;

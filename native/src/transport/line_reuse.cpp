@@ -20,6 +20,8 @@ namespace {
 using Field = std::vector<glm::vec3>;  // per side
 
 constexpr int kMaxIterations = 1000;
+// Where no light of more than this share, squared, reaches what is shown, it may stay rough.
+constexpr double kLeastShown = 1e-8;
 constexpr int kMaxPasses = 200;  // through translucent patches
 // A guess whose squared residual is this many times what is allowed is the solution of a solve to
 // about the same tolerance.
@@ -48,13 +50,14 @@ void forEachSide(size_t n, const Body& body) {
     });
 }
 
-// In double and in an order that does not depend on the number of threads.
-glm::dvec3 dot(const Field& a, const Field& b) {
+// In double and in an order that does not depend on the number of threads. Over the sides that
+// `which` holds for; null: all.
+glm::dvec3 dot(const Field& a, const Field& b, const std::vector<bool>* which = nullptr) {
     return tbb::parallel_deterministic_reduce(
         tbb::blocked_range<size_t>(0, a.size(), kGrain), glm::dvec3(0.0),
         [&](const auto& range, glm::dvec3 sum) {
             for (size_t i = range.begin(); i < range.end(); ++i)
-                sum += glm::dvec3(a[i]) * glm::dvec3(b[i]);
+                if (!which || (*which)[i]) sum += glm::dvec3(a[i]) * glm::dvec3(b[i]);
             return sum;
         },
         std::plus<>());
@@ -107,12 +110,14 @@ glm::dvec3 ratio(const glm::dvec3& a, const glm::dvec3& b) {
 }  // namespace
 
 LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
-                     const glm::vec3& worldRadiance, const std::vector<float>& exposed)
+                     const glm::vec3& worldRadiance, const std::vector<float>& exposed,
+                     const std::vector<bool>* isShown)
     : patches(patches),
       counts(counts),
       shot(shot),
       worldRadiance(worldRadiance),
       exposed(exposed),
+      isShown(isShown),
       hasEmission(std::any_of(shot.emission.begin(), shot.emission.end(),
                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
 
@@ -215,7 +220,12 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         // Lines' product with the guess, to the last bit as at the end of the solve that found it.
         scaled[i] = padded(x[i] * reflected[i]);
     });
-    const glm::dvec3 enough = dot(product, product) * double(tolerance) * double(tolerance);
+    const glm::dvec3 given = dot(product, product);
+    // A sunny yard around a room says nothing of what matters in the room.
+    auto enough = [&] {
+        const glm::dvec3 shown = isShown ? glm::min(given, dot(z, z, isShown)) : given;
+        return glm::max(shown, kLeastShown * given) * double(tolerance) * double(tolerance);
+    };
     Field brought(n, glm::vec3(0.0f));  // by the lines, over x_i
     if (dot(z, z) != glm::dvec3(0.0))
         forEachSide(n, [&](size_t i) { brought[i] = rowTimes(counts, half, i, scaled); });
@@ -224,7 +234,7 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         r[i] = product[i] - p[i];
     });
     glm::dvec3 rr = dot(r, r);
-    auto isNearly = [&] { return !glm::any(glm::greaterThan(rr, kSameSolution * enough)); };
+    auto isNearly = [&] { return !glm::any(glm::greaterThan(rr, kSameSolution * enough())); };
     glm::vec3 share(1.0f);
     if (!isNearly()) {
         // Of all multiples of the guess the best, in the measure of conjugate gradients: after a
@@ -241,7 +251,7 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
 
     // Conjugate gradients, each channel with its own coefficients.
     for (int iteration = 0; !isSolved && iteration < kMaxIterations; ++iteration) {
-        if (!glm::any(glm::greaterThan(rr, enough))) break;
+        if (!glm::any(glm::greaterThan(rr, enough()))) break;
         forEachSide(n, [&](size_t i) { scaled[i] = padded(lineScale[i] * p[i]); });
         forEachSide(n, [&](size_t i) {
             product[i] = p[i] - lineScale[i] * rowTimes(counts, half, i, scaled);

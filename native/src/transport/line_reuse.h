@@ -40,12 +40,15 @@ namespace raybundle {
 
 class LineReuse {
   public:
-    // exposed: per side, the share of it that nothing covers; empty: as the counts have it. All
-    // references must outlive the object.
+    // exposed: per side, the share of it that nothing covers; empty: as the counts have it.
+    // isShown: per side, whether its light is shown, and not only that of what it lights; null: all
+    // is. All references must outlive the object.
     LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
-              const glm::vec3& worldRadiance, const std::vector<float>& exposed);
+              const glm::vec3& worldRadiance, const std::vector<float>& exposed,
+              const std::vector<bool>* isShown = nullptr);
 
-    // Solves until the residual is below `tolerance` of the right-hand side in every channel.
+    // Solves until the residual is below `tolerance` of the right-hand side in every channel, and of
+    // the solution on the sides that are shown.
     // `reflected` (R, per side, W/m^2) holds the first guess, which any multiple of is as good as
     // itself, and takes the solution. weights: of the same half.
     // Where patches are translucent, it is solved again with what they passed on until that has
@@ -83,6 +86,7 @@ class LineReuse {
     const FirstShot& shot;
     const glm::vec3 worldRadiance;
     const std::vector<float>& exposed;
+    const std::vector<bool>* const isShown;
     bool hasEmission = false;
 };
 

@@ -33,7 +33,8 @@ class LineReuseTransport : public Transport {
   public:
     explicit LineReuseTransport(const TransportInput& input)
         : input(input),
-          solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed),
+          solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed,
+                 input.isShown),
           limit(size_t(input.settings.memoryLimit * 1e6)),
           own(input.solutions ? 0 : input.patches.sideCount()),
           last(input.solutions ? *input.solutions : own) {}

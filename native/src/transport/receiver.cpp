@@ -17,17 +17,19 @@ constexpr double kLaxShare = 0.25;
 constexpr float kStep = 0.33f, kEdge = 6;
 
 // How many times these tolerances the errors may be, so that all of them together are no more than
-// `most` at each receiver that has light: where few receivers have any, each may have more.
-float laxity(const std::vector<Gathered>& results, const std::vector<float>& tolerance,
-             double most) {
+// `most` at each receiver that has light: where few receivers have any, each may have more. Of those
+// that count.
+float laxity(const std::vector<Gathered>& results, const std::vector<bool>& counts,
+             const std::vector<float>& tolerance, double most) {
     double allowed = 0;
-    for (const Gathered& result : results)
-        if (brightest(result.irradiance) > 0) allowed += most * most;
+    for (size_t k = 0; k < results.size(); ++k)
+        if (counts[k] && brightest(results[k].irradiance) > 0) allowed += most * most;
     for (float factor = kMostLaxity; factor > 1; factor *= 0.8f) {
         double left = 0;
         for (size_t k = 0; k < results.size(); ++k)
-            left += double(
-                std::min(results[k].variance, factor * factor * tolerance[k] * tolerance[k]));
+            if (counts[k])
+                left += double(
+                    std::min(results[k].variance, factor * factor * tolerance[k] * tolerance[k]));
         if (left <= allowed) return factor;
     }
     return 1;
@@ -55,22 +57,28 @@ std::vector<bool> besideShadows(const std::vector<Gathered>& results,
 Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
                const std::function<Receiver(size_t)>& receiverAt,
                const std::vector<ReceiverPair>& neighbours, float targetError) {
-    double lit = 0, litArea = 0;
+    // Of what is shown, if any light reaches that: a sunny yard says nothing of a room.
+    double lit[2] = {0, 0}, litArea[2] = {0, 0};
     for (size_t k = 0; k < results.size(); ++k)
         if (const double h = brightest(results[k].irradiance); h > 0) {
             const Receiver receiver = receiverAt(k);
             const double weight = receiver.point ? 1 : double(patches.area[receiver.side / 2]);
-            lit += weight * h;
-            litArea += weight;
+            lit[receiver.isShown] += weight * h;
+            litArea[receiver.isShown] += weight;
         }
+    const bool anyShown = litArea[true] > 0;
     // Not its square: a few receivers beside a lamp may have most of that.
-    const double meanLight = litArea > 0 ? lit / litArea : 0;
+    const double meanLight = litArea[anyShown] > 0 ? lit[anyShown] / litArea[anyShown] : 0;
     const float floor = kDarkShare * float(meanLight);
     std::vector<float> tolerance(results.size());
-    for (size_t k = 0; k < results.size(); ++k)
-        tolerance[k] = receiverAt(k).errorFactor * kDirectShare * targetError *
+    std::vector<bool> counts(results.size());
+    for (size_t k = 0; k < results.size(); ++k) {
+        const Receiver receiver = receiverAt(k);
+        counts[k] = receiver.isShown || !anyShown;
+        tolerance[k] = receiver.errorFactor * kDirectShare * targetError *
                        std::max(floor, brightest(results[k].irradiance));
-    const float factor = laxity(results, tolerance, kLaxShare * targetError * meanLight);
+    }
+    const float factor = laxity(results, counts, tolerance, kLaxShare * targetError * meanLight);
     for (float& error : tolerance) error *= factor;
     const std::vector<bool> besideShadow = besideShadows(results, neighbours, tolerance);
     Aims further;

@@ -34,6 +34,7 @@ struct Receiver {
     // Only the light that lines which end at the first surface do not bring it.
     bool passingOnly = false;
     float errorFactor = 1;  // its error may be so many times that of others
+    bool isShown = true;    // whether its light is shown, and not only that of what it lights
 };
 
 struct Outlook;

@@ -68,6 +68,8 @@ struct TransportInput {
     LineCounts& counts;  // of the bundles traced so far; LINE_REUSE alone adds to it
     // Of the light of the same set, per side of these patches; null: none are kept.
     LineSolutions* solutions = nullptr;
+    // Per side: whether its light is shown, and not only that of what it lights; null: all is.
+    const std::vector<bool>* isShown = nullptr;
 };
 
 class Transport {
