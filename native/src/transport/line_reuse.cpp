@@ -152,27 +152,33 @@ LineWeights LineReuse::lineWeights(Half half) const {
     return weights;
 }
 
-Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected,
+Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected, Field& passed,
                             const LineWeights& weights) const {
     if (patches.translucence.empty())
         return solveReflected(half, tolerance, reflected, weights, {});
     const std::vector<float> exposed = exposedShare();
     const size_t n = counts.sideCount();
-    HandOver first = handOver(patches, shot, exposed);
-    Irradiance light(n);
-    light.direct = std::move(first.gathered);
-    light.indirect = std::move(first.indirect);
-    Field passed(n), next(n);
-    for (int pass = 0; pass < kMaxPasses; ++pass) {
-        forEachSide(n,
-                    [&](size_t i) { next[i] = passedOn(patches, exposed, i, light.all(i ^ 1)); });
-        passed.swap(next);
-        forEachSide(n, [&](size_t i) { next[i] -= passed[i]; });
-        const glm::dvec3 enough = dot(passed, passed) * double(tolerance) * double(tolerance);
-        if (pass > 0 && !glm::any(glm::greaterThan(dot(next, next), enough))) break;
-        light = solveReflected(half, tolerance, reflected, weights, passed);
+    Field next(n), change(n);
+    auto passOn = [&](const Field& direct, const Field& indirect) {
+        forEachSide(n, [&](size_t i) {
+            next[i] = passedOn(patches, exposed, i, direct[i ^ 1] + indirect[i ^ 1]);
+        });
+    };
+    if (passed.empty()) {
+        const HandOver first = handOver(patches, shot, exposed);
+        passOn(first.gathered, first.indirect);
+        passed = next;
     }
-    return light;
+    for (int pass = 1;; ++pass) {
+        Irradiance light = solveReflected(half, tolerance, reflected, weights, passed);
+        passOn(light.direct, light.indirect);
+        forEachSide(n, [&](size_t i) { change[i] = next[i] - passed[i]; });
+        passed.swap(next);
+        const glm::dvec3 sent = dot(reflected, reflected, isShown) + dot(passed, passed, isShown);
+        const glm::dvec3 enough = sent * double(tolerance) * double(tolerance);
+        if (pass == kMaxPasses || !glm::any(glm::greaterThan(dot(change, change), enough)))
+            return light;
+    }
 }
 
 Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflected,

@@ -52,11 +52,13 @@ class LineReuse {
     // `reflected` (R, per side, W/m^2) holds the first guess, which any multiple of is as good as
     // itself, and takes the solution. weights: of the same half.
     // Where patches are translucent, it is solved again with what they passed on until that has
-    // settled: R is without it.
+    // settled: R is without it. `passed` (likewise; may be empty) holds the first guess of it, and
+    // takes the solution.
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected,
-                     const LineWeights& weights) const;
+                     std::vector<glm::vec3>& passed, const LineWeights& weights) const;
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const {
-        return solve(half, tolerance, reflected, lineWeights(half));
+        std::vector<glm::vec3> passed;
+        return solve(half, tolerance, reflected, passed, lineWeights(half));
     }
 
     // The share of each side that nothing covers.

@@ -29,6 +29,12 @@ constexpr uint32_t kStep = 16;  // bundles between two looks at the cancel flag
 // Of the solution that streaming starts from, relative.
 constexpr float kStartTolerance = 1e-4f;
 
+std::vector<glm::vec3> meanOf(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
+    std::vector<glm::vec3> mean(std::min(a.size(), b.size()));
+    for (size_t i = 0; i < mean.size(); ++i) mean[i] = 0.5f * (a[i] + b[i]);
+    return mean;
+}
+
 class LineReuseTransport : public Transport {
   public:
     explicit LineReuseTransport(const TransportInput& input)
@@ -82,16 +88,20 @@ class LineReuseTransport : public Transport {
         if (streaming[0]) return streamed(half);
         const uint32_t bundles = input.counts.bundles;
         std::vector<glm::vec3>& guess = last.reflected[size_t(half)];
-        if (!input.settings.skipWarmStart)
+        std::vector<glm::vec3>& passed = last.passed[size_t(half)];
+        if (!input.settings.skipWarmStart) {
             std::fill(guess.begin(), guess.end(), glm::vec3(0.0f));
-        else if (half == Half::BOTH && last.bundles != bundles)
-            for (size_t i = 0; i < guess.size(); ++i)
-                guess[i] = 0.5f * (last.reflected[0][i] + last.reflected[1][i]);
+            passed.clear();
+        } else if (half == Half::BOTH && last.bundles != bundles) {
+            guess = meanOf(last.reflected[0], last.reflected[1]);
+            passed = meanOf(last.passed[0], last.passed[1]);
+        }
         ++solves;
-        if (half != Half::BOTH) return solver.solve(half, tolerance, guess);
+        if (half != Half::BOTH)
+            return solver.solve(half, tolerance, guess, passed, solver.lineWeights(half));
         if (last.bundles != bundles) last.weights = solver.lineWeights(half);
         last.bundles = bundles;
-        return solver.solve(half, tolerance, guess, last.weights);
+        return solver.solve(half, tolerance, guess, passed, last.weights);
     }
 
     Irradiance finish(float tolerance, const std::vector<bool>& wanted, Report& report) override {

@@ -51,8 +51,10 @@ struct LineSolutions {
     }
 
     std::vector<glm::vec3> reflected[3];  // per half and for both, per side: exitance, W/m^2
-    LineWeights weights;                  // for both
-    uint32_t bundles = 0;                 // that those for both are of; 0: there are none
+    // Likewise, besides: what passed through translucent patches; empty: not known.
+    std::vector<glm::vec3> passed[3];
+    LineWeights weights;   // for both
+    uint32_t bundles = 0;  // that those for both are of; 0: there are none
 };
 
 // What transports are made of. References must outlive them.
