@@ -2,9 +2,9 @@
 """Node trees rewritten so that they emit one of their own properties, for Cycles to evaluate.
 
 Each shader gives way to an emission shader of its reflectance, what of that is diffuse, its
-radiance, its transmittance or its translucence; mixes and sums of shaders stay as they are, because all of these are
-linear in them. The tables say the same as node_reader.py; here whatever is linked to a socket stays
-linked, but for those that gloss depends on (principled.py).
+radiance, its transmittance or its translucence; mixes and sums of shaders stay as they are, because
+all of these are linear in them. The tables say the same as node_reader.py; here whatever is linked
+to a socket stays linked, but for those that gloss depends on (principled.py).
 """
 
 from __future__ import annotations
