@@ -71,8 +71,9 @@ TEST(PointReconstruction, SmallBoxesInVastScenesHaveNoDarkEdges) {
     });
 }
 
-// At a corner of one of two plates that face each other very near, the other hides a quarter of what
-// is around: the configuration factor from a point to a rectangle above its corner, seen from nearby.
+// At a corner of one of two plates that face each other very near, the other hides a quarter of
+// what is around: the configuration factor from a point to a rectangle above its corner, seen from
+// nearby.
 TEST(PointReconstruction, CornersBesideANarrowGapSeeOut) {
     Scene scene;
     place(scene, rectangle("plate", {0, 0, 0}, {0.2f, 0, 0}, {0, 0.2f, 0}), grey("", 0));

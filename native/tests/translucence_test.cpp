@@ -88,8 +88,8 @@ TEST_P(Translucence, ASheetShowsTheSunBehindIt) {
     expectLight(bake, sheet, RB_OUTPUT_COMBINED, 0.3 * 4, 1e-4);
 }
 
-// A sheet that reflects nothing over a floor that reflects nothing: what the floor gets is tau times
-// the sun's light times their form factor.
+// A sheet that reflects nothing over a floor that reflects nothing: what the floor gets is tau
+// times the sun's light times their form factor.
 TEST_P(Translucence, AFloorGetsTheSunThroughASheet) {
     Scene scene;
     const int32_t floor =
@@ -180,8 +180,9 @@ TEST(TranslucenceOfMaterials, AnImageVariesIt) {
     EXPECT_NEAR(bake.patchIrradiance().all(0).x, 0.6 * kWorld, 1e-3);
 }
 
-// Half of the light goes straight through: H_in = 0.5 kWorld + rho H_in + tau kWorld, for reflectance
-// and translucence are those of the whole. The noise in the mean over all walls is below 1 %.
+// Half of the light goes straight through: H_in = 0.5 kWorld + rho H_in + tau kWorld, for
+// reflectance and translucence are those of the whole. The noise in the mean over all walls is
+// below 1 %.
 TEST(TranslucenceOfMaterials, ItIsThatOfTheWholeSurfaceHolesIncluded) {
     Scene scene = paperCube(0.2f, 0.2f);
     scene.materials[0].opacity = 0.5f;

@@ -114,8 +114,8 @@ struct Patches {
     std::vector<glm::vec3> reflectance;  // per side
     std::vector<glm::vec3> grazing;      // per side, see Material; empty where all are 0
     std::vector<glm::vec3> emission;     // per side, W/m^2
-    // Per side: what leaves it of the light that arrives at the other side of the patch; empty where
-    // all are 0.
+    // Per side: what leaves it of the light that arrives at the other side of the patch; empty
+    // where all are 0.
     std::vector<glm::vec3> translucence;
     double totalArea = 0;  // of all patches, one side, m^2
     float size = 0;        // target edge of a tile, metres

@@ -24,9 +24,9 @@ namespace raybundle {
 
 class CornerGather {
   public:
-    // Gathers the light of the sources, of all light sets, on both sides where both show. exposed: per side, the share of it that
-    // nothing covers; surfaces not further apart than touchDistance (m) touch. References must
-    // outlive the object.
+    // Gathers the light of the sources, of all light sets, on both sides where both show. exposed:
+    // per side, the share of it that nothing covers; surfaces not further apart than touchDistance
+    // (m) touch. References must outlive the object.
     CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
                  float touchDistance, const SetLights& lights, const ShownLight& shown,
                  const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,

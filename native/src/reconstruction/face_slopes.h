@@ -18,8 +18,8 @@
 
 namespace raybundle {
 
-// Adds what light differs there from its mean to the nodes of an instance: to the direct irradiance,
-// and times the colour (per patch side) to the exitance, W/m^2.
+// Adds what light differs there from its mean to the nodes of an instance: to the direct
+// irradiance, and times the colour (per patch side) to the exitance, W/m^2.
 void addFaceSlopes(const Patches& patches, const InstanceRange& range, const SmoothRegions& regions,
                    rb_side side, const std::vector<glm::vec3>& color, const SetLight& light,
                    float targetError, std::vector<glm::vec3>& direct,

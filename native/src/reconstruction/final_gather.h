@@ -31,8 +31,8 @@ namespace raybundle {
 class FinalGather {
   public:
     // The light of one set, or what belongs to none. meanLight: of all that is baked, W/m^2;
-    // targetError: relative to it, or to the light of what is brighter; exposed: per side, the share
-    // of it that nothing covers. References must outlive the object.
+    // targetError: relative to it, or to the light of what is brighter; exposed: per side, the
+    // share of it that nothing covers. References must outlive the object.
     FinalGather(const Patches& patches, const Visibility& visibility, const SetLight& light,
                 const std::vector<float>& exposed, float meanLight, float targetError);
 

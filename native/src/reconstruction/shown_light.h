@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What outputs show of the light on patches, and on which: that of the front, and where a patch is translucent the
-// mean of both sides, weighted by what the side sends of each; times its colour it is what the side
-// sends without gloss.
+// What outputs show of the light on patches, and on which: that of the front, and where a patch is
+// translucent the mean of both sides, weighted by what the side sends of each; times its colour it
+// is what the side sends without gloss.
 //
 // Source: measured against Cycles' Diffuse bake, which counts Translucent BSDFs among the diffuse.
 #pragma once

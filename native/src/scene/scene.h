@@ -21,8 +21,8 @@ struct Image {
     std::vector<glm::vec3> pixels;
 };
 
-// Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The optional image and corner colours, each times its weight, are added to both
-// reflectances.
+// Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The
+// optional image and corner colours, each times its weight, are added to both reflectances.
 struct Material {
     std::string name;
     std::array<glm::vec3, 2> reflectance{glm::vec3(0.8f), glm::vec3(0.8f)};

@@ -12,9 +12,9 @@
 // and positive definite, unit diagonal, solved by conjugate gradients for the three channels at
 // once.
 //
-// Light that passes through translucent patches is one more source: R_i + tau_i H_k, k the other side
-// of the patch, is what leaves side i. Solving for R with the H_k of the last solve, again and again,
-// splits the whole system regularly, and so converges: no light is gained on the way.
+// Light that passes through translucent patches is one more source: R_i + tau_i H_k, k the other
+// side of the patch, is what leaves side i. Solving for R with the H_k of the last solve, again and
+// again, splits the whole system regularly, and so converges: no light is gained on the way.
 //
 // Sources: thesis section 2.3.2 (eq. 2.30: F = r_ij / r_i) and 2.1.4 (the radiosity system).
 // Differs:
@@ -47,13 +47,12 @@ class LineReuse {
               const glm::vec3& worldRadiance, const std::vector<float>& exposed,
               const std::vector<bool>* isShown = nullptr);
 
-    // Solves until the residual is below `tolerance` of the right-hand side in every channel, and of
-    // the solution on the sides that are shown.
-    // `reflected` (R, per side, W/m^2) holds the first guess, which any multiple of is as good as
-    // itself, and takes the solution. weights: of the same half.
-    // Where patches are translucent, it is solved again with what they passed on until that has
-    // settled: R is without it. `passed` (likewise; may be empty) holds the first guess of it, and
-    // takes the solution.
+    // Solves until the residual is below `tolerance` of the right-hand side in every channel, and
+    // of the solution on the sides that are shown. `reflected` (R, per side, W/m^2) holds the first
+    // guess, which any multiple of is as good as itself, and takes the solution. weights: of the
+    // same half. Where patches are translucent, it is solved again with what they passed on until
+    // that has settled: R is without it. `passed` (likewise; may be empty) holds the first guess of
+    // it, and takes the solution.
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected,
                      std::vector<glm::vec3>& passed, const LineWeights& weights) const;
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const {

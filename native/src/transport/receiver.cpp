@@ -17,8 +17,8 @@ constexpr double kLaxShare = 0.25;
 constexpr float kStep = 0.33f, kEdge = 6;
 
 // How many times these tolerances the errors may be, so that all of them together are no more than
-// `most` at each receiver that has light: where few receivers have any, each may have more. Of those
-// that count.
+// `most` at each receiver that has light: where few receivers have any, each may have more. Of
+// those that count.
 float laxity(const std::vector<Gathered>& results, const std::vector<bool>& counts,
              const std::vector<float>& tolerance, double most) {
     double allowed = 0;

@@ -28,7 +28,8 @@ class StreamingReuse {
   public:
     // One half, started from the solution on `bundles` bundles. Per side: lines (m_i of those
     // bundles), direct and indirect (irradiance by their lines, W/m^2). source: exitance that is
-    // there without lines; exposed: per side, the share of it that nothing covers; emission and worldExitance: what lines bring straight, W/m^2.
+    // there without lines; exposed: per side, the share of it that nothing covers; emission and
+    // worldExitance: what lines bring straight, W/m^2.
     StreamingReuse(const Patches& patches, uint32_t bundles, const std::vector<float>& lines,
                    const std::vector<glm::vec3>& direct, const std::vector<glm::vec3>& indirect,
                    const std::vector<glm::vec3>& source, const std::vector<float>& exposed,

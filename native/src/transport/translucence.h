@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Light that passes diffusely through patches: the side it leaves sends it into all directions, as if
-// it had reflected it.
+// Light that passes diffusely through patches: the side it leaves sends it into all directions, as
+// if it had reflected it.
 //
 // Source: Cycles' Translucent BSDF; the thesis has opaque surfaces only.
 #pragma once
