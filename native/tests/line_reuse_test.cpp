@@ -22,6 +22,7 @@ using Field = std::vector<glm::vec3>;
 
 constexpr size_t kMany = 10000000;
 constexpr float kTolerance = 1e-6f;  // of the solver
+constexpr float kTouch = 1e-5f;      // surfaces not further apart touch, metres: as traceLines' is
 
 // Patches and their lines, with light that a test may set side by side.
 struct System {
@@ -141,8 +142,8 @@ TEST(Furnace, StarvedSidesGatherTheSameLight) {
             starved += linesOf(system.counts, i) < 16;
         ASSERT_GT(starved, 100u);
         EXPECT_EQ(system.solver().gatherStarvedSides(
-                      visibility, 16, 1, std::vector<bool>(system.patches.sideCount(), true),
-                      system.reflected, h),
+                      visibility, kTouch, 16, 1,
+                      std::vector<bool>(system.patches.sideCount(), true), system.reflected, h),
                   starved);
         double worst = 0;
         for (uint32_t i = 0; i < system.patches.sideCount(); i += 2)
@@ -157,11 +158,30 @@ TEST(Furnace, StarvedSidesKeepTheirFirstShot) {
     System system(closedCube(0), 0.25f, 0.5f, 2);
     for (glm::vec3& g : system.shot.irradiance) g = {1, 2, 3};
     Irradiance h = system.solve();
-    system.solver().gatherStarvedSides(Visibility(system.patches), 1000, 1,
+    system.solver().gatherStarvedSides(Visibility(system.patches), kTouch, 1000, 1,
                                        std::vector<bool>(system.patches.sideCount(), true),
                                        system.reflected, h);
     for (uint32_t i = 0; i < system.patches.sideCount(); i += 2)
         ASSERT_LT(glm::distance(total(h, i), {1, 2, 3}), 1e-5f);
+}
+
+TEST(Furnace, StarvedSidesThatAreCoveredStayDark) {
+    // Boxes that stand on the floor of a glowing room, all of whose sides gather.
+    System system(roomWithBoxes(0.7f, 0.3f, 0), 0.1f, 0.2f, 2);
+    Irradiance h = system.solve();
+    system.solver().gatherStarvedSides(Visibility(system.patches), kTouch, 1000, 1,
+                                       std::vector<bool>(system.patches.sideCount(), true),
+                                       system.reflected, h);
+    size_t bottoms = 0;
+    // Of a hundred rays that start on the very edge of a contact one may slip through.
+    for (uint32_t i = 0; i < system.patches.sideCount(); i += 2) {
+        const Parent& parent = system.patches.parents[system.patches.parentOf[i / 2]];
+        const bool isBottom = parent.instance > 0 && parent.normal.z < -0.5f;
+        bottoms += isBottom;
+        const float light = largest(total(h, i));
+        ASSERT_LT(std::min(isBottom ? INFINITY : std::abs(light - 1), std::abs(light)), 0.02f) << i;
+    }
+    EXPECT_GT(bottoms, 50u);
 }
 
 TEST(MeanRadiosity, IsMeanEmissionOverOneMinusReflectance) {

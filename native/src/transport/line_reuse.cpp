@@ -10,6 +10,7 @@
 #include <functional>
 #include <glm/gtc/constants.hpp>
 
+#include "transport/local_lines.h"
 #include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
 #include "transport/translucence.h"
@@ -287,7 +288,8 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
     return result;
 }
 
-size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minLines, uint32_t seed,
+size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDistance,
+                                     uint32_t minLines, uint32_t seed,
                                      const std::vector<bool>& wanted, const Field& reflected,
                                      Irradiance& irradiance) const {
     auto linesAt = [&](uint32_t side) { return float(counts.linesMet(side)); };
@@ -313,26 +315,35 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
     const HandOver shotLight = handOver(patches, shot, exposedShare());
     std::vector<uint32_t> hits;
-    Field fromLines;  // indirect irradiance times the lines
+    std::vector<float> weights;  // of what lines and rays bring: the number of both
+    Field fromLines;             // indirect irradiance times the lines
     for (size_t first = 0; first < starved.size();) {
         const size_t last = starved.size();
         hits.resize(last * rays, kNone);
+        weights.resize(last);
         fromLines.resize(last);
         tbb::parallel_for(first, last, [&](size_t k) {
             const uint32_t side = starved[k];
             const glm::vec3 normal = patches.normal(side);
+            const float m = linesAt(side);
             glm::vec3 direct(0.0f);
+            weights[k] = m;
             for (size_t i = 0; i < rays; ++i) {
                 const glm::vec4 u = sobolPoint(uint32_t(i), hash(seed, side));
+                const glm::vec3 direction = cosineDirection(normal, {u.z, u.w});
+                float distance = 0;
                 const auto hit = visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}),
-                                                     cosineDirection(normal, {u.z, u.w}));
+                                                     direction, &distance);
+                if (hit && isCovered(patches, side, *hit, direction, distance, touchDistance))
+                    continue;
                 if (hit) hits[k * rays + i] = *hit;
                 direct += hit ? shot.emission[*hit] : worldExitance;
+                ++weights[k];
             }
-            const float m = linesAt(side);
+            if (weights[k] == 0) return;
             const glm::vec3 fromSources = shotLight.gathered[side];
             const glm::vec3 lineDirect = irradiance.direct[side] - fromSources;
-            irradiance.direct[side] = fromSources + (m * lineDirect + direct) / (m + float(rays));
+            irradiance.direct[side] = fromSources + (m * lineDirect + direct) / weights[k];
             fromLines[k] = m * (irradiance.indirect[side] - shotLight.indirect[side]);
         });
         for (size_t k = first * rays; k < last * rays; ++k)
@@ -355,7 +366,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, uint32_t minL
             glm::vec3 sum = fromLines[k];
             for (size_t i = 0; i < rays; ++i)
                 if (const uint32_t hit = hits[k * rays + i]; hit != kNone) sum += known[hit];
-            const glm::vec3 arriving = sum / (linesAt(side) + float(rays));
+            const glm::vec3 arriving = weights[k] > 0 ? sum / weights[k] : glm::vec3(0.0f);
             irradiance.indirect[side] = shotLight.indirect[side] + arriving;
             next[k] = shotLight.unshot[side] +
                       patches.reflectance[side] *

@@ -70,9 +70,10 @@ class LineReuse {
 
     // Adds local rays (cosine distribution, weighted like the lines the side has) to the irradiance
     // of wanted sides that have fewer than `minLines` lines, and to that of other such sides that
-    // these rays meet. Returns the number of sides.
-    size_t gatherStarvedSides(const Visibility& visibility, uint32_t minLines, uint32_t seed,
-                              const std::vector<bool>& wanted,
+    // these rays meet. Rays that start where the side is covered, by a surface not further than
+    // touchDistance (m), do not count. Returns the number of sides.
+    size_t gatherStarvedSides(const Visibility& visibility, float touchDistance, uint32_t minLines,
+                              uint32_t seed, const std::vector<bool>& wanted,
                               const std::vector<glm::vec3>& reflected,
                               Irradiance& irradiance) const;
 

@@ -111,8 +111,8 @@ class LineReuseTransport : public Transport {
             report.skipped.push_back(
                 {"iterations of a solve", "it starts from the last solution", solves - 2});
         const size_t starved = solver.gatherStarvedSides(
-            input.visibility, kStarvedLines, uint32_t(input.settings.seed), wanted,
-            last.reflected[size_t(Half::BOTH)], result);
+            input.visibility, input.touchDistance, kStarvedLines, uint32_t(input.settings.seed),
+            wanted, last.reflected[size_t(Half::BOTH)], result);
         if (starved)
             report.skipped.push_back({"bundles on small patches",
                                       "too few lines met them: they gathered with local rays",
