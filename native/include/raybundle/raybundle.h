@@ -3,8 +3,8 @@
  * the corners and vertices of its meshes.
  *
  * This is the whole C99 interface, in the order a caller needs it:
- *   scene (images, materials, meshes, instances, lights, world) -> bake (settings, progress,
- * execute)
+ *   scene (images, materials, meshes, instances, lights, world)
+ *   -> bake (settings, progress, execute)
  *   -> light per corner or vertex, report.
  *
  * Conventions
@@ -140,9 +140,10 @@ RB_API rb_error rb_set_material_translucence(rb_scene scene, int32_t material,
 /* Adds a mesh of planar or nearly planar n-gons, which may be concave.
  *   vertices         3 * vertex_count floats, object space, metres
  *   corner_vertices  corner_count vertex indices, face after face
- *   face_offsets     face_count + 1 ascending positions in corner_vertices; a face needs 3 corners
- * or more face_materials   face_count material ids, or NULL for a grey (0.8) default material Faces
- * of zero area are left out with a warning in the report. Id in *mesh. */
+ *   face_offsets     face_count + 1 ascending positions in corner_vertices, of 3 corners or more
+ *   face_materials   face_count material ids, or NULL for a grey (0.8) default material
+ *
+ * Faces of zero area are left out with a warning in the report. Id in *mesh. */
 RB_API rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices,
                             size_t vertex_count, const int32_t* corner_vertices,
                             size_t corner_count, const int32_t* face_offsets, size_t face_count,
