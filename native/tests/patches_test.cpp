@@ -314,5 +314,30 @@ TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnTriangles) {
         << "the mean of a linear colour is that at the centroid";
 }
 
+TEST(Subdivide, ANeedleIsCutIntoAsManyPiecesAsItIsLong) {
+    // 100 m long, 1 mm wide: with the short edge first, second, last, and with a blunt corner.
+    const std::vector<std::vector<glm::vec3>> needles = {
+        {{0, 0, 0}, {0, 1e-3f, 0}, {-100, 0, 0}},
+        {{-100, 0, 0}, {0, 0, 0}, {0, 1e-3f, 0}},
+        {{0, 1e-3f, 0}, {-100, 0, 0}, {0, 0, 0}},
+        {{0, 0, 0}, {100, 0, 0}, {30, 1e-3f, 0}},
+    };
+    for (const std::vector<glm::vec3>& needle : needles) {
+        Scene scene;
+        place(scene, polygons("needle", needle, {{0, 1, 2}}), grey("", 0.5f));
+        const Patches patches = subdivide(scene, 0.1f, 1000000);
+        EXPECT_GE(patches.count(), 500u);
+        EXPECT_LE(patches.count(), 4000u);
+        double area = 0;
+        for (const Parent& parent : patches.parents) {
+            area += double(parent.area());
+            EXPECT_GT(glm::dot(glm::cross(parent.a, parent.b), parent.normal), 0);
+            EXPECT_LE(std::max(glm::length(parent.a), glm::length(parent.b)),
+                      0.201f * float(parent.countA));
+        }
+        EXPECT_NEAR(area, 0.05, 1e-5);
+    }
+}
+
 }  // namespace
 }  // namespace raybundle

@@ -112,6 +112,9 @@ namespace {
 // A triangle is bisected along its longest edge while it is longer than this many times its height
 // and than two patches: a grid of n^2 slivers would waste patches.
 constexpr double kMaxElongation = 4.0;
+// More elongated still, it is cut across, into as many pieces as it is long: bisections would end in
+// the power 1.6 of that, one above the other.
+constexpr double kNeedle = 16.0;
 // Share of the edge by which the fourth corner of a parallelogram may be off.
 constexpr double kParallelogramTolerance = 1e-4;
 constexpr int kMaxGrid = 4096;
@@ -188,7 +191,9 @@ class Subdivision {
         if (corners.size() == 4 && isParallelogram(points)) {
             const uint32_t cell = addCell(instance, face, points[0], points[1], points[3],
                                           {corners[0], corners[1], corners[2], corners[3]});
-            Parent parent = makeParent(instance, face, cell, points[0], points[1], points[3]);
+            const glm::dvec3 normal = glm::cross(points[1] - points[0], points[3] - points[0]);
+            Parent parent = makeParent({instance, face, cell, glm::vec3(glm::normalize(normal))},
+                                       points[0], points[1], points[3]);
             for (int k = 0; k < 4; ++k) parent.vertex[k] = worldVertex(instance, corners[k]);
             parent.isTriangle = false;
             parent.countA = gridCount(glm::length(parent.a), size);
@@ -205,7 +210,13 @@ class Subdivision {
             any = true;
             const uint32_t cell = addCell(instance, face, points[t[0]], points[t[1]], points[t[2]],
                                           {corners[t[0]], corners[t[1]], corners[t[2]], -1});
-            cutTriangle(instance, face, cell, triangle, size);
+            const double longest = std::max({glm::length(points[t[1]] - points[t[0]]),
+                                             glm::length(points[t[2]] - points[t[1]]),
+                                             glm::length(points[t[0]] - points[t[2]])});
+            const glm::dvec3 normal =
+                glm::cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]);
+            cutTriangle({instance, face, cell, glm::vec3(glm::normalize(normal))}, triangle,
+                        std::max(size, longest / kMaxGrid));
         }
         return any;
     }
@@ -248,22 +259,29 @@ class Subdivision {
         return uint32_t(patches.cells.size()) - 1;
     }
 
-    static Parent makeParent(uint32_t instance, int32_t face, uint32_t cell, const glm::dvec3& p0,
-                             const glm::dvec3& pa, const glm::dvec3& pb) {
+    // What a parent is cut from.
+    struct Origin {
+        uint32_t instance;
+        int32_t face;
+        uint32_t cell;
+        glm::vec3 normal;  // of the cell: that of a tiny piece would be rounding alone
+    };
+
+    static Parent makeParent(const Origin& of, const glm::dvec3& p0, const glm::dvec3& pa,
+                             const glm::dvec3& pb) {
         Parent parent;
         parent.origin = glm::vec3(p0);
         parent.a = glm::vec3(pa - p0);
         parent.b = glm::vec3(pb - p0);
-        parent.normal = glm::vec3(glm::normalize(glm::cross(pa - p0, pb - p0)));
-        parent.instance = instance;
-        parent.face = face;
-        parent.cell = cell;
+        parent.normal = of.normal;
+        parent.instance = of.instance;
+        parent.face = of.face;
+        parent.cell = of.cell;
         parent.vertex = {0, 0, 0, 0};
         return parent;
     }
 
-    void cutTriangle(uint32_t instance, int32_t face, uint32_t cell, const Triangle& v,
-                     double size) {
+    void cutTriangle(const Origin& of, const Triangle& v, double size) {
         const glm::dvec3 p[3] = {patches.vertices[v[0]], patches.vertices[v[1]],
                                  patches.vertices[v[2]]};
         int longest = 0;
@@ -276,17 +294,64 @@ class Subdivision {
         const double height = doubleArea / length[longest];
         if (length[longest] > kMaxElongation * height && length[longest] > 2 * size) {
             const uint32_t v0 = v[longest], v1 = v[(longest + 1) % 3], v2 = v[(longest + 2) % 3];
-            const uint32_t middle = middleVertex(v0, v1);
-            cutTriangle(instance, face, cell, {v0, middle, v2}, size);
-            cutTriangle(instance, face, cell, {middle, v1, v2}, size);
+            const double after = length[(longest + 1) % 3], before = length[(longest + 2) % 3];
+            if (length[longest] < kNeedle * height) {
+                const uint32_t middle = middleVertex(v0, v1);
+                cutTriangle(of, {v0, middle, v2}, size);
+                cutTriangle(of, {middle, v1, v2}, size);
+            } else if (std::min(after, before) > std::max(2 * size, 2 * height)) {
+                // Blunt: two needles whose short edge is the height.
+                const glm::dvec3 edge = p[(longest + 1) % 3] - p[longest];
+                const double along = glm::dot(p[(longest + 2) % 3] - p[longest], edge) /
+                                     (length[longest] * length[longest]);
+                patches.vertices.push_back(glm::vec3(p[longest] + along * edge));
+                const uint32_t foot = uint32_t(patches.vertices.size()) - 1;
+                cutTriangle(of, {v0, foot, v2}, size);
+                cutTriangle(of, {foot, v1, v2}, size);
+            } else if (after < before) {
+                cutNeedle(of, {v0, v1, v2}, size);
+            } else {
+                cutNeedle(of, {v1, v2, v0}, size);
+            }
             return;
         }
-        Parent parent = makeParent(instance, face, cell, p[0], p[1], p[2]);
+        addTriangle(of, v, std::sqrt(0.5 * doubleArea), length[longest], size);
+    }
+
+    // A needle with its point at v[0].
+    void cutNeedle(const Origin& of, const Triangle& v, double size) {
+        const uint32_t right = middleVertex(v[0], v[1]), left = middleVertex(v[0], v[2]);
+        cutTriangle(of, {v[0], right, left}, size);
+        cutStrip(of, {right, v[1]}, {left, v[2]}, size);
+    }
+
+    // Between two edges along each other, much longer than they are apart; from `bottom` to `top`
+    // is to the left.
+    void cutStrip(const Origin& of, const std::array<uint32_t, 2>& bottom,
+                  const std::array<uint32_t, 2>& top, double size) {
+        auto length = [&](const std::array<uint32_t, 2>& edge) {
+            return double(glm::distance(patches.vertices[edge[0]], patches.vertices[edge[1]]));
+        };
+        if (std::max(length(bottom), length(top)) <= 2 * size) {
+            cutTriangle(of, {bottom[0], bottom[1], top[1]}, size);
+            cutTriangle(of, {bottom[0], top[1], top[0]}, size);
+            return;
+        }
+        const uint32_t low = middleVertex(bottom[0], bottom[1]);
+        const uint32_t high = middleVertex(top[0], top[1]);
+        cutStrip(of, {bottom[0], low}, {top[0], high}, size);
+        cutStrip(of, {low, bottom[1]}, {high, top[1]}, size);
+    }
+
+    void addTriangle(const Origin& of, const Triangle& v, double edge, double longest,
+                     double size) {
+        if (!(edge > 0)) return;  // a piece of nothing, by rounding
+        Parent parent =
+            makeParent(of, patches.vertices[v[0]], patches.vertices[v[1]], patches.vertices[v[2]]);
         std::copy(v.begin(), v.end(), parent.vertex.begin());
         // As many patches as squares of the patch size would cover, but no edge much longer.
-        const double byArea = std::sqrt(0.5 * doubleArea) / size;
-        const double byLength = length[longest] / (2.0 * size);
-        parent.countA = parent.countB = gridCount(std::max(byArea, byLength), 1.0);
+        parent.countA = parent.countB =
+            gridCount(std::max(edge / size, longest / (2.0 * size)), 1.0);
         patches.parents.push_back(parent);
     }
 
