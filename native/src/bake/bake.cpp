@@ -148,6 +148,7 @@ void Bake::run(const Scene& scene) {
 
 void Bake::runStages(const Scene& scene) {
     Report report;
+    std::vector<InstanceLight> made;  // kept once nothing can fail any more
     {
         Stopwatch total(report.totalSeconds);
         report.warnings = scene.warnings;
@@ -195,19 +196,20 @@ void Bake::runStages(const Scene& scene) {
         irradiance = sumOf(lights);
 
         Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
-        light = reconstruct(scene, patches, trace->visibility, trace->touchDistance, lights, shown,
-                            exposed, settings, progress, report);
+        made = reconstruct(scene, patches, trace->visibility, trace->touchDistance, lights, shown,
+                           exposed, settings, progress, report);
         const std::vector<float> weight = exposedArea(patches, exposed);
         stateErrors(scene, tiles, instanceRanges(scene, patches),
                     meanOver(tiles, shown.of(irradiance, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
-                    settings.targetError, light, report);
+                    settings.targetError, made, report);
     }
     report.patches = trace->patches.count();
     report.cuts = trace->cuts;
     report.lines = trace->tracer->lineCount();
     report.exchanges = trace->counts.exchangeCount();
     json = report.json();
+    light = std::move(made);
     ran = true;
 }
 

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace raybundle {
 namespace {
@@ -16,11 +17,40 @@ int64_t peakMemoryBytes() {
     return int64_t(usage.ru_maxrss) * 1024;
 }
 
-nlohmann::ordered_json toJson(const Report::Errors& error) {
-    return {{"noise", error.noise},
-            {"discretisation", error.discretisation},
-            {"mesh", error.mesh},
-            {"total", error.total()}};
+// Text of strings and numbers by nlohmann; objects and arrays are put together here, since its own
+// allocate when they are destroyed: without memory the process would end.
+template <class T>
+std::string text(const T& value) {
+    // Names that are not UTF-8 must not lose the report.
+    return nlohmann::json(value).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string listed(const std::vector<std::string>& items, char first, char last) {
+    std::string joined(1, first);
+    for (const std::string& item : items) joined += (joined.size() > 1 ? ",\n" : "") + item;
+    return joined + last;
+}
+
+// Keys with the text of their values.
+std::string object(const std::vector<std::pair<const char*, std::string>>& members) {
+    std::vector<std::string> items;
+    for (const auto& [key, value] : members) items.push_back(text(key) + ": " + value);
+    return listed(items, '{', '}');
+}
+
+template <class Items, class TextOf>
+std::string array(const Items& items, const TextOf& textOf) {
+    std::vector<std::string> texts;
+    for (const auto& item : items)
+        if (std::string one = textOf(item); !one.empty()) texts.push_back(std::move(one));
+    return listed(texts, '[', ']');
+}
+
+std::string errors(const Report::Errors& error) {
+    return object({{"noise", text(error.noise)},
+                   {"discretisation", text(error.discretisation)},
+                   {"mesh", text(error.mesh)},
+                   {"total", text(error.total())}});
 }
 
 }  // namespace
@@ -34,49 +64,50 @@ double Report::balanceError() const {
 }
 
 std::string Report::json() const {
-    using nlohmann::ordered_json;
-    ordered_json seconds_;
-    seconds_["total"] = totalSeconds;
-    seconds_["patches"] = seconds[RB_STAGE_PATCHES];
-    seconds_["first_shot"] = seconds[RB_STAGE_FIRST_SHOT];
-    seconds_["bundles"] = seconds[RB_STAGE_BUNDLES];
-    seconds_["solve"] = seconds[RB_STAGE_SOLVE];
-    seconds_["reconstruction"] = seconds[RB_STAGE_RECONSTRUCTION];
-    ordered_json objects_ = ordered_json::array(), skipped_ = ordered_json::array(),
-                 lightSets_ = ordered_json::array(), cuts_ = ordered_json::array();
-    for (const Cut& cut : cuts)
-        if (cut.tiles > 0) cuts_.push_back({{"why", cut.why}, {"tiles", cut.tiles}});
-    for (const LightSet& set : lightSets)
-        lightSets_.push_back({{"name", set.name}, {"estimated_error", set.estimatedError}});
-    for (const Object& object : objects)
-        objects_.push_back({{"name", object.name},
-                            {"corners", object.corners},
-                            {"status", object.status},
-                            {"error", toJson(object.error)}});
-    for (const Skip& skip : skipped)
-        if (skip.count > 0)
-            skipped_.push_back({{"what", skip.what}, {"why", skip.why}, {"count", skip.count}});
-    const ordered_json report = {{"seconds", seconds_},
-                                 {"patches", patches},
-                                 {"refined", cuts_},
-                                 {"bundles", bundles},
-                                 {"lines", lines},
-                                 {"exchanges", exchanges},
-                                 {"shadow_rays", shadowRays},
-                                 {"estimated_error", estimatedError},
-                                 {"error", toJson(error)},
-                                 {"energy",
-                                  {{"emitted", emitted},
-                                   {"absorbed", absorbed},
-                                   {"escaped", escaped},
-                                   {"balance_error", balanceError()}}},
-                                 {"peak_memory_bytes", peakMemoryBytes()},
-                                 {"light_sets", lightSets_},
-                                 {"objects", objects_},
-                                 {"warnings", warnings},
-                                 {"skipped", skipped_}};
-    // Names that are not UTF-8 must not lose the report.
-    return report.dump(2, ' ', false, ordered_json::error_handler_t::replace);
+    return object(
+        {{"seconds", object({{"total", text(totalSeconds)},
+                             {"patches", text(seconds[RB_STAGE_PATCHES])},
+                             {"first_shot", text(seconds[RB_STAGE_FIRST_SHOT])},
+                             {"bundles", text(seconds[RB_STAGE_BUNDLES])},
+                             {"solve", text(seconds[RB_STAGE_SOLVE])},
+                             {"reconstruction", text(seconds[RB_STAGE_RECONSTRUCTION])}})},
+         {"patches", text(patches)},
+         {"refined", array(cuts,
+                           [](const Cut& cut) {
+                               return cut.tiles == 0 ? ""
+                                                     : object({{"why", text(cut.why)},
+                                                               {"tiles", text(cut.tiles)}});
+                           })},
+         {"bundles", text(bundles)},
+         {"lines", text(lines)},
+         {"exchanges", text(exchanges)},
+         {"shadow_rays", text(shadowRays)},
+         {"estimated_error", text(estimatedError)},
+         {"error", errors(error)},
+         {"energy", object({{"emitted", text(emitted)},
+                            {"absorbed", text(absorbed)},
+                            {"escaped", text(escaped)},
+                            {"balance_error", text(balanceError())}})},
+         {"peak_memory_bytes", text(peakMemoryBytes())},
+         {"light_sets", array(lightSets,
+                              [](const LightSet& set) {
+                                  return object({{"name", text(set.name)},
+                                                 {"estimated_error", text(set.estimatedError)}});
+                              })},
+         {"objects", array(objects,
+                           [](const Object& one) {
+                               return object({{"name", text(one.name)},
+                                              {"corners", text(one.corners)},
+                                              {"status", text(one.status)},
+                                              {"error", errors(one.error)}});
+                           })},
+         {"warnings", array(warnings, [](const std::string& warning) { return text(warning); })},
+         {"skipped", array(skipped, [](const Skip& skip) {
+              return skip.count == 0 ? ""
+                                     : object({{"what", text(skip.what)},
+                                               {"why", text(skip.why)},
+                                               {"count", text(skip.count)}});
+          })}});
 }
 
 }  // namespace raybundle

@@ -21,8 +21,14 @@ namespace {
 constexpr float kRelativeOffset = 2e-6f;
 
 [[noreturn]] void fail(RTCError code, const char* what) {
-    throw Error(code == RTC_ERROR_OUT_OF_MEMORY ? RB_ERROR_OUT_OF_MEMORY : RB_ERROR_UNKNOWN,
-                std::string("the ray tracer failed: ") + what);
+    // A tree that is built in several threads knows of an allocation that failed in one of them only
+    // that it was cancelled, which is RTC_ERROR_UNKNOWN; nothing else can fail in it.
+    const bool isMemory = code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_UNKNOWN;
+    throw Error(
+        isMemory                            ? RB_ERROR_OUT_OF_MEMORY
+        : code == RTC_ERROR_UNSUPPORTED_CPU ? RB_ERROR_UNSUPPORTED_HARDWARE
+                                            : RB_ERROR_UNKNOWN,
+        std::string("the ray tracer failed: ") + (isMemory ? "out of memory, " : "") + what);
 }
 
 }  // namespace
@@ -45,6 +51,7 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     embree->device = rtcNewDevice(nullptr);
     if (!embree->device) fail(rtcGetDeviceError(nullptr), "no device");
     embree->scene = rtcNewScene(embree->device);
+    if (!embree->scene) fail(rtcGetDeviceError(embree->device), "no scene");
     // Robust: rays must not slip between neighbouring triangles.
     rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
 
@@ -55,13 +62,16 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
         if (blocks(patches.parents[i])) embree->parentOf.push_back(uint32_t(i));
     const size_t quads = embree->parentOf.size();
     if (quads > 0) {
-        RTCGeometry geometry = rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_QUAD);
+        const std::unique_ptr<RTCGeometryTy, decltype(&rtcReleaseGeometry)> made(
+            rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_QUAD), &rtcReleaseGeometry);
+        const RTCGeometry geometry = made.get();
+        if (!geometry) fail(rtcGetDeviceError(embree->device), "no geometry");
         float* vertices = static_cast<float*>(
             rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                     3 * sizeof(float), patches.vertices.size()));
         uint32_t* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
             geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(uint32_t), quads));
-        if (!vertices || !indices) fail(rtcGetDeviceError(embree->device), "no memory");
+        if (!vertices || !indices) fail(rtcGetDeviceError(embree->device), "no buffers");
         std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
         for (const Parent& parent : patches.parents) {
             if (!blocks(parent)) continue;
@@ -71,7 +81,6 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
         }
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(embree->scene, geometry);
-        rtcReleaseGeometry(geometry);
     }
     rtcCommitScene(embree->scene);
     const RTCError error = rtcGetDeviceError(embree->device);
