@@ -30,8 +30,13 @@
 #define RB_API __attribute__((visibility("default")))
 #endif
 
+/* C++ must not see a value that an enum does not have, as a caller may pass one, unless its type is
+ * fixed. */
 #ifdef __cplusplus
+#define RB_INT : int32_t
 extern "C" {
+#else
+#define RB_INT
 #endif
 
 /* ------------------------------------------------------------------------------------------------
@@ -48,7 +53,7 @@ RB_API int32_t rb_get_abi_version(void);
 /* Release of the library, "major.minor.patch". Static memory. */
 RB_API const char* rb_get_version(void);
 
-typedef enum rb_error {
+typedef enum rb_error RB_INT {
     RB_ERROR_NONE = 0,
     RB_ERROR_UNKNOWN = 1,
     RB_ERROR_INVALID_ARGUMENT = 2, /* the message names the argument or the object */
@@ -75,7 +80,7 @@ RB_API rb_error rb_new_scene(rb_scene* scene);
 /* Frees the scene. NULL is allowed. A bake keeps what it needs, so the scene may go first. */
 RB_API void rb_release_scene(rb_scene scene);
 
-typedef enum rb_image_extension {
+typedef enum rb_image_extension RB_INT {
     RB_IMAGE_REPEAT = 0,
     RB_IMAGE_EXTEND = 1, /* border pixels go on */
     RB_IMAGE_CLIP = 2    /* black outside */
@@ -168,12 +173,12 @@ RB_API rb_error rb_set_mesh_uvs(rb_scene scene, int32_t mesh, const float* uvs,
 RB_API rb_error rb_set_mesh_corner_colors(rb_scene scene, int32_t mesh, const float* rgb,
                                           size_t corner_count);
 
-typedef enum rb_role {
+typedef enum rb_role RB_INT {
     RB_ROLE_BAKE = 0,   /* takes part in the light and gets a result */
     RB_ROLE_OCCLUDE = 1 /* takes part in the light, has no result */
 } rb_role;
 
-typedef enum rb_side { RB_SIDE_FRONT = 0, RB_SIDE_BACK = 1 } rb_side;
+typedef enum rb_side RB_INT { RB_SIDE_FRONT = 0, RB_SIDE_BACK = 1 } rb_side;
 
 /* Places a mesh in the world. transform holds 12 floats, the rows of a 3 x 4 matrix, object to
  * world; a matrix that mirrors keeps the front sides outside, as in Blender. side is the side whose
@@ -191,7 +196,7 @@ RB_API rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name,
 RB_API rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops_direct,
                                            bool exchanges);
 
-typedef enum rb_point_shape {
+typedef enum rb_point_shape RB_INT {
     RB_POINT_DISK =
         0, /* a disk of the given radius that faces the receiver (Blender's soft falloff) */
     RB_POINT_SPHERE = 1 /* a sphere of the given radius */
@@ -214,7 +219,7 @@ RB_API rb_error rb_set_light_cone(rb_scene scene, int32_t light, const float wor
 RB_API rb_error rb_add_sun_light(rb_scene scene, const char* name, const float direction[3],
                                  const float irradiance[3], float angle, int32_t* light);
 
-typedef enum rb_area_shape { RB_AREA_RECTANGLE = 0, RB_AREA_ELLIPSE = 1 } rb_area_shape;
+typedef enum rb_area_shape RB_INT { RB_AREA_RECTANGLE = 0, RB_AREA_ELLIPSE = 1 } rb_area_shape;
 
 /* Adds a one-sided area light that blocks no light itself: the parallelogram (or the ellipse in it)
  * centre +- axis_u +- axis_v, shining towards cross(axis_u, axis_v), with constant radiance (RGB).
@@ -304,7 +309,7 @@ RB_API rb_error rb_get_bake_int(rb_bake bake, const char* name, int32_t* value);
 RB_API rb_error rb_get_bake_float(rb_bake bake, const char* name, float* value);
 RB_API rb_error rb_get_bake_string(rb_bake bake, const char* name, const char** value);
 
-typedef enum rb_stage {
+typedef enum rb_stage RB_INT {
     RB_STAGE_PATCHES = 0,
     RB_STAGE_FIRST_SHOT = 1,
     RB_STAGE_BUNDLES = 2,
@@ -324,7 +329,7 @@ RB_API rb_error rb_set_bake_progress(rb_bake bake, rb_progress_function function
  * light is solved anew (relighting). On failure the results of the last successful run are kept. */
 RB_API rb_error rb_execute_bake(rb_bake bake, rb_scene scene);
 
-typedef enum rb_output {
+typedef enum rb_output RB_INT {
     RB_OUTPUT_COMBINED = 0, /* radiance that leaves: (emission + reflectance * irradiance) / pi */
     RB_OUTPUT_LIGHTING = 1, /* irradiance / pi: light on a white surface */
     RB_OUTPUT_DIRECT =

@@ -190,6 +190,7 @@ std::vector<std::vector<glm::vec3>> leastSquares(
     const std::vector<const std::vector<glm::vec3>*>& fields) {
     const size_t columns = 3 * fields.size();
     const Eigen::Index nodes = regions.nodeCount;
+    if (nodes == 0) return std::vector<std::vector<glm::vec3>>(fields.size());
     SymmetricSum sum(regions.nodeCount);
     Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));
     Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));

@@ -125,7 +125,8 @@ LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const Fir
 LineWeights LineReuse::lineWeights(Half half) const {
     const size_t n = counts.sideCount();
     LineWeights weights{std::vector<float>(n, 1.0f), std::vector<float>(n)};
-    auto& [x, m] = weights;
+    std::vector<float>& x = weights.x;
+    std::vector<float>& m = weights.m;
     if (half != Half::BOTH) {
         for (size_t i = 0; i < n; ++i) m[i] = float(linesOf(counts.total[i], half));
         return weights;
