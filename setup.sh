@@ -6,7 +6,7 @@
 bake_packages=(blender python3-numpy g++ cmake ninja-build libembree-dev libglm-dev libopenmesh-dev libtbb-dev
     libeigen3-dev nlohmann-json3-dev)
 # The window of the UI test is drawn by Mesa in software.
-test_packages=(libgtest-dev python3-pytest xvfb xauth xdotool libgl1-mesa-dri libegl-mesa0)
+test_packages=(libgtest-dev librapidcheck-dev python3-pytest xvfb xauth xdotool libgl1-mesa-dri libegl-mesa0)
 
 require_packages() {
     local missing=() package

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Properties that hold for whatever scene: RapidCheck makes rooms with boxes at random and shrinks
+// those that fail. Most compare two bakes with different lines: what they may differ by is a multiple
+// of what two seeds differ by.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numeric>
+
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+// Each case is two or three bakes. The same ones in every run; for others, and more of them:
+// RC_PARAMS="max_success=200" raybundle_tests --gtest_filter='Properties*'. Read by RapidCheck before
+// the first.
+const bool areFew = setenv("RC_PARAMS", "seed=1 max_success=20 max_size=20", 0) == 0;
+
+constexpr int kBundles = 128;
+// Differences of bakes are random with a mean square as that of two seeds; those over about a
+// hundred corners, some of them alike, scatter by a third of it.
+constexpr double kSeeds = 2.5;
+
+// In hundredths, so that shrinking leads to simple numbers.
+struct BoxSpec {
+    std::array<int, 3> centre, size;
+    int turn, reflectance;
+};
+
+struct RoomSpec {
+    std::vector<BoxSpec> boxes;
+    int reflectance;
+};
+
+void showValue(const BoxSpec& box, std::ostream& out) {
+    out << "box at " << box.centre[0] << ' ' << box.centre[1] << ' ' << box.centre[2] << ", size "
+        << box.size[0] << ' ' << box.size[1] << ' ' << box.size[2] << ", turn " << box.turn
+        << ", reflectance " << box.reflectance << '\n';
+}
+
+void showValue(const RoomSpec& room, std::ostream& out) {
+    out << "room of reflectance " << room.reflectance << '\n';
+    for (const BoxSpec& box : room.boxes) showValue(box, out);
+}
+
+rc::Gen<BoxSpec> boxes() {
+    auto three = [](int low, int high) {
+        return rc::gen::container<std::array<int, 3>>(rc::gen::inRange(low, high));
+    };
+    return rc::gen::build<BoxSpec>(rc::gen::set(&BoxSpec::centre, three(40, 160)),
+                                   rc::gen::set(&BoxSpec::size, three(10, 60)),
+                                   rc::gen::set(&BoxSpec::turn, rc::gen::inRange(0, 150)),
+                                   rc::gen::set(&BoxSpec::reflectance, rc::gen::inRange(0, 95)));
+}
+
+rc::Gen<RoomSpec> rooms() {
+    return rc::gen::build<RoomSpec>(
+        rc::gen::set(&RoomSpec::boxes,
+                     rc::gen::resize(3, rc::gen::container<std::vector<BoxSpec>>(boxes()))),
+        rc::gen::set(&RoomSpec::reflectance, rc::gen::inRange(0, 90)));
+}
+
+// A closed room of 2 m with boxes, which may lie in each other, and two lamps at the ceiling: the
+// first two instances. order: of the boxes.
+Scene sceneOf(const RoomSpec& room, float first, float second, const glm::dmat4& motion,
+              bool isReversed = false) {
+    Scene scene;
+    place(scene, rectangle("lamp 1", {0.3f, 0.3f, 1.9f}, {0, 0.4f, 0}, {0.4f, 0, 0}),
+          grey("lamp 1", 0, first), motion);
+    place(scene, rectangle("lamp 2", {1.2f, 1.1f, 1.9f}, {0, 0.4f, 0}, {0.4f, 0, 0}),
+          grey("lamp 2", 0, second), motion);
+    place(scene, box("room", glm::vec3(0), glm::vec3(2), true),
+          grey("walls", 0.01f * float(room.reflectance)), motion);
+    std::vector<BoxSpec> specs = room.boxes;
+    if (isReversed) std::reverse(specs.begin(), specs.end());
+    for (const BoxSpec& spec : specs) {
+        const glm::vec3 half = 0.005f * glm::vec3(spec.size[0], spec.size[1], spec.size[2]);
+        glm::dmat4 m = glm::translate(
+            motion, 0.01 * glm::dvec3(spec.centre[0], spec.centre[1], spec.centre[2]));
+        m = glm::rotate(m, 0.01 * spec.turn, glm::normalize(glm::dvec3(1, 2, 3)));
+        place(scene, box("box", -half, half, false), grey("box", 0.01f * float(spec.reflectance)),
+              m);
+    }
+    return scene;
+}
+
+// Irradiance of the patches' sides, instance by instance in the order of sceneOf.
+std::vector<glm::vec3> lightOn(const Scene& scene, int seed, float patchSize = 0.2f) {
+    Bake bake;
+    bake.settings.patchSize = patchSize;
+    bake.settings.minBundles = bake.settings.maxBundles = kBundles;
+    bake.settings.contacts = 0;
+    bake.settings.seed = seed;
+    bake.run(scene);
+    std::vector<glm::vec3> light;
+    for (uint32_t i = 0; i < bake.patches().sideCount(); i += 2)
+        light.push_back(bake.patchIrradiance().all(i));
+    return light;
+}
+
+// By what two seeds differ, and a quarter of the target: where hardly anything reflects, two seeds
+// may be alike by chance.
+double allowed(const Scene& scene, const std::vector<glm::vec3>& light) {
+    return kSeeds * noise(lightOn(scene, 77), light) + 0.005;
+}
+
+std::vector<glm::vec3> scaled(std::vector<glm::vec3> light, float factor) {
+    for (glm::vec3& v : light) v *= factor;
+    return light;
+}
+
+const glm::dmat4 kStill(1);
+
+RC_GTEST_PROP(Properties, TwiceTheEmissionIsTwiceTheLight, ()) {
+    const RoomSpec room = *rooms();
+    const std::vector<glm::vec3> once = lightOn(sceneOf(room, 10, 3, kStill), 0);
+    const std::vector<glm::vec3> twice = lightOn(sceneOf(room, 20, 6, kStill), 0);
+    // The same lines and rays.
+    RC_ASSERT(noise(twice, scaled(once, 2)) < 1e-4);
+}
+
+RC_GTEST_PROP(Properties, TheLightOfTwoLampsIsTheSumOfTheirs, ()) {
+    const RoomSpec room = *rooms();
+    const Scene scene = sceneOf(room, 10, 3, kStill);
+    const std::vector<glm::vec3> both = lightOn(scene, 0);
+    std::vector<glm::vec3> sum = lightOn(sceneOf(room, 10, 0, kStill), 0);
+    const std::vector<glm::vec3> second = lightOn(sceneOf(room, 0, 3, kStill), 0);
+    for (size_t i = 0; i < sum.size(); ++i) sum[i] += second[i];
+    RC_ASSERT(noise(sum, both) < allowed(scene, both));
+}
+
+RC_GTEST_PROP(Properties, ARigidMotionChangesNothing, ()) {
+    const RoomSpec room = *rooms();
+    const glm::dmat4 motion = glm::rotate(
+        glm::translate(glm::dmat4(1), glm::dvec3(*rc::gen::inRange(-1000, 1000), 3, 100)),
+        0.01 * *rc::gen::inRange(0, 628), glm::normalize(glm::dvec3(3, 1, 2)));
+    const Scene scene = sceneOf(room, 10, 3, kStill);
+    const std::vector<glm::vec3> still = lightOn(scene, 0);
+    RC_ASSERT(noise(lightOn(sceneOf(room, 10, 3, motion), 0), still) < allowed(scene, still));
+}
+
+RC_GTEST_PROP(Properties, SizeChangesNothing, ()) {
+    const RoomSpec room = *rooms();
+    const double size = std::pow(10.0, *rc::gen::inRange(-3, 6));
+    const std::vector<glm::vec3> one = lightOn(sceneOf(room, 10, 3, kStill), 0);
+    const std::vector<glm::vec3> other =
+        lightOn(sceneOf(room, 10, 3, glm::scale(kStill, glm::dvec3(size))), 0, 0.2f * float(size));
+    // The same lines and rays, but for those that rounding moves over an edge.
+    RC_ASSERT(noise(other, one) < 0.01);
+}
+
+RC_GTEST_PROP(Properties, TheOrderOfObjectsChangesNothing, ()) {
+    const RoomSpec room = *rooms();
+    const Scene scene = sceneOf(room, 10, 3, kStill);
+    const std::vector<glm::vec3> light = lightOn(scene, 0);
+    const std::vector<glm::vec3> reversed = lightOn(sceneOf(room, 10, 3, kStill, true), 0);
+    RC_ASSERT(light.size() == reversed.size());
+    // The walls come before the boxes, which are compared by their sum.
+    const double limit = allowed(scene, light);
+    auto sum = [](const std::vector<glm::vec3>& values) {
+        return double(std::accumulate(values.begin(), values.end(), glm::vec3(0)).x);
+    };
+    RC_ASSERT(std::abs(sum(reversed) / sum(light) - 1) < limit);
+}
+
+RC_GTEST_PROP(Properties, WhatOneLampGivesAnotherSurfaceItGetsFromIt, ()) {
+    // Transport is symmetric: unit exitance of A brings B the power that that of B brings A.
+    const RoomSpec room = *rooms();
+    auto received = [&](bool isFirst, int seed) {
+        Bake bake;
+        bake.settings.patchSize = 0.2f;
+        bake.settings.minBundles = bake.settings.maxBundles = kBundles;
+        bake.settings.seed = seed;
+        bake.run(sceneOf(room, isFirst ? 1.0f : 0.0f, isFirst ? 0.0f : 1.0f, kStill));
+        double power = 0;
+        for (uint32_t i = 0; i < bake.patches().sideCount(); i += 2)
+            if (bake.patches().parentAt(i).instance == (isFirst ? 1u : 0u))
+                power += double(bake.patches().area[i / 2] * bake.patchIrradiance().all(i).x);
+        return power;
+    };
+    const double there = received(true, 0), back = received(false, 0);
+    // Lamps do not see each other: what they get was reflected. With walls of 5 % that is next to
+    // nothing beside what the lamps' own light leaves in rounding.
+    const double seeds =
+        std::abs(received(true, 77) - there) + std::abs(received(false, 77) - back);
+    RC_ASSERT(std::abs(there - back) <= kSeeds * seeds + 0.05 * std::max(there, back));
+}
+
+RC_GTEST_PROP(Properties, AFurnaceOfAnyShapeIsExact, ()) {
+    // A ball whose vertices are pulled in and out: closed, in places concave.
+    const std::vector<int> pulls =
+        *rc::gen::container<std::vector<int>>(42, rc::gen::inRange(-30, 30));
+    const float reflectance = 0.01f * float(*rc::gen::inRange(0, 98));
+    Mesh ball = icosphere("ball", 1, 1, true);
+    for (size_t v = 0; v < ball.vertices.size(); ++v)
+        ball.vertices[v] *= 1 + 0.01f * float(pulls[v % pulls.size()]);
+    Scene scene;
+    place(scene, ball, grey("", reflectance, 1 - reflectance));
+    const std::vector<glm::vec3> light = lightOn(scene, 0);
+    for (const glm::vec3& v : light) RC_ASSERT(std::abs(v.x - 1) < 1e-3f);
+}
+
+}  // namespace
+}  // namespace raybundle
