@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> None:
         _apply(scene, assignment)
 
     report = raybundle.bake(bpy.context, ProgressLines())
-    (out / f"{name}.json").write_text(report.to_json(indent=2) + "\n")
+    _write_whole(out / f"{name}.json", report.to_json(indent=2) + "\n")
     # Without a backup of the result of an earlier run beside it.
     bpy.context.preferences.filepaths.save_version = 0
     # Textures and libraries beside the original must still be found from the new place.
@@ -90,6 +90,16 @@ class ProgressLines:
         print(f"{stage:<14} {100.0 * fraction:3.0f} %", flush=True)
 
 
+def _write_whole(path: Path, text: str) -> None:
+    """Writes a file, or on failure leaves the one that was there."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(text)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
 def _print_summary(report: raybundle.BakeReport, out: Path, name: str) -> None:
     print(report.summary())
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
@@ -113,7 +123,8 @@ if __name__ == "__main__":
     given = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     try:
         main(given)
-    except (raybundle.BakeError, raybundle.RaybundleError, ValueError, OSError) as error:
+    except (raybundle.BakeError, raybundle.RaybundleError, ValueError, OSError,
+            RuntimeError) as error:  # the last: Blender's own, of operators such as saving
         print(f"bake: {error}", file=sys.stderr, flush=True)
         # Blender itself would print a traceback and go on.
         os._exit(1)

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What goes wrong outside of the add-on, and scenes as no one should make them: nothing is lost."""
+
+import resource
+import signal
+import subprocess
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+import raybundle
+from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_EMISSION_RADIANCE, FURNACE_REFLECTANCE
+
+pytestmark = pytest.mark.needs_library
+
+FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
+SCRIPT = Path(__file__).parent.parent / "addon" / "bake_file.py"
+
+in_blender = pytest.mark.skipif(not bpy.app.binary_path, reason="Blender is a module here")
+
+
+def bake(**overrides):
+    return raybundle.bake(bpy.context, **{"max_patches": 2000, "max_bundles": 64, **overrides})
+
+
+def colors(item, name="Radiosity"):
+    attribute = item.data.color_attributes[name]
+    values = np.empty(4 * len(attribute.data), np.float32)
+    attribute.data.foreach_get('color', values)
+    return values.reshape(-1, 4)[:, :3]
+
+
+def is_furnace(values):
+    # Exact but for the solver's tolerance and single precision.
+    return np.abs(values / FURNACE_LIGHT - 1.0).max() < 1e-3
+
+
+# --------------------------------------------------------------------------------------------------
+# Names and transforms
+# --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["x" * 63, "Wände über Öl", "部屋の箱", "🦊", 'a "quoted" \\ name', " "])
+def test_names_are_kept_as_they_are(closed_box, name):
+    closed_box.name = closed_box.data.name = name
+    closed_box.data.materials[0].name = name
+    report = bake(attribute=name)
+    assert [item.name for item in report.objects] == [closed_box.name]
+    assert is_furnace(colors(closed_box, name))
+
+
+def test_a_name_of_an_attribute_that_is_too_long_loses_nothing(closed_box):
+    closed_box.data.color_attributes.new("Mine", 'FLOAT_COLOR', 'CORNER')
+    try:
+        bake(attribute="ü" * 60)
+    except raybundle.BakeError as error:
+        assert "ü" in str(error)
+    assert "Mine" in closed_box.data.color_attributes
+
+
+@pytest.mark.parametrize("scale", [(-1, 1, 1), (-1, -1, -1), (1e-3, 1e-3, 1e-3), (1e4, 1e4, 1e4)])
+def test_scaled_and_mirrored_objects(closed_box, scale):
+    closed_box.scale = scale
+    bpy.context.view_layer.update()
+    bake()
+    assert is_furnace(colors(closed_box))
+
+
+@pytest.mark.parametrize("scale", [(0, 0, 0), (1, 1, 0), (0, 0, 1)])
+def test_an_object_without_volume_spoils_nothing(closed_box, new_object, scale):
+    flat = new_object("Flat", 0.2 * np.array(CUBE_VERTICES), CUBE_FACES,
+                      closed_box.data.materials[0])
+    flat.scale = scale
+    bpy.context.view_layer.update()
+    report = bake()
+    assert any('"Flat"' in warning for warning in report.warnings)
+    assert is_furnace(colors(closed_box))
+    assert np.isfinite(colors(flat)).all()
+
+
+def test_instances_of_instances_of_instances(closed_box, new_object):
+    """A collection of a cube, instanced three times in a collection, and so on: 27 cubes."""
+    inner = bpy.data.collections.new("Level 0")
+    cube = new_object("Cube", 0.02 * np.array(CUBE_VERTICES), CUBE_FACES,
+                      closed_box.data.materials[0])
+    bpy.context.scene.collection.objects.unlink(cube)
+    inner.objects.link(cube)
+    for level in range(3):
+        outer = bpy.data.collections.new(f"Level {level + 1}")
+        for k in range(3):
+            empty = bpy.data.objects.new(f"Empty {level} {k}", None)
+            empty.instance_type, empty.instance_collection = 'COLLECTION', inner
+            empty.location[level] = 0.3 * (k - 1)
+            outer.objects.link(empty)
+        inner = outer
+    root = bpy.data.objects.new("Root", None)
+    root.instance_type, root.instance_collection = 'COLLECTION', inner
+    bpy.context.scene.collection.objects.link(root)
+    bpy.context.view_layer.update()
+    bake()
+    assert is_furnace(colors(closed_box))
+
+
+# --------------------------------------------------------------------------------------------------
+# Many bakes
+# --------------------------------------------------------------------------------------------------
+
+
+def resident_bytes():
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize()
+
+
+def test_memory_stays_the_same(closed_box):
+    for seed in range(8):
+        bake(seed=seed)
+    before = resident_bytes()
+    for seed in range(32):
+        bake(seed=seed)
+    # A leak of one bake's lines alone, about 1 MB, would show.
+    assert resident_bytes() < before + 8e6
+
+
+def test_two_scenes_in_turns(closed_box):
+    first = bpy.context.scene
+    second = bpy.data.scenes.new("Second")
+    box = bpy.data.objects.new("Box 2", closed_box.data.copy())
+    second.collection.objects.link(box)
+    for _ in range(3):
+        for scene, item in ((first, closed_box), (second, box)):
+            with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+                raybundle.bake(bpy.context, max_patches=2000, max_bundles=64)
+            assert is_furnace(colors(item))
+
+
+def test_undo_after_a_bake(closed_box):
+    bpy.ops.ed.undo_push(message="before")
+    name = closed_box.name
+    assert bpy.ops.raybundle.bake() == {'FINISHED'}
+    bpy.ops.ed.undo_push(message="baked")
+    bpy.ops.ed.undo()
+    item = bpy.data.objects[name]
+    assert "Radiosity" not in item.data.color_attributes
+    bpy.ops.ed.redo()
+    assert is_furnace(colors(bpy.data.objects[name]))
+    bake(seed=3)
+    assert is_furnace(colors(bpy.data.objects[name]))
+
+
+# --------------------------------------------------------------------------------------------------
+# Files
+# --------------------------------------------------------------------------------------------------
+
+
+def command(path, out):
+    return [bpy.app.binary_path, "-b", "--factory-startup", str(path), "--python-exit-code", "1",
+            "-P", str(SCRIPT), "--", "--out", str(out), "--set", "max_patches=500"]
+
+
+@pytest.fixture
+def saved_box(closed_box, tmp_path):
+    path = tmp_path / "box.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def limit_files(size):
+    """As a full disk does, writing fails; instead of the signal, an error."""
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+    return limit
+
+
+@in_blender
+@pytest.mark.parametrize("size", [0, 1000, 20000])
+def test_a_full_disk_is_said_and_earlier_results_stay(saved_box, tmp_path, size):
+    out = tmp_path / "out"
+    assert subprocess.run(command(saved_box, out), capture_output=True, timeout=120).returncode == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    original = saved_box.read_bytes()
+    result = subprocess.run(command(saved_box, out), capture_output=True, text=True, timeout=120,
+                            preexec_fn=limit_files(size))
+    assert result.returncode == 1
+    assert any(line.startswith("bake: ") for line in result.stderr.splitlines())
+    assert saved_box.read_bytes() == original
+    blend = out / "box.baked.blend"
+    assert blend.read_bytes() == before[blend.name]
+    assert not list(out.glob("*.part"))
+
+
+@in_blender
+def test_a_killed_bake_leaves_the_file_as_it_was(saved_box, tmp_path):
+    original = saved_box.read_bytes()
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        [*command(saved_box, out), "max_patches=20000", "max_bundles=60000", "skip.bundles=0"],
+        stdout=subprocess.PIPE, text=True)
+    for line in process.stdout:
+        if line.startswith("bundles"):
+            break
+    process.kill()
+    assert process.wait(timeout=30) == -signal.SIGKILL
+    assert saved_box.read_bytes() == original
+    assert not out.exists() or not list(out.iterdir())
