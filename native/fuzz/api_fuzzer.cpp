@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The C border under arbitrary calls: bytes become calls with arbitrary numbers, ids, enums, counts
+// and settings, and a small bake. Nothing may crash, hang, leak or give a number that is not finite;
+// every refusal has a message. A libFuzzer target; native/fuzz/replay.cpp runs saved inputs without
+// it.
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "raybundle/raybundle.h"
+
+namespace {
+
+// Reads the input from its front; past its end everything is 0, so that each prefix is an input.
+class Bytes {
+  public:
+    Bytes(const uint8_t* data, size_t size) : at(data), end(data + size) {}
+
+    bool isAtEnd() const { return at == end; }
+    uint8_t byte() { return at < end ? *at++ : 0; }
+    uint32_t below(uint32_t limit) { return limit ? byte() % limit : 0; }
+    bool flag() { return byte() & 1; }
+    int32_t integer() {
+        int32_t value = 0;
+        for (int k = 0; k < 4; ++k) value = int32_t(uint32_t(value) << 8 | byte());
+        return value;
+    }
+    // An id or an enum: mostly small, sometimes anything.
+    int32_t small() {
+        const uint8_t first = byte();
+        return first < 240 ? first % 4 : first < 248 ? -1 : integer();
+    }
+    // Mostly of the size of rooms, sometimes anything: huge, tiny, negative, infinite, no number.
+    float number() {
+        const uint8_t first = byte();
+        if (first < 200) return float(first) / 50 - 1;
+        if (first < 210) return 0;
+        float value;
+        const int32_t bits = integer();
+        std::memcpy(&value, &bits, sizeof value);
+        return value;
+    }
+    template <size_t N>
+    std::array<float, N> numbers() {
+        std::array<float, N> values;
+        for (float& v : values) v = number();
+        return values;
+    }
+    std::vector<float> numbers(size_t count) {
+        std::vector<float> values(count);
+        for (float& v : values) v = number();
+        return values;
+    }
+    std::string text() {
+        std::string value(below(12), ' ');
+        for (char& c : value) c = char(byte());
+        return value;
+    }
+
+  private:
+    const uint8_t* at;
+    const uint8_t* const end;
+};
+
+[[noreturn]] void die(const char* what) {
+    std::fprintf(stderr, "%s: %s\n", what, rb_get_error_message());
+    std::abort();
+}
+
+void expectMessage(rb_error error) {
+    if (error != RB_ERROR_NONE && !*rb_get_error_message()) die("a refusal without a message");
+    if (error == RB_ERROR_UNKNOWN) die("an error that is not known");
+}
+
+// A mesh: a box in reach of the rest, or whatever the bytes say.
+void addMesh(Bytes& in, rb_scene scene) {
+    int32_t id = -1;
+    const std::string name = in.text();
+    if (in.flag()) {
+        const size_t vertices = in.below(12), faces = in.below(8);
+        const std::vector<float> positions = in.numbers(3 * vertices);
+        std::vector<int32_t> corners, offsets{0}, materials;
+        for (size_t f = 0; f < faces; ++f) {
+            for (uint32_t k = in.below(6); k > 0; --k)
+                corners.push_back(in.flag() ? in.small() : int32_t(in.below(12)));
+            offsets.push_back(in.byte() < 250 ? int32_t(corners.size()) : in.integer());
+            materials.push_back(in.small());
+        }
+        expectMessage(rb_add_mesh(scene, name.c_str(), positions.data(), vertices, corners.data(),
+                                  corners.size(), offsets.data(), faces,
+                                  in.flag() ? materials.data() : nullptr, &id));
+        if (in.flag()) {
+            const std::vector<float> values = in.numbers(3 * corners.size());
+            expectMessage(rb_set_mesh_corner_normals(scene, id, values.data(), corners.size()));
+            expectMessage(rb_set_mesh_uvs(scene, id, values.data(), corners.size()));
+            expectMessage(rb_set_mesh_corner_colors(scene, id, values.data(), corners.size()));
+        }
+        return;
+    }
+    static const float kVertices[24] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0,
+                                        0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
+    static const int32_t kCorners[24] = {0, 1, 2, 3, 4, 7, 6, 5, 0, 4, 5, 1,
+                                         1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 4, 0};
+    static const int32_t kFaces[7] = {0, 4, 8, 12, 16, 20, 24};
+    std::array<int32_t, 6> materials;
+    for (int32_t& m : materials) m = in.small();
+    expectMessage(rb_add_mesh(scene, name.c_str(), kVertices, 8, kCorners, 24, kFaces, 6,
+                              in.flag() ? materials.data() : nullptr, &id));
+}
+
+void addLight(Bytes& in, rb_scene scene) {
+    int32_t id = -1;
+    const std::string name = in.text();
+    const auto a = in.numbers<3>(), b = in.numbers<3>(), c = in.numbers<3>(), d = in.numbers<3>();
+    switch (in.below(3)) {
+        case 0:
+            expectMessage(rb_add_point_light(scene, name.c_str(), a.data(), b.data(), in.number(),
+                                             rb_point_shape(in.small()), &id));
+            break;
+        case 1:
+            expectMessage(
+                rb_add_sun_light(scene, name.c_str(), a.data(), b.data(), in.number(), &id));
+            break;
+        default:
+            expectMessage(rb_add_area_light(scene, name.c_str(), a.data(), b.data(), c.data(),
+                                            d.data(), rb_area_shape(in.small()), &id));
+    }
+    const int32_t target = in.flag() ? id : in.small();
+    const auto matrix = in.numbers<9>();
+    if (in.flag())
+        expectMessage(
+            rb_set_light_cone(scene, target, matrix.data(), in.number(), in.number(), in.flag()));
+    if (in.flag()) expectMessage(rb_set_light_spread(scene, target, in.number()));
+    if (in.flag()) expectMessage(rb_set_light_shadows(scene, target, in.flag()));
+    if (in.flag()) expectMessage(rb_set_light_set(scene, target, in.small()));
+}
+
+void addImage(Bytes& in, rb_scene scene) {
+    int32_t id = -1;
+    const int32_t width = int32_t(in.below(5)), height = int32_t(in.below(5));
+    const std::vector<float> pixels = in.numbers(3 * size_t(width) * size_t(height));
+    if (in.flag())
+        expectMessage(rb_add_image(scene, in.text().c_str(), width, height, pixels.data(),
+                                   rb_image_extension(in.small()), &id));
+    else
+        expectMessage(rb_set_world_image(scene, width, height, pixels.data()));
+}
+
+void addMaterial(Bytes& in, rb_scene scene) {
+    int32_t id = -1;
+    const auto a = in.numbers<6>(), b = in.numbers<6>();
+    expectMessage(rb_add_material(scene, in.text().c_str(), a.data(), b.data(), &id));
+    const int32_t target = in.flag() ? id : in.small();
+    switch (in.below(8)) {
+        case 0:
+            expectMessage(rb_set_material_image(scene, target, in.small(), a.data()));
+            break;
+        case 1:
+            expectMessage(rb_set_material_corner_colors(scene, target, b.data()));
+            break;
+        case 2:
+            expectMessage(rb_set_material_emission_image(scene, target, in.small(), a.data()));
+            break;
+        case 3:
+            expectMessage(rb_set_material_emission_corner_colors(scene, target, b.data()));
+            break;
+        case 4:
+            expectMessage(rb_set_material_diffuse(scene, target, a.data(), b.data()));
+            expectMessage(rb_set_material_grazing(scene, target, b.data()));
+            break;
+        case 5:
+            expectMessage(rb_set_material_opacity(scene, target, in.number()));
+            expectMessage(rb_set_material_opacity_image(scene, target, in.small()));
+            break;
+        case 6:
+            expectMessage(
+                rb_set_material_translucence(scene, target, a.data(), in.small(), b.data()));
+            break;
+        default:
+            break;
+    }
+}
+
+void addInstance(Bytes& in, rb_scene scene) {
+    int32_t id = -1;
+    auto transform = in.numbers<12>();
+    if (in.flag())
+        transform = {1, 0, 0, transform[3], 0, 1, 0, transform[7], 0, 0, 1, transform[11]};
+    expectMessage(rb_add_instance(scene, in.small(), in.text().c_str(), transform.data(),
+                                  rb_role(in.below(3)), rb_side(in.below(3)), &id));
+    if (in.flag()) expectMessage(rb_set_instance_visibility(scene, id, in.flag(), in.flag()));
+    if (in.flag()) expectMessage(rb_set_instance_light_set(scene, in.small(), in.small()));
+}
+
+void set(Bytes& in, rb_bake bake) {
+    static const char* const kIntegers[] = {
+        "refine",          "contacts", "seed",        "thesis_literal", "final_gather",
+        "plane_coherence", "skip.lit", "skip.gather", "skip.sheets",    "skip.warm_start"};
+    static const std::pair<const char*, std::vector<const char*>> kChoices[] = {
+        {"solver", {"LINE_REUSE", "MULTIPATH", "STOCHASTIC_ITERATION", "RANDOM_WALK"}},
+        {"first_shot", {"GATHER", "SHOOT", "EXTENDED"}},
+        {"directions", {"LOW_DISCREPANCY", "RANDOM", "ADAPTIVE"}},
+        {"projector", {"FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL", "PLANE", "PLANES"}},
+        {"reconstruction", {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}},
+        {"small_patches", {"CENTRE_SAMPLING", "ROULETTE"}},
+    };
+    switch (in.below(4)) {
+        case 0: {
+            const auto& [name, values] = kChoices[in.below(std::size(kChoices))];
+            expectMessage(
+                rb_set_bake_string(bake, name, values[in.below(uint32_t(values.size()))]));
+            break;
+        }
+        case 1:
+            expectMessage(rb_set_bake_int(bake, kIntegers[in.below(std::size(kIntegers))],
+                                          int32_t(in.below(3))));
+            break;
+        case 2:
+            expectMessage(rb_set_bake_float(bake, "regularization", in.number()));
+            break;
+        default:
+            expectMessage(rb_set_bake_string(bake, in.text().c_str(), in.text().c_str()));
+    }
+}
+
+// Returns false at the call that the bytes name.
+struct Canceller {
+    uint32_t after;
+    static bool goesOn(void* user, rb_stage, double fraction) {
+        if (!(fraction >= 0 && fraction <= 1)) die("progress is not a share");
+        uint32_t& after = static_cast<Canceller*>(user)->after;
+        return after == 0 || --after > 0;
+    }
+};
+
+void expectResults(rb_bake bake, rb_error error) {
+    const char* report = nullptr;
+    if (error == RB_ERROR_NONE && (rb_get_report(bake, &report) != RB_ERROR_NONE || !*report))
+        die("no report after a bake");
+    std::vector<float> light(3 * 64);
+    for (int32_t instance = -1; instance < 5; ++instance)
+        for (size_t count = 0; count < 64; ++count)
+            for (int output = 0; output < 4; ++output) {
+                if (rb_get_corner_light(bake, instance, rb_output(output), light.data(), count) !=
+                    RB_ERROR_NONE)
+                    break;
+                for (size_t k = 0; k < 3 * count; ++k)
+                    if (!(light[k] >= 0) || std::isinf(light[k])) die("light is not finite");
+            }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    Bytes in(data, size);
+    rb_scene scene = nullptr;
+    rb_bake bake = nullptr;
+    if (rb_new_scene(&scene) != RB_ERROR_NONE || rb_new_bake(&bake) != RB_ERROR_NONE)
+        die("no handles");
+    // Small, so that a bake takes milliseconds.
+    rb_set_bake_int(bake, "max_patches", 300);
+    rb_set_bake_int(bake, "min_bundles", 2);
+    rb_set_bake_int(bake, "max_bundles", 8);
+    rb_set_bake_int(bake, "lines_per_bundle", 400);
+    rb_set_bake_int(bake, "local_rays", 200);
+    rb_set_bake_float(bake, "target_error", 0.5f);
+    rb_set_bake_int(bake, "threads", 1);
+    Canceller canceller{0};
+    rb_set_bake_progress(bake, &Canceller::goesOn, &canceller);
+    for (int calls = 0; calls < 40 && !in.isAtEnd(); ++calls) switch (in.below(10)) {
+            case 0:
+                addMesh(in, scene);
+                break;
+            case 1:
+                addLight(in, scene);
+                break;
+            case 2:
+                addImage(in, scene);
+                break;
+            case 3:
+                addMaterial(in, scene);
+                break;
+            case 4:
+            case 5:
+                addInstance(in, scene);
+                break;
+            case 6:
+                set(in, bake);
+                break;
+            case 7: {
+                const auto radiance = in.numbers<3>();
+                expectMessage(rb_set_world(scene, radiance.data()));
+                expectMessage(rb_set_world_light_set(scene, in.small()));
+                break;
+            }
+            case 8: {
+                int32_t id = -1;
+                expectMessage(rb_add_light_set(scene, in.text().c_str(), &id));
+                break;
+            }
+            default: {
+                canceller.after = in.flag() ? in.byte() : 0;
+                const rb_error error = rb_execute_bake(bake, scene);
+                expectMessage(error);
+                expectResults(bake, error);
+            }
+        }
+    canceller.after = 0;
+    const rb_error error = rb_execute_bake(bake, scene);
+    expectMessage(error);
+    expectResults(bake, error);
+    rb_release_bake(bake);
+    rb_release_scene(scene);
+    return 0;
+}

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// rb_new_subdivision under arbitrary meshes: it refuses them with a message, or gives triangles with
+// valid indices and weights that sum to 1. A libFuzzer target, as api_fuzzer.cpp.
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "raybundle/raybundle.h"
+
+namespace {
+
+[[noreturn]] void die(const char* what) {
+    std::fprintf(stderr, "%s: %s\n", what, rb_get_error_message());
+    std::abort();
+}
+
+float numberOf(const uint8_t* bytes) {
+    // Mostly of the size of rooms, sometimes anything.
+    if (bytes[0] < 220) return float(bytes[0]) / 50 + float(bytes[1]) / 5000;
+    float value;
+    std::memcpy(&value, bytes, sizeof value);
+    return value;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    if (size < 3) return 0;
+    const size_t vertices = data[0] % 16;
+    const float maxEdge = data[1] < 250 ? float(data[1] + 10) / 100 : float(data[1] - 252);
+    std::vector<float> positions(3 * vertices);
+    size_t at = 2;
+    for (float& value : positions) {
+        if (at + 4 > size) return 0;
+        value = numberOf(data + at);
+        at += 4;
+    }
+    // One byte a corner; 255 ends a face.
+    std::vector<int32_t> corners, offsets{0};
+    for (; at < size && corners.size() < 64; ++at) {
+        if (data[at] < 255)
+            corners.push_back(data[at] < 250 ? data[at] % 16 : int32_t(data[at]) - 252);
+        else
+            offsets.push_back(int32_t(corners.size()));
+    }
+    // Edges of 1e30 m would be cut for ever by one of centimetres: what is asked for has a limit.
+    float longest = 0;
+    for (float value : positions)
+        if (std::isfinite(value)) longest = std::max(longest, std::abs(value));
+    rb_subdivision made = nullptr;
+    const rb_error error = rb_new_subdivision(positions.data(), vertices, corners.data(),
+                                              corners.size(), offsets.data(), offsets.size() - 1,
+                                              longest < 10 ? maxEdge : maxEdge * longest, &made);
+    if (error != RB_ERROR_NONE) {
+        if (!*rb_get_error_message()) die("a refusal without a message");
+        if (error == RB_ERROR_UNKNOWN || made) die("an error that is not known");
+        return 0;
+    }
+    size_t vertexCount = 0, triangles = 0;
+    rb_get_subdivision_size(made, &vertexCount, &triangles);
+    std::vector<float> points(3 * vertexCount), weights(9 * triangles);
+    std::vector<int32_t> indices(3 * triangles), faces(triangles), sources(9 * triangles);
+    if (rb_get_subdivision(made, points.data(), vertexCount, indices.data(), faces.data(),
+                           sources.data(), weights.data(), triangles) != RB_ERROR_NONE)
+        die("no result");
+    for (float value : points)
+        if (!std::isfinite(value)) die("a vertex that is not finite");
+    for (int32_t index : indices)
+        if (index < 0 || size_t(index) >= vertexCount) die("a vertex that does not exist");
+    for (int32_t face : faces)
+        if (face < 0 || size_t(face) + 1 >= offsets.size()) die("a face that does not exist");
+    for (size_t k = 0; k < 3 * triangles; ++k) {
+        float sum = 0;
+        for (size_t c = 3 * k; c < 3 * k + 3; ++c) {
+            if (sources[c] < 0 || size_t(sources[c]) >= corners.size())
+                die("a corner that does not exist");
+            sum += weights[c];
+        }
+        if (!(std::abs(sum - 1) < 1e-4f)) die("weights that do not sum to 1");
+    }
+    rb_release_subdivision(made);
+    return 0;
+}

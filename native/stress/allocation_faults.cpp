@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A bake that runs out of memory at its first allocation, at its second, and so on to its last, on
+// whichever thread: each time it must say so, keep the results of the run before, and be as good as
+// new afterwards.
+//
+//   allocation_faults [STEP]     fails every STEP-th allocation (1)
+//
+// Operator new is replaced; what TBB and Embree take by malloc does not fail here.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "raybundle/raybundle.h"
+
+namespace {
+
+// Counts down while a bake runs; the allocation that reaches 0 fails. Negative: none does.
+std::atomic<int64_t> untilFault{-1};
+std::atomic<int64_t> allocations{0};
+
+void* allocate(size_t size, size_t alignment) {
+    ++allocations;
+    if (untilFault.load() >= 0 && untilFault.fetch_sub(1) == 0) throw std::bad_alloc();
+    void* memory =
+        alignment > alignof(std::max_align_t)
+            ? std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment)
+            : std::malloc(size ? size : 1);
+    if (!memory) throw std::bad_alloc();
+    return memory;
+}
+
+}  // namespace
+
+void* operator new(size_t size) { return allocate(size, 0); }
+void* operator new[](size_t size) { return allocate(size, 0); }
+void* operator new(size_t size, std::align_val_t alignment) {
+    return allocate(size, size_t(alignment));
+}
+void* operator new[](size_t size, std::align_val_t alignment) {
+    return allocate(size, size_t(alignment));
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace {
+
+void require(bool holds, const char* what, int64_t at) {
+    if (holds) return;
+    std::printf("allocation %lld: %s (%s)\n", (long long)at, what, rb_get_error_message());
+    std::exit(1);
+}
+
+// A closed room with a box and a lamp; `brightness` of the lamp.
+rb_scene roomOf(float brightness) {
+    static const float kVertices[24] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0,
+                                        0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
+    static const int32_t kInside[24] = {0, 1, 2, 3, 4, 7, 6, 5, 0, 4, 5, 1,
+                                        1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 4, 0};
+    static const int32_t kFaces[7] = {0, 4, 8, 12, 16, 20, 24};
+    static const float kGrey[6] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
+    static const float kBlack[6] = {0, 0, 0, 0, 0, 0};
+    static const float kRoom[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 3, 0};
+    static const float kBox[12] = {-1, 0, 0, 2, 0, 1, 0, 1, 0, 0, 1, 0};
+    const float intensity[3] = {brightness, brightness, brightness};
+    const float position[3] = {1, 3, 2.5f};
+    rb_scene scene = nullptr;
+    int32_t id = -1, mesh = -1;
+    rb_new_scene(&scene);
+    rb_add_material(scene, "grey", kGrey, kBlack, &id);
+    const std::vector<int32_t> materials(6, id);
+    rb_add_mesh(scene, "cube", kVertices, 8, kInside, 24, kFaces, 6, materials.data(), &mesh);
+    rb_add_instance(scene, mesh, "room", kRoom, RB_ROLE_BAKE, RB_SIDE_FRONT, &id);
+    rb_add_instance(scene, mesh, "box", kBox, RB_ROLE_BAKE, RB_SIDE_BACK, &id);
+    rb_add_point_light(scene, "bulb", position, intensity, 0.1f, RB_POINT_DISK, &id);
+    return scene;
+}
+
+std::vector<float> lightOf(rb_bake bake) {
+    std::vector<float> light(2 * 72);
+    for (int32_t i = 0; i < 2; ++i)
+        rb_get_corner_light(bake, i, RB_OUTPUT_COMBINED, light.data() + 72 * i, 24);
+    return light;
+}
+
+rb_bake newBake(const char* reconstruction) {
+    rb_bake bake = nullptr;
+    rb_new_bake(&bake);
+    rb_set_bake_float(bake, "patch_size", 0.5f);
+    rb_set_bake_int(bake, "min_bundles", 8);
+    rb_set_bake_int(bake, "max_bundles", 8);
+    rb_set_bake_int(bake, "threads", 2);
+    rb_set_bake_string(bake, "reconstruction", reconstruction);
+    return bake;
+}
+
+// Returns how many allocations were made to fail.
+int64_t failEach(const char* reconstruction, int64_t step) {
+    const rb_scene first = roomOf(10), second = roomOf(20);
+    rb_bake bake = newBake(reconstruction);
+    require(rb_execute_bake(bake, second) == RB_ERROR_NONE, "no bake", 0);
+    const std::vector<float> secondLight = lightOf(bake);
+    require(rb_execute_bake(bake, first) == RB_ERROR_NONE, "no relighting", 0);
+    const std::vector<float> firstLight = lightOf(bake);
+    rb_release_bake(bake);
+
+    int64_t failed = 0;
+    for (int64_t at = 0;; at += step) {
+        // The results of a first run, which another one replaces.
+        bake = newBake(reconstruction);
+        require(rb_execute_bake(bake, first) == RB_ERROR_NONE, "the run before failed", at);
+        rb_set_bake_int(bake, "skip.geometry", 0);  // all of it, not a relighting
+        const std::vector<float> before = lightOf(bake);
+        untilFault = at;
+        const rb_error error = rb_execute_bake(bake, second);
+        const bool wasReached = untilFault.exchange(-1) < 0;
+        if (!wasReached) {
+            require(error == RB_ERROR_NONE, "a bake with memory failed", at);
+            rb_release_bake(bake);
+            break;
+        }
+        // Where it does without what it asked for, the result is right.
+        if (error == RB_ERROR_NONE) {
+            require(lightOf(bake).size() == secondLight.size(), "no light", at);
+        } else {
+            ++failed;
+            require(error == RB_ERROR_OUT_OF_MEMORY, "not RB_ERROR_OUT_OF_MEMORY", at);
+            require(*rb_get_error_message(), "no message", at);
+            require(lightOf(bake) == before, "the results of the run before are gone", at);
+        }
+        require(rb_execute_bake(bake, second) == RB_ERROR_NONE, "it does not recover", at);
+        const std::vector<float> after = lightOf(bake);
+        for (size_t k = 0; k < after.size(); ++k)
+            require(std::abs(after[k] - secondLight[k]) <= 1e-4f * (1 + secondLight[k]),
+                    "another light after recovery", at);
+        rb_release_bake(bake);
+    }
+    rb_release_scene(first);
+    rb_release_scene(second);
+    return failed;
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+    const int64_t step = count > 1 ? std::max(1, std::atoi(arguments[1])) : 1;
+    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"})
+        std::printf(
+            "%s: %lld allocations failed, each with an error, results kept, and recovered\n",
+            reconstruction, (long long)failEach(reconstruction, step));
+    return 0;
+}
