@@ -417,6 +417,14 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                 {"bundles", "the noise is at its target", most - std::min(most, bundles)});
             break;
         }
+        const double needed = bundles * std::pow(onSmall / settings.targetError, 1 / kNoiseSlope);
+        if (*worst <= settings.targetError && needed > kMostWindowBundles && settings.skipBundles) {
+            report.warnings.push_back(
+                "on small patches the noise is " + std::to_string(100 * onSmall) +
+                " %: they are too many and too small for lines; those that few lines met gather "
+                "with local rays");
+            break;
+        }
         if (onSmall <= settings.targetError &&
             noise.ofBundles() < kFewNoise * settings.targetError) {
             report.warnings.push_back(
