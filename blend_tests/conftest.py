@@ -15,6 +15,8 @@ import raybundle  # noqa: E402
 # The furnace: E, reflectance and the side of the box.
 FURNACE_EMISSION_RADIANCE = 0.5
 FURNACE_REFLECTANCE = 0.6
+# B = E / (1 - rho) in a closed box.
+FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
 
 
 def pytest_configure() -> None:

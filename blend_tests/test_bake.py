@@ -8,9 +8,10 @@ import bpy
 import numpy as np
 import pytest
 import raybundle
-from conftest import (CUBE_FACES, CUBE_VERTICES, FURNACE_EMISSION_RADIANCE, FURNACE_REFLECTANCE)
+from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_EMISSION_RADIANCE, FURNACE_LIGHT
 from raybundle import native
 from raybundle.native import ErrorCode
+from surface_error import read_colors
 
 bake_cache = importlib.import_module("raybundle.bake_cache")
 
@@ -18,9 +19,8 @@ pytestmark = pytest.mark.needs_library
 
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
-# B = E / (1 - rho) in a closed box. The rows of the counted form factors sum to 1 by construction,
-# so only the tolerance of the solver and single precision remain.
-FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
+# The rows of the counted form factors sum to 1 by construction, so only the tolerance of the solver
+# and single precision remain.
 FURNACE_TOLERANCE = 1e-4
 
 REPORT_KEYS = {"seconds", "patches", "bundles", "lines", "exchanges", "estimated_error", "error",
@@ -33,13 +33,6 @@ def bake(**overrides):
     # Few patches and one thread's worth of work: the answers here do not depend on them.
     overrides = {"max_patches": 2000, "max_bundles": 128, **overrides}
     return raybundle.bake(bpy.context, **overrides)
-
-
-def colors(item, name="Radiosity"):
-    attribute = item.data.color_attributes[name]
-    values = np.empty(4 * len(attribute.data), np.float32)
-    attribute.data.foreach_get('color', values)
-    return values.reshape(-1, 4)[:, :3]
 
 
 def statuses(report):
@@ -69,7 +62,7 @@ def floor_and_lamp(new_object, new_light, new_material):
 @pytest.mark.parametrize("domain", ['CORNER', 'POINT'])
 def test_furnace(closed_box, output, expected, domain):
     report = bake(output=output, domain=domain)
-    values = colors(closed_box)
+    values = read_colors(closed_box)
     assert len(values) == (24 if domain == 'CORNER' else 8)
     assert np.abs(values / expected - 1.0).max() < FURNACE_TOLERANCE
     assert report.energy['balance_error'] < 1e-3
@@ -81,7 +74,7 @@ def test_furnace_with_a_modifier(closed_box, seed):
     closed_box.modifiers.new("Subdivision", 'SUBSURF').levels = 2
     before = len(closed_box.data.attributes)
     bake(seed=seed)
-    assert np.abs(colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
+    assert np.abs(read_colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
     assert len(closed_box.data.attributes) == before + 1
 
 
@@ -90,11 +83,11 @@ def test_outward_normals_are_named_and_the_back_side_can_be_baked(closed_box):
     report = bake()
     assert "no light" in statuses(report)["Box"]
     assert any('"Box"' in text for text in report.warnings)
-    assert np.abs(colors(closed_box)).max() == 0.0
+    assert np.abs(read_colors(closed_box)).max() == 0.0
     closed_box.raybundle.side = 'BACK'
     report = bake()
     assert statuses(report) == {"Box": "baked"}
-    assert np.abs(colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
+    assert np.abs(read_colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
 
 
 def test_irradiance_under_a_point_light(floor_and_lamp):
@@ -106,7 +99,7 @@ def test_irradiance_under_a_point_light(floor_and_lamp):
     squared = (x - 0.1) ** 2 + (y - 0.5) ** 2 + 0.25
     irradiance = 10.0 / (4.0 * np.pi) * 0.5 / squared ** 1.5
     # The regularisation does not change the mean of one face; patches are 1 % of the square.
-    assert colors(floor_and_lamp).mean() == pytest.approx(irradiance.mean() / np.pi, rel=1e-2)
+    assert read_colors(floor_and_lamp).mean() == pytest.approx(irradiance.mean() / np.pi, rel=1e-2)
 
 
 # --------------------------------------------------------------------------------------------------
@@ -169,7 +162,7 @@ def test_cancel_leaves_the_mesh_unchanged(closed_box, stage):
     assert bpy.context.scene.raybundle.report == ""
     # And the next bake is as if nothing had been.
     bake()
-    assert np.abs(colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
+    assert np.abs(read_colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
 
 
 def test_an_exception_in_progress_reaches_the_caller(closed_box):
@@ -190,7 +183,7 @@ def test_relight_uses_the_lines_again(closed_box):
                     if node.type == 'EMISSION')
     emission.inputs['Strength'].default_value = 2.0
     assert bpy.ops.raybundle.relight() == {'FINISHED'}
-    assert np.abs(colors(closed_box) / (2.0 * FURNACE_LIGHT) - 1.0).max() < FURNACE_TOLERANCE
+    assert np.abs(read_colors(closed_box) / (2.0 * FURNACE_LIGHT) - 1.0).max() < FURNACE_TOLERANCE
     report = json.loads(bpy.context.scene.raybundle.report)
     assert report["seconds"]["bundles"] == 0.0
     assert any("unchanged" in item["why"] for item in report["skipped"])
@@ -228,7 +221,7 @@ def test_error_attribute(floor_and_lamp, domain, count):
     attribute.data.foreach_get('value', errors)
     # One face below a lamp: in all the error of the corners is that of the report, relative to the
     # light, which is not far from evenly spread over the corners' shares.
-    light = colors(floor_and_lamp)
+    light = read_colors(floor_and_lamp)
     relative = np.sqrt((errors ** 2).mean() / (light ** 2).mean())
     assert 0.3 < relative / report.error['total'] < 3.0
     assert any('"Floor"' in text and "too coarse" in text for text in report.warnings)
@@ -260,7 +253,7 @@ def test_same_seed_same_result_for_any_number_of_threads(floor_and_lamp, new_obj
     for threads in (1, 2):
         bake_cache.discard_all()
         bake(threads=threads, seed=7)
-        results.append(colors(floor_and_lamp))
+        results.append(read_colors(floor_and_lamp))
     assert np.abs(results[0] - results[1]).max() <= 1e-5 * results[0].max()
 
 
@@ -277,10 +270,10 @@ def test_selected_scope(floor_and_lamp, new_object):
     assert statuses(report) == {"Other": "baked"}
     assert len(floor_and_lamp.data.color_attributes) == 0
     # The floor above still casts its shadow: the centre below it is darker than without.
-    shadowed = colors(other).mean()
+    shadowed = read_colors(other).mean()
     floor_and_lamp.raybundle.role = 'IGNORE'
     bake(scope='SELECTED')
-    assert colors(other).mean() > 2.0 * shadowed
+    assert read_colors(other).mean() > 2.0 * shadowed
 
 
 def shared_squares(floor):
@@ -296,7 +289,7 @@ def test_single_user_copies_have_their_own_light(floor_and_lamp):
     far = shared_squares(floor_and_lamp)
     report = bake(shared_meshes='SINGLE_USER')
     assert far.data != floor_and_lamp.data
-    assert colors(floor_and_lamp).mean() > 3.0 * colors(far).mean() > 0.0
+    assert read_colors(floor_and_lamp).mean() > 3.0 * read_colors(far).mean() > 0.0
     assert any("shared by 2" in text for text in report.warnings)
     # The copy has the same geometry: nothing is traced again.
     report = bake(shared_meshes='SINGLE_USER')
@@ -309,10 +302,10 @@ def test_averaged_instances_show_their_mean(floor_and_lamp):
     far = shared_squares(floor_and_lamp)
     report = bake(shared_meshes='AVERAGE')
     assert far.data == floor_and_lamp.data
-    averaged = colors(far)
+    averaged = read_colors(far)
     assert any("mean light" in text for text in report.warnings)
     bake(shared_meshes='SINGLE_USER')
-    mean = 0.5 * (colors(floor_and_lamp) + colors(far))
+    mean = 0.5 * (read_colors(floor_and_lamp) + read_colors(far))
     # The same lines, so only rounding differs.
     assert averaged == pytest.approx(mean, rel=1e-4)
 
@@ -371,7 +364,7 @@ def test_subdivided_copy_is_replaced_and_cleared(floor_and_lamp):
             "Floor", "Floor (Radiosity)", "Lamp"]
     # A light close to the left edge: the finer mesh follows it.
     copy = bpy.data.objects["Floor (Radiosity)"]
-    assert colors(copy).max() > 4.0 * colors(copy).min()
+    assert read_colors(copy).max() > 4.0 * read_colors(copy).min()
     # A failing bake leaves the copy in place.
     with pytest.raises(raybundle.RaybundleError):
         bake(topology='SUBDIVIDE', patch_size=0.1, progress=lambda *_: False)
@@ -389,7 +382,7 @@ def test_subdivided_furnace_with_smooth_shading(closed_box):
     copy = bpy.data.objects["Box (Radiosity)"]
     assert len(copy.data.polygons) > 12
     assert all(item.use_smooth for item in copy.data.polygons)
-    assert np.abs(colors(copy) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
+    assert np.abs(read_colors(copy) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
 
 
 # --------------------------------------------------------------------------------------------------
@@ -407,7 +400,7 @@ def test_bad_objects_are_named_and_the_rest_is_baked(closed_box, new_object):
     for name in ("Bad", "Empty"):
         assert any(f'"{name}"' in text for text in report.warnings)
         assert len(bpy.data.objects[name].data.color_attributes) == 0
-    assert np.abs(colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
+    assert np.abs(read_colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
 
 
 def test_zero_area_faces(closed_box):
@@ -416,7 +409,7 @@ def test_zero_area_faces(closed_box):
     faces = [face[::-1] for face in CUBE_FACES]
     mesh.from_pydata([*CUBE_VERTICES, (0, 0, 0), (0, 0, 0), (0, 0, 0)], [], [*faces, (8, 9, 10)])
     bake()
-    values = colors(closed_box)
+    values = read_colors(closed_box)
     assert len(values) == 27 and np.isfinite(values).all()
     assert np.abs(values[:24] / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
 
@@ -435,7 +428,7 @@ def test_no_light_is_black_and_says_so(new_object):
     item = new_object("Floor", SQUARE, [(0, 1, 2, 3)])
     report = bake()
     assert any("no light" in text for text in report.warnings)
-    assert np.abs(colors(item)).max() == 0.0
+    assert np.abs(read_colors(item)).max() == 0.0
 
 
 def test_reflectance_of_one_is_clamped_and_named(closed_box, new_material):
@@ -443,7 +436,7 @@ def test_reflectance_of_one_is_clamped_and_named(closed_box, new_material):
     report = bake()
     assert any('Snow' in text for text in report.warnings)
     # Clamped to 0.999: L_E / 0.001, to the tolerance of a solver whose answer is 1000 times E.
-    assert colors(closed_box) == pytest.approx(np.full((24, 3), 10.0), rel=1e-2)
+    assert read_colors(closed_box) == pytest.approx(np.full((24, 3), 10.0), rel=1e-2)
 
 
 def test_edit_mode_is_left_and_entered_again(closed_box):
@@ -452,7 +445,7 @@ def test_edit_mode_is_left_and_entered_again(closed_box):
     assert bpy.ops.raybundle.bake() == {'FINISHED'}
     assert bpy.context.mode == 'EDIT_MESH'
     bpy.ops.object.mode_set(mode='OBJECT')
-    assert np.abs(colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
+    assert np.abs(read_colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
 
 
 def test_a_name_that_is_taken_is_refused(closed_box):
@@ -475,7 +468,7 @@ def test_linked_data_is_lit_but_not_written(closed_box, new_object, tmp_path):
     assert "linked" in statuses(report)["Box"] and statuses(report)["Inside"] == "baked"
     assert len(bpy.data.objects["Box"].data.color_attributes) == 0
     # The emission of the box reaches the square inside it.
-    assert colors(inside).min() > 0.0
+    assert read_colors(inside).min() > 0.0
 
 
 @pytest.mark.parametrize("content, message", [

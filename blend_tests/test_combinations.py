@@ -22,7 +22,7 @@ import bpy
 import numpy as np
 import pytest
 import raybundle
-from conftest import FURNACE_EMISSION_RADIANCE, FURNACE_REFLECTANCE
+from conftest import FURNACE_LIGHT
 from raybundle.native import ErrorCode, RaybundleError
 from raybundle.properties import RaybundleSceneSettings
 from surface_error import corner_areas, off_contact_edges, read_colors
@@ -42,8 +42,6 @@ COARSE = {'output': 'LIGHTING', 'target_error': TARGET, 'max_bundles': 4096}
 ROULETTE = {'lines_per_bundle': 20_000}
 MOST_STATED = 0.5
 
-# B = E / (1 - rho) in a closed box.
-FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
 # What no stated error has to cover: in the furnace single precision and the solver's tolerance, and
 # for LINE_REUSE there is nothing else.
 FURNACE_FLOOR = 1e-4

@@ -10,11 +10,11 @@ import bpy
 import numpy as np
 import pytest
 import raybundle
-from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_EMISSION_RADIANCE, FURNACE_REFLECTANCE
+from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
+from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
 
-FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
 SCRIPT = Path(__file__).parent.parent / "addon" / "bake_file.py"
 
 in_blender = pytest.mark.skipif(not bpy.app.binary_path, reason="Blender is a module here")
@@ -22,13 +22,6 @@ in_blender = pytest.mark.skipif(not bpy.app.binary_path, reason="Blender is a mo
 
 def bake(**overrides):
     return raybundle.bake(bpy.context, **{"max_patches": 2000, "max_bundles": 64, **overrides})
-
-
-def colors(item, name="Radiosity"):
-    attribute = item.data.color_attributes[name]
-    values = np.empty(4 * len(attribute.data), np.float32)
-    attribute.data.foreach_get('color', values)
-    return values.reshape(-1, 4)[:, :3]
 
 
 def is_furnace(values):
@@ -41,13 +34,14 @@ def is_furnace(values):
 # --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["x" * 63, "Wände über Öl", "部屋の箱", "🦊", 'a "quoted" \\ name', " "])
+@pytest.mark.parametrize("name", ["x" * 63, "Wände über Öl", "部屋の箱", "🦊",
+                                  'a "quoted" \\ name', " "])
 def test_names_are_kept_as_they_are(closed_box, name):
     closed_box.name = closed_box.data.name = name
     closed_box.data.materials[0].name = name
     report = bake(attribute=name)
     assert [item.name for item in report.objects] == [closed_box.name]
-    assert is_furnace(colors(closed_box, name))
+    assert is_furnace(read_colors(closed_box, name))
 
 
 def test_a_name_of_an_attribute_that_is_too_long_loses_nothing(closed_box):
@@ -64,7 +58,7 @@ def test_scaled_and_mirrored_objects(closed_box, scale):
     closed_box.scale = scale
     bpy.context.view_layer.update()
     bake()
-    assert is_furnace(colors(closed_box))
+    assert is_furnace(read_colors(closed_box))
 
 
 @pytest.mark.parametrize("scale", [(0, 0, 0), (1, 1, 0), (0, 0, 1)])
@@ -75,8 +69,8 @@ def test_an_object_without_volume_spoils_nothing(closed_box, new_object, scale):
     bpy.context.view_layer.update()
     report = bake()
     assert any('"Flat"' in warning for warning in report.warnings)
-    assert is_furnace(colors(closed_box))
-    assert np.isfinite(colors(flat)).all()
+    assert is_furnace(read_colors(closed_box))
+    assert np.isfinite(read_colors(flat)).all()
 
 
 def test_instances_of_instances_of_instances(closed_box, new_object):
@@ -99,7 +93,7 @@ def test_instances_of_instances_of_instances(closed_box, new_object):
     bpy.context.scene.collection.objects.link(root)
     bpy.context.view_layer.update()
     bake()
-    assert is_furnace(colors(closed_box))
+    assert is_furnace(read_colors(closed_box))
 
 
 # --------------------------------------------------------------------------------------------------
@@ -131,7 +125,7 @@ def test_two_scenes_in_turns(closed_box):
         for scene, item in ((first, closed_box), (second, box)):
             with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
                 raybundle.bake(bpy.context, max_patches=2000, max_bundles=64)
-            assert is_furnace(colors(item))
+            assert is_furnace(read_colors(item))
 
 
 def test_undo_after_a_bake(closed_box):
@@ -143,9 +137,9 @@ def test_undo_after_a_bake(closed_box):
     item = bpy.data.objects[name]
     assert "Radiosity" not in item.data.color_attributes
     bpy.ops.ed.redo()
-    assert is_furnace(colors(bpy.data.objects[name]))
+    assert is_furnace(read_colors(bpy.data.objects[name]))
     bake(seed=3)
-    assert is_furnace(colors(bpy.data.objects[name]))
+    assert is_furnace(read_colors(bpy.data.objects[name]))
 
 
 # --------------------------------------------------------------------------------------------------

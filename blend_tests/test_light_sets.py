@@ -9,6 +9,7 @@ import pytest
 import raybundle
 from conftest import CUBE_FACES, CUBE_VERTICES
 from raybundle import native
+from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
 
@@ -27,13 +28,6 @@ def bake(**overrides):
     # Fixed bundles, so that all bakes have the same lines.
     return raybundle.bake(bpy.context, **{"max_patches": 2000, "max_bundles": 64,
                                           "target_error": 0.001, **overrides})
-
-
-def colors(item, name="Radiosity"):
-    attribute = item.data.color_attributes[name]
-    values = np.empty(4 * len(attribute.data), np.float32)
-    attribute.data.foreach_get('color', values)
-    return values.reshape(-1, 4)[:, :3]
 
 
 def difference(a, b):
@@ -97,7 +91,7 @@ def lit_by(court, warm=False, cold=False, sun=False):
 def test_two_sets_are_two_separate_bakes_and_their_sum(court, output, domain):
     add_both(court)
     report = bake(output=output, domain=domain)
-    together = [{name: colors(item, name) for name in
+    together = [{name: read_colors(item, name) for name in
                  ("Radiosity", "Radiosity warm", "Radiosity cold")} for item in court["items"]]
     assert [(entry["name"], entry["attribute"]) for entry in report.light_sets] == [
         ("warm", "Radiosity warm"), ("cold", "Radiosity cold")]
@@ -107,7 +101,7 @@ def test_two_sets_are_two_separate_bakes_and_their_sum(court, output, domain):
     for name, lit in (("cold", {"cold": True}), ("warm", {"warm": True}), ("sun", {"sun": True})):
         lit_by(court, **lit)
         assert bake(output=output, domain=domain, attribute=name).lines == report.lines
-        parts[name] = [colors(item, name) for item in court["items"]]
+        parts[name] = [read_colors(item, name) for item in court["items"]]
     for index, found in enumerate(together):
         assert difference(found["Radiosity warm"], parts["warm"][index]) < SOLVER_TOLERANCE
         assert difference(found["Radiosity cold"], parts["cold"][index]) < SOLVER_TOLERANCE
@@ -120,8 +114,8 @@ def test_the_main_attribute_is_the_sum_and_stays_active(court):
     bpy.data.objects["Sun"].hide_render = True
     bake()
     for item in court["items"]:
-        parts = colors(item, "Radiosity warm") + colors(item, "Radiosity cold")
-        assert difference(colors(item), parts) < ROUNDING
+        parts = read_colors(item, "Radiosity warm") + read_colors(item, "Radiosity cold")
+        assert difference(read_colors(item), parts) < ROUNDING
         assert item.data.color_attributes.active_color.name == "Radiosity"
 
 
@@ -134,8 +128,8 @@ def test_all_lights_are_those_of_a_bake_without_sets(court, reconstruction):
     add_both(court)
     bake(target_error=0.02, reconstruction=reconstruction)
     for item in court["items"]:
-        plain = colors(item, "Plain")
-        error = np.sqrt(((colors(item) - plain) ** 2).mean() / (plain ** 2).mean())
+        plain = read_colors(item, "Plain")
+        error = np.sqrt(((read_colors(item) - plain) ** 2).mean() / (plain ** 2).mean())
         assert error < 0.02
 
 
@@ -146,15 +140,15 @@ def test_relight_updates_all_sets_on_the_same_lines(court):
     assert bpy.ops.raybundle.bake() == {'FINISHED'}
     before = json.loads(settings.report)
     floor = court["items"][0]
-    warm, cold = colors(floor, "Radiosity warm"), colors(floor, "Radiosity cold")
+    warm, cold = read_colors(floor, "Radiosity warm"), read_colors(floor, "Radiosity cold")
     bpy.data.objects["Blue"].data.color = (0.1, 0.2, 0.5)
     court["sky"].default_value = (*(0.5 * value for value in SKY), 1.0)
     assert bpy.ops.raybundle.relight() == {'FINISHED'}
     after = json.loads(settings.report)
     assert after["lines"] == before["lines"]
     assert any("unchanged" in entry["why"] for entry in after["skipped"])
-    assert difference(colors(floor, "Radiosity warm"), warm) < SOLVER_TOLERANCE
-    assert difference(colors(floor, "Radiosity cold"), 0.5 * cold) < SOLVER_TOLERANCE
+    assert difference(read_colors(floor, "Radiosity warm"), warm) < SOLVER_TOLERANCE
+    assert difference(read_colors(floor, "Radiosity cold"), 0.5 * cold) < SOLVER_TOLERANCE
 
 
 def test_clear_removes_the_attributes_of_all_sets(court):
@@ -173,7 +167,7 @@ def test_clear_removes_the_attributes_of_all_sets(court):
 def test_sets_are_saved_with_the_file(court, tmp_path):
     add_both(court)
     bake()
-    wanted = colors(court["items"][0], "Radiosity cold")
+    wanted = read_colors(court["items"][0], "Radiosity cold")
     path = str(tmp_path / "sets.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
@@ -181,9 +175,9 @@ def test_sets_are_saved_with_the_file(court, tmp_path):
     assert (warm.name, warm.collection.name, warm.world) == ("warm", "Warm", False)
     assert (cold.name, cold.collection.name, cold.world) == ("cold", "Cold", True)
     floor = bpy.data.objects["Floor"]
-    assert np.array_equal(colors(floor, "Radiosity cold"), wanted)
+    assert np.array_equal(read_colors(floor, "Radiosity cold"), wanted)
     bake()
-    assert difference(colors(floor, "Radiosity cold"), wanted) < SOLVER_TOLERANCE
+    assert difference(read_colors(floor, "Radiosity cold"), wanted) < SOLVER_TOLERANCE
 
 
 def test_a_set_without_lights_is_black_and_named(court):
@@ -194,8 +188,8 @@ def test_a_set_without_lights_is_black_and_named(court):
     report = bake()
     for name in ("nothing", "hidden"):
         assert any(f'light set "{name}"' in warning for warning in report.warnings)
-        assert not colors(court["items"][0], f"Radiosity {name}").any()
-    assert colors(court["items"][0]).max() > 0.0
+        assert not read_colors(court["items"][0], f"Radiosity {name}").any()
+    assert read_colors(court["items"][0]).max() > 0.0
 
 
 def test_disabled_sets_are_not_baked(court):
@@ -217,7 +211,7 @@ def test_instances_of_a_collection_belong_to_the_set_of_their_empty(court, new_l
     bpy.context.scene.collection.objects.link(empty)
     add_set("hung", collection_of("Hung", empty))
     bake()
-    assert colors(court["items"][0], "Radiosity hung").max() > 0.0
+    assert read_colors(court["items"][0], "Radiosity hung").max() > 0.0
 
 
 def test_copies_and_means_have_the_sets_too(court):
@@ -232,7 +226,7 @@ def test_copies_and_means_have_the_sets_too(court):
     twin.location = (1.0, 3.0, 0.8)
     bpy.context.scene.collection.objects.link(twin)
     bake(shared_meshes='AVERAGE')
-    assert colors(twin, "Radiosity warm").max() > 0.0
+    assert read_colors(twin, "Radiosity warm").max() > 0.0
 
 
 # --------------------------------------------------------------------------------------------------
