@@ -13,9 +13,12 @@
 #include <string>
 #include <vector>
 
+#include "cube_arrays.h"
 #include "raybundle/raybundle.h"
 
 namespace {
+
+using namespace raybundle::test;
 
 // Reads the input from its front; past its end everything is 0, so that each prefix is an input.
 class Bytes {
@@ -103,11 +106,6 @@ void addMesh(Bytes& in, rb_scene scene) {
         }
         return;
     }
-    static const float kVertices[24] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0,
-                                        0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
-    static const int32_t kCorners[24] = {0, 1, 2, 3, 4, 7, 6, 5, 0, 4, 5, 1,
-                                         1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 4, 0};
-    static const int32_t kFaces[7] = {0, 4, 8, 12, 16, 20, 24};
     std::array<int32_t, 6> materials;
     for (int32_t& m : materials) m = in.small();
     expectMessage(rb_add_mesh(scene, name.c_str(), kVertices, 8, kCorners, 24, kFaces, 6,

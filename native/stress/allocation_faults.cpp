@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "cube_arrays.h"
 #include "raybundle/raybundle.h"
 
 namespace {
@@ -59,6 +60,8 @@ void operator delete[](void* memory, size_t, std::align_val_t) noexcept { std::f
 
 namespace {
 
+using namespace raybundle::test;
+
 void require(bool holds, const char* what, int64_t at) {
     if (holds) return;
     std::printf("allocation %lld: %s (%s)\n", (long long)at, what, rb_get_error_message());
@@ -67,11 +70,6 @@ void require(bool holds, const char* what, int64_t at) {
 
 // A closed room with a box and a lamp; `brightness` of the lamp.
 rb_scene roomOf(float brightness) {
-    static const float kVertices[24] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0,
-                                        0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
-    static const int32_t kInside[24] = {0, 1, 2, 3, 4, 7, 6, 5, 0, 4, 5, 1,
-                                        1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 4, 0};
-    static const int32_t kFaces[7] = {0, 4, 8, 12, 16, 20, 24};
     static const float kGrey[6] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
     static const float kBlack[6] = {0, 0, 0, 0, 0, 0};
     static const float kRoom[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 3, 0};
@@ -83,7 +81,7 @@ rb_scene roomOf(float brightness) {
     rb_new_scene(&scene);
     rb_add_material(scene, "grey", kGrey, kBlack, &id);
     const std::vector<int32_t> materials(6, id);
-    rb_add_mesh(scene, "cube", kVertices, 8, kInside, 24, kFaces, 6, materials.data(), &mesh);
+    rb_add_mesh(scene, "cube", kVertices, 8, kCorners, 24, kFaces, 6, materials.data(), &mesh);
     rb_add_instance(scene, mesh, "room", kRoom, RB_ROLE_BAKE, RB_SIDE_FRONT, &id);
     rb_add_instance(scene, mesh, "box", kBox, RB_ROLE_BAKE, RB_SIDE_BACK, &id);
     rb_add_point_light(scene, "bulb", position, intensity, 0.1f, RB_POINT_DISK, &id);
@@ -108,14 +106,18 @@ rb_bake newBake(const char* reconstruction) {
     return bake;
 }
 
+// To the solver's tolerance.
+bool isLike(const std::vector<float>& light, const std::vector<float>& wanted) {
+    return std::equal(light.begin(), light.end(), wanted.begin(), wanted.end(),
+                      [](float a, float b) { return std::abs(a - b) <= 1e-4f * (1 + b); });
+}
+
 // Returns how many allocations were made to fail.
 int64_t failEach(const char* reconstruction, int64_t step) {
     const rb_scene first = roomOf(10), second = roomOf(20);
     rb_bake bake = newBake(reconstruction);
     require(rb_execute_bake(bake, second) == RB_ERROR_NONE, "no bake", 0);
     const std::vector<float> secondLight = lightOf(bake);
-    require(rb_execute_bake(bake, first) == RB_ERROR_NONE, "no relighting", 0);
-    const std::vector<float> firstLight = lightOf(bake);
     rb_release_bake(bake);
 
     int64_t failed = 0;
@@ -135,7 +137,7 @@ int64_t failEach(const char* reconstruction, int64_t step) {
         }
         // Where it does without what it asked for, the result is right.
         if (error == RB_ERROR_NONE) {
-            require(lightOf(bake).size() == secondLight.size(), "no light", at);
+            require(isLike(lightOf(bake), secondLight), "another light with less memory", at);
         } else {
             ++failed;
             require(error == RB_ERROR_OUT_OF_MEMORY, "not RB_ERROR_OUT_OF_MEMORY", at);
@@ -143,10 +145,7 @@ int64_t failEach(const char* reconstruction, int64_t step) {
             require(lightOf(bake) == before, "the results of the run before are gone", at);
         }
         require(rb_execute_bake(bake, second) == RB_ERROR_NONE, "it does not recover", at);
-        const std::vector<float> after = lightOf(bake);
-        for (size_t k = 0; k < after.size(); ++k)
-            require(std::abs(after[k] - secondLight[k]) <= 1e-4f * (1 + secondLight[k]),
-                    "another light after recovery", at);
+        require(isLike(lightOf(bake), secondLight), "another light after recovery", at);
         rb_release_bake(bake);
     }
     rb_release_scene(first);

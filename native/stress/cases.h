@@ -3,6 +3,7 @@
 // Scenes that are hard on numbers, each with what a bake of it must give.
 #pragma once
 
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,13 @@
 #include "scene/scene.h"
 
 namespace raybundle::stress {
+
+// As printf does.
+inline std::string printed(const char* format, double value) {
+    char text[64];
+    std::snprintf(text, sizeof text, format, value);
+    return text;
+}
 
 struct Case {
     std::string group, name;

@@ -3,6 +3,7 @@
 // Meshes as no one should make them. All stand in the light of a white furnace: the world has
 // radiance 1 / pi and both sides of every surface emit what they do not reflect, so that the
 // irradiance is 1 wherever a surface is, whatever its shape.
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>

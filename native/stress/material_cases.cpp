@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Reflectance up to 1 and beyond, and emission over 24 orders of magnitude.
-#include <cstdio>
-
 #include "cases.h"
 #include "test_scenes.h"
 
@@ -10,12 +8,6 @@ namespace raybundle::stress {
 namespace {
 
 using namespace test;
-
-std::string printed(const char* format, double value) {
-    char text[64];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
 
 // A closed room whose walls and boxes emit and reflect alike: the same light everywhere.
 Case furnace(const std::string& name, float reflectance, float emission, double light) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Sizes, places, and patches beside pixels: a lit room must look the same in all of them.
-#include <cstdio>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "cases.h"
@@ -15,12 +14,6 @@ using namespace test;
 // Relative RMS difference of two bakes to 2 %, each of whose corners has some of that noise.
 constexpr double kNoise = 0.05;
 constexpr float kPatchSize = 0.25f;
-
-std::string printed(const char* format, double value) {
-    char text[64];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
 
 // A room with two boxes and a lamp below the ceiling, `scale` times as large, at `offset`.
 Scene litRoomAt(double scale, const glm::dvec3& offset) {

@@ -28,7 +28,7 @@
 namespace raybundle::stress {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+using test::kPi;
 // Counts are compared pair by pair up to this many patches.
 constexpr size_t kMostPairs = 20000;
 // Below this noise need not fall any more.
@@ -208,9 +208,7 @@ Row measure(const Case& made) {
 
 void print(const Case& made, const Row& row) {
     auto number = [](double value) {
-        char text[32];
-        std::snprintf(text, sizeof text, "%.2g", value);
-        return std::isnan(value) ? std::string("-") : std::string(text);
+        return std::isnan(value) ? std::string("-") : printed("%.2g", value);
     };
     std::string expected =
         made.light  ? "irradiance " + number(*made.light) + " within " + number(made.tolerance)

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "cube_arrays.h"
 #include "raybundle/raybundle.h"
 
 namespace raybundle::test {
@@ -19,11 +20,6 @@ inline constexpr float kGrey[6] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
 inline constexpr float kBlack[6] = {0, 0, 0, 0, 0, 0};
 inline constexpr float kGlow[6] = {1, 1, 1, 0, 0, 0};
 inline constexpr float kOne[3] = {1, 1, 1};
-inline constexpr float kVertices[24] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0,
-                                        0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
-inline constexpr int32_t kCorners[24] = {0, 1, 2, 3, 4, 7, 6, 5, 0, 4, 5, 1,
-                                         1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 4, 0};
-inline constexpr int32_t kFaces[7] = {0, 4, 8, 12, 16, 20, 24};
 
 inline std::string message() { return rb_get_error_message(); }
 
