@@ -24,10 +24,10 @@ struct GridPlace {
 
 GridPlace placeAt(bool isTriangle, int countA, int countB, glm::vec2 st) {
     const glm::vec2 at = st * glm::vec2(countA, countB);
-    const int row = std::clamp(int(at.y), 0, countB - 1);
+    const int row = int(std::clamp(at.y, 0.0f, float(countB - 1)));
     // Row t of a triangle has n - row upright triangles with n - row - 1 upside-down ones between.
     const int columns = isTriangle ? countA - row : countA;
-    const int column = std::clamp(int(at.x), 0, columns - 1);
+    const int column = int(std::clamp(at.x, 0.0f, float(columns - 1)));
     const glm::vec2 inside = at - glm::vec2(column, row);
     if (!isTriangle) return {uint32_t(row * countA + column), inside};
     const bool upsideDown = inside.x + inside.y > 1.0f && column < columns - 1;
@@ -80,18 +80,20 @@ glm::vec2 Parent::pointOn(uint32_t patchInParent, glm::vec2 uv) const {
 
 namespace {
 
-// The s and t with d = s a + t b, by the dual basis; d is projected into the plane of a and b.
-std::pair<float, float> affine(const glm::vec3& a, const glm::vec3& b, const glm::vec3& d) {
-    const float aa = glm::dot(a, a), ab = glm::dot(a, b), bb = glm::dot(b, b);
-    const float det = aa * bb - ab * ab;
-    return {(bb * glm::dot(d, a) - ab * glm::dot(d, b)) / det,
-            (aa * glm::dot(d, b) - ab * glm::dot(d, a)) / det};
+// The s and t with d = s a + t b, by the dual basis; d is projected into the plane of a and b. In
+// double precision: the fourth power of a length underflows in float at 1e-10 m, and the difference
+// keeps no digit of slivers 4000 times as long as wide.
+std::pair<float, float> affine(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& d) {
+    const double aa = glm::dot(a, a), ab = glm::dot(a, b), bb = glm::dot(b, b);
+    const double det = aa * bb - ab * ab;
+    return {float((bb * glm::dot(d, a) - ab * glm::dot(d, b)) / det),
+            float((aa * glm::dot(d, b) - ab * glm::dot(d, a)) / det)};
 }
 
 }  // namespace
 
 std::array<float, 4> Cell::weights(const glm::vec3& point) const {
-    const auto [s, t] = affine(a, b, point - origin);
+    const auto [s, t] = affine(a, b, glm::dvec3(point) - glm::dvec3(origin));
     if (isTriangle()) return {1 - s - t, s, t, 0};
     return {(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t};
 }
@@ -103,7 +105,7 @@ glm::vec3 Patches::point(uint32_t patch, glm::vec2 uv) const {
 
 uint32_t Patches::patchAt(uint32_t parentIndex, const glm::vec3& point) const {
     const Parent& parent = parents[parentIndex];
-    const auto [s, t] = affine(parent.a, parent.b, point - parent.origin);
+    const auto [s, t] = affine(parent.a, parent.b, glm::dvec3(point) - glm::dvec3(parent.origin));
     return parent.firstPatch + parent.patchAt(s, t);
 }
 
