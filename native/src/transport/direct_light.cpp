@@ -14,8 +14,6 @@
 namespace raybundle {
 namespace {
 
-// Emission up to this many times the mean exitance of the scene is left to the bundles.
-constexpr double kBundledEmission = 1.5;
 // Of light that was scaled: a squared relative error that has grown by less than this is as it was.
 constexpr float kSameError = 1.1f;
 // Receivers that learn together what they see of such a source: at first, and then by more samples.
@@ -28,41 +26,6 @@ constexpr uint32_t kSlopeSamples = 32;
 // For the power balance: rays of all sources together, and of each at least.
 constexpr uint32_t kEscapeRays = 16384, kLeastEscapeRays = 1024;
 
-// Estimate of the scene's mean exitance by the light of a set: all power over the area, times the
-// bounces of the mean reflectance. Only its order of magnitude matters. emission: of the set, per
-// side.
-double meanExitance(const Scene& scene, const Patches& patches,
-                    const std::vector<glm::vec3>& emission, int32_t lightSet) {
-    double emitted = 0, reflectance = 0;
-    for (size_t side = 0; side < patches.sideCount(); ++side) {
-        emitted += patches.area[side / 2] * brightest(emission[side]);
-        if (side % 2 == 0)
-            reflectance += patches.area[side / 2] *
-                           brightest(patches.reflectance[side] + patches.translucenceOf(side));
-    }
-    const double area = patches.totalArea;
-    for (const Light& light : scene.lights) {
-        if (light.lightSet != lightSet) continue;
-        const double strength = std::max({light.strength.x, light.strength.y, light.strength.z});
-        switch (light.kind) {
-            case Light::Kind::POINT:
-                emitted += 4 * glm::pi<double>() * strength;
-                break;
-            case Light::Kind::SUN:
-                emitted += 0.25 * area * strength;
-                break;
-            case Light::Kind::AREA:
-                emitted += 4 * glm::pi<double>() * strength *
-                           glm::length(glm::cross(light.axisU, light.axisV));
-                break;
-        }
-    }
-    glm::vec3 world = scene.worldRadianceOf(lightSet);
-    if (scene.worldLightSet == lightSet) world += scene.worldImage.meanRadiance();
-    emitted += area * glm::pi<double>() * brightest(world);
-    return emitted / area / std::max(0.05, 1 - reflectance / area);
-}
-
 }  // namespace
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
@@ -71,26 +34,8 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
       visibility(visibility),
       seed(seed),
       skips(skips),
-      emitted(patches.emission),
-      bundled(patches.sideCount()),
-      gathered(patches.sideCount()) {
-    for (size_t side = 0; side < emitted.size(); ++side) {
-        const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
-        if (scene.instances[instance].lightSet != lightSet) emitted[side] = glm::vec3(0.0f);
-    }
-    const double brightLimit = kBundledEmission * meanExitance(scene, patches, emitted, lightSet);
-    std::vector<bool> isSource(patches.sideCount(), false);
-    for (size_t side = 0; side < isSource.size(); ++side) {
-        if (!patches.parentAt(uint32_t(side)).exchanges) continue;
-        if (brightest(emitted[side]) > brightLimit) {
-            isSource[side] = true;
-            gathered[side] = patches.opacityOf(uint32_t(side / 2)) * emitted[side];
-        } else {
-            bundled[side] = emitted[side];
-        }
-    }
-    sources = raybundle::lightSources(scene, patches, isSource, gathered, lightSet);
-}
+      split(splitEmission(scene, patches, visibility, lightSet, seed)),
+      sources(raybundle::lightSources(scene, patches, split.isSource, split.gathered, lightSet)) {}
 
 void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
                               const std::function<Receiver(size_t)>& receiverAt,
@@ -117,9 +62,9 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
                                 LightBySource* bySource, std::vector<Sightings>* sightings) const {
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
-    for (size_t side = 0; side < bundled.size(); ++side)
+    for (size_t side = 0; side < split.bundled.size(); ++side)
         coarse.bundled +=
-            double(patches.area[side / 2] * brightest(bundled[side])) / patches.totalArea;
+            double(patches.area[side / 2] * brightest(split.bundled[side])) / patches.totalArea;
     if (sources.empty()) return;
     Seen seen(sources.size());
     const Aim aim{INFINITY, hasNeighbours ? kNeighbourSamples : kFirstSamples, false};

@@ -8,8 +8,7 @@
 // Sources: Szecsi, Sbert and Szirmay-Kalos, "Combined Correlated and Importance Sampling in Direct
 // Light Source Computation" (2004) for the closed form as a control.
 // Differs:
-// - Emission that is not much brighter than the scene's mean exitance is no source here: bundles
-//   carry it without extra noise, and then a furnace is exact.
+// - Emission that bundles carry without much noise is no source here (transport/emission_split.h).
 // - Each light set has a DirectLight of its own, which knows nothing of the others: its light is
 //   what a scene with no other lights would have, sample for sample.
 #pragma once
@@ -26,6 +25,7 @@
 #include "bake/skips.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
+#include "transport/emission_split.h"
 #include "transport/light_by_source.h"
 #include "transport/light_source.h"
 #include "transport/outlook.h"
@@ -51,10 +51,10 @@ class DirectLight {
                 uint32_t seed, int32_t lightSet = kNoLightSet, const Skips& skips = {});
 
     // Per side: all emission of the set, W/m^2.
-    const std::vector<glm::vec3>& emission() const { return emitted; }
+    const std::vector<glm::vec3>& emission() const { return split.emitted; }
 
     // Per side: emission that is no source here, for the bundles to carry, W/m^2.
-    const std::vector<glm::vec3>& bundledEmission() const { return bundled; }
+    const std::vector<glm::vec3>& bundledEmission() const { return split.bundled; }
     const std::vector<std::unique_ptr<LightSource>>& lightSources() const { return sources; }
 
     // Gathers at `count` receivers to about `targetError` relative standard error each: all
@@ -144,8 +144,7 @@ class DirectLight {
     const Visibility& visibility;
     const uint32_t seed;
     const Skips skips;
-    std::vector<glm::vec3> emitted, bundled;
-    std::vector<glm::vec3> gathered;  // per side: emission of sources, W/m^2 of the whole patch
+    EmissionSplit split;
     std::vector<std::unique_ptr<LightSource>> sources;
 };
 

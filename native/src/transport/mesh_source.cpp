@@ -11,8 +11,11 @@
 namespace raybundle {
 namespace {
 
-// A source of more parents than this has no closed form: sampling it is quicker.
-constexpr size_t kMaxPolygons = 16;
+// A source of more parents than this, or whose outline has more edges, has no closed form: sampling
+// it is quicker.
+constexpr size_t kMaxPolygons = 16, kMaxEdges = 4 * kMaxPolygons;
+// Edges that follow each other and turn by less are one, radians.
+constexpr double kStraight = 1e-5;
 
 // An edge's part of Lambert's sum: the angle it spans times the cosine of its normal; a and b are
 // relative to the receiver.
@@ -100,8 +103,9 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
                                                 const glm::vec3& receiver) const {
-    if (sideEmission || parents.size() > kMaxPolygons) return std::nullopt;
-    if (const auto whole = outlineIrradiance(point, receiver)) return *whole;
+    if (sideEmission) return std::nullopt;
+    if (!outline.empty()) return outlineIrradiance(point, receiver);
+    if (parents.size() > kMaxPolygons) return std::nullopt;
     glm::vec3 sum(0.0f);
     for (uint32_t index : parents) {
         const Parent& parent = patches.parents[index];
@@ -152,36 +156,80 @@ EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     return ray;
 }
 
-// The closed form of a planar source that lies wholly above the receiver's horizon: the edges
-// inside it cancel, so its outline is enough.
-std::optional<glm::vec3> MeshSource::outlineIrradiance(const glm::vec3& point,
-                                                       const glm::vec3& receiver) const {
-    if (!isPlanar) return std::nullopt;
+// The closed form of a planar source: the edges inside it cancel, so its outline is enough. Where the
+// receiver's horizon cuts the outline, the cut closes it: along the line in which the two planes
+// meet, from where edges go down to where they come up, whichever belong together.
+glm::vec3 MeshSource::outlineIrradiance(const glm::vec3& point, const glm::vec3& receiver) const {
     const glm::dvec3 p(point), n(receiver);
-    for (const auto& [a, b] : outline)
-        if (glm::dot(a - p, n) <= 0) return std::nullopt;
+    const double distance = glm::dot(glm::dvec3(centre) - p, glm::dvec3(planeNormal));
+    const glm::vec3& emitted = emission[distance < 0 ? 0 : 1];
+    if (emitted == glm::vec3(0.0f)) return glm::vec3(0.0f);
+    // Towards the line, along the horizon; and the angle there of a point on it.
+    const glm::dvec3 ahead = distance *
+                             (glm::dvec3(planeNormal) - glm::dot(glm::dvec3(planeNormal), n) * n),
+                     aside = glm::cross(n, ahead);
+    auto angle = [&](const glm::dvec3& q) {
+        return double(std::atan2(float(glm::dot(q, aside)), float(glm::dot(q, ahead))));
+    };
     double sum = 0;
-    for (const auto& [a, b] : outline) sum += edgeTerm(a - p, b - p, n);
-    const bool front = glm::dot(point - centre, planeNormal) > 0;
-    return emission[front ? 0 : 1] / glm::pi<float>() * float(0.5 * std::abs(sum));
+    for (const auto& [from, to] : outline) {
+        const glm::dvec3 a = from - p, b = to - p;
+        const double ha = glm::dot(a, n), hb = glm::dot(b, n);
+        if (ha <= 0 && hb <= 0) continue;
+        if (ha > 0 && hb > 0) {
+            sum += edgeTerm(a, b, n);
+            continue;
+        }
+        const glm::dvec3 cut = a + (ha / (ha - hb)) * (b - a);
+        sum += ha > 0 ? edgeTerm(a, cut, n) - angle(cut) : edgeTerm(cut, b, n) + angle(cut);
+    }
+    return emitted / glm::pi<float>() * float(0.5 * std::abs(sum));
 }
 
 void MeshSource::findOutline() {
+    // How often an edge is passed from the lower to the higher vertex, less the other way round.
     std::map<std::pair<uint32_t, uint32_t>, int> edges;
     for (uint32_t index : parents) {
         const Parent& parent = patches.parents[index];
         const int n = parent.isTriangle ? 3 : 4;
         for (int k = 0; k < n; ++k) {
             const uint32_t a = parent.vertex[size_t(k)], b = parent.vertex[size_t((k + 1) % n)];
-            const auto opposite = edges.find({b, a});
-            if (opposite != edges.end())
-                edges.erase(opposite);
-            else
-                ++edges[{a, b}];
+            edges[std::minmax(a, b)] += a < b ? 1 : -1;
         }
     }
+    struct Meeting {
+        uint32_t neighbour;
+        int count;
+    };
+    std::map<uint32_t, Meeting> before, after;  // per vertex, of the edges that arrive and leave
+    auto meet = [](std::map<uint32_t, Meeting>& at, uint32_t vertex, uint32_t neighbour) {
+        ++at.try_emplace(vertex, Meeting{neighbour, 0}).first->second.count;
+    };
+    std::vector<std::pair<uint32_t, uint32_t>> directed;
     for (const auto& [edge, count] : edges)
-        outline.emplace_back(patches.vertices[edge.first], patches.vertices[edge.second]);
+        for (int k = 0; k < std::abs(count); ++k) {
+            const auto [from, to] = count > 0 ? edge : std::pair(edge.second, edge.first);
+            directed.emplace_back(from, to);
+            meet(after, from, to);
+            meet(before, to, from);
+        }
+    auto at = [&](uint32_t vertex) { return glm::dvec3(patches.vertices[vertex]); };
+    auto isStraight = [&](uint32_t vertex) {
+        const Meeting &in = before.at(vertex), &out = after.at(vertex);
+        if (in.count > 1 || out.count > 1) return false;
+        const glm::dvec3 u = at(vertex) - at(in.neighbour), v = at(out.neighbour) - at(vertex);
+        return glm::dot(u, v) > 0 &&
+               glm::length(glm::cross(u, v)) <= kStraight * glm::length(u) * glm::length(v);
+    };
+    size_t used = 0;
+    for (const auto& [from, first] : directed) {
+        if (isStraight(from)) continue;
+        uint32_t to = first;
+        for (++used; isStraight(to); ++used) to = after.at(to).neighbour;
+        outline.emplace_back(at(from), at(to));
+    }
+    // A loop without a corner is a circle of very many edges.
+    if (outline.size() > kMaxEdges || used < directed.size()) outline.clear();
 }
 
 // Sphere around the source, and whether it lies in one plane with one front.
@@ -210,7 +258,7 @@ void MeshSource::boundSource() {
         const Parent& parent = patches.parents[index];
         isPlanar = isPlanar && glm::dot(parent.normal, planeNormal) > 0;
     }
-    if (isPlanar && parents.size() <= kMaxPolygons) findOutline();
+    if (isPlanar && !sideEmission) findOutline();
 }
 
 // A point, uniform by area or chosen by power, and the front's normal there.

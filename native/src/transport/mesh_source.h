@@ -34,8 +34,7 @@ class MeshSource : public LightSource {
     EmittedRay emit(const glm::vec4& u, float sceneRadius) const override;
 
   private:
-    std::optional<glm::vec3> outlineIrradiance(const glm::vec3& point,
-                                               const glm::vec3& receiver) const;
+    glm::vec3 outlineIrradiance(const glm::vec3& point, const glm::vec3& receiver) const;
     void boundSource();
     void findOutline();
     struct SurfacePoint {
@@ -62,7 +61,7 @@ class MeshSource : public LightSource {
     glm::vec3 centre{0.0f}, planeNormal{0.0f};
     float extent = 0;  // radius of a sphere around centre, metres
     bool isPlanar = false;
-    std::vector<std::pair<glm::dvec3, glm::dvec3>> outline;  // of a planar source, edge by edge
+    std::vector<std::pair<glm::dvec3, glm::dvec3>> outline;  // of a planar source, if short
 };
 
 }  // namespace raybundle
