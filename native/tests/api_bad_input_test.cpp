@@ -289,6 +289,15 @@ TEST_F(Api, SettingsOutOfRangeAreRefusedAndNotKept) {
     EXPECT_EQ(rb_set_bake_int(bake, "max_bundles", 2), RB_ERROR_NONE);
 }
 
+TEST_F(Api, ObjectsTooFarAwayAreRefusedByName) {
+    addFurnace();
+    const float far[12] = {1, 0, 0, 2e12f, 0, 1, 0, 0, 0, 0, 1, 0};
+    int32_t id = -1;
+    ASSERT_EQ(rb_add_instance(scene, 0, "comet", far, RB_ROLE_BAKE, RB_SIDE_FRONT, &id),
+              RB_ERROR_NONE);
+    expectInvalid(rb_execute_bake(bake, scene), "comet");
+}
+
 TEST(ApiSubdivision, RefusesWhatCannotBeCut) {
     rb_subdivision subdivision = nullptr;
     for (float edge : {0.0f, -1.0f, NAN})

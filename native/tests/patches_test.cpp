@@ -314,6 +314,24 @@ TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnTriangles) {
         << "the mean of a linear colour is that at the centroid";
 }
 
+TEST(Subdivide, CutsNoFurtherThanNumbersReach) {
+    // 6e8 m from the centre neighbouring numbers are 64 m apart: what is a few of them long cannot
+    // be halved down to a patch of 1 m.
+    const float far = 6e8f, step = 256;
+    for (const float length : {8.0f, 40.0f, 80.0f}) {
+        const Mesh mesh = polygons("far",
+                                   {{far, far, 0},
+                                    {far + length * step, far, 0},
+                                    {far + length * step, far + step, 0},
+                                    {far + length * step / 2, far + step, 0},
+                                    {-far, -far, 0}},
+                                   {{0, 1, 2}, {0, 1, 3}});
+        const Patches patches = subdivided(mesh, 1);
+        EXPECT_NEAR(patchArea(patches), length * step * step, 0.2 * length * step * step);
+        for (float area : patches.area) EXPECT_GE(area, 0);
+    }
+}
+
 TEST(Subdivide, ANeedleIsCutIntoAsManyPiecesAsItIsLong) {
     // 100 m long, 1 mm wide: with the short edge first, second, last, and with a blunt corner.
     const std::vector<std::vector<glm::vec3>> needles = {

@@ -120,6 +120,8 @@ constexpr double kNeedle = 16.0;
 // Share of the edge by which the fourth corner of a parallelogram may be off.
 constexpr double kParallelogramTolerance = 1e-4;
 constexpr int kMaxGrid = 4096;
+// From the origin, metres: areas, and the squares of distances, stay far from the ends of float.
+constexpr double kFarthest = 1e12;
 
 // Walks over the faces of all instances and appends vertices, cells and parents.
 class Subdivision {
@@ -135,6 +137,9 @@ class Subdivision {
             firstVertex.push_back(world.size());
             for (const glm::vec3& vertex : scene.meshes[instance.mesh].vertices) {
                 world.push_back(glm::dvec3(instance.transform * glm::dvec4(vertex, 1.0)));
+                if (!(glm::length(world.back()) <= kFarthest))
+                    throw invalidArgument("object \"" + instance.name +
+                                          "\" reaches further than 1e12 m from the origin");
                 extents[i].add(world.back());
                 low = glm::min(low, world.back());
                 high = glm::max(high, world.back());
@@ -294,22 +299,25 @@ class Subdivision {
         }
         const double doubleArea = glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
         const double height = doubleArea / length[longest];
-        if (length[longest] > kMaxElongation * height && length[longest] > 2 * size) {
+        if (length[longest] > kMaxElongation * height && length[longest] > 2 * size &&
+            hasMiddle(p[longest], p[(longest + 1) % 3])) {
             const uint32_t v0 = v[longest], v1 = v[(longest + 1) % 3], v2 = v[(longest + 2) % 3];
             const double after = length[(longest + 1) % 3], before = length[(longest + 2) % 3];
+            const glm::dvec3 edge = p[(longest + 1) % 3] - p[longest];
+            const double along = glm::dot(p[(longest + 2) % 3] - p[longest], edge) /
+                                 (length[longest] * length[longest]);
+            const glm::vec3 foot(p[longest] + along * edge);
             if (length[longest] < kNeedle * height) {
                 const uint32_t middle = middleVertex(v0, v1);
                 cutTriangle(of, {v0, middle, v2}, size);
                 cutTriangle(of, {middle, v1, v2}, size);
-            } else if (std::min(after, before) > std::max(2 * size, 2 * height)) {
+            } else if (std::min(after, before) > std::max(2 * size, 2 * height) &&
+                       foot != patches.vertices[v0] && foot != patches.vertices[v1]) {
                 // Blunt: two needles whose short edge is the height.
-                const glm::dvec3 edge = p[(longest + 1) % 3] - p[longest];
-                const double along = glm::dot(p[(longest + 2) % 3] - p[longest], edge) /
-                                     (length[longest] * length[longest]);
-                patches.vertices.push_back(glm::vec3(p[longest] + along * edge));
-                const uint32_t foot = uint32_t(patches.vertices.size()) - 1;
-                cutTriangle(of, {v0, foot, v2}, size);
-                cutTriangle(of, {foot, v1, v2}, size);
+                patches.vertices.push_back(foot);
+                const uint32_t v3 = uint32_t(patches.vertices.size()) - 1;
+                cutTriangle(of, {v0, v3, v2}, size);
+                cutTriangle(of, {v3, v1, v2}, size);
             } else if (after < before) {
                 cutNeedle(of, {v0, v1, v2}, size);
             } else {
@@ -331,10 +339,11 @@ class Subdivision {
     // is to the left.
     void cutStrip(const Origin& of, const std::array<uint32_t, 2>& bottom,
                   const std::array<uint32_t, 2>& top, double size) {
-        auto length = [&](const std::array<uint32_t, 2>& edge) {
-            return double(glm::distance(patches.vertices[edge[0]], patches.vertices[edge[1]]));
+        auto isLong = [&](const std::array<uint32_t, 2>& edge) {
+            const glm::vec3 &a = patches.vertices[edge[0]], &b = patches.vertices[edge[1]];
+            return glm::distance(a, b) > 2 * size && hasMiddle(a, b);
         };
-        if (std::max(length(bottom), length(top)) <= 2 * size) {
+        if (!isLong(bottom) && !isLong(top)) {
             cutTriangle(of, {bottom[0], bottom[1], top[1]}, size);
             cutTriangle(of, {bottom[0], top[1], top[0]}, size);
             return;
@@ -355,6 +364,12 @@ class Subdivision {
         parent.countA = parent.countB =
             gridCount(std::max(edge / size, longest / (2.0 * size)), 1.0);
         patches.parents.push_back(parent);
+    }
+
+    // Not between numbers that follow each other, far from the centre.
+    static bool hasMiddle(const glm::vec3& a, const glm::vec3& b) {
+        const glm::vec3 middle = 0.5f * (a + b);
+        return middle != a && middle != b;
     }
 
     // Neighbouring faces that bisect the same edge share the new vertex.
