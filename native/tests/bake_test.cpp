@@ -190,7 +190,8 @@ TEST(BakeOutputs, TheBackIsBakedWhereItIsAskedFor) {
         mean += double(v.x) * kPi / 24;
     EXPECT_NEAR(mean, 4 * kPi / 24 / 0.5, 0.2) << "at the corners it is darker than in the mean";
     // Six faces are too few for its light, which is said; nothing else is.
-    for (const Json& warning : reportOf(bake)["warnings"])
+    const Json report = reportOf(bake);
+    for (const Json& warning : report["warnings"])
         EXPECT_TRUE(mentions(warning, "too coarse")) << warning;
 }
 
