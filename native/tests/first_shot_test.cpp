@@ -8,6 +8,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "test_scenes.h"
+#include "test_shots.h"
 #include "transport/light_source.h"
 #include "visibility/visibility.h"
 
@@ -375,6 +376,18 @@ TEST(FirstShot, LeavesDimEmissionToTheBundles) {
         EXPECT_EQ(shot.light.emission[side], shot.patches.emission[side]);
         EXPECT_EQ(shot.light.irradiance[side], glm::vec3(0));
     }
+}
+
+// Half of the surfaces emit, but four lines of five pass the emitter by.
+TEST(FirstShot, GathersDimEmissionThatLinesSeldomMeet) {
+    Scene scene;
+    place(scene, rectangle("receiver", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.8f));
+    place(scene, grid("emitter", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}, 10, 10), grey("", 0, 1, 1));
+    const ShotScene shots(scene, 0.05f);
+    const FirstShot shot = shots.shoot("GATHER", 0);
+    for (const glm::vec3& left : shot.emission) EXPECT_EQ(left, glm::vec3(0));
+    // In closed form: the error is that of the quadrature over the patches.
+    EXPECT_NEAR(meanLight(shots.patches, shot, 0).value, parallelRectangles(1, 1, 1), 1e-4);
 }
 
 TEST(FirstShot, PowerIsConservedInAClosedRoom) {
