@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import raybundle
 from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
+from soak import resident_bytes
 from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
@@ -99,11 +100,6 @@ def test_instances_of_instances_of_instances(closed_box, new_object):
 # --------------------------------------------------------------------------------------------------
 # Many bakes
 # --------------------------------------------------------------------------------------------------
-
-
-def resident_bytes():
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * resource.getpagesize()
 
 
 def test_memory_stays_the_same(closed_box):
