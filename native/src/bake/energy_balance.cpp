@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "scene/channels.h"
 #include "transport/translucence.h"
 
 namespace raybundle {
@@ -65,7 +66,7 @@ double errorByWrongExchanges(const Patches& patches, double share) {
     double reflectance = 0, area = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         const glm::vec3 rho = patches.reflectance[side] + patches.translucenceOf(side);
-        reflectance += double(patches.area[side / 2] * std::max({rho.x, rho.y, rho.z}));
+        reflectance += double(patches.area[side / 2] * brightest(rho));
         area += double(patches.area[side / 2]);
     }
     return area > 0 ? share / (1 - reflectance / area * (1 - share)) : 0;

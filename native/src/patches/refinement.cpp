@@ -8,6 +8,7 @@
 
 #include "reconstruction/reconstruction.h"
 #include "reconstruction/surplus.h"
+#include "scene/channels.h"
 
 namespace raybundle {
 namespace {
@@ -27,8 +28,6 @@ struct Mark {
     bool isShadowEdge = false;
 };
 
-double brightest(const glm::vec3& v) { return double(std::max({v.x, v.y, v.z})); }
-
 // Not occluders, which have no result, nor the insides of solids.
 bool isWanted(const Scene& scene, const Patches& patches, uint32_t side) {
     const Parent& parent = patches.parentAt(side);
@@ -40,12 +39,12 @@ bool isWanted(const Scene& scene, const Patches& patches, uint32_t side) {
 double meanSquareLight(const Patches& patches, const CoarseShot& shot) {
     double sum = 0, squares = 0, area = 0, reflected = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const double h = brightest(shot.gathered[side].irradiance);
+        const double h = double(brightest(shot.gathered[side].irradiance));
         if (!(h > 0)) continue;
         const double a = double(patches.area[side / 2]);
         sum += a * h;
         squares += a * h * h;
-        reflected += a * h * brightest(patches.reflectance[side]);
+        reflected += a * h * double(brightest(patches.reflectance[side]));
         area += a;
     }
     if (!(area > 0)) return 0;

@@ -19,6 +19,7 @@
 #include <random>
 #include <vector>
 
+#include "scene/channels.h"
 #include "transport/transport.h"
 
 namespace raybundle {
@@ -68,8 +69,7 @@ class LocalRays {
 
     // Largest reflectance of a side.
     static float reflectance(const Patches& patches, uint32_t side) {
-        const glm::vec3& rho = patches.reflectance[side];
-        return std::max({rho.x, rho.y, rho.z});
+        return brightest(patches.reflectance[side]);
     }
 
   private:

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "scene/channels.h"
 
 namespace raybundle {
 
@@ -21,9 +22,6 @@ inline float grazingShare(float cosine) {
     const float rest = 1 - std::min(std::max(cosine, 0.0f), 1.0f), square = rest * rest;
     return square * square * rest;
 }
-
-// The largest channel.
-inline float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
 // Where direct light is to be known: a whole patch side (the mean over it), or a point on one.
 struct Receiver {

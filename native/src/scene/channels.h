@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <glm/glm.hpp>
+
+namespace raybundle {
+
+// The largest channel.
+inline float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
+
+}  // namespace raybundle
