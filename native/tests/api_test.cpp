@@ -157,7 +157,7 @@ TEST_F(Api, TheCallersMemoryIsNotKept) {
     expectFurnace(instance);
 }
 
-struct Progress {
+struct Watched {
     double cancelAt;
     double done = 0;  // of all stages, each counted as a fifth
     bool cancelled = false;
@@ -165,7 +165,7 @@ struct Progress {
 };
 
 bool follow(void* user, rb_stage stage, double fraction) {
-    Progress& progress = *static_cast<Progress*>(user);
+    Watched& progress = *static_cast<Watched*>(user);
     EXPECT_EQ(std::this_thread::get_id(), progress.thread) << "called from the thread that bakes";
     EXPECT_TRUE(fraction >= 0 && fraction <= 1);
     progress.done = std::max(progress.done, (int(stage) + fraction) / 5);
@@ -176,7 +176,7 @@ bool follow(void* user, rb_stage stage, double fraction) {
 TEST_F(Api, ABakeCanBeCancelledAnywhereAndUsedAgain) {
     const int32_t instance = addFurnace();
     for (double at : {0.0, 0.1, 0.5, 1.0}) {
-        Progress progress{at, 0, false, std::this_thread::get_id()};
+        Watched progress{at, 0, false, std::this_thread::get_id()};
         ASSERT_EQ(rb_set_bake_progress(bake, follow, &progress), RB_ERROR_NONE);
         expectFailure(rb_execute_bake(bake, scene), RB_ERROR_CANCELLED, "cancelled");
         EXPECT_TRUE(progress.cancelled) << at;
@@ -186,7 +186,7 @@ TEST_F(Api, ABakeCanBeCancelledAnywhereAndUsedAgain) {
                   RB_ERROR_INVALID_OPERATION)
             << "a cancelled bake has no result";
     }
-    Progress progress{2, 0, false, std::this_thread::get_id()};
+    Watched progress{2, 0, false, std::this_thread::get_id()};
     ASSERT_EQ(rb_set_bake_progress(bake, follow, &progress), RB_ERROR_NONE);
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
     EXPECT_EQ(progress.done, 1);
@@ -197,7 +197,7 @@ TEST_F(Api, ABakeCanBeCancelledAnywhereAndUsedAgain) {
     // Without a function again; and the old result stays when a later run is cancelled.
     ASSERT_EQ(rb_set_bake_progress(bake, nullptr, nullptr), RB_ERROR_NONE);
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE);
-    Progress late{0.5, 0, false, std::this_thread::get_id()};
+    Watched late{0.5, 0, false, std::this_thread::get_id()};
     ASSERT_EQ(rb_set_bake_progress(bake, follow, &late), RB_ERROR_NONE);
     EXPECT_EQ(rb_execute_bake(bake, scene), RB_ERROR_CANCELLED);
     expectFurnace(instance);

@@ -15,15 +15,7 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-
 Bundle alongZ(glm::vec2 shift) { return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, shift, 0, 0}; }
-
-uint64_t exchangedLines(const BundleLines& lines) {
-    uint64_t sum = 0;
-    for (const Exchange& e : lines.exchanges) sum += e.lines;
-    return sum;
-}
 
 TEST(FragmentLists, AStackExchangesBetweenNeighboursInOrderOfDepth) {
     // Not in the order of depth; the one in the middle looks down.

@@ -17,9 +17,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 100000;
-constexpr float kTouch = 1e-5f;
-
 // Ground of 10 x 10 patches of 0.1 m; a board of 0.3 x 0.3 m over its middle.
 Scene groundUnderBoard(float gap) {
     Scene scene;

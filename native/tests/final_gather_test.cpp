@@ -14,12 +14,12 @@ namespace {
 
 using namespace test;
 
-constexpr float kTarget = 0.01f;
+constexpr float kGatherTarget = 0.01f;
 
 void bakePoint(Bake& bake, const Scene& scene, bool gathers = true) {
     bake.settings.reconstruction = "POINT";
     bake.settings.finalGather = gathers;
-    bake.settings.targetError = kTarget;
+    bake.settings.targetError = kGatherTarget;
     bake.settings.maxBundles = 1024;
     bake.run(scene);
 }
@@ -67,7 +67,8 @@ TEST(FinalGather, CornersUnderABoardSeeTheSkyAroundIt) {
     bakePoint(interpolated, scene, false);
     // Of the target three quarters are noise, one standard error of each of 64 corners; receivers
     // lie 7 mm inside their face, in four directions around a vertex, and light changes over 0.1 m.
-    EXPECT_LT(worstCorner(scene, gathered, skyIrradiance), 4 * 0.75 * double(kTarget) + 0.007);
+    EXPECT_LT(worstCorner(scene, gathered, skyIrradiance),
+              4 * 0.75 * double(kGatherTarget) + 0.007);
     // Else the test would say nothing.
     EXPECT_GT(worstCorner(scene, interpolated, skyIrradiance), 0.1);
 }
@@ -92,7 +93,7 @@ TEST(FinalGather, CornersBesideAWallSeeWhatItReflects) {
     bakePoint(interpolated, scene, false);
     // Where corners are left to interpolation it is off by the target around them, RMS: at the
     // corner itself it may be thrice that.
-    EXPECT_LT(worstCorner(scene, gathered, exact), (4 * 0.75 + 3) * double(kTarget));
+    EXPECT_LT(worstCorner(scene, gathered, exact), (4 * 0.75 + 3) * double(kGatherTarget));
     EXPECT_GT(worstCorner(scene, interpolated, exact), 0.1);
 }
 
@@ -118,7 +119,7 @@ TEST(FinalGather, CornersOverANarrowGapSeeTheLightInIt) {
         gathered.settings.contacts = interpolated.settings.contacts = contacts;
         bakePoint(gathered, scene);
         bakePoint(interpolated, scene, false);
-        EXPECT_LT(worstCorner(scene, gathered, exact), 4 * 0.75 * double(kTarget));
+        EXPECT_LT(worstCorner(scene, gathered, exact), 4 * 0.75 * double(kGatherTarget));
         EXPECT_GT(worstCorner(scene, interpolated, exact), 0.1);
     }
 }

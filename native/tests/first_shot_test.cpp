@@ -17,7 +17,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
 constexpr float kTarget = 0.002f;
 // At most 256 stratified samples per side and source leave about half a per cent of noise
 // (0.0037 relative RMS in a test room); twice that is safe for one side.

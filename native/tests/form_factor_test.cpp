@@ -14,14 +14,13 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-constexpr uint32_t kBundles = 4096;
+constexpr uint32_t kManyBundles = 4096;
 
 // One standard error of a form factor from as many independent lines as there are bundles, with the
 // factor 4/3 that the cosine's weight costs. All lines of a bundle share a
 // direction, so more of them do not help; but the low-discrepancy directions do, by far more than a
 // factor of 4, so that one such standard error is a safe bound.
-double bound(double f) { return std::sqrt(4.0 / 3 * f * (1 - f) / kBundles); }
+double bound(double f) { return std::sqrt(4.0 / 3 * f * (1 - f) / kManyBundles); }
 
 // Form factor between two meshes, both ways by reciprocity.
 void expectFormFactor(const Mesh& from, const Mesh& to, double areaRatio, double exact,
@@ -31,7 +30,7 @@ void expectFormFactor(const Mesh& from, const Mesh& to, double areaRatio, double
         place(scene, from, grey("", 0));
         place(scene, to, grey("", 0));
         const Patches patches = subdivide(scene, patchSize, kMany);
-        const LineCounts counts = traceLines(patches, 0.05f, kBundles);
+        const LineCounts counts = traceLines(patches, 0.05f, kManyBundles);
         EXPECT_NEAR(formFactor(patches, counts, 0, 1), exact,
                     bound(exact) + discretisation * exact);
         const double back = exact * areaRatio;
@@ -98,7 +97,7 @@ TEST(FormFactor, CoaxialDisks) {
 
 TEST(FormFactor, RowsOfAClosedSceneSumToOne) {
     const Patches patches = subdivide(closedCube(0.5f), 10, kMany);
-    const LineCounts counts = traceLines(patches, 0.05f, kBundles);
+    const LineCounts counts = traceLines(patches, 0.05f, kManyBundles);
     for (uint32_t i = 0; i < counts.sideCount(); i += 2) {
         double sum = 0;
         for (const LineCount& c : counts.row(i)) {

@@ -20,8 +20,6 @@ using namespace test;
 
 const double kSpreads[] = {0.02, 0.3, 1.0, 2.0, 3.0, kPi};
 const char* const kShots[] = {"GATHER", "SHOOT", "EXTENDED"};
-// Standard errors that are beyond chance.
-constexpr double kSigmas = 4;
 
 // Integral of a function of the angle over the half space, per steradian of the projected one.
 template <class Function>

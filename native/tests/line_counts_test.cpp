@@ -18,8 +18,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-
 bool sameCounts(const LineCounts& a, const LineCounts& b) {
     if (a.sideCount() != b.sideCount() || a.bundles != b.bundles || a.sky != b.sky ||
         a.total != b.total || a.touching != b.touching)

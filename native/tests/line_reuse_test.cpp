@@ -20,9 +20,7 @@ using namespace test;
 
 using Field = std::vector<glm::vec3>;
 
-constexpr size_t kMany = 10000000;
 constexpr float kTolerance = 1e-6f;  // of the solver
-constexpr float kTouch = 1e-5f;      // surfaces not further apart touch, metres: as traceLines' is
 
 // Patches and their lines, with light that a test may set side by side.
 struct System {

@@ -20,7 +20,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
 constexpr float kPixel = 0.5f;
 
 // A closed hall of 10 m with a small ball and a pair of small boxes in it.

@@ -20,8 +20,7 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-constexpr float kTouch = 1e-4f;  // metres
+constexpr float kTouchInOrder = 1e-4f;  // metres
 
 // Lines without the order in which a projector found them.
 struct Merged {
@@ -41,12 +40,12 @@ struct Merged {
     }
 };
 
-class Projection {
+class PaintedScene {
   public:
-    Projection(const Scene& scene, float patchSize, float pixelSize)
+    PaintedScene(const Scene& scene, float patchSize, float pixelSize)
         : patches(subdivide(scene, patchSize, kMany)),
           visibility(patches),
-          input{patches, visibility, pixelSize, kTouch} {}
+          input{patches, visibility, pixelSize, kTouchInOrder} {}
 
     BundleLines along(const char* projector, const Bundle& bundle) const {
         BundleLines lines;
@@ -58,12 +57,6 @@ class Projection {
     const Visibility visibility;
     const ProjectorInput input;
 };
-
-uint64_t exchangedLines(const BundleLines& lines) {
-    uint64_t sum = 0;
-    for (const Exchange& e : lines.exchanges) sum += e.lines;
-    return sum;
-}
 
 // Boxes and balls of triangles, turned at random, none near another.
 Scene separatedSolids() {
@@ -94,7 +87,7 @@ TEST(PainterNewell, HasTheExchangesOfFragmentLists) {
                  {"solids", separatedSolids(), 0.1f},
                  {"solids, coarse", separatedSolids(), 100.0f}};
     for (const auto& c : cases) {
-        const Projection projection(c.scene, c.patchSize, 0.03f);
+        const PaintedScene projection(c.scene, c.patchSize, 0.03f);
         for (const Bundle& bundle : Directions("RANDOM", 11).next(12)) {
             const BundleLines exact = projection.along("FRAGMENT_LISTS", bundle);
             const BundleLines found = projection.along("PAINTER_NEWELL", bundle);
@@ -110,7 +103,7 @@ TEST(PainterNewell, NoLineLeavesAClosedScene) {
     Scene cube = closedCube(0.5f), ball;
     place(ball, icosphere("ball", 1, 3, true), grey("", 0.5f));
     for (const Scene* scene : {&cube, &ball}) {
-        const Projection projection(*scene, 0.1f, 0.01f);
+        const PaintedScene projection(*scene, 0.1f, 0.01f);
         uint64_t all = 0, open = 0;
         for (const Bundle& bundle : Directions("RANDOM", 9).next(10)) {
             const BundleLines lines = projection.along("PAINTER_NEWELL", bundle);
@@ -127,7 +120,7 @@ TEST(PainterNewell, NoLineLeavesAClosedScene) {
 TEST(Painter, IsRightButForAFewLinesWherePatchesAreSmall) {
     uint64_t disordered = 0, all = 0;
     for (const Scene& scene : {roomWithBoxes(0.5f), separatedSolids()}) {
-        const Projection projection(scene, 0.1f, 0.03f);
+        const PaintedScene projection(scene, 0.1f, 0.03f);
         for (const Bundle& bundle : Directions("RANDOM", 11).next(10)) {
             const BundleLines exact = projection.along("FRAGMENT_LISTS", bundle);
             const BundleLines found = projection.along("PAINTER", bundle);
@@ -148,7 +141,7 @@ TEST(Painter, IsWrongWhereALongPatchReachesBehindASmallOne) {
     Scene scene;
     place(scene, rectangle("slope", {0, 0, 0}, {10, 0, 10}, {0, 1, 0}), grey("", 0.5f));
     place(scene, rectangle("small", {1, 0.25f, 3}, {0.5f, 0, 0}, {0, 0.5f, 0}), grey("", 0.5f));
-    const Projection projection(scene, 100, 0.05f);
+    const PaintedScene projection(scene, 100, 0.05f);
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
     const BundleLines centroid = projection.along("PAINTER", upwards);
     const BundleLines newell = projection.along("PAINTER_NEWELL", upwards);
@@ -173,7 +166,7 @@ Scene interlockedBars() {
 }
 
 TEST(PainterNewell, CountsTheCyclesOfInterlockedClosedObjects) {
-    const Projection whole(interlockedBars(), 100, 0.02f), cut(interlockedBars(), 0.3f, 0.02f);
+    const PaintedScene whole(interlockedBars(), 100, 0.02f), cut(interlockedBars(), 0.3f, 0.02f);
     // Near the axis of the three bars, along which they form a ring.
     const glm::dvec3 direction = glm::normalize(glm::dvec3(0.05, 0.03, 1));
     const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), direction));
@@ -208,7 +201,7 @@ TEST(PainterNewell, CountsIntersectingPatchesAsACycle) {
     Scene scene;
     place(scene, rectangle("one", {-1, -1, -1}, {2, 0, 2}, {0, 2, 0}), grey("", 0.5f));
     place(scene, rectangle("other", {-1, -1, 1}, {2, 0, -2}, {0, 2, 0}), grey("", 0.5f));
-    const Projection projection(scene, 100, 0.05f);
+    const PaintedScene projection(scene, 100, 0.05f);
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
     const BundleLines lines = projection.along("PAINTER_NEWELL", upwards);
     EXPECT_EQ(lines.cycles, 1u);
@@ -221,7 +214,7 @@ TEST(PainterNewell, OrdersPatchesThatCutEachOthersPlanesApart) {
     Scene scene;
     place(scene, rectangle("low", {-2, -0.5f, -1}, {4, 0, 1.6f}, {0, 1, 0}), grey("", 0.5f));
     place(scene, rectangle("high", {-0.4f, -3, 1.4f}, {0.8f, 0, 0}, {0, 6, -2.2f}), grey("", 0.5f));
-    const Projection projection(scene, 100, 0.05f);
+    const PaintedScene projection(scene, 100, 0.05f);
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
     const BundleLines lines = projection.along("PAINTER_NEWELL", upwards);
     EXPECT_EQ(lines.cycles, 0u);

@@ -16,11 +16,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-// Points inside a patch, away from its edges, where rounding decides.
-const glm::vec2 kInside[] = {
-    {0.33f, 0.33f}, {0.1f, 0.1f}, {0.8f, 0.1f}, {0.1f, 0.8f}, {0.8f, 0.8f}};
-
 Patches subdivided(Mesh mesh, float size, const glm::dmat4& transform = glm::dmat4(1)) {
     Scene scene;
     place(scene, std::move(mesh), grey("grey", 0.5f), transform);

@@ -20,8 +20,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-
 // A projector of the table with its settings.
 struct Kind {
     const char* row;

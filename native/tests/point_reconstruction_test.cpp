@@ -18,7 +18,7 @@ using namespace test;
 
 // Receivers lie 1 % of the way to their face's centre inside: 0.7 % of an edge. The light changes
 // by less than its own size over an edge here.
-constexpr double kInside = 0.01;
+constexpr double kReceiverOffset = 0.01;
 
 struct PointBake : Bake {
     explicit PointBake(const Scene& scene, const char* reconstruction = "POINT") {
@@ -89,7 +89,8 @@ TEST(PointReconstruction, CornersBesideANarrowGapSeeOut) {
 TEST(PointReconstruction, CornersHaveTheLightAtThemselves) {
     const Scene scene = groundBelowLamp();
     forEachCorner(scene, PointBake(scene), [](const glm::vec3& at, size_t, double found) {
-        EXPECT_NEAR(found, lampIrradiance(at), kInside * lampIrradiance(at)) << at.x << " " << at.y;
+        EXPECT_NEAR(found, lampIrradiance(at), kReceiverOffset * lampIrradiance(at))
+            << at.x << " " << at.y;
     });
 }
 

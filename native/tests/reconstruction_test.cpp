@@ -16,7 +16,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
 constexpr float kRegularization = 0.02f;  // the default
 
 // One mesh, cut, with the light of each patch given by a function of its centroid in the world.

@@ -24,10 +24,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-const glm::vec2 kInside[] = {
-    {0.33f, 0.33f}, {0.1f, 0.1f}, {0.8f, 0.1f}, {0.1f, 0.8f}, {0.8f, 0.8f}};
-
 // Levels 0 to 5 in no order.
 std::vector<uint8_t> mixedLevels(size_t tiles) {
     std::mt19937 random(1);

@@ -20,22 +20,14 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-
-uint64_t exchangedLines(const BundleLines& lines) {
-    uint64_t sum = 0;
-    for (const Exchange& e : lines.exchanges) sum += e.lines;
-    return sum;
-}
-
 // Where lines meet a patch: each fragment is once the far end of a line and once the near one.
 double fragmentCount(const BundleLines& lines) {
     return 0.5 * double(2 * exchangedLines(lines) + lines.sky.size() + lines.touching.size());
 }
 
-class Projection {
+class RouletteScene {
   public:
-    Projection(const Scene& scene, float patchSize, float pixelSize)
+    RouletteScene(const Scene& scene, float patchSize, float pixelSize)
         : patches(subdivide(scene, patchSize, kMany)), visibility(patches), pixelSize(pixelSize) {}
 
     std::unique_ptr<Projector> projector(SmallPatches kind,
@@ -110,7 +102,7 @@ TEST(Roulette, LinesOfSmallPatchesAreUnbiased) {
     } cases[] = {{"dust", scattered(216, 0.2f * pixel, 0.2f * pixel), 1000},
                  {"slivers", scattered(216, 6 * pixel, 0.05f * pixel), 200}};
     for (const auto& c : cases) {
-        const Projection projection(c.scene, 10, pixel);
+        const RouletteScene projection(c.scene, 10, pixel);
         const double expected = projection.expectedFragments(c.bundles);
         EXPECT_GT(expected, 4000);
         // A patch is drawn or not, so that the variance is no more than the mean; that of the
@@ -125,7 +117,7 @@ TEST(Roulette, LinesOfSmallPatchesAreUnbiased) {
 
 TEST(Roulette, ThinPatchesOfMoreThanAPixelGetTooManyLines) {
     const float pixel = 0.04f;
-    const Projection projection(scattered(108, 16 * pixel, 0.4f * pixel), 10, pixel);
+    const RouletteScene projection(scattered(108, 16 * pixel, 0.4f * pixel), 10, pixel);
     const double expected = projection.expectedFragments(100);
     EXPECT_NEAR(projection.fragments(SmallPatches::CENTRE_SAMPLING, 100), expected,
                 0.03 * expected);
@@ -136,7 +128,7 @@ TEST(Roulette, ThinPatchesOfMoreThanAPixelGetTooManyLines) {
 TEST(Roulette, ClosedSurfacesOfSmallPatchesLeak) {
     // Patches of a sixteenth of a pixel at most. A pixel holds the centroids of 1 / p patches, each
     // drawn with probability p: none is drawn with probability (1 - p)^(1/p), 0.356 to 1/e.
-    const Projection projection(closedCube(0.5f), 0.01f, 0.04f);
+    const RouletteScene projection(closedCube(0.5f), 0.01f, 0.04f);
     const auto exact = projection.projector(SmallPatches::CENTRE_SAMPLING);
     const auto roulette = projection.projector(SmallPatches::ROULETTE);
     double crossed = 0, met = 0, inside = 0, all = 0;
@@ -162,7 +154,7 @@ TEST(Roulette, ClosedSurfacesOfSmallPatchesLeak) {
 }
 
 TEST(Roulette, AllProjectorsHaveTheSameFragments) {
-    const Projection projection(roomWithBoxes(0.5f), 0.1f, 0.06f);
+    const RouletteScene projection(roomWithBoxes(0.5f), 0.1f, 0.06f);
     for (const Bundle& bundle : Directions("RANDOM", 6).next(4)) {
         std::vector<double> counts;
         std::vector<uint64_t> lines;

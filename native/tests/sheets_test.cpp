@@ -18,8 +18,6 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-
 Patches patchesOf(Mesh mesh, float patchSize) {
     Scene scene;
     place(scene, std::move(mesh), grey("", 0.5f));

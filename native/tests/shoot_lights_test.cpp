@@ -15,9 +15,6 @@ namespace {
 
 using namespace test;
 
-// Of the standard error that is stated: passed by chance once in 16000 checks.
-constexpr double kSigmas = 4;
-
 // A square of 2 m around the origin that faces up, under a light of unit strength.
 Scene underLight(const Light& light) {
     Scene scene;

@@ -19,9 +19,6 @@ namespace {
 
 using namespace test;
 
-// Of the standard error that is stated: passed by chance once in 16000 checks.
-constexpr double kSigmas = 4;
-
 TEST(Allotment, FollowsThePowerAndLosesNoLine) {
     const std::vector<double> expected = {0.3, 5.25, 0.3, 0.15, 4};
     std::vector<double> mean(expected.size(), 0);

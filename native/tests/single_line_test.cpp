@@ -18,10 +18,8 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-
-struct Scenery {
-    explicit Scenery(const Scene& scene, float patchSize = 0.3f)
+struct LineScenery {
+    explicit LineScenery(const Scene& scene, float patchSize = 0.3f)
         : patches(subdivide(scene, patchSize, kMany)), visibility(patches) {}
 
     std::unique_ptr<Projector> singleLines() const {
@@ -82,7 +80,7 @@ TEST(SingleLines, NoLineLeavesAClosedScene) {
     Scene ball;
     place(ball, icosphere("ball", 1, 3, true), grey("", 0.5f));
     for (const Scene& scene : {closedCube(0.5f), roomWithBoxes(0.5f), ball}) {
-        const Scenery scenery(scene);
+        const LineScenery scenery(scene);
         const auto projector = scenery.singleLines();
         uint64_t met = 0;
         for (const Bundle& bundle : Directions("RANDOM", 9).next(20000)) {
@@ -99,7 +97,7 @@ TEST(SingleLines, NoLineLeavesAClosedScene) {
 }
 
 TEST(SingleLines, CrossAreasAsCroftonSays) {
-    const Scenery scenery(roomWithBoxes(0.5f));
+    const LineScenery scenery(roomWithBoxes(0.5f));
     const auto projector = scenery.singleLines();
     constexpr uint32_t kLines = 40000;
     std::array<double, 3> crossings{}, areas{};  // per instance, on fronts
@@ -130,7 +128,7 @@ TEST(SingleLines, CrossAreasAsCroftonSays) {
 TEST(SingleLines, ExchangeAsInTheLists) {
     // Standing boxes: the rules on contacts are the same too.
     for (float gap : {0.1f, 0.0f}) {
-        const Scenery scenery(roomWithBoxes(0.5f, 0, gap));
+        const LineScenery scenery(roomWithBoxes(0.5f, 0, gap));
         auto groupOf = [&](uint32_t i, uint32_t j) {
             auto instanceOf = [&](uint32_t side) {
                 return scenery.patches.parents[scenery.patches.parentOf[side / 2]].instance;

@@ -18,10 +18,8 @@ namespace {
 
 using namespace test;
 
-constexpr size_t kMany = 10000000;
-
 // The same grid with every quad cut in two.
-Mesh triangulated(const Mesh& quads) {
+Mesh halved(const Mesh& quads) {
     std::vector<std::vector<int32_t>> faces;
     for (size_t f = 0; f < quads.faceCount(); ++f) {
         const int32_t* c = quads.cornerVertices.data() + 4 * f;
@@ -104,17 +102,17 @@ class LitMesh {
     Irradiance irradiance;
 };
 
-Mesh plane(int n) { return grid("plane", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, n, n); }
+Mesh square(int n) { return grid("square", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, n, n); }
 
 TEST(Surplus, LinearLightHasNone) {
-    for (const Mesh& mesh : {plane(1), plane(3), plane(40), triangulated(plane(4))}) {
+    for (const Mesh& mesh : {square(1), square(3), square(40), halved(square(4))}) {
         const LitMesh lit(mesh, 0.1f, [](glm::dvec3 p) { return 3 + 0.5 * p.x - 0.25 * p.y; });
         EXPECT_LT(lit.surplus(), 1e-5) << mesh.faceCount() << " faces";
     }
 }
 
 TEST(Surplus, PointLightOverAPlaneIsKnownWithinAFactorOfTwo) {
-    // 0.7 m above the plane and off its middle; patches of 0.36, 0.25 and 0.5 of that height.
+    // 0.7 m above the square and off its middle; patches of 0.36, 0.25 and 0.5 of that height.
     const LightAt light = [](glm::dvec3 p) {
         const glm::dvec3 d = glm::dvec3(0.3, -0.2, 0.7) - p;
         return d.z / std::pow(glm::length(d), 3);
@@ -122,7 +120,7 @@ TEST(Surplus, PointLightOverAPlaneIsKnownWithinAFactorOfTwo) {
     double last = 0;
     for (float patchSize : {0.125f, 0.25f, 0.5f})
         for (int faces : {1, 8}) {
-            const LitMesh lit(plane(faces), patchSize, light);
+            const LitMesh lit(square(faces), patchSize, light);
             const double truth = lit.distanceFromLinear(), found = lit.surplus();
             EXPECT_GT(found, 0.5 * truth) << patchSize << " m, " << faces;
             EXPECT_LT(found, 2 * truth) << patchSize << " m, " << faces;
@@ -137,7 +135,7 @@ TEST(Surplus, ShadowEdgesAreKnownWithinAFactorOfTwo) {
         // The place of the edge on the grid is chance: the mean over some.
         for (int k = 0; k < 8; ++k)
             for (double angle : {0.0, 0.3, 0.7}) {
-                const LitMesh lit(plane(1), patchSize, [=](glm::dvec3 p) {
+                const LitMesh lit(square(1), patchSize, [=](glm::dvec3 p) {
                     const double across = std::cos(angle) * p.x + std::sin(angle) * p.y;
                     return across < 0.1 + 0.031 * k ? 1.0 : 0.2;
                 });
@@ -170,7 +168,7 @@ TEST(StatedError, IsNothingInAFurnace) {
 // way.
 Scene groundBelowLamp(int faces) {
     Scene scene;
-    place(scene, plane(faces), grey("", 0));
+    place(scene, square(faces), grey("", 0));
     scene.addLight(areaLight({0, 0, 1}, {0, 0.5, 0}, {0.5, 0, 0}, {1, 1, 1}));
     return scene;
 }
@@ -218,7 +216,7 @@ TEST(StatedError, IsTheSurfaceErrorWithinAFactorOfTwo) {
 
 TEST(StatedError, NamesCoarseObjectsAndTheEdgesTheyNeed) {
     const Json report = errorsOf(groundBelowLamp(3), 0.1f);
-    ASSERT_TRUE(mentions(report["warnings"], "object \\\"plane\\\"")) << report["warnings"];
+    ASSERT_TRUE(mentions(report["warnings"], "object \\\"square\\\"")) << report["warnings"];
     EXPECT_TRUE(mentions(report["warnings"], "SUBDIVIDE"));
     EXPECT_GT(double(report["error"]["mesh"]), 0.05);
     // 5 % is what it promises for the edges that it names.

@@ -171,6 +171,12 @@ LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, u
     return counts;
 }
 
+uint64_t exchangedLines(const BundleLines& lines) {
+    uint64_t sum = 0;
+    for (const Exchange& e : lines.exchanges) sum += e.lines;
+    return sum;
+}
+
 double linesOf(const LineCounts& counts, uint32_t side) {
     return double(counts.total[side][0]) + counts.total[side][1];
 }

@@ -9,12 +9,20 @@
 #include <vector>
 
 #include "bundles/line_counts.h"
+#include "bundles/projector.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
 
 namespace raybundle::test {
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr float kTouch = 1e-5f;     // surfaces not further apart touch, metres
+constexpr size_t kMany = 10000000;  // a limit of patches that no test reaches
+// Of the standard error that is stated: passed by chance once in 16000 checks.
+constexpr double kSigmas = 4;
+// Points inside a patch, away from its edges, where rounding decides.
+constexpr glm::vec2 kInside[] = {
+    {0.33f, 0.33f}, {0.1f, 0.1f}, {0.8f, 0.1f}, {0.1f, 0.8f}, {0.8f, 0.8f}};
 
 // Meshes. All faces are wound counter-clockwise seen from their front.
 Mesh polygons(const std::string& name, std::vector<glm::vec3> vertices,
@@ -55,7 +63,10 @@ Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double
 // Lines of the first `count` bundles of a sequence through the patches.
 LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed = 1,
                       const std::string& directions = "LOW_DISCREPANCY",
-                      float touchDistance = 1e-5f);
+                      float touchDistance = kTouch);
+
+// Lines that the pairs of a bundle exchange.
+uint64_t exchangedLines(const BundleLines& lines);
 
 // m_i of both halves together.
 double linesOf(const LineCounts& counts, uint32_t side);

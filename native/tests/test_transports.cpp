@@ -8,8 +8,6 @@
 
 namespace raybundle::test {
 
-constexpr size_t kMany = 10000000;
-
 TransportScene::TransportScene(const Scene& scene, float patchSize, float pixelSize)
     : patches(subdivide(scene, patchSize, kMany)),
       visibility(patches),

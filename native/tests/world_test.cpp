@@ -20,7 +20,7 @@ namespace {
 using namespace test;
 
 // The target of 0.2 % is the standard error of a side; five times that is safe.
-constexpr double kSampled = 0.01;
+constexpr double kFiveErrors = 0.01;
 
 // As image, from radiance by direction, at the middle of each pixel.
 WorldImage painted(int width, int height,
@@ -144,7 +144,7 @@ TEST(WorldImage, AnOccluderTakesItsFormFactor) {
         {-0.6, -0.8, 0.7}, {0.9, -0.8, 0.7}, {0.9, 0.3, 0.7}, {-0.6, 0.3, 0.7}};
     const double exact = 2 * (kPi - polygonIrradiance({0, 0, 0}, {0, 0, 1}, canopy, 4));
     const FirstShot shot = shots.shoot("GATHER", 0, 0, 0.002f);
-    EXPECT_NEAR(shot.irradiance[0].x, exact, kSampled * exact);
+    EXPECT_NEAR(shot.irradiance[0].x, exact, kFiveErrors * exact);
     EXPECT_NEAR(shot.irradiance[1].x, 2 * kPi, 1e-3);
     EXPECT_NEAR(shot.irradiance[0].x, exact, 5 * double(shot.error[0]));
 }
