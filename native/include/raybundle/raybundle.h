@@ -14,8 +14,10 @@
  * of the calling thread and names the object concerned. Output parameters are untouched on failure.
  * - Arrays are pointer + count, are read or written only during the call, and stay the caller's. No
  *   memory of the caller is kept.
- * - Handles are not shared between threads without the caller's own locking. Different handles may
- * be used from different threads at once.
+ * - Different handles may be used from different threads at once. A call with a handle that another
+ * call is not done with, in another thread or around the progress function, fails with
+ * RB_ERROR_INVALID_OPERATION. Handles are numbers and no addresses; one that was released, or is of
+ * another kind, fails with RB_ERROR_INVALID_ARGUMENT, and its release does nothing.
  */
 #ifndef RAYBUNDLE_H
 #define RAYBUNDLE_H
@@ -77,7 +79,8 @@ typedef struct rb_scene_impl* rb_scene;
 /* Makes an empty scene in *scene; the caller releases it. */
 RB_API rb_error rb_new_scene(rb_scene* scene);
 
-/* Frees the scene. NULL is allowed. A bake keeps what it needs, so the scene may go first. */
+/* Frees the scene, or lets the call that is at work with it do so. NULL is allowed. A bake keeps what
+ * it needs, so the scene may go first. */
 RB_API void rb_release_scene(rb_scene scene);
 
 typedef enum rb_image_extension RB_INT {
@@ -267,7 +270,7 @@ typedef struct rb_bake_impl* rb_bake;
 /* Makes a bake with default settings in *bake; the caller releases it. */
 RB_API rb_error rb_new_bake(rb_bake* bake);
 
-/* Frees the bake. NULL is allowed. */
+/* Frees the bake, or lets the call that is at work with it do so. NULL is allowed. */
 RB_API void rb_release_bake(rb_bake bake);
 
 /* Settings by name; an unknown name, a wrong type or a value out of range is
@@ -374,7 +377,7 @@ RB_API rb_error rb_new_subdivision(const float* vertices, size_t vertex_count,
                                    const int32_t* face_offsets, size_t face_count, float max_edge,
                                    rb_subdivision* subdivision);
 
-/* Frees the subdivision. NULL is allowed. */
+/* Frees the subdivision, or lets the call that is at work with it do so. NULL is allowed. */
 RB_API void rb_release_subdivision(rb_subdivision subdivision);
 
 /* Number of vertices and of triangles. */

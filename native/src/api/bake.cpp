@@ -5,76 +5,78 @@
 
 using namespace raybundle;
 
-struct rb_bake_impl {
-    Bake bake;
-};
+namespace {
+
+using HeldBake = Held<rb_bake, Bake>;
+
+}  // namespace
 
 rb_error rb_new_bake(rb_bake* bake) {
     return guarded([&] {
         need(bake, "bake");
-        *bake = new rb_bake_impl;
+        *bake = Handles<rb_bake, Bake>::add(std::make_unique<Bake>());
     });
 }
 
-void rb_release_bake(rb_bake bake) { delete bake; }
+void rb_release_bake(rb_bake bake) { Handles<rb_bake, Bake>::release(bake); }
 
 rb_error rb_set_bake_int(rb_bake bake, const char* name, int32_t value) {
     return guarded([&] {
-        need(bake, "bake");
-        bake->bake.settings.set(nameOf(name), int(value));
+        const HeldBake held(bake, "bake");
+        held->settings.set(nameOf(name), int(value));
     });
 }
 
 rb_error rb_set_bake_float(rb_bake bake, const char* name, float value) {
     return guarded([&] {
-        need(bake, "bake");
-        bake->bake.settings.set(nameOf(name), value);
+        const HeldBake held(bake, "bake");
+        held->settings.set(nameOf(name), value);
     });
 }
 
 rb_error rb_set_bake_string(rb_bake bake, const char* name, const char* value) {
     return guarded([&] {
-        need(bake, "bake");
-        bake->bake.settings.set(nameOf(name), nameOf(value));
+        const HeldBake held(bake, "bake");
+        held->settings.set(nameOf(name), nameOf(value));
     });
 }
 
 rb_error rb_get_bake_int(rb_bake bake, const char* name, int32_t* value) {
     return guarded([&] {
-        need(bake, "bake");
+        const HeldBake held(bake, "bake");
         need(value, "value");
-        bake->bake.settings.get(nameOf(name), *value);
+        held->settings.get(nameOf(name), *value);
     });
 }
 
 rb_error rb_get_bake_float(rb_bake bake, const char* name, float* value) {
     return guarded([&] {
-        need(bake, "bake");
+        const HeldBake held(bake, "bake");
         need(value, "value");
-        bake->bake.settings.get(nameOf(name), *value);
+        held->settings.get(nameOf(name), *value);
     });
 }
 
 rb_error rb_get_bake_string(rb_bake bake, const char* name, const char** value) {
     return guarded([&] {
-        need(bake, "bake");
+        const HeldBake held(bake, "bake");
         need(value, "value");
-        *value = bake->bake.settings.get(nameOf(name)).c_str();
+        *value = held->settings.get(nameOf(name)).c_str();
     });
 }
 
 rb_error rb_set_bake_progress(rb_bake bake, rb_progress_function function, void* user) {
     return guarded([&] {
-        need(bake, "bake");
-        bake->bake.progress = Progress(function, user);
+        const HeldBake held(bake, "bake");
+        held->progress = Progress(function, user);
     });
 }
 
 rb_error rb_execute_bake(rb_bake bake, rb_scene scene) {
     return guarded([&] {
-        need(bake, "bake");
-        need(scene, "scene");
-        bake->bake.run(scene->scene);
+        const HeldBake held(bake, "bake");
+        const HeldScene heldScene(scene, "scene");
+        held->run(*heldScene);
     });
 }
 
@@ -91,40 +93,40 @@ void copyLight(const std::vector<glm::vec3>& light, float* rgb, size_t count) {
 rb_error rb_get_corner_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
                              size_t count) {
     return guarded([&] {
-        need(bake, "bake");
-        copyLight(bake->bake.instanceLight(instance).perCorner(output), rgb, count);
+        const HeldBake held(bake, "bake");
+        copyLight(held->instanceLight(instance).perCorner(output), rgb, count);
     });
 }
 
 rb_error rb_get_vertex_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
                              size_t count) {
     return guarded([&] {
-        need(bake, "bake");
-        copyLight(bake->bake.instanceLight(instance).perVertex(output), rgb, count);
+        const HeldBake held(bake, "bake");
+        copyLight(held->instanceLight(instance).perVertex(output), rgb, count);
     });
 }
 
 rb_error rb_get_set_corner_light(rb_bake bake, int32_t set, int32_t instance, rb_output output,
                                  float* rgb, size_t count) {
     return guarded([&] {
-        need(bake, "bake");
-        copyLight(bake->bake.setLight(set, instance).perCorner(output), rgb, count);
+        const HeldBake held(bake, "bake");
+        copyLight(held->setLight(set, instance).perCorner(output), rgb, count);
     });
 }
 
 rb_error rb_get_set_vertex_light(rb_bake bake, int32_t set, int32_t instance, rb_output output,
                                  float* rgb, size_t count) {
     return guarded([&] {
-        need(bake, "bake");
-        const CornerLight& light = bake->bake.setLight(set, instance);
-        copyLight(bake->bake.instanceLight(instance).perVertex(light, output), rgb, count);
+        const HeldBake held(bake, "bake");
+        const CornerLight& light = held->setLight(set, instance);
+        copyLight(held->instanceLight(instance).perVertex(light, output), rgb, count);
     });
 }
 
 rb_error rb_get_corner_error(rb_bake bake, int32_t instance, float* error, size_t count) {
     return guarded([&] {
-        need(bake, "bake");
-        const std::vector<float>& values = bake->bake.instanceLight(instance).error;
+        const HeldBake held(bake, "bake");
+        const std::vector<float>& values = held->instanceLight(instance).error;
         needCount(count, values.size(), "count");
         needArray(error, count, "error");
         if (count) std::memcpy(error, values.data(), count * sizeof(float));
@@ -133,10 +135,10 @@ rb_error rb_get_corner_error(rb_bake bake, int32_t instance, float* error, size_
 
 rb_error rb_get_report(rb_bake bake, const char** json) {
     return guarded([&] {
-        need(bake, "bake");
+        const HeldBake held(bake, "bake");
         need(json, "json");
-        if (!bake->bake.hasRun())
+        if (!held->hasRun())
             throw Error(RB_ERROR_INVALID_OPERATION, "there is no report before a bake");
-        *json = bake->bake.reportJson().c_str();
+        *json = held->reportJson().c_str();
     });
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "api/border.h"
 
+#include <atomic>
+
 namespace {
 
 thread_local std::string lastMessage;
@@ -17,6 +19,11 @@ rb_error fail(rb_error code, const char* message) noexcept {
         lastMessage.clear();
     }
     return code;
+}
+
+uintptr_t nextHandle() {
+    static std::atomic<uintptr_t> last{0};
+    return ++last;
 }
 
 void need(const void* pointer, const char* name) {

@@ -11,13 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "api/handles.h"
 #include "bake/error.h"
 #include "raybundle/raybundle.h"
 #include "scene/scene.h"
-
-struct rb_scene_impl {
-    raybundle::Scene scene;
-};
 
 namespace raybundle {
 
@@ -40,6 +37,8 @@ rb_error guarded(const Body& body) noexcept {
         return fail(RB_ERROR_UNKNOWN, "unknown error");
     }
 }
+
+using HeldScene = Held<rb_scene, Scene>;
 
 // Each throws Error(INVALID_ARGUMENT) that names the argument.
 void need(const void* pointer, const char* name);

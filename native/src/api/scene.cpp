@@ -8,16 +8,16 @@ using namespace raybundle;
 rb_error rb_new_scene(rb_scene* scene) {
     return guarded([&] {
         need(scene, "scene");
-        *scene = new rb_scene_impl;
+        *scene = Handles<rb_scene, Scene>::add(std::make_unique<Scene>());
     });
 }
 
-void rb_release_scene(rb_scene scene) { delete scene; }
+void rb_release_scene(rb_scene scene) { Handles<rb_scene, Scene>::release(scene); }
 
 rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, int32_t height,
                       const float* rgb, rb_image_extension extension, int32_t* image) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(image, "image");
         if (width <= 0 || height <= 0)
             throw invalidArgument("image \"" + nameOf(name) + "\" has no pixels");
@@ -26,7 +26,7 @@ rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, int32_t h
         if (extension != RB_IMAGE_REPEAT && extension != RB_IMAGE_EXTEND &&
             extension != RB_IMAGE_CLIP)
             throw invalidArgument("there is no image extension " + std::to_string(int(extension)));
-        *image = scene->scene.addImage(
+        *image = held->addImage(
             {nameOf(name), width, height, extension, vectors<glm::vec3>(rgb, pixels)});
     });
 }
@@ -34,7 +34,7 @@ rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, int32_t h
 rb_error rb_add_material(rb_scene scene, const char* name, const float reflectance[6],
                          const float emission[6], int32_t* material) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(reflectance, "reflectance");
         need(emission, "emission");
         need(material, "material");
@@ -42,18 +42,18 @@ rb_error rb_add_material(rb_scene scene, const char* name, const float reflectan
         made.name = nameOf(name);
         made.reflectance = {vec3(reflectance), vec3(reflectance + 3)};
         made.emission = {vec3(emission), vec3(emission + 3)};
-        *material = scene->scene.addMaterial(std::move(made));
+        *material = held->addMaterial(std::move(made));
     });
 }
 
 rb_error rb_set_material_image(rb_scene scene, int32_t material, int32_t image,
                                const float weight[3]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(weight, "weight");
         needFinite(weight, 3, "weight");
-        Material& target = scene->scene.material(material);
-        scene->scene.checkImage(image);
+        Material& target = held->material(material);
+        held->checkImage(image);
         target.image = image;
         target.imageWeight = vec3(weight);
     });
@@ -61,10 +61,10 @@ rb_error rb_set_material_image(rb_scene scene, int32_t material, int32_t image,
 
 rb_error rb_set_material_corner_colors(rb_scene scene, int32_t material, const float weight[3]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(weight, "weight");
         needFinite(weight, 3, "weight");
-        Material& target = scene->scene.material(material);
+        Material& target = held->material(material);
         target.usesCornerColors = true;
         target.cornerColorWeight = vec3(weight);
     });
@@ -73,11 +73,11 @@ rb_error rb_set_material_corner_colors(rb_scene scene, int32_t material, const f
 rb_error rb_set_material_emission_image(rb_scene scene, int32_t material, int32_t image,
                                         const float weight[6]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(weight, "weight");
         needFinite(weight, 6, "weight");
-        Material& target = scene->scene.material(material);
-        scene->scene.checkImage(image);
+        Material& target = held->material(material);
+        held->checkImage(image);
         target.emissionImage = image;
         target.emissionImageWeight = {vec3(weight), vec3(weight + 3)};
     });
@@ -86,10 +86,10 @@ rb_error rb_set_material_emission_image(rb_scene scene, int32_t material, int32_
 rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t material,
                                                 const float weight[6]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(weight, "weight");
         needFinite(weight, 6, "weight");
-        Material& target = scene->scene.material(material);
+        Material& target = held->material(material);
         target.emissionUsesCornerColors = true;
         target.emissionColorWeight = {vec3(weight), vec3(weight + 3)};
     });
@@ -98,12 +98,12 @@ rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t material
 rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float scale[6],
                                  const float offset[6]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(scale, "scale");
         need(offset, "offset");
         needFinite(scale, 6, "scale");
         needFinite(offset, 6, "offset");
-        Material& target = scene->scene.material(material);
+        Material& target = held->material(material);
         target.diffuseScale = {vec3(scale), vec3(scale + 3)};
         target.diffuseOffset = {vec3(offset), vec3(offset + 3)};
     });
@@ -111,17 +111,17 @@ rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float s
 
 rb_error rb_set_material_grazing(rb_scene scene, int32_t material, const float grazing[6]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(grazing, "grazing");
         needFinite(grazing, 6, "grazing");
-        scene->scene.material(material).grazing = {vec3(grazing), vec3(grazing + 3)};
+        held->material(material).grazing = {vec3(grazing), vec3(grazing + 3)};
     });
 }
 
 rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity) {
     return guarded([&] {
-        need(scene, "scene");
-        Material& target = scene->scene.material(material);
+        const HeldScene held(scene, "scene");
+        Material& target = held->material(material);
         if (!(opacity >= 0 && opacity <= 1))
             throw invalidArgument("material \"" + target.name + "\": opacity must be 0 to 1");
         target.opacity = opacity;
@@ -130,9 +130,9 @@ rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity
 
 rb_error rb_set_material_opacity_image(rb_scene scene, int32_t material, int32_t image) {
     return guarded([&] {
-        need(scene, "scene");
-        Material& target = scene->scene.material(material);
-        scene->scene.checkImage(image);
+        const HeldScene held(scene, "scene");
+        Material& target = held->material(material);
+        held->checkImage(image);
         target.opacityImage = image;
     });
 }
@@ -140,12 +140,12 @@ rb_error rb_set_material_opacity_image(rb_scene scene, int32_t material, int32_t
 rb_error rb_set_material_translucence(rb_scene scene, int32_t material, const float translucence[6],
                                       int32_t image, const float image_weight[6]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(translucence, "translucence");
         needFinite(translucence, 6, "translucence");
-        Material& target = scene->scene.material(material);
+        Material& target = held->material(material);
         if (image != -1) {
-            scene->scene.checkImage(image);
+            held->checkImage(image);
             need(image_weight, "image_weight");
             needFinite(image_weight, 6, "image_weight");
             target.translucenceImageWeight = {vec3(image_weight), vec3(image_weight + 3)};
@@ -160,20 +160,20 @@ rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices, si
                      const int32_t* face_offsets, size_t face_count, const int32_t* face_materials,
                      int32_t* mesh) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(mesh, "mesh");
         Mesh made = makeMesh(name, vertices, vertex_count, corner_vertices, corner_count,
                              face_offsets, face_count);
         if (face_materials) made.faceMaterials.assign(face_materials, face_materials + face_count);
-        *mesh = scene->scene.addMesh(std::move(made));
+        *mesh = held->addMesh(std::move(made));
     });
 }
 
 rb_error rb_set_mesh_corner_normals(rb_scene scene, int32_t mesh, const float* normals,
                                     size_t corner_count) {
     return guarded([&] {
-        need(scene, "scene");
-        Mesh& target = scene->scene.mesh(mesh);
+        const HeldScene held(scene, "scene");
+        Mesh& target = held->mesh(mesh);
         needCount(corner_count, target.cornerCount(), "corner_count");
         needArray(normals, corner_count, "normals");
         needFinite(normals, 3 * corner_count, "normal component");
@@ -184,8 +184,8 @@ rb_error rb_set_mesh_corner_normals(rb_scene scene, int32_t mesh, const float* n
 rb_error rb_set_mesh_sharp_edges(rb_scene scene, int32_t mesh, const int32_t* vertices,
                                  size_t edge_count) {
     return guarded([&] {
-        need(scene, "scene");
-        Mesh& target = scene->scene.mesh(mesh);
+        const HeldScene held(scene, "scene");
+        Mesh& target = held->mesh(mesh);
         needArray(vertices, edge_count, "vertices");
         std::vector<uint64_t> edges;
         for (size_t e = 0; e < edge_count; ++e) {
@@ -203,8 +203,8 @@ rb_error rb_set_mesh_sharp_edges(rb_scene scene, int32_t mesh, const int32_t* ve
 
 rb_error rb_set_mesh_uvs(rb_scene scene, int32_t mesh, const float* uvs, size_t corner_count) {
     return guarded([&] {
-        need(scene, "scene");
-        Mesh& target = scene->scene.mesh(mesh);
+        const HeldScene held(scene, "scene");
+        Mesh& target = held->mesh(mesh);
         needCount(corner_count, target.cornerCount(), "corner_count");
         needArray(uvs, corner_count, "uvs");
         needFinite(uvs, 2 * corner_count, "UV component");
@@ -215,8 +215,8 @@ rb_error rb_set_mesh_uvs(rb_scene scene, int32_t mesh, const float* uvs, size_t 
 rb_error rb_set_mesh_corner_colors(rb_scene scene, int32_t mesh, const float* rgb,
                                    size_t corner_count) {
     return guarded([&] {
-        need(scene, "scene");
-        Mesh& target = scene->scene.mesh(mesh);
+        const HeldScene held(scene, "scene");
+        Mesh& target = held->mesh(mesh);
         needCount(corner_count, target.cornerCount(), "corner_count");
         needArray(rgb, corner_count, "rgb");
         needFinite(rgb, 3 * corner_count, "colour component");
@@ -227,7 +227,7 @@ rb_error rb_set_mesh_corner_colors(rb_scene scene, int32_t mesh, const float* rg
 rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name, const float transform[12],
                          rb_role role, rb_side side, int32_t* instance) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(transform, "transform");
         need(instance, "instance");
         if (role != RB_ROLE_BAKE && role != RB_ROLE_OCCLUDE)
@@ -238,15 +238,15 @@ rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name, const f
         for (int row = 0; row < 3; ++row)
             for (int column = 0; column < 4; ++column)
                 made.transform[column][row] = double(transform[4 * row + column]);
-        *instance = scene->scene.addInstance(std::move(made));
+        *instance = held->addInstance(std::move(made));
     });
 }
 
 rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops_direct,
                                     bool exchanges) {
     return guarded([&] {
-        need(scene, "scene");
-        Instance& target = scene->scene.instance(instance);
+        const HeldScene held(scene, "scene");
+        Instance& target = held->instance(instance);
         target.stopsDirect = stops_direct;
         target.exchanges = exchanges;
     });
@@ -256,7 +256,7 @@ rb_error rb_add_point_light(rb_scene scene, const char* name, const float positi
                             const float intensity[3], float radius, rb_point_shape shape,
                             int32_t* light) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(position, "position");
         need(intensity, "intensity");
         need(light, "light");
@@ -268,17 +268,17 @@ rb_error rb_add_point_light(rb_scene scene, const char* name, const float positi
         made.strength = vec3(intensity);
         made.radius = double(radius);
         made.pointShape = shape;
-        *light = scene->scene.addLight(std::move(made));
+        *light = held->addLight(std::move(made));
     });
 }
 
 rb_error rb_set_light_cone(rb_scene scene, int32_t light, const float world_to_light[9],
                            float angle, float blend, bool dims_by_cosine) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(world_to_light, "world_to_light");
         needFinite(world_to_light, 9, "matrix element");
-        Light& target = scene->scene.light(light);
+        Light& target = held->light(light);
         if (target.kind != Light::Kind::POINT)
             throw invalidArgument("light \"" + target.name + "\" is not a point light");
         if (!(angle >= 0 && std::isfinite(angle)) || !(blend >= 0 && blend <= 1))
@@ -296,7 +296,7 @@ rb_error rb_set_light_cone(rb_scene scene, int32_t light, const float world_to_l
 rb_error rb_add_sun_light(rb_scene scene, const char* name, const float direction[3],
                           const float irradiance[3], float angle, int32_t* light) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(direction, "direction");
         need(irradiance, "irradiance");
         need(light, "light");
@@ -306,7 +306,7 @@ rb_error rb_add_sun_light(rb_scene scene, const char* name, const float directio
         made.direction = vec3(direction);
         made.strength = vec3(irradiance);
         made.angle = double(angle);
-        *light = scene->scene.addLight(std::move(made));
+        *light = held->addLight(std::move(made));
     });
 }
 
@@ -314,7 +314,7 @@ rb_error rb_add_area_light(rb_scene scene, const char* name, const float centre[
                            const float axis_u[3], const float axis_v[3], const float radiance[3],
                            rb_area_shape shape, int32_t* light) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(centre, "centre");
         need(axis_u, "axis_u");
         need(axis_v, "axis_v");
@@ -330,14 +330,14 @@ rb_error rb_add_area_light(rb_scene scene, const char* name, const float centre[
         made.axisV = vec3(axis_v);
         made.strength = vec3(radiance);
         made.areaShape = shape;
-        *light = scene->scene.addLight(std::move(made));
+        *light = held->addLight(std::move(made));
     });
 }
 
 rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread) {
     return guarded([&] {
-        need(scene, "scene");
-        Light& target = scene->scene.light(light);
+        const HeldScene held(scene, "scene");
+        Light& target = held->light(light);
         if (target.kind != Light::Kind::AREA)
             throw invalidArgument("light \"" + target.name + "\" is not an area light");
         // In float pi may come out a little larger.
@@ -349,58 +349,58 @@ rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread) {
 
 rb_error rb_set_light_shadows(rb_scene scene, int32_t light, bool casts_shadows) {
     return guarded([&] {
-        need(scene, "scene");
-        scene->scene.light(light).castsShadows = casts_shadows;
+        const HeldScene held(scene, "scene");
+        held->light(light).castsShadows = casts_shadows;
     });
 }
 
 rb_error rb_set_world(rb_scene scene, const float radiance[3]) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(radiance, "radiance");
         needFinite(radiance, 3, "world radiance");
-        scene->scene.worldRadiance = glm::max(vec3(radiance), glm::vec3(0.0f));
+        held->worldRadiance = glm::max(vec3(radiance), glm::vec3(0.0f));
     });
 }
 
 rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height, const float* rgb) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         if (width <= 0 || height <= 0) throw invalidArgument("world image has no pixels");
         const size_t pixels = size_t(width) * size_t(height);
         needArray(rgb, pixels, "rgb");
-        scene->scene.setWorldImage({width, height, vectors<glm::vec3>(rgb, pixels)});
+        held->setWorldImage({width, height, vectors<glm::vec3>(rgb, pixels)});
     });
 }
 
 rb_error rb_add_light_set(rb_scene scene, const char* name, int32_t* set) {
     return guarded([&] {
-        need(scene, "scene");
+        const HeldScene held(scene, "scene");
         need(set, "set");
-        *set = scene->scene.addLightSet(nameOf(name));
+        *set = held->addLightSet(nameOf(name));
     });
 }
 
 rb_error rb_set_light_set(rb_scene scene, int32_t light, int32_t set) {
     return guarded([&] {
-        need(scene, "scene");
-        scene->scene.checkLightSet(set);
-        scene->scene.light(light).lightSet = set;
+        const HeldScene held(scene, "scene");
+        held->checkLightSet(set);
+        held->light(light).lightSet = set;
     });
 }
 
 rb_error rb_set_instance_light_set(rb_scene scene, int32_t instance, int32_t set) {
     return guarded([&] {
-        need(scene, "scene");
-        scene->scene.checkLightSet(set);
-        scene->scene.instance(instance).lightSet = set;
+        const HeldScene held(scene, "scene");
+        held->checkLightSet(set);
+        held->instance(instance).lightSet = set;
     });
 }
 
 rb_error rb_set_world_light_set(rb_scene scene, int32_t set) {
     return guarded([&] {
-        need(scene, "scene");
-        scene->scene.checkLightSet(set);
-        scene->scene.worldLightSet = set;
+        const HeldScene held(scene, "scene");
+        held->checkLightSet(set);
+        held->worldLightSet = set;
     });
 }

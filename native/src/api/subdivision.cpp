@@ -4,9 +4,12 @@
 
 using namespace raybundle;
 
-struct rb_subdivision_impl {
-    ConformingSubdivision subdivision;
-};
+namespace {
+
+using Subdivisions = Handles<rb_subdivision, ConformingSubdivision>;
+using HeldSubdivision = Held<rb_subdivision, ConformingSubdivision>;
+
+}  // namespace
 
 rb_error rb_new_subdivision(const float* vertices, size_t vertex_count,
                             const int32_t* corner_vertices, size_t corner_count,
@@ -19,21 +22,21 @@ rb_error rb_new_subdivision(const float* vertices, size_t vertex_count,
         Scene scene;
         const int32_t mesh = scene.addMesh(makeMesh("", vertices, vertex_count, corner_vertices,
                                                     corner_count, face_offsets, face_count));
-        *subdivision =
-            new rb_subdivision_impl{subdivideConforming(scene.meshes[size_t(mesh)], max_edge)};
+        *subdivision = Subdivisions::add(std::make_unique<ConformingSubdivision>(
+            subdivideConforming(scene.meshes[size_t(mesh)], max_edge)));
     });
 }
 
-void rb_release_subdivision(rb_subdivision subdivision) { delete subdivision; }
+void rb_release_subdivision(rb_subdivision subdivision) { Subdivisions::release(subdivision); }
 
 rb_error rb_get_subdivision_size(rb_subdivision subdivision, size_t* vertex_count,
                                  size_t* triangle_count) {
     return guarded([&] {
-        need(subdivision, "subdivision");
+        const HeldSubdivision held(subdivision, "subdivision");
         need(vertex_count, "vertex_count");
         need(triangle_count, "triangle_count");
-        *vertex_count = subdivision->subdivision.vertices.size();
-        *triangle_count = subdivision->subdivision.triangles.size();
+        *vertex_count = held->vertices.size();
+        *triangle_count = held->triangles.size();
     });
 }
 
@@ -41,8 +44,8 @@ rb_error rb_get_subdivision(rb_subdivision subdivision, float* vertices, size_t 
                             int32_t* triangles, int32_t* source_faces, int32_t* source_corners,
                             float* source_weights, size_t triangle_count) {
     return guarded([&] {
-        need(subdivision, "subdivision");
-        const ConformingSubdivision& s = subdivision->subdivision;
+        const HeldSubdivision held(subdivision, "subdivision");
+        const ConformingSubdivision& s = *held;
         needCount(vertex_count, s.vertices.size(), "vertex_count");
         needCount(triangle_count, s.triangles.size(), "triangle_count");
         auto copy = [](const auto& values, void* to, const char* name) {
