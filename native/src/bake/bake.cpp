@@ -16,6 +16,7 @@
 #include "bake/energy_balance.h"
 #include "bake/geometry_hash.h"
 #include "bake/light_hash.h"
+#include "bake/threads.h"
 #include "bake/trace.h"
 #include "bake/window_noise.h"
 #include "patches/contacts.h"
@@ -142,16 +143,21 @@ Bake::~Bake() = default;
 
 void Bake::run(const Scene& scene) {
     checkCombination(settings, scene.lightSets.size());
-    tbb::task_arena arena(settings.threads > 0 ? settings.threads : tbb::task_arena::automatic);
-    arena.execute([&] { runStages(scene); });
+    const Threads threads(settings.threads);
+    tbb::task_arena arena(threads.count);
+    arena.execute([&] { runStages(scene, threads); });
 }
 
-void Bake::runStages(const Scene& scene) {
+void Bake::runStages(const Scene& scene, const Threads& threads) {
     Report report;
     std::vector<InstanceLight> made;  // kept once nothing can fail any more
     {
         Stopwatch total(report.totalSeconds);
         report.warnings = scene.warnings;
+        if (threads.count < threads.wanted)
+            report.warnings.push_back("the system lets " + std::to_string(threads.count) + " of " +
+                                      std::to_string(threads.wanted) +
+                                      " threads run; the bake takes longer for it");
         for (const std::string& name : scene.lightSets) report.lightSets.push_back({name, 0});
         makePatches(scene, report);
 

@@ -23,6 +23,7 @@
 
 namespace raybundle {
 
+class Threads;
 struct Trace;
 
 // One bake: settings in, light per corner and a report out. Keeps patches and traced lines for the
@@ -53,7 +54,7 @@ class Bake {
     const CornerLight& setLight(int32_t set, int32_t instance) const;
 
   private:
-    void runStages(const Scene& scene);
+    void runStages(const Scene& scene, const Threads& threads);
     void makePatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> shootCoarsely(const Scene& scene, Report& report);

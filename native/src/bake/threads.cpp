@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/threads.h"
+
+#include <algorithm>
+#include <exception>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace raybundle {
+namespace {
+
+// Starts threads until there are as many at once, with the caller's, or no more can be. oneTBB keeps
+// those that it has, so that what went once is not tried again.
+int startable(int wanted) {
+    static std::mutex mutex;
+    static int known = 1;
+    const std::lock_guard lock(mutex);
+    if (wanted <= known) return wanted;
+    std::promise<void> end;
+    const std::shared_future<void> ended = end.get_future().share();
+    std::vector<std::thread> threads;
+    try {
+        while (int(threads.size()) + 1 < wanted) threads.emplace_back([ended] { ended.wait(); });
+    } catch (const std::exception&) {
+        // No more threads, or no memory for them.
+    }
+    end.set_value();
+    for (std::thread& thread : threads) thread.join();
+    const int count = int(threads.size()) + 1;
+    known = std::max(known, count);
+    return count;
+}
+
+}  // namespace
+
+Threads::Threads(int asked) {
+    const int most =
+        int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+    wanted = asked > 0 ? std::min(asked, most) : most;
+    count = startable(wanted);
+    if (count < wanted) limit.emplace(tbb::global_control::max_allowed_parallelism, size_t(count));
+}
+
+}  // namespace raybundle

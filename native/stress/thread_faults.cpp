@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A bake in a process that may start no other thread, one, two or three, of the four that were asked
+// for: it must give its light with those that it gets, and say so.
+//
+// pthread_create is replaced. Each number of threads has a process of its own, since oneTBB keeps the
+// threads that it has started.
+#include <dlfcn.h>
+#include <pthread.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "fault_room.h"
+
+namespace {
+
+constexpr int kAsked = 4;
+
+// Threads that live at once, without the first; beyond `most` none starts.
+std::atomic<int> running{0}, most{1000};
+
+struct Start {
+    void* (*routine)(void*);
+    void* argument;
+};
+
+void* run(void* start) {
+    const Start copy = *static_cast<Start*>(start);
+    delete static_cast<Start*>(start);
+    void* result = copy.routine(copy.argument);
+    --running;
+    return result;
+}
+
+}  // namespace
+
+extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attributes,
+                              void* (*routine)(void*), void* argument) {
+    using Create = int (*)(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*);
+    static const Create create = reinterpret_cast<Create>(dlsym(RTLD_NEXT, "pthread_create"));
+    if (++running > most) {
+        --running;
+        return EAGAIN;
+    }
+    return create(thread, attributes, run, new Start{routine, argument});
+}
+
+namespace {
+
+using namespace raybundle::test;
+
+// With as many threads: its light goes to `light`, or must be like it.
+int bakeWith(int threads, float* light, bool isFirst) {
+    // What oneTBB takes at most, on however many cores.
+    const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, kAsked);
+    const rb_scene room = roomOf(10);
+    const rb_bake bake = newBake("LEAST_SQUARES");
+    rb_set_bake_int(bake, "threads", isFirst ? 1 : kAsked);
+    most = threads - 1;
+    for (int k = 0; k < 3; ++k) {
+        if (rb_execute_bake(bake, room) != RB_ERROR_NONE) return 1;
+        const std::vector<float> found = lightOf(bake);
+        if (isFirst) std::copy(found.begin(), found.end(), light);
+        if (!isLike(found, {light, light + found.size()})) return 2;
+        const char* report = "";
+        rb_get_report(bake, &report);
+        const bool isSaid = std::strstr(report, "threads run") != nullptr;
+        if (isSaid != (!isFirst && threads < kAsked)) return 3;
+        rb_set_bake_int(bake, "skip.geometry", 0);  // all of it, not a relighting
+    }
+    return 0;
+}
+
+}  // namespace
+
+int main() {
+    void* const shared =
+        mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (shared == MAP_FAILED) return 1;
+    // First the light of one thread that is all that is asked for.
+    for (int threads : {0, 1, 2, 3, kAsked}) {
+        const pid_t child = fork();
+        if (child == 0)
+            _exit(bakeWith(threads ? threads : 1, static_cast<float*>(shared), threads == 0));
+        int status = -1;
+        if (child < 0 || waitpid(child, &status, 0) != child || status != 0) {
+            std::printf("%d threads of %d: failed, status %x\n", threads, kAsked, unsigned(status));
+            return 1;
+        }
+        if (threads) std::printf("%d threads of %d: the light of one\n", threads, kAsked);
+    }
+    return 0;
+}
