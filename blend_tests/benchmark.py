@@ -36,20 +36,19 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils.bvhtree import BVHTree
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
-from cycles_reference import (ATTRIBUTE, bakeable_objects, corner_values, load,  # noqa: E402
+from cycles_reference import (bakeable_objects, corner_values, load,  # noqa: E402
                               prepare_scene, target_attribute)
 from raybundle import bake_cache  # noqa: E402
 from raybundle.properties import assign  # noqa: E402
-from surface_error import (SurfaceError, corner_areas, corner_vertices, face_means,  # noqa: E402
-                           face_sizes, is_defined, off_contact_edges, read_colors, surface_error,
-                           world_positions)
+from surface_error import (SurfaceError, corner_areas, is_defined, off_contact_edges,  # noqa: E402
+                           read_colors)
+from surface_reference import Light, SurfaceReference, joined_error  # noqa: E402
 
 SCENES = HERE.parent / "scenes"
 CYCLES_SAMPLES = (64, 256, 1024)
@@ -57,10 +56,6 @@ ERRORS_OF_INTEREST = (0.05, 0.02, 0.01)
 # With four times the samples noise is halved; an error that keeps more than this is something else.
 STILL_NOISE = 0.7
 RAYBUNDLE = "Raybundle"
-# Surfaces nearer to each other than this share of the scene's diagonal touch.
-TOUCH = 2e-5
-
-Light = dict[str, np.ndarray]  # by object name, RGB per corner or point
 
 
 @dataclass
@@ -134,123 +129,7 @@ class VertexReference:
             for item in objects}
 
     def error(self, light: Light) -> SurfaceError:
-        return _joined_error(light, self._values, self._weights)
-
-
-class SurfaceReference:
-    """Cycles' light at points inside the faces, one half-way from each corner to the centre."""
-
-    def __init__(self, objects: Sequence[bpy.types.Object], samples: int, seed: int = 0) -> None:
-        self._weights = {item.name: corner_areas(item) for item in objects}
-        self._sizes = {item.name: face_sizes(item.data) for item in objects}
-        twins = {item.name: _with_inner_points(item) for item in objects}
-        hidden = [item.hide_render for item in objects]
-        for item in objects:
-            item.hide_render = True
-        values = _bake_points(list(twins.values()), samples, seed)
-        self._values = {name: values[twin.name] for name, twin in twins.items()}
-        for item, was_hidden in zip(objects, hidden):
-            item.hide_render = was_hidden
-        covered = _covered_points(twins)
-        for twin in twins.values():
-            bpy.data.meshes.remove(twin.data)
-        for item in objects:
-            # Faces that reflect nothing have no value. Covered points nobody sees, and what Cycles
-            # has there is arbitrary.
-            self._weights[item.name] = (self._weights[item.name]
-                                        * self._values[item.name].any(axis=1)
-                                        * ~covered[item.name])
-
-    def points(self, name: str, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """At an object's points: what is shown of its corners' values, Cycles' light, the area."""
-        return self._interpolated(name, corners), self._values[name], self._weights[name]
-
-    def error(self, light: Light) -> SurfaceError:
-        points = {name: self._interpolated(name, values) for name, values in light.items()}
-        return _joined_error(points, self._values, self._weights)
-
-    def _interpolated(self, name: str, corners: np.ndarray) -> np.ndarray:
-        """Bilinear in quads, linear in triangles, at the points in the order of the corners."""
-        sizes = self._sizes[name]
-        ends = np.cumsum(sizes)
-        starts = ends - sizes
-        face = np.repeat(np.arange(len(sizes)), sizes)
-        number = np.arange(len(corners)) - starts[face]
-        after, before = (corners[starts[face] + (number + step) % sizes[face]] for step in (1, -1))
-        mean = (np.add.reduceat(corners.astype(float), starts, axis=0) / sizes[:, None])[face]
-        opposite = corners[starts[face] + (number + 2) % sizes[face]]
-        bilinear = (9 * corners + 3 * after + 3 * before + opposite) / 16
-        return np.where((sizes == 4)[face, None], bilinear, 0.5 * (corners + mean))
-
-
-def _with_inner_points(item: bpy.types.Object) -> bpy.types.Object:
-    """A copy whose faces have a smaller face in their middle: its vertices are the points."""
-    vertices, sizes = corner_vertices(item.data), face_sizes(item.data)
-    positions = np.empty(3 * len(item.data.vertices), np.float32)
-    item.data.vertices.foreach_get('co', positions)
-    positions = positions.reshape(-1, 3)
-    centres = np.repeat(face_means(item, positions[vertices]), sizes, axis=0)
-    inner = 0.5 * (positions[vertices] + centres)
-    faces: list[list[int]] = []
-    slots: list[int] = []
-    for polygon in item.data.polygons:
-        outside = list(polygon.vertices)
-        inside = [len(positions) + corner for corner in polygon.loop_indices]
-        count = len(outside)
-        faces.append(inside)
-        faces += [[outside[k], outside[(k + 1) % count], inside[(k + 1) % count], inside[k]]
-                  for k in range(count)]
-        slots += [polygon.material_index] * (count + 1)
-    mesh = bpy.data.meshes.new(f"{item.name}.points")
-    mesh.from_pydata(np.concatenate([positions, inner]).tolist(), [], faces)
-    for material in item.data.materials:
-        mesh.materials.append(material)
-    mesh.polygons.foreach_set('material_index', slots)
-    mesh.color_attributes.new(ATTRIBUTE, 'FLOAT_COLOR', 'POINT')
-    mesh.color_attributes.active_color_index = 0
-    mesh.update()
-    twin = bpy.data.objects.new(mesh.name, mesh)
-    twin.matrix_world = item.matrix_world
-    bpy.context.scene.collection.objects.link(twin)
-    # How many vertices come before the points.
-    twin["first_point"] = len(positions)
-    return twin
-
-
-def _covered_points(twins: dict[str, bpy.types.Object]) -> dict[str, np.ndarray]:
-    """(points,) by name: whether a surface of another object lies against the point."""
-    positions = {name: world_positions(twin) for name, twin in twins.items()}
-    counts = [len(twin.data.polygons) for twin in twins.values()]
-    begins = dict(zip(twins, np.cumsum([0, *map(len, positions.values())]).tolist()))
-    polygons = [[begins[name] + vertex for vertex in polygon.vertices]
-                for name, twin in twins.items() for polygon in twin.data.polygons]
-    every = np.concatenate(list(positions.values()))
-    tree = BVHTree.FromPolygons(every.tolist(), polygons)
-    owner = np.repeat(np.arange(len(twins)), counts)
-    reach = TOUCH * float(np.linalg.norm(np.ptp(every, axis=0)))
-    return {name: np.array([any(owner[face] != index
-                                for _, _, face, _ in tree.find_nearest_range(point, reach))
-                            for point in positions[name][twin["first_point"]:].tolist()], bool)
-            for index, (name, twin) in enumerate(twins.items())}
-
-
-def _bake_points(twins: Sequence[bpy.types.Object], samples: int, seed: int) -> Light:
-    scene = bpy.context.scene
-    engine = scene.render.engine
-    prepare_scene(scene, samples, seed)
-    bpy.context.view_layer.update()
-    for item in bpy.context.view_layer.objects:
-        item.select_set(item in twins)
-    bpy.context.view_layer.objects.active = twins[0]
-    bpy.ops.object.bake(type='DIFFUSE', pass_filter={'DIRECT', 'INDIRECT'},
-                        target='VERTEX_COLORS', use_selected_to_active=False, use_clear=True)
-    scene.render.engine = engine
-    return {twin.name: read_colors(twin, ATTRIBUTE)[twin["first_point"]:] for twin in twins}
-
-
-def _joined_error(light: Light, reference: Light, weights: dict[str, np.ndarray]) -> SurfaceError:
-    return surface_error(*(np.concatenate([entry[name] for name in light])
-                           for entry in (light, reference, weights)))
+        return joined_error(light, self._values, self._weights)
 
 
 # --------------------------------------------------------------------------------------------------

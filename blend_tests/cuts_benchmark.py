@@ -29,12 +29,12 @@ sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
 import small_objects  # noqa: E402
-from benchmark import SurfaceReference  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
 from mesh_densities import squared_error  # noqa: E402
 from raybundle import bake_cache  # noqa: E402
 from surface_error import (corner_areas, read_colors, surface_error,  # noqa: E402
                            world_positions)
+from surface_reference import SurfaceReference  # noqa: E402
 
 SCENES = HERE.parent / "scenes"
 SWITCHES = ("contacts", "refine")

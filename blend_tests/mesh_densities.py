@@ -37,9 +37,10 @@ sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scenes"), str(HERE)]
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
-from benchmark import Light, SurfaceReference, bake_cycles, bake_raybundle  # noqa: E402
+from benchmark import bake_cycles, bake_raybundle  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
 from raybundle.properties import assign  # noqa: E402
+from surface_reference import Light, SurfaceReference  # noqa: E402
 
 CYCLES_SAMPLES = 4096  # whose noise is stated
 

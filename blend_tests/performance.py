@@ -35,10 +35,11 @@ sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
 from area_lamps import area_lamps  # noqa: E402
-from benchmark import Light, bake_cycles, bake_raybundle  # noqa: E402
+from benchmark import bake_cycles, bake_raybundle  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
 from mesh_densities import make_plain  # noqa: E402
 from small_objects import mean_product, squared_vertex_error  # noqa: E402
+from surface_reference import Light  # noqa: E402
 
 SCENES = HERE.parent / "scenes"
 ROOMS = ("cornell_box", "big_room", "office", "two_rooms")

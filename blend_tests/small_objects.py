@@ -35,11 +35,12 @@ sys.path[:0] = [str(ROOT / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
-from benchmark import Light, SurfaceReference, bake_cycles, bake_raybundle  # noqa: E402
+from benchmark import bake_cycles, bake_raybundle  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
 from mesh_densities import squared_error  # noqa: E402
 from surface_error import (corner_areas, is_defined, off_contact_edges,  # noqa: E402
                            surface_error)
+from surface_reference import Light, SurfaceReference  # noqa: E402
 
 # Names begin with these.
 LARGE = {"house_on_plain": ("plain",), "laid_table": ("floor", "ceiling", "wall_", "lamp_")}

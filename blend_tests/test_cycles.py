@@ -14,11 +14,11 @@ import bpy
 import numpy as np
 import pytest
 import raybundle
-from benchmark import SurfaceReference
 from cycles_comparison import square
 from cycles_reference import bake_objects, bakeable_objects, load
 from surface_error import (SurfaceError, corner_areas, face_means, face_sizes, is_defined,
                            off_contact_edges, read_colors, surface_error)
+from surface_reference import SurfaceReference
 
 pytestmark = pytest.mark.needs_library
 
