@@ -112,6 +112,12 @@ def _object_mode(context: bpy.types.Context) -> Iterator[None]:
 def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[LightSet]) -> None:
     if not settings.attribute:
         raise BakeError("The attribute needs a name")
+    longest = settings.attribute
+    if settings.write_error:
+        longest = color_attribute.error_name(longest)
+    if len(longest.encode()) > color_attribute.MOST_BYTES:
+        raise BakeError(f'The name of the attribute, "{longest}", is longer than '
+                        f'{color_attribute.MOST_BYTES} bytes')
     for item in scene.objects:
         if item.type != 'MESH' or item.raybundle.role != 'BAKE':
             continue

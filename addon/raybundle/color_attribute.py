@@ -6,6 +6,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+# Of a name: longer ones are cut off, or refused, by the version of Blender.
+MOST_BYTES = 63
+
 
 def write_light(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, light: np.ndarray
                 ) -> None:

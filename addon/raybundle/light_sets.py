@@ -13,10 +13,8 @@ from dataclasses import dataclass
 import bpy
 
 from .bake_report import BakeError
+from .color_attribute import MOST_BYTES
 from .scene_data import LightSetData, SceneData
-
-# Blender cuts longer names of attributes off.
-_MOST_BYTES = 63
 
 
 @dataclass(frozen=True)
@@ -44,9 +42,9 @@ def read_light_sets(scene: bpy.types.Scene, main_attribute: str) -> list[LightSe
         if any(item.name == other.name for other in sets):
             raise BakeError(f'There are two light sets of the name "{item.name}"')
         attribute = attribute_of(item, main_attribute)
-        if len(attribute.encode()) > _MOST_BYTES:
+        if len(attribute.encode()) > MOST_BYTES:
             raise BakeError(f'Light set "{item.name}": the name of its attribute, "{attribute}", '
-                            f'is longer than {_MOST_BYTES} bytes')
+                            f'is longer than {MOST_BYTES} bytes')
         if attribute in owners:
             raise BakeError(f'Light set "{item.name}" has the same attribute, "{attribute}", as '
                             f'{owners[attribute]}: choose another name')
