@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from cycles_comparison import square
 from cycles_reference import bake_objects
+from raybundle.diffuse_angles import MEANS
 from raybundle.gloss import gloss_albedo, ior_of
 from raybundle.principled import principled_albedo
 
@@ -66,6 +67,7 @@ def test_cycles_from_above(new_object, new_world, roughness, metallic):
     assert found == pytest.approx(expected, rel=0.02, abs=0.001)
     if not metallic:
         diffuse = bake_objects([sheet], 512, 0, "DIFFUSE", passes)["Sheet"].mean()
-        shown = principled_albedo(roughness, 0.5, 1.5, node.distribution == 'MULTI_GGX', base,
-                                  True).shown
-        assert diffuse == pytest.approx(base * shown, rel=0.01)
+        found = principled_albedo(roughness, 0.5, 1.5, 0.0, node.distribution == 'MULTI_GGX', base,
+                                  True)
+        from_everywhere = found.angles.shown[0, 0] + MEANS @ found.angles.shown[1:, 0]
+        assert diffuse == pytest.approx(base * found.shown * from_everywhere, rel=0.01)

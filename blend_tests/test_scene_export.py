@@ -19,7 +19,7 @@ from raybundle.principled import principled_albedo
 from raybundle.scene_export import export_scene
 
 # Diffuse part of a Principled shader of roughness 0.5, without specular reflection.
-ALBEDO = principled_albedo(0.5, 0.0, 1.5, False, 0.5, True).diffuse
+ALBEDO = principled_albedo(0.5, 0.0, 1.5, 0.0, False, 0.5, True).diffuse[0]
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
 
@@ -402,7 +402,7 @@ def test_principled(principled):
     shader.inputs['Emission Strength'].default_value = 3.0
     material, result = exported_material(principled)
     base = np.array([0.8, 0.4, 0.2])
-    albedo = principled_albedo(0.5, 0.0, shader.inputs['IOR'].default_value,
+    albedo = principled_albedo(0.5, 0.0, shader.inputs['IOR'].default_value, 0.0,
                                shader.distribution == 'MULTI_GGX', base, True)
     assert any('"Principled"' in text and "mirrors" in text for text in result.warnings)
     for side in range(2):
@@ -410,6 +410,18 @@ def test_principled(principled):
             0.25 * ALBEDO * base + 0.5 * (albedo.metal * base + albedo.metal_edge))
         assert diffuse_of(material, side) == pytest.approx(0.25 * albedo.shown * base)
         assert material.emission[side] == pytest.approx([3 * math.pi, 1.5 * math.pi, 0.0])
+
+
+def test_light_under_the_surface_has_a_colour_of_its_own(principled):
+    shader = shader_of(principled)
+    if 'Subsurface Color' not in shader.inputs:
+        pytest.skip("it has the base colour from 4.0 on")
+    shader.inputs['Base Color'].default_value = (0.8, 0.4, 0.2, 1.0)
+    shader.inputs['Subsurface Color'].default_value = (0.2, 0.4, 0.6, 1.0)
+    shader.inputs['Subsurface'].default_value = 0.25
+    material, _ = exported_material(principled)
+    assert diffuse_of(material) == pytest.approx([0.65, 0.4, 0.3])
+    assert material.reflectance[0] == pytest.approx(ALBEDO * np.array([0.65, 0.4, 0.3]))
 
 
 def test_backfacing_separates_the_sides(new_material):
@@ -630,7 +642,7 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
     shader = shader_of(principled)
     base = np.array([0.8, 0.4, 0.0])
     shader.inputs['Base Color'].default_value = (*base, 1.0)
-    albedo = principled_albedo(0.5, 0.5, shader.inputs['IOR'].default_value,
+    albedo = principled_albedo(0.5, 0.5, shader.inputs['IOR'].default_value, 0.0,
                                shader.distribution == 'MULTI_GGX', base, True)
     material, result = exported_material(principled)
     assert result.warnings == []

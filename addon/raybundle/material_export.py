@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from .color_expression import WHITE, ColorExpression, Texture
+from .diffuse_angles import lambert
 from .image_export import ImagePixels
 from .node_reader import NodeReader, Surface, output_node
 from .scene_data import ImageData, MaterialData, SceneData, Warnings
@@ -54,6 +55,18 @@ def _diffuse_of(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     return scale, diffuse.constant - scale * whole.constant
 
 
+def _shown_by_angle(surface: Surface) -> np.ndarray:
+    """(1 + TERMS, 3), for MaterialData."""
+    color = np.maximum(surface.diffuse.mean(), 0.0)
+    return np.where(color > 1e-6, surface.shown_by_angle / np.maximum(color, 1e-6),
+                    lambert().shown)
+
+
+def _by_side(values: list[np.ndarray]) -> np.ndarray:
+    """(n, 2, 3) of (n, 3) of the front and of the back."""
+    return np.stack(values, axis=1)
+
+
 def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return np.divide(part, whole, out=np.zeros(3), where=whole != 0.0)
 
@@ -97,7 +110,7 @@ class MaterialExporter:
         """A material as Cycles baked it for the faces of one object (surface_bake.py)."""
         # What both ways only approximate is still named.
         approximated = Warnings()
-        surface = self._surface(material, False, approximated, [])
+        surface = self._surface(material, False, approximated, [], baked.diffuse_color)
         for text in (*approximated, baked.message):
             self.warnings.add(text)
         index = {}
@@ -113,7 +126,8 @@ class MaterialExporter:
             emission_image_weight=np.full((2, 3), np.pi) if glows else None,
             opacity_image=index.get('opacity'), diffuse_scale=np.tile(baked.diffuse_scale, (2, 1)),
             diffuse_offset=np.tile(baked.diffuse_offset, (2, 1)),
-            grazing=np.tile(surface.grazing, (2, 1)),
+            reflected_by_angle=_by_side([surface.reflected_by_angle] * 2),
+            shown_by_angle=_by_side([_shown_by_angle(surface)] * 2),
             translucence_image=index.get('translucence'),
             translucence_image_weight=None if baked.translucence is None else np.ones((2, 3))))
         return MaterialExport(len(self.scene.materials) - 1, baked_uvs=True)
@@ -170,7 +184,8 @@ class MaterialExporter:
             (np.pi * np.array([glow.attribute_weight for glow in glows])
              if glow_attribute is not None else None),
             1.0 - float(transmittance.mean()), diffuse_scale=scale, diffuse_offset=offset,
-            grazing=np.array([side.grazing for side in sides]),
+            reflected_by_angle=_by_side([side.reflected_by_angle for side in sides]),
+            shown_by_angle=_by_side([_shown_by_angle(side) for side in sides]),
             translucence=np.array([color.constant for color in passed]),
             translucence_image=self._image_index(passed_texture) if passed_texture else None,
             translucence_image_weight=(np.array([color.texture_weight for color in passed])
@@ -181,8 +196,9 @@ class MaterialExporter:
                               glow_attribute if attribute is None else attribute)
 
     def _surface(self, material: bpy.types.Material | None, backfacing: bool,
-                 warnings: Warnings, unread: list[str] | None = None) -> Surface:
-        """unread: gets what is inexact, which then is no warning."""
+                 warnings: Warnings, unread: list[str] | None = None,
+                 unread_color: np.ndarray | None = None) -> Surface:
+        """unread: gets what is inexact, which then is no warning. unread_color: see NodeReader."""
         if material is None:
             return Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
         # From 5.0 on every material has nodes and use_nodes only warns.
@@ -194,7 +210,7 @@ class MaterialExporter:
             return Surface()
         reader = NodeReader(f'material "{material.name}"', self.images, warnings, backfacing,
                             None if unread is None else Warnings(), varying_emission=True,
-                            mirrors=self.mirrors)
+                            mirrors=self.mirrors, unread_color=unread_color)
         surface = reader.surface(output.inputs['Surface'])
         if unread is not None:
             unread += reader.unread

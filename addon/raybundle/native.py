@@ -107,7 +107,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_material_emission_image': (_handle, _int, _int, _floats),
     'rb_set_material_emission_corner_colors': (_handle, _int, _floats),
     'rb_set_material_diffuse': (_handle, _int, _floats, _floats),
-    'rb_set_material_grazing': (_handle, _int, _floats),
+    'rb_set_material_angles': (_handle, _int, _floats, _floats),
     'rb_set_material_translucence': (_handle, _int, _floats, _int, _floats),
     'rb_set_material_opacity': (_handle, _int, _float),
     'rb_set_material_opacity_image': (_handle, _int, _int),
@@ -359,10 +359,13 @@ class Scene(_Handle):
         self._library.rb_set_material_diffuse(
             self._pointer, material, _as_floats(scale), _as_floats(offset))
 
-    def set_material_grazing(self, material: int, grazing: np.ndarray) -> None:
-        """(2, 3): what light from straight above lacks of the reflectance."""
-        grazing = _float_array(grazing, (2, 3), "grazing")
-        self._library.rb_set_material_grazing(self._pointer, material, _as_floats(grazing))
+    def set_material_angles(self, material: int, reflected: np.ndarray, shown: np.ndarray) -> None:
+        """(4, 2, 3): by the terms of diffuse_angles.py, how the reflectance depends on the light's
+        angle; (5, 2, 3): what outputs show of light from straight above, then by the terms."""
+        reflected = _float_array(reflected, (4, 2, 3), "reflected")
+        shown = _float_array(shown, (5, 2, 3), "shown")
+        self._library.rb_set_material_angles(
+            self._pointer, material, _as_floats(reflected), _as_floats(shown))
 
     def set_material_translucence(self, material: int, translucence: np.ndarray,
                                   image: int | None = None,

@@ -25,7 +25,7 @@ def build_native_scene(data: SceneData) -> native.Scene:
         if material.emission_color_weight is not None:
             scene.set_material_emission_corner_colors(identifier, material.emission_color_weight)
         scene.set_material_diffuse(identifier, material.diffuse_scale, material.diffuse_offset)
-        scene.set_material_grazing(identifier, material.grazing)
+        scene.set_material_angles(identifier, material.reflected_by_angle, material.shown_by_angle)
         scene.set_material_translucence(
             identifier, material.translucence,
             None if material.translucence_image is None else images[material.translucence_image],

@@ -18,6 +18,7 @@ import numpy as np
 from mathutils import Euler, Matrix
 
 from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
+from .diffuse_angles import TERMS, oren_nayar
 from .gloss import GlossAlbedo, gloss_albedo
 from .image_export import ImagePixels, sphere_mean
 from .principled import GLOSS_SOCKETS, METAL_IOR, principled_albedo
@@ -60,14 +61,20 @@ class Surface:
     transmittance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) straight through
     # What of the reflectance is a diffuse colour.
     diffuse: ColorExpression = field(default_factory=ColorExpression)
-    # (3,): what light from straight above lacks of it.
-    grazing: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # (TERMS, 3): how the reflectance depends on the light's angle (diffuse_angles.py).
+    reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
+    # (1 + TERMS, 3): what is seen of light by its angle, times the mean of the diffuse colour.
+    shown_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((1 + TERMS, 3)))
     # What leaves it, diffusely, of the light on the other side.
     translucence: ColorExpression = field(default_factory=ColorExpression)
 
     @staticmethod
-    def matt(color: ColorExpression) -> Surface:
-        return Surface(color, diffuse=color)
+    def matt(color: ColorExpression, roughness: float = 0.0) -> Surface:
+        mean = np.maximum(color.mean(), 0.0)
+        angles = oren_nayar(roughness, mean)
+        return Surface(color.scaled(angles.albedo), diffuse=color,
+                       reflected_by_angle=mean * angles.reflected,
+                       shown_by_angle=mean * angles.shown)
 
     @property
     def emission(self) -> np.ndarray:
@@ -77,7 +84,8 @@ class Surface:
     def scaled(self, factor: float) -> Surface:
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
                        self.transmittance * factor, self.diffuse.scaled(factor),
-                       self.grazing * factor, self.translucence.scaled(factor))
+                       self.reflected_by_angle * factor, self.shown_by_angle * factor,
+                       self.translucence.scaled(factor))
 
 
 @dataclass(frozen=True)
@@ -96,12 +104,14 @@ class NodeReader:
     What is only approximated goes to the warnings. What a node does and the reader cannot express
     goes to `inexact`, for there is another way to it (surface_bake.py); by default it is a warning
     too. varying_emission: whether emission may be more than a constant. mirrors: whether diffuse
-    light sees gloss.
+    light sees gloss. unread_color: (3,), what stands for colours that cannot be read; None: that of
+    the socket.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
                  backfacing: bool = False, inexact: Warnings | None = None,
-                 varying_emission: bool = False, mirrors: bool = True) -> None:
+                 varying_emission: bool = False, mirrors: bool = True,
+                 unread_color: np.ndarray | None = None) -> None:
         self.owner = owner  # what warnings name, such as 'material "Wall"'
         self.images = images
         self.warnings = warnings
@@ -109,6 +119,7 @@ class NodeReader:
         self.inexact = warnings if inexact is None else inexact
         self.varying_emission = varying_emission
         self.mirrors = mirrors
+        self.unread_color = unread_color
         self.unread: list[str] = []  # what is inexact, without the consequences
 
     # ----------------------------------------------------------------------------------------------
@@ -123,7 +134,8 @@ class NodeReader:
         if node is None:
             return Surface()
         if node.type == 'BSDF_DIFFUSE':
-            return Surface.matt(self.color(node.inputs['Color'], path))
+            return Surface.matt(self.color(node.inputs['Color'], path),
+                                self._usual(node, *GLOSS_SOCKETS[0], path))
         if node.type == 'BSDF_PRINCIPLED':
             return self._principled(node, path)
         if node.type in GLOSSY:
@@ -164,7 +176,7 @@ class NodeReader:
         radiance = ColorExpression()
         if strength:
             radiance = self._emission_color(emission, path).scaled(strength)
-        base = self.color(node.inputs['Base Color'], path)
+        base = self._base_color(node, path)
         transmittance = WHITE * (1.0 - alpha)
         metallic = float(np.clip(self.value(node.inputs['Metallic'], path), 0.0, 1.0))
         if metallic > 0.0:
@@ -175,29 +187,43 @@ class NodeReader:
             transmittance = transmittance + alpha * through * np.clip(base.mean(), 0.0, 1.0)
         mean = np.clip(base.mean(), 0.0, 1.0)
         albedo = principled_albedo(
-            *(self._usual(_input(node, *names), path, usual) for names, usual in GLOSS_SOCKETS),
+            *(self._usual(node, names, usual, path) for names, usual in GLOSS_SOCKETS),
             node.distribution == 'MULTI_GGX', mean, self.mirrors)
         opaque = 1.0 - metallic - through
         reflectance = base.scaled(opaque * albedo.diffuse + metallic * albedo.metal).plus(
             ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
-        grazing = (opaque * (mean * albedo.diffuse_grazing + albedo.specular_grazing)
-                   + metallic * albedo.metal_grazing)
+        shown = opaque * albedo.shown * alpha
         return Surface(reflectance.scaled(alpha), radiance.scaled(alpha), transmittance,
-                       base.scaled(opaque * albedo.shown * alpha), alpha * grazing * WHITE)
+                       base.scaled(shown), alpha * albedo.reflected_by_angle(mean, opaque, metallic),
+                       shown * mean * albedo.angles.shown)
+
+    def _base_color(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]
+                    ) -> ColorExpression:
+        """What is scattered under the surface has a colour of its own before 4.0."""
+        base = self.color(node.inputs['Base Color'], path)
+        if 'Subsurface Color' not in node.inputs:
+            return base
+        share = float(np.clip(self.value(node.inputs['Subsurface'], path), 0.0, 1.0))
+        if share == 0.0:
+            return base
+        under = self.color(node.inputs['Subsurface Color'], path)
+        return self._plus(base.scaled(1.0 - share), under.scaled(share), node)
 
     def _glossy(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
         if not self.mirrors:
             return Surface()
         color = self.color(_input(node, 'Color', 'Base Color'), path)
-        names, usual = GLOSS_SOCKETS[0]
-        albedo = glossy_albedo(node, self._usual(_input(node, *names), path, usual))
+        albedo = glossy_albedo(node, self._usual(node, *GLOSS_SOCKETS[0], path))
         mean = np.maximum(np.clip(color.mean(), 0.0, 1.0), 1e-6)
         return Surface(color.scaled(albedo.of(mean, node.distribution == 'MULTI_GGX') / mean))
 
-    def _usual(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...],
-               usual: float) -> float:
-        """A value that is no reason to ask Cycles: where it varies it is the usual one."""
-        source = _follow(socket, path)
+    def _usual(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
+               path: tuple[bpy.types.Node, ...]) -> float:
+        """A value that is no reason to ask Cycles: where it varies, or no input has one of the names,
+        it is the usual one."""
+        if not any(name in node.inputs for name in names):
+            return usual
+        source = _follow(_input(node, *names), path)
         if source.node is None:
             return _default_value(source.socket)
         return source.output.default_value if source.node.type == 'VALUE' else usual
@@ -216,7 +242,8 @@ class NodeReader:
                             self._plus(total.radiance, part.radiance, node),
                             total.transmittance + part.transmittance,
                             total.diffuse.plus(part.diffuse).simplified(),
-                            total.grazing + part.grazing,
+                            total.reflected_by_angle + part.reflected_by_angle,
+                            total.shown_by_angle + part.shown_by_angle,
                             self._plus(total.translucence, part.translucence, node))
         return total
 
@@ -245,7 +272,8 @@ class NodeReader:
         if node.type in _VALUE_NODES:
             return ColorExpression(WHITE * self._node_value(source))
         self._inexact(node, "cannot be read: the colour of the socket it is linked to is used")
-        return ColorExpression(_default_color(source.socket))
+        return ColorExpression(_default_color(source.socket) if self.unread_color is None
+                               else self.unread_color)
 
     def _emission_color(self, socket: bpy.types.NodeSocket,
                         path: tuple[bpy.types.Node, ...]) -> ColorExpression:

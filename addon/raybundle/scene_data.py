@@ -38,8 +38,11 @@ class MaterialData:
     # (2, 3) each: scale * reflectance + offset is diffuse, the rest gloss.
     diffuse_scale: np.ndarray = field(default_factory=lambda: np.ones((2, 3)))
     diffuse_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    # (2, 3): what light from straight above lacks of the reflectance.
-    grazing: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    # By the terms of diffuse_angles.py: (4, 2, 3) of the reflectance; (5, 2, 3) what outputs show of
+    # light from straight above, then by the terms.
+    reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
+    shown_by_angle: np.ndarray = field(
+        default_factory=lambda: np.concatenate([np.ones((1, 2, 3)), np.zeros((4, 2, 3))]))
     # (2, 3): what leaves a side, diffusely, of the light that arrives at the other.
     translucence: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
     translucence_image: int | None = None

@@ -14,12 +14,13 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from .diffuse_angles import facet_shares, oren_nayar
 from .node_reader import GLOSSY, glossy_albedo
 from .principled import GLOSS_SOCKETS, PrincipledAlbedo, principled_albedo
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
     'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
-# DIFFUSE is the reflectance where nothing has gloss.
+# DIFFUSE is the reflectance where nothing has gloss and nothing diffuse is rough.
 PROPERTIES = (REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE)
 _USUAL_COLOR = 0.5  # of a metal whose colour varies
 
@@ -61,7 +62,8 @@ class ShaderColors:
                 self._rewrite_shader(tree, node)
 
     def _rewrite_shader(self, tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
-        self.has_gloss |= node.type == 'BSDF_PRINCIPLED' or node.type in GLOSSY
+        self.has_gloss |= (node.type == 'BSDF_PRINCIPLED' or node.type in GLOSSY
+                           or node.type == 'BSDF_DIFFUSE' and _is_rough(node))
         build = _SHADERS.get((node.type, self.wanted))
         # A muted shader passes nothing on.
         if build is not None and not node.mute:
@@ -151,8 +153,12 @@ class _Formula:
         """Of colours."""
         if isinstance(a, tuple) and isinstance(b, tuple):
             return tuple(x + y for x, y in zip(a, b))
+        return self.vector('ADD', a, b)
+
+    def vector(self, operation: str, a: _Value, b: _Value) -> _Value:
+        """Of colours, channel by channel."""
         node = self.tree.nodes.new('ShaderNodeVectorMath')
-        node.operation = 'ADD'
+        node.operation = operation
         _set(self.tree, node.inputs[0], a)
         _set(self.tree, node.inputs[1], b)
         return node.outputs[0]
@@ -178,12 +184,46 @@ _TRANSMISSION = ('Transmission Weight', 'Transmission')
 
 
 def _usual(formula: _Formula, node: bpy.types.Node, names: tuple[str, ...], usual: float) -> float:
+    if not any(name in node.inputs for name in names):
+        return usual
     value = formula.raw(node, *names)
     return usual if isinstance(value, bpy.types.NodeSocket) else value
 
 
-def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlbedo:
+def _is_rough(node: bpy.types.Node) -> bool:
+    socket = node.inputs['Roughness']
+    return socket.is_linked or socket.default_value > 0.0
+
+
+def _rough_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
+    color = formula.raw(node, 'Color')
+    roughness = _usual(formula, node, *GLOSS_SOCKETS[0])
+    if isinstance(color, tuple):
+        return tuple(np.array(color) * oren_nayar(roughness, np.array(color)).albedo)
+    once, again = facet_shares(roughness)
+    if again == 0.0:
+        return formula.scaled(color, once)
+    # Light that meets several facets.
+    rest = formula.vector('SUBTRACT', (1.0, 1.0, 1.0), formula.scaled(color, 1.0 - once))
+    cube = formula.vector('MULTIPLY', color, formula.vector('MULTIPLY', color, color))
+    return formula.plus(formula.scaled(color, once),
+                        formula.scaled(formula.vector('DIVIDE', cube, rest), again))
+
+
+def _base_color(formula: _Formula, node: bpy.types.Node) -> _Value:
     base = formula.raw(node, 'Base Color')
+    # Before 4.0.
+    if 'Subsurface Color' not in node.inputs:
+        return base
+    share = formula.value(node, 'Subsurface')
+    if share == 0.0:
+        return base
+    return formula.plus(formula.scaled(base, formula.rest(share)),
+                        formula.scaled(formula.raw(node, 'Subsurface Color'), share))
+
+
+def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlbedo:
+    base = _base_color(formula, node)
     return principled_albedo(
         *(_usual(formula, node, names, usual) for names, usual in GLOSS_SOCKETS),
         node.distribution == 'MULTI_GGX',
@@ -199,11 +239,11 @@ def _principled_shares(formula: _Formula, node: bpy.types.Node) -> tuple[_Value,
 
 
 def _principled_reflectance(formula: _Formula, node: bpy.types.Node) -> _Value:
-    albedo, base = _principled_albedo(formula, node), formula.raw(node, 'Base Color')
+    albedo, base = _principled_albedo(formula, node), _base_color(formula, node)
     opaque, metal = _principled_shares(formula, node)
     white = (1.0, 1.0, 1.0)
     return formula.plus(
-        formula.plus(formula.scaled(base, formula.times(opaque, albedo.diffuse)),
+        formula.plus(formula.scaled(base, formula.times(opaque, float(albedo.diffuse.mean()))),
                      formula.scaled(base, formula.times(metal, float(albedo.metal)))),
         formula.plus(formula.scaled(white, formula.times(opaque, albedo.specular)),
                      formula.scaled(white, formula.times(metal, float(albedo.metal_edge)))))
@@ -211,7 +251,7 @@ def _principled_reflectance(formula: _Formula, node: bpy.types.Node) -> _Value:
 
 def _principled_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
     opaque, _ = _principled_shares(formula, node)
-    return formula.scaled(formula.raw(node, 'Base Color'),
+    return formula.scaled(_base_color(formula, node),
                           formula.times(opaque, _principled_albedo(formula, node).shown))
 
 
@@ -241,7 +281,7 @@ def _principled_transmittance(formula: _Formula, node: bpy.types.Node) -> _Value
 
 # The colour of a property, by kind of shader; a shader that is not here has none of it.
 _SHADERS: dict[tuple[str, str], Callable[[_Formula, bpy.types.Node], _Value]] = {
-    ('BSDF_DIFFUSE', REFLECTANCE): _color,
+    ('BSDF_DIFFUSE', REFLECTANCE): _rough_diffuse,
     ('BSDF_DIFFUSE', DIFFUSE): _color,
     ('SUBSURFACE_SCATTERING', REFLECTANCE): _color,
     ('SUBSURFACE_SCATTERING', DIFFUSE): _color,

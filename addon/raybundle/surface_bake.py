@@ -45,6 +45,7 @@ class BakedMaterial:
     # (3,) each: scale * reflectance + offset is diffuse, as nearly as that goes for all its pixels.
     diffuse_scale: np.ndarray
     diffuse_offset: np.ndarray
+    diffuse_color: np.ndarray  # (3,), the mean
 
 
 @dataclass(frozen=True)
@@ -188,12 +189,15 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
     diffuse = images.get(DIFFUSE, black) if stage.has_gloss else whole
     sizes = np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get('loop_total', sizes)
-    return BakedSurface(atlas.uvs, {
-        slot: BakedMaterial(f'material "{item.material_slots[slot].material.name}": baked by '
-                            f'Cycles on "{item.name}", because of {reason}',
-                            whole, images.get(RADIANCE), opacity, images.get(TRANSLUCENCE),
-                            *_line_through(*_pixels(atlas, sizes, slots == slot, whole, diffuse)))
-        for slot, reason in reasons.items()})
+    materials = {}
+    for slot, reason in reasons.items():
+        pixels, diffuse_pixels = _pixels(atlas, sizes, slots == slot, whole, diffuse)
+        materials[slot] = BakedMaterial(
+            f'material "{item.material_slots[slot].material.name}": baked by Cycles on '
+            f'"{item.name}", because of {reason}', whole, images.get(RADIANCE), opacity,
+            images.get(TRANSLUCENCE), *_line_through(pixels, diffuse_pixels),
+            diffuse_pixels.mean(axis=0) if len(diffuse_pixels) else np.zeros(3))
+    return BakedSurface(atlas.uvs, materials)
 
 
 def _pixels(atlas: FaceAtlas, sizes: np.ndarray, faces: np.ndarray, *images: np.ndarray

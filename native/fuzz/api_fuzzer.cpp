@@ -170,7 +170,6 @@ void addMaterial(Bytes& in, rb_scene scene) {
             break;
         case 4:
             expectMessage(rb_set_material_diffuse(scene, target, a.data(), b.data()));
-            expectMessage(rb_set_material_grazing(scene, target, b.data()));
             break;
         case 5:
             expectMessage(rb_set_material_opacity(scene, target, in.number()));
@@ -180,8 +179,12 @@ void addMaterial(Bytes& in, rb_scene scene) {
             expectMessage(
                 rb_set_material_translucence(scene, target, a.data(), in.small(), b.data()));
             break;
-        default:
+        default: {
+            const auto reflected = in.numbers<24>();
+            const auto shown = in.numbers<30>();
+            expectMessage(rb_set_material_angles(scene, target, reflected.data(), shown.data()));
             break;
+        }
     }
 }
 

@@ -79,7 +79,8 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_add_material(scene, "", kGrey, nullptr, &id), "emission");
     expectInvalid(rb_add_material(scene, "", kGrey, kBlack, nullptr), "material");
     expectInvalid(rb_set_material_diffuse(scene, 0, nullptr, kBlack), "scale");
-    expectInvalid(rb_set_material_grazing(scene, 0, nullptr), "grazing");
+    expectInvalid(rb_set_material_angles(scene, 0, nullptr, kAngles), "reflected");
+    expectInvalid(rb_set_material_angles(scene, 0, kAngles, nullptr), "shown");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, nullptr), "offset");
     expectInvalid(rb_set_material_translucence(scene, 0, nullptr, -1, nullptr), "translucence");
     expectInvalid(rb_add_mesh(scene, "", nullptr, 8, kCorners, 24, kFaces, 6, nullptr, &id),
@@ -120,7 +121,7 @@ TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
         expectInvalid(rb_set_material_opacity_image(scene, material, bad),
                       "image " + std::to_string(bad));
         expectInvalid(rb_set_material_opacity(scene, bad, 0.5f), "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_grazing(scene, bad, kGrey),
+        expectInvalid(rb_set_material_angles(scene, bad, kAngles, kAngles),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_diffuse(scene, bad, kGrey, kBlack),
                       "material " + std::to_string(bad));
@@ -216,7 +217,12 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     expectInvalid(rb_add_material(scene, "fog", negative, kBlack, &id), "fog");
     expectInvalid(rb_add_material(scene, "fog", kGrey, negative, &id), "fog");
     expectInvalid(rb_set_material_diffuse(scene, 0, bad, kBlack), "scale");
-    expectInvalid(rb_set_material_grazing(scene, 0, bad), "grazing");
+    float badAngles[30] = {};
+    badAngles[17] = INFINITY;
+    expectInvalid(rb_set_material_angles(scene, 0, badAngles, kAngles), "reflected");
+    badAngles[17] = 0;
+    badAngles[29] = NAN;
+    expectInvalid(rb_set_material_angles(scene, 0, kAngles, badAngles), "shown");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, bad), "offset");
     expectInvalid(rb_set_material_translucence(scene, 0, bad, -1, nullptr), "translucence");
     const float infinite[3] = {0, INFINITY, 0}, zero[3] = {0, 0, 0};

@@ -19,6 +19,7 @@ inline constexpr float kIdentity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 inline constexpr float kGrey[6] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
 inline constexpr float kBlack[6] = {0, 0, 0, 0, 0, 0};
 inline constexpr float kGlow[6] = {1, 1, 1, 0, 0, 0};
+inline constexpr float kAngles[30] = {1, 1, 1, 1, 1, 1};
 inline constexpr float kOne[3] = {1, 1, 1};
 
 inline std::string message() { return rb_get_error_message(); }

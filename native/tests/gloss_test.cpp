@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Reflectance that is not diffuse: it carries light on, leaves outputs with colour alone, and is
-// more where the light of the sources comes in at grazing angles.
+// more where the light of the sources comes in at grazing angles. And what outputs show of light by
+// its angle.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -46,7 +47,7 @@ TEST(Gloss, IsNoPartOfWhatLeaves) {
 Scene boardOverFloor(double cosine, float grazing) {
     Scene scene;
     Material white = grey("white", 0.5f);
-    white.grazing[0] = glm::vec3(grazing);
+    white.reflectanceByAngle[0][2] = glm::vec3(21 * grazing);
     place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), white);
     place(scene, rectangle("board", {-1, -1, 0.8f}, {0, 2, 0}, {2, 0, 0}), grey("black", 0));
     Light sun = sunLight({std::sqrt(1 - cosine * cosine), 0, cosine}, glm::dvec3(3));
@@ -72,9 +73,67 @@ TEST(Gloss, MoreIsReflectedAtGrazingAngles) {
     }
 }
 
+// Of no shader; with terms that none has alone.
+Material shownByAngle(Material material) {
+    material.shownFromAbove[0] = {0.8f, 0.9f, 1.0f};
+    material.shownByAngle[0] = {glm::vec3(0.1f, 0.2f, -0.1f), glm::vec3(-0.3f, 0.1f, 0.2f),
+                                glm::vec3(0.5f, -0.4f, 0.3f), glm::vec3(-0.2f, 0.6f, 0.7f)};
+    return material;
+}
+
+TEST(ShownByAngle, OfTheSunIsExact) {
+    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
+        for (double cosine : {1.0, 0.5, 0.1}) {
+            Scene scene;
+            const Material white = shownByAngle(grey("white", 0.5f));
+            place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), white);
+            scene.addLight(sunLight({std::sqrt(1 - cosine * cosine), 0, cosine}, glm::dvec3(3)));
+            Bake bake;
+            setQuick(bake);
+            bake.settings.reconstruction = reconstruction;
+            bake.run(scene);
+            const double rest = 1 - cosine, fifth = std::pow(rest, 5);
+            for (int c = 0; c < 3; ++c) {
+                double share = double(white.shownFromAbove[0][c]);
+                const double terms[] = {rest, rest * rest, fifth, cosine * fifth};
+                for (size_t k = 0; k < 4; ++k)
+                    share += terms[k] * double(white.shownByAngle[0][k][c]);
+                for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
+                    EXPECT_NEAR(double(light[c]) * kPi / (3 * cosine), share, 1e-4);
+                for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_COMBINED))
+                    EXPECT_NEAR(double(light[c]) * kPi / (3 * cosine), 0.5 * share, 1e-4);
+            }
+        }
+}
+
+TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
+    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
+        // A furnace: the irradiance is 1.
+        Scene scene = closedCube(0.6f, 0.4f);
+        for (Material& material : scene.materials) material = shownByAngle(material);
+        Bake bake;
+        setQuick(bake);
+        bake.settings.reconstruction = reconstruction;
+        bake.run(scene);
+        const Material& white = scene.materials.front();
+        for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
+            for (int c = 0; c < 3; ++c)
+                EXPECT_NEAR(
+                    double(light[c]) * kPi,
+                    double(white.shownFromAbove[0][c] + white.shownByAngle[0][0][c] / 3 +
+                           white.shownByAngle[0][1][c] / 6 + white.shownByAngle[0][2][c] / 21 +
+                           white.shownByAngle[0][3][c] / 84),
+                    1e-4)
+                    << reconstruction;
+        EXPECT_LT(reportOf(bake)["estimated_error"].get<double>(), 1e-3);
+        EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 1e-4);
+    }
+}
+
 Scene paintedRoom(float grazing) {
     Scene scene = roomWithBoxes(0.6f);
-    for (Material& material : scene.materials) material.grazing[0] = glm::vec3(grazing);
+    for (Material& material : scene.materials)
+        material.reflectanceByAngle[0][2] = glm::vec3(21 * grazing);
     scene.addLight(pointLight({1, 1, 2}, {3, 5, 2}));
     return scene;
 }

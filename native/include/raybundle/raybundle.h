@@ -124,11 +124,16 @@ RB_API rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t m
 RB_API rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float scale[6],
                                         const float offset[6]);
 
-/* How much less of the light that comes from straight above is reflected than of light from
- * everywhere, which reflectance is for (six floats, likewise). Light of the sources at an angle of
- * cosine c is reflected by reflectance + grazing * (21 (1 - c)^5 - 1), with first shot GATHER.
- * Without it 0. */
-RB_API rb_error rb_set_material_grazing(rb_scene scene, int32_t material, const float grazing[6]);
+/* How reflection depends on the cosine c between the normal and the light, by the terms 1 - c,
+ * (1 - c)^2, (1 - c)^5 and c (1 - c)^5, with first shot GATHER.
+ *   reflected  six floats, likewise, for each term. The reflectance is for light from everywhere;
+ *              light of the sources meets more by the sum of these factors times the term less its
+ *              mean (1/3, 1/6, 1/21, 1/84)
+ *   shown      six floats for light from straight above, then for each term: outputs show light times
+ *              the first plus the sum of the others times the terms, 0 to 16 in all
+ * Without it 0 and, for light from straight above, 1. */
+RB_API rb_error rb_set_material_angles(rb_scene scene, int32_t material, const float reflected[24],
+                                       const float shown[30]);
 
 /* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.
  * Reflectance and emission remain those of the whole surface, so reflectance is at most the

@@ -109,12 +109,22 @@ rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float s
     });
 }
 
-rb_error rb_set_material_grazing(rb_scene scene, int32_t material, const float grazing[6]) {
+rb_error rb_set_material_angles(rb_scene scene, int32_t material, const float reflected[24],
+                                const float shown[30]) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
-        need(grazing, "grazing");
-        needFinite(grazing, 6, "grazing");
-        held->material(material).grazing = {vec3(grazing), vec3(grazing + 3)};
+        need(reflected, "reflected");
+        need(shown, "shown");
+        needFinite(reflected, 24, "reflected");
+        needFinite(shown, 30, "shown");
+        Material& target = held->material(material);
+        for (size_t side = 0; side < 2; ++side) {
+            target.shownFromAbove[side] = vec3(shown + 3 * side);
+            for (size_t term = 0; term < target.shownByAngle[side].size(); ++term) {
+                target.reflectanceByAngle[side][term] = vec3(reflected + 6 * term + 3 * side);
+                target.shownByAngle[side][term] = vec3(shown + 6 * (term + 1) + 3 * side);
+            }
+        }
     });
 }
 

@@ -206,7 +206,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                            exposed, settings, progress, report);
         const std::vector<float> weight = exposedArea(patches, exposed);
         stateErrors(scene, tiles, instanceRanges(scene, patches),
-                    meanOver(tiles, shown.of(irradiance, exposed), weight),
+                    meanOver(tiles, shown.of(lights, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
                     settings.targetError, made, report);
     }

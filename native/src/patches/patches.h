@@ -112,7 +112,7 @@ struct Patches {
     std::vector<float> area;
     std::vector<float> opacity;          // per patch; empty where all are opaque
     std::vector<glm::vec3> reflectance;  // per side
-    std::vector<glm::vec3> grazing;      // per side, see Material; empty where all are 0
+    std::vector<AngleFactors> byAngle;   // per side: of the reflectance; empty where all are 0
     std::vector<glm::vec3> emission;     // per side, W/m^2
     // Per side: what leaves it of the light that arrives at the other side of the patch; empty
     // where all are 0.

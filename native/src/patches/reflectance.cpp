@@ -156,11 +156,11 @@ void assignOpacity(const Scene& scene, Patches& patches) {
 void assignMaterials(const Scene& scene, Patches& patches) {
     patches.reflectance.resize(patches.sideCount());
     patches.emission.resize(patches.sideCount());
-    constexpr std::array<glm::vec3, 2> kNone{glm::vec3(0.0f), glm::vec3(0.0f)};
-    const bool hasGrazing =
+    const std::array<AngleFactors, 2> none{};
+    const bool hasAngles =
         std::any_of(scene.materials.begin(), scene.materials.end(),
-                    [&](const Material& material) { return material.grazing != kNone; });
-    patches.grazing.assign(hasGrazing ? patches.sideCount() : 0, glm::vec3(0.0f));
+                    [&](const Material& material) { return material.reflectanceByAngle != none; });
+    patches.byAngle.assign(hasAngles ? patches.sideCount() : 0, AngleFactors{});
     const bool hasTranslucence =
         std::any_of(scene.materials.begin(), scene.materials.end(),
                     [](const Material& material) { return material.isTranslucent(); });
@@ -180,7 +180,10 @@ void assignMaterials(const Scene& scene, Patches& patches) {
                 patches.reflectance[2 * p + side] =
                     glm::clamp(scale * (material.reflectance[side] + varying.reflectance), 0.0f,
                                kMaxReflectance);
-                if (hasGrazing) patches.grazing[2 * p + side] = scale * material.grazing[side];
+                for (size_t term = 0; hasAngles && term < material.reflectanceByAngle[side].size();
+                     ++term)
+                    patches.byAngle[2 * p + side][term] =
+                        scale * material.reflectanceByAngle[side][term];
                 if (hasTranslucence)
                     patches.translucence[2 * p + side] = glm::clamp(
                         scale * (material.translucence[side] + varying.translucence[side]),

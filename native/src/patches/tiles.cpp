@@ -12,7 +12,7 @@ Tiles::Tiles(const Patches& cut) : original(cut) {
     uncut->sheets = {};
     uncut->opacity.clear();
     uncut->reflectance.clear();
-    uncut->grazing.clear();
+    uncut->byAngle.clear();
     uncut->translucence.clear();
     uncut->emission.clear();
     uncut->parentOf.clear();

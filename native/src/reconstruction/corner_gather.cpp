@@ -83,7 +83,9 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
             corners.size() + behind.size(), receiverAt, settings.targetError,
             [&](double done) { part.report(RB_STAGE_RECONSTRUCTION, done); });
         std::vector<glm::vec3>& light = sources.emplace_back();
-        for (size_t c = 0; c < corners.size(); ++c) light.push_back(gathered[c].irradiance);
+        for (size_t c = 0; c < corners.size(); ++c)
+            light.push_back(shown.byAngle(corners[c].receiver.side, gathered[c].meanAngles()) *
+                            gathered[c].irradiance);
         for (size_t b = 0; b < behind.size(); ++b) {
             glm::vec3& own = light[behind[b]];
             own = shown.of(corners[behind[b]].receiver.side, own,
@@ -136,6 +138,10 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
     }
     const auto means =
         nodeMeans(instance, regions, cornerAngles, [&](size_t c) { return sources[k][c]; });
+    for (size_t node = 0; node < light.shownShare.size(); ++node) {
+        light.carried[node] *= light.shownShare[node];
+        light.indirect[node] *= light.shownShare[node];
+    }
     for (size_t node = 0; node < means.size(); ++node)
         if (means[node]) light.direct[node] = light.carried[node] + *means[node];
 }

@@ -36,6 +36,8 @@ class CornerGather {
     struct NodeLight {
         std::vector<glm::vec3> direct, indirect;
         std::vector<glm::vec3> carried;  // of the direct light what is not from sources
+        // What is shown of the indirect and the carried light, which are as they arrive; empty: all.
+        std::vector<glm::vec3> shownShare;
     };
 
     // Puts what corners gather of light k in its place; nodes none of whose corners can gather keep

@@ -7,9 +7,8 @@
 namespace raybundle {
 
 void addFaceSlopes(const Patches& patches, const InstanceRange& range, const SmoothRegions& regions,
-                   rb_side side, const std::vector<glm::vec3>& color, const SetLight& light,
-                   float targetError, std::vector<glm::vec3>& direct,
-                   std::vector<glm::vec3>& exitance) {
+                   rb_side side, const ShownLight& shown, const SetLight& light, float targetError,
+                   std::vector<glm::vec3>& direct, std::vector<glm::vec3>& exitance) {
     if (light.direct.lightSources().empty()) return;
     std::vector<uint32_t> cells(regions.nodeCount, 0), patchesOf(range.lastCell - range.firstCell);
     auto forEachNode = [&](const Cell& cell, const auto& visit) {
@@ -42,14 +41,17 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
             continue;
         // Slopes that make less than a part of the target error are no matter.
         light.direct.unblocked(at, points.data(), count, 0.25f * targetError, values.data());
+        const glm::vec3 factor = light.shot.angles.empty()
+                                     ? shown.byAngle(at, kEverywhere)
+                                     : shown.byAngle(at, light.shot.angles[at]);
         glm::vec3 mean(0.0f), share(0.0f);
         for (size_t k = 0; k < count; ++k) mean += values[k] / float(count);
         for (int c = 0; c < 3; ++c)
             if (mean[c] > 0) share[c] = std::min(1.0f, gathered[c] / mean[c]);
         for (size_t k = 0; k < count; ++k) {
-            const glm::vec3 slope = glm::max(share * (values[k] - mean), -gathered);
+            const glm::vec3 slope = factor * glm::max(share * (values[k] - mean), -gathered);
             direct[nodes[k]] += slope;
-            exitance[nodes[k]] += color[at] * slope;
+            exitance[nodes[k]] += shown.color()[at] * slope;
         }
     }
 }

@@ -13,16 +13,16 @@
 #include "patches/patches.h"
 #include "raybundle/raybundle.h"
 #include "reconstruction/least_squares.h"
+#include "reconstruction/shown_light.h"
 #include "reconstruction/smooth_regions.h"
 #include "transport/set_light.h"
 
 namespace raybundle {
 
 // Adds what light differs there from its mean to the nodes of an instance: to the direct
-// irradiance, and times the colour (per patch side) to the exitance, W/m^2.
+// irradiance, and times the colour to the exitance, W/m^2.
 void addFaceSlopes(const Patches& patches, const InstanceRange& range, const SmoothRegions& regions,
-                   rb_side side, const std::vector<glm::vec3>& color, const SetLight& light,
-                   float targetError, std::vector<glm::vec3>& direct,
-                   std::vector<glm::vec3>& exitance);
+                   rb_side side, const ShownLight& shown, const SetLight& light, float targetError,
+                   std::vector<glm::vec3>& direct, std::vector<glm::vec3>& exitance);
 
 }  // namespace raybundle

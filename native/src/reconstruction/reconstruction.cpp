@@ -31,7 +31,9 @@ struct SideLight {
     Irradiance shown;
     Field emission;  // W/m^2
     Field exitance;  // emission included, W/m^2
-    Field carried;   // direct light without that of the sources, W/m^2
+    // As if all of it were shown, whatever its angle, W/m^2.
+    Field carried;  // direct light without that of the sources
+    Field indirect;
 };
 
 bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side side,
@@ -51,15 +53,15 @@ std::vector<SideLight> sideLights(const Patches& patches, const ShownLight& show
                                   const std::vector<float>& exposed, const SetLights& lights) {
     std::vector<SideLight> result;
     for (const SetLight& light : lights) {
-        SideLight out{shown.of(light.irradiance, exposed), light.direct.emission(),
-                      Field(patches.sideCount()), Field(patches.sideCount())};
-        const Irradiance& h = out.shown;
-        for (size_t side = 0; side < h.direct.size(); ++side) {
+        Irradiance all = shown.of(light.irradiance, exposed);
+        SideLight out{shown.of(light, exposed), light.direct.emission(), Field(patches.sideCount()),
+                      std::move(all.direct), std::move(all.indirect)};
+        for (size_t side = 0; side < out.exitance.size(); ++side) {
             // Of the whole patch, what lets light through included.
             const float opacity = patches.opacityOf(uint32_t(side / 2));
             out.emission[side] *= opacity;
-            out.exitance[side] = out.emission[side] + shown.color()[side] * h.all(side);
-            out.carried[side] = h.direct[side] - h.gathered[side];
+            out.exitance[side] = out.emission[side] + shown.color()[side] * out.shown.all(side);
+            out.carried[side] -= all.gathered[side];
         }
         result.push_back(std::move(out));
     }
@@ -129,14 +131,20 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         out.cornerAngles = cornerAngles(mesh);
         const SmoothRegions regions =
             smoothRegions(mesh, patches.cells, ranges[i].firstCell, ranges[i].lastCell);
-        // Three fields of each light, one after the other; for POINT the colour is the last.
+        // Three fields of each light, one after the other; for POINT the colour, and what is shown of
+        // light from everywhere, are the last.
         std::vector<const Field*> fields;
-        for (const SideLight& light : onSides)
-            fields.insert(fields.end(), {&light.shown.direct, &light.shown.indirect,
-                                         isPoint ? &light.carried : &light.exitance});
+        for (const SideLight& light : onSides) {
+            fields.push_back(&light.shown.direct);
+            if (isPoint)
+                fields.insert(fields.end(), {&light.indirect, &light.carried});
+            else
+                fields.insert(fields.end(), {&light.shown.indirect, &light.exitance});
+        }
         for (const SideLight& light : onSides)
             if (isPoint) fields.push_back(&light.emission);
         if (isPoint) fields.push_back(&shown.color());
+        if (isPoint && !shown.everywhere().empty()) fields.push_back(&shown.everywhere());
         std::vector<Field> nodes =
             settings.reconstruction == "AREA_AVERAGE"
                 ? areaAverage(patches, ranges[i], regions, instance.side, exposed, fields)
@@ -146,18 +154,19 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
             Field &direct = nodes[3 * k], &indirect = nodes[3 * k + 1];
             Field& exitance = nodes[3 * k + 2];
             if (isPoint) {
-                CornerGather::NodeLight atNodes{std::move(direct), std::move(indirect),
-                                                std::move(exitance)};
+                CornerGather::NodeLight atNodes{
+                    std::move(direct), std::move(indirect), std::move(exitance), {}};
+                if (!shown.everywhere().empty()) atNodes.shownShare = nodes.back();
                 atCorners->improve(i, k, regions, out.cornerAngles, atNodes);
                 direct = std::move(atNodes.direct);
                 indirect = std::move(atNodes.indirect);
                 exitance.resize(direct.size());
                 const Field& emission = nodes[3 * lights.size() + k];
-                const Field& colors = nodes.back();
+                const Field& colors = nodes[4 * lights.size()];
                 for (size_t v = 0; v < direct.size(); ++v)
                     exitance[v] = emission[v] + colors[v] * (direct[v] + indirect[v]);
             } else if (settings.reconstruction == "LEAST_SQUARES") {
-                addFaceSlopes(patches, ranges[i], regions, instance.side, shown.color(), lights[k],
+                addFaceSlopes(patches, ranges[i], regions, instance.side, shown, lights[k],
                               settings.targetError, direct, exitance);
             }
             CornerLight light = cornerLight(regions, direct, indirect, exitance);

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/shown_light.h"
 
+#include <algorithm>
+
 #include "patches/reflectance.h"
 
 namespace raybundle {
 namespace {
+
+// Far above what any shader shows; keeps results finite.
+constexpr float kMostShown = 16;
 
 std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
     bool anyBaked = false;
@@ -18,13 +23,27 @@ std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
     return isResult;
 }
 
+glm::vec3 shareOf(const Material& material, size_t side, const glm::vec4& angles) {
+    return glm::clamp(
+        material.shownFromAbove[side % 2] + sumOfTerms(material.shownByAngle[side % 2], angles),
+        0.0f, kMostShown);
+}
+
 }  // namespace
 
 ShownLight::ShownLight(const Scene& scene, const Patches& patches)
-    : patches(patches),
+    : scene(scene),
+      patches(patches),
       results(resultSides(scene, patches)),
       shown(results),
       colors(diffuseReflectances(scene, patches)) {
+    const Material plain;
+    if (std::any_of(scene.materials.begin(), scene.materials.end(), [&](const Material& material) {
+            return material.shownFromAbove != plain.shownFromAbove ||
+                   material.shownByAngle != plain.shownByAngle;
+        }))
+        for (size_t side = 0; side < shown.size(); ++side)
+            fromEverywhere.push_back(shareOf(materialOf(side), side, kEverywhere));
     if (isOwnAlone()) return;
     for (size_t side = 0; side < shown.size(); ++side)
         if (results[side ^ 1] && !isOwnAlone(side ^ 1)) shown[side] = true;
@@ -38,6 +57,16 @@ ShownLight::ShownLight(const Scene& scene, const Patches& patches)
     }
 }
 
+const Material& ShownLight::materialOf(size_t side) const {
+    const Parent& parent = patches.parentAt(uint32_t(side));
+    return scene.materialOf(scene.meshes[scene.instances[parent.instance].mesh], parent.face);
+}
+
+glm::vec3 ShownLight::byAngle(size_t side, const glm::vec4& angles) const {
+    if (fromEverywhere.empty()) return glm::vec3(1.0f);
+    return shareOf(materialOf(side), side, angles);
+}
+
 glm::vec3 ShownLight::of(size_t side, const glm::vec3& own, const glm::vec3& others,
                          const std::vector<float>& exposed) const {
     if (isOwnAlone()) return own;
@@ -45,14 +74,40 @@ glm::vec3 ShownLight::of(size_t side, const glm::vec3& own, const glm::vec3& oth
 }
 
 Irradiance ShownLight::of(Irradiance light, const std::vector<float>& exposed) const {
-    if (isOwnAlone()) return light;
-    for (std::vector<glm::vec3>* field : {&light.direct, &light.gathered, &light.indirect})
-        for (size_t front = 0; front < field->size(); front += 2) {
-            const glm::vec3 lit[2] = {(*field)[front], (*field)[front + 1]};
-            for (size_t back = 0; back < 2; ++back)
-                (*field)[front + back] = of(front + back, lit[back], lit[1 - back], exposed);
-        }
+    if (!isOwnAlone()) mixSides(light, light, exposed);
     return light;
+}
+
+Irradiance ShownLight::of(const SetLight& light, const std::vector<float>& exposed) const {
+    Irradiance own = light.irradiance;
+    for (size_t side = 0; side < fromEverywhere.size(); ++side) {
+        const glm::vec3 factor = fromEverywhere[side];
+        const glm::vec3 fromSources =
+            light.shot.angles.empty() ? factor : byAngle(side, light.shot.angles[side]);
+        own.direct[side] =
+            fromSources * own.gathered[side] + factor * (own.direct[side] - own.gathered[side]);
+        own.gathered[side] *= fromSources;
+        own.indirect[side] *= factor;
+    }
+    if (!isOwnAlone()) mixSides(own, light.irradiance, exposed);
+    return own;
+}
+
+Irradiance ShownLight::of(const SetLights& lights, const std::vector<float>& exposed) const {
+    Irradiance sum = of(lights.front(), exposed);
+    for (size_t k = 1; k < lights.size(); ++k) sum.add(of(lights[k], exposed));
+    return sum;
+}
+
+void ShownLight::mixSides(Irradiance& own, const Irradiance& arriving,
+                          const std::vector<float>& exposed) const {
+    auto mix = [&](std::vector<glm::vec3>& shownOf, std::vector<glm::vec3> others) {
+        for (size_t side = 0; side < shownOf.size(); ++side)
+            shownOf[side] = of(side, shownOf[side], others[side ^ 1], exposed);
+    };
+    mix(own.direct, arriving.direct);
+    mix(own.gathered, arriving.gathered);
+    mix(own.indirect, arriving.indirect);
 }
 
 }  // namespace raybundle

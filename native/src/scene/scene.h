@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "raybundle/raybundle.h"
+#include "scene/angles.h"
 
 namespace raybundle {
 
@@ -39,8 +40,10 @@ struct Material {
     // What of the reflectance is diffuse and no gloss: scale times it plus offset.
     std::array<glm::vec3, 2> diffuseScale{glm::vec3(1.0f), glm::vec3(1.0f)};
     std::array<glm::vec3, 2> diffuseOffset{glm::vec3(0.0f), glm::vec3(0.0f)};
-    // What light from straight above lacks of it, see rb_set_material_grazing.
-    std::array<glm::vec3, 2> grazing{glm::vec3(0.0f), glm::vec3(0.0f)};
+    // See rb_set_material_angles: of the reflectance, and of what outputs show.
+    std::array<AngleFactors, 2> reflectanceByAngle{};
+    std::array<glm::vec3, 2> shownFromAbove{glm::vec3(1.0f), glm::vec3(1.0f)};
+    std::array<AngleFactors, 2> shownByAngle{};
     // Share of the light that does not pass straight through, and an image (its mean channel) that
     // multiplies it. Reflectance and emission are those of the whole, what passes through included.
     float opacity = 1;

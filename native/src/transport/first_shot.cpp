@@ -21,8 +21,9 @@ constexpr Kind kKinds[] = {
 }  // namespace
 
 glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t side) {
-    if (patches.grazing.empty() || shot.obliqueness.empty()) return patches.reflectance[side];
-    return glm::clamp(patches.reflectance[side] + shot.obliqueness[side] * patches.grazing[side],
+    if (patches.byAngle.empty() || shot.angles.empty()) return patches.reflectance[side];
+    return glm::clamp(patches.reflectance[side] +
+                          sumOfTerms(patches.byAngle[side], shot.angles[side] - kEverywhere),
                       0.0f, 1.0f);
 }
 

@@ -24,9 +24,7 @@ struct FirstShot {
     // Where the first shot went on with reflected light: irradiance from it, and the reflected
     // exitance that is left to the transport, per side, W/m^2; else both are empty.
     std::vector<glm::vec3> indirect, unshot;
-    // Per side, of GATHER: how much more light comes at grazing angles than of light from
-    // everywhere: 21 times the mean of (1 - cosine)^5, less 1; -1 is light from straight above.
-    std::vector<float> obliqueness;
+    std::vector<glm::vec4> angles;    // per side, of GATHER: means of angleTerms; else empty
     std::vector<float> error;         // per side, standard error of all irradiance, W/m^2
     std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2
     std::shared_ptr<const LightBySource> bySource;  // of GATHER: what came from each source

@@ -73,7 +73,7 @@ FirstShot gather(const FirstShotInput& input) {
     FirstShot shot;
     shot.emission = light.bundledEmission();
     shot.irradiance.resize(n);
-    shot.obliqueness.resize(n);
+    shot.angles.resize(n);
     shot.error.resize(n);
     auto report = [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); };
     auto receiverAt = [&](size_t side) {
@@ -112,8 +112,7 @@ FirstShot gather(const FirstShotInput& input) {
         const Gathered& result = results[side];
         shot.irradiance[side] = result.irradiance;
         shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
-        if (result.brightness > 0)
-            shot.obliqueness[side] = 21 * result.grazing / result.brightness - 1;
+        shot.angles[side] = result.meanAngles();
         shot.error[side] = std::sqrt(result.variance);
         shot.rays += result.rays;
         shot.unblockedSides += result.unblocked;

@@ -12,16 +12,10 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "scene/angles.h"
 #include "scene/channels.h"
 
 namespace raybundle {
-
-// What surfaces that mirror at grazing angles have more of there, by Schlick: (1 - cosine)^5. In
-// light from everywhere its mean is 1 / 21.
-inline float grazingShare(float cosine) {
-    const float rest = 1 - std::min(std::max(cosine, 0.0f), 1.0f), square = rest * rest;
-    return square * square * rest;
-}
 
 // Where direct light is to be known: a whole patch side (the mean over it), or a point on one.
 struct Receiver {
@@ -47,14 +41,14 @@ struct LightPart {
     glm::vec3 irradiance{0.0f};  // W/m^2
     float variance = 0;          // of the brightest channel
     float contrast = 0;          // standard deviation over the receiver that shadows make, W/m^2
-    float grazing = 0;  // the brightest channel times the mean of (1 - cosine)^5, see FirstShot
+    glm::vec4 angles{0.0f};      // the brightest channel times the means of angleTerms
 
     // From a source so many times as strong. The samples have the colour of the light.
     LightPart scaled(const glm::vec3& factor) const {
         const glm::vec3 light = factor * irradiance;
         const float most = brightest(irradiance) > 0 ? brightest(light) / brightest(irradiance)
                                                      : brightest(factor);
-        return {light, most * most * variance, most * contrast, most * grazing};
+        return {light, most * most * variance, most * contrast, most * angles};
     }
 };
 
@@ -64,7 +58,7 @@ struct Gathered {
     glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
     float variance = 0;          // of the brightest channel
     float contrast = 0;          // sums over the sources: of theirs
-    float grazing = 0;           // of theirs
+    glm::vec4 angles{0.0f};      // of theirs
     float brightness = 0;        // of their brightest channels
     uint64_t rays = 0;
     uint64_t unblocked = 0;  // sources without noise: wholly visible
@@ -77,9 +71,11 @@ struct Gathered {
         if (isUnpowered) unpowered += part.irradiance;
         variance += part.variance;
         contrast += part.contrast;
-        grazing += part.grazing;
+        angles += part.angles;
         brightness += brightest(part.irradiance);
     }
+    // Means of angleTerms.
+    glm::vec4 meanAngles() const { return brightness > 0 ? angles / brightness : kEverywhere; }
 };
 
 // Standard error that direct light may keep, as a share of the target: errors of receivers are

@@ -38,13 +38,13 @@ constexpr float kFar = 0.1f;
 struct DirectLight::Block {
     glm::vec3 open{0.0f};     // sum of the samples as if unblocked
     glm::vec3 visible{0.0f};  // sum of those that are not blocked
-    float grazing = 0;        // the same, of their brightest channels times grazingShare
+    glm::vec4 angles{0.0f};   // the same, of their brightest channels times angleTerms
     int count = 0;
 
     void add(const Block& other) {
         open += other.open;
         visible += other.visible;
-        grazing += other.grazing;
+        angles += other.angles;
         count += other.count;
     }
     // The closed form times the visible share; the plain mean where there is no closed form.
@@ -165,7 +165,7 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
     int count = 0;
     auto see = [&](Block& block, const glm::vec3& irradiance, const glm::vec3& direction) {
         block.visible += irradiance;
-        block.grazing += brightest(irradiance) * grazingShare(glm::dot(direction, place.normal));
+        block.angles += brightest(irradiance) * angleTerms(glm::dot(direction, place.normal));
     };
     auto trace = [&] {
         std::array<float, Visibility::kPacket> shares;
@@ -251,7 +251,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                 next = 4 * all.count;
                 continue;
             }
-            return {glm::vec3(0.0f), missed * missed, 0, 0};
+            return {glm::vec3(0.0f), missed * missed, 0, glm::vec4(0.0f)};
         }
         // By the first pass alone, so that the order of the receivers does not matter.
         if (std::isinf(tolerance)) seen[index] = true;
@@ -272,7 +272,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     return {irradiance, variance + closedError * closedError,
             brightest(closed ? *closed : all.open / float(all.count)) *
                 std::sqrt(visible * (1 - visible)),
-            brightest(irradiance) * all.grazing / brightest(all.visible)};
+            brightest(irradiance) / brightest(all.visible) * all.angles};
 }
 
 void DirectLight::look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,

@@ -13,14 +13,7 @@ bool SetLight::isDark() const {
 
 Irradiance sumOf(const SetLights& lights) {
     Irradiance sum = lights.front().irradiance;
-    for (size_t k = 1; k < lights.size(); ++k) {
-        const Irradiance& light = lights[k].irradiance;
-        for (size_t side = 0; side < sum.direct.size(); ++side) {
-            sum.direct[side] += light.direct[side];
-            sum.gathered[side] += light.gathered[side];
-            sum.indirect[side] += light.indirect[side];
-        }
-    }
+    for (size_t k = 1; k < lights.size(); ++k) sum.add(lights[k].irradiance);
     return sum;
 }
 

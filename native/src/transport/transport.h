@@ -33,6 +33,13 @@ struct Irradiance {
     std::vector<glm::vec3> indirect;  // after one reflection or more
 
     glm::vec3 all(size_t side) const { return direct[side] + indirect[side]; }
+    void add(const Irradiance& other) {
+        for (size_t side = 0; side < direct.size(); ++side) {
+            direct[side] += other.direct[side];
+            gathered[side] += other.gathered[side];
+            indirect[side] += other.indirect[side];
+        }
+    }
 };
 
 // Which bundles an estimate looks at.
