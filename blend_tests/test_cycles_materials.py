@@ -326,6 +326,24 @@ def test_sun(floor, new_light, kind, roughness, angle):
             assert np.abs(found - truth).max() < SUN_TOLERANCE * truth.max()
 
 
+@pytest.mark.skipif(bpy.app.version < (4, 0, 0), reason="Principled has no such coat yet")
+@pytest.mark.parametrize("weight, roughness, metallic", [
+    (1.0, 0.03, 0.0), (0.5, 0.5, 0.0), (1.0, 0.03, 0.5)])
+def test_coat(floor, new_light, weight, roughness, metallic):
+    """What it leaves of the diffuse colour, seen from straight above."""
+    tree = Tree()
+    floor.data.materials.clear()
+    floor.data.materials.append(tree.finish(tree.add(
+        'BsdfPrincipled', Base_Color=RED, Metallic=metallic, Coat_Weight=weight,
+        Coat_Roughness=roughness)))
+    new_light("Sun", 'SUN', 3.0, angle=0.01)
+    truth = bake_objects([floor], 256, 0, passes=frozenset({"DIRECT", "INDIRECT", "COLOR"}))["Floor"]
+    raybundle.bake(bpy.context, output='COMBINED')
+    found, expected = read_colors(floor).mean(axis=0), truth.mean(axis=0)
+    print(np.round(100 * (found / expected - 1), 2))
+    assert np.abs(found - expected).max() < SUN_TOLERANCE * expected.max()
+
+
 @pytest.mark.parametrize("roughness, specular, metallic", [
     # Diffuse.
     (0.5, None, None), (1.0, None, None),

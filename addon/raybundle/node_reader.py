@@ -21,7 +21,7 @@ from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
 from .diffuse_angles import TERMS, oren_nayar
 from .gloss import GlossAlbedo, gloss_albedo
 from .image_export import ImagePixels, sphere_mean
-from .principled import GLOSS_SOCKETS, METAL_IOR, principled_albedo
+from .principled import COAT_SOCKETS, GLOSS_SOCKETS, METAL_IOR, principled_albedo
 from .scene_data import Warnings
 
 # Values of the Light Path node as diffuse light sees a surface.
@@ -188,7 +188,9 @@ class NodeReader:
         mean = np.clip(base.mean(), 0.0, 1.0)
         albedo = principled_albedo(
             *(self._usual(node, names, usual, path) for names, usual in GLOSS_SOCKETS),
-            node.distribution == 'MULTI_GGX', mean, self.mirrors)
+            node.distribution == 'MULTI_GGX', mean, self.mirrors).coated(
+                *(self._usual(node, names, usual, path) for names, usual in COAT_SOCKETS),
+                self.mirrors)
         opaque = 1.0 - metallic - through
         reflectance = base.scaled(opaque * albedo.diffuse + metallic * albedo.metal).plus(
             ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))

@@ -20,6 +20,8 @@ from .gloss import gloss_albedo, ior_of
 # count as where they vary or are missing.
 GLOSS_SOCKETS = ((('Roughness',), 0.5), (('Specular IOR Level', 'Specular'), 0.5),
                  (('IOR',), 1.5), (('Diffuse Roughness',), 0.0))
+# The same of the coat, the first arguments of PrincipledAlbedo.coated.
+COAT_SOCKETS = ((('Coat Weight',), 0.0), (('Coat Roughness',), 0.03), (('Coat IOR',), 1.5))
 METAL_IOR = 1.5  # of the increase towards grazing angles
 
 
@@ -50,6 +52,25 @@ class PrincipledAlbedo:
         mirrored = opaque * self.specular_grazing + metallic * self.metal_grazing
         reflected[2] += mirrored / MEANS[2]
         return reflected
+
+    def coated(self, weight: float, roughness: float, ior: float, mirrors: bool
+               ) -> PrincipledAlbedo:
+        """Under a coat, which is there from 4.0 on: what it mirrors is missing from what lies beneath.
+        Its tint is not read."""
+        weight = min(max(weight, 0.0), 1.0)
+        if weight == 0.0:
+            return self
+        f0 = min(((ior - 1.0) / (ior + 1.0))**2, 0.99)
+        mirrored, above = (weight * float(gloss_albedo(roughness, ior, from_above).of(f0))
+                           for from_above in (False, True))
+        under, shown = 1.0 - mirrored, self.shown * (1.0 - above)
+        if not mirrors:
+            mirrored = above = 0.0
+        return PrincipledAlbedo(
+            self.angles, shown, self.diffuse * under,
+            self.specular * under + mirrored, self.specular_grazing * under + mirrored - above,
+            self.metal * under, self.metal_edge * under + mirrored,
+            self.metal_grazing * under + mirrored - above)
 
 
 def principled_albedo(roughness: float, specular: float, ior: float, diffuse_roughness: float,

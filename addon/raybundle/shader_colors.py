@@ -16,7 +16,7 @@ import numpy as np
 
 from .diffuse_angles import facet_shares, oren_nayar
 from .node_reader import GLOSSY, glossy_albedo
-from .principled import GLOSS_SOCKETS, PrincipledAlbedo, principled_albedo
+from .principled import COAT_SOCKETS, GLOSS_SOCKETS, PrincipledAlbedo, principled_albedo
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
     'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
@@ -227,7 +227,9 @@ def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlb
     return principled_albedo(
         *(_usual(formula, node, names, usual) for names, usual in GLOSS_SOCKETS),
         node.distribution == 'MULTI_GGX',
-        float(np.mean(base)) if isinstance(base, tuple) else _USUAL_COLOR, formula.mirrors)
+        float(np.mean(base)) if isinstance(base, tuple) else _USUAL_COLOR, formula.mirrors).coated(
+            *(_usual(formula, node, names, usual) for names, usual in COAT_SOCKETS),
+            formula.mirrors)
 
 
 def _principled_shares(formula: _Formula, node: bpy.types.Node) -> tuple[_Value, _Value]:
