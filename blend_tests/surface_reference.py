@@ -47,7 +47,7 @@ class SurfaceReference:
         return self._interpolated(name, corners), self._values[name], self._weights[name]
 
     def means(self, light: Light) -> tuple[np.ndarray, np.ndarray]:
-        """(RGB) each, over the faces of all these objects: of what is shown and of Cycles' light."""
+        """RGB each, over the faces of all these objects: of what is shown and of Cycles' light."""
         shown, truth, area = (np.concatenate(parts) for parts in
                               zip(*(self.points(name, light[name]) for name in light)))
         return area @ shown / area.sum(), area @ truth / area.sum()

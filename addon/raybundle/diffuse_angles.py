@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How the diffuse shaders of Cycles depend on the angle of the light.
 
-Sources: Burley, "Physically-Based Shading at Disney" (2012), Principled before Blender 4.0. Oren and
-Nayar, "Generalization of Lambert's Reflectance Model" (1994), in the form of Fujii, "A tiny
-improvement of Oren-Nayar reflectance model" (2012): Diffuse, and Principled from 4.3 on. From 4.3 on
-light that meets several facets is added, as OpenPBR has it.
+Sources: Burley, "Physically-Based Shading at Disney" (2012), Principled before Blender 4.0. Oren
+and Nayar, "Generalization of Lambert's Reflectance Model" (1994), in the form of Fujii, "A tiny
+improvement of Oren-Nayar reflectance model" (2012): Diffuse, and Principled from 4.3 on. From 4.3
+on light that meets several facets is added, as OpenPBR has it.
 
 By the cosine c between the normal and the light, in the terms of rb_set_material_angles: 1 - c,
-(1 - c)^2, (1 - c)^5 and c (1 - c)^5. What differs: surfaces send light as if they were Lambert's, up
-to its amount; Oren and Nayar's albedo over c is a fit, good to 0.003.
+(1 - c)^2, (1 - c)^5 and c (1 - c)^5. What differs: surfaces send light as if they were Lambert's,
+up to its amount; Oren and Nayar's albedo over c is a fit, good to 0.003.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def burley(roughness: float) -> DiffuseAngles:
 
 
 def facet_shares(roughness: float) -> tuple[float, float]:
-    """Of Oren and Nayar's albedo over a colour c, p + q c^2 / (1 - c (1 - p)): p, by one facet, and q,
-    by several."""
+    """Of Oren and Nayar's albedo over a colour c, p + q c^2 / (1 - c (1 - p)): p, by one facet, and
+    q, by several."""
     once = _from_above(roughness) * (1.0 + roughness / math.pi * _FACETS_MEAN)
     return once, once * (1.0 - once) if bpy.app.version >= (4, 3, 0) else 0.0
 

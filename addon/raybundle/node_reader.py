@@ -196,7 +196,8 @@ class NodeReader:
             ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
         shown = opaque * albedo.shown * alpha
         return Surface(reflectance.scaled(alpha), radiance.scaled(alpha), transmittance,
-                       base.scaled(shown), alpha * albedo.reflected_by_angle(mean, opaque, metallic),
+                       base.scaled(shown),
+                       alpha * albedo.reflected_by_angle(mean, opaque, metallic),
                        shown * mean * albedo.angles.shown)
 
     def _base_color(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]
@@ -221,8 +222,8 @@ class NodeReader:
 
     def _usual(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                path: tuple[bpy.types.Node, ...]) -> float:
-        """A value that is no reason to ask Cycles: where it varies, or no input has one of the names,
-        it is the usual one."""
+        """A value that is no reason to ask Cycles: where it varies, or no input has one of the
+        names, it is the usual one."""
         if not any(name in node.inputs for name in names):
             return usual
         source = _follow(_input(node, *names), path)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender's Principled shader is to diffuse light, by version, apart from its base colour.
 
-Before 4.0 the specular layer lies on top of a diffuse part that is Burley's. From 4.0 on the diffuse
-part is Lambert's, or later Oren and Nayar's, and what the specular layer reflects is missing from it;
-the layer's reflectance follows the index of refraction.
+Before 4.0 the specular layer lies on top of a diffuse part that is Burley's. From 4.0 on the
+diffuse part is Lambert's, or later Oren and Nayar's, and what the specular layer reflects is
+missing from it; the layer's reflectance follows the index of refraction.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from .diffuse_angles import MEANS, DiffuseAngles, burley, oren_nayar
 from .gloss import gloss_albedo, ior_of
 
-# Names of the sockets that gloss depends on, the first arguments of principled_albedo, and what they
-# count as where they vary or are missing.
+# Names of the sockets that gloss and angles depend on, the first arguments of principled_albedo,
+# and what they count as where they vary or are missing.
 GLOSS_SOCKETS = ((('Roughness',), 0.5), (('Specular IOR Level', 'Specular'), 0.5),
                  (('IOR',), 1.5), (('Diffuse Roughness',), 0.0))
 # The same of the coat, the first arguments of PrincipledAlbedo.coated.
@@ -55,8 +55,8 @@ class PrincipledAlbedo:
 
     def coated(self, weight: float, roughness: float, ior: float, mirrors: bool
                ) -> PrincipledAlbedo:
-        """Under a coat, which is there from 4.0 on: what it mirrors is missing from what lies beneath.
-        Its tint is not read."""
+        """Under a coat, which is there from 4.0 on: what it mirrors is missing from what lies
+        beneath. Its tint is not read."""
         weight = min(max(weight, 0.0), 1.0)
         if weight == 0.0:
             return self

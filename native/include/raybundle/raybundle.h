@@ -129,8 +129,8 @@ RB_API rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const 
  *   reflected  six floats, likewise, for each term. The reflectance is for light from everywhere;
  *              light of the sources meets more by the sum of these factors times the term less its
  *              mean (1/3, 1/6, 1/21, 1/84)
- *   shown      six floats for light from straight above, then for each term: outputs show light times
- *              the first plus the sum of the others times the terms, 0 to 16 in all
+ *   shown      six floats for light from straight above, then for each term: outputs show light
+ *              times the first plus the sum of the others times the terms, 0 to 16 in all
  * Without it 0 and, for light from straight above, 1. */
 RB_API rb_error rb_set_material_angles(rb_scene scene, int32_t material, const float reflected[24],
                                        const float shown[30]);

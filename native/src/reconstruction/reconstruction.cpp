@@ -131,8 +131,8 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         out.cornerAngles = cornerAngles(mesh);
         const SmoothRegions regions =
             smoothRegions(mesh, patches.cells, ranges[i].firstCell, ranges[i].lastCell);
-        // Three fields of each light, one after the other; for POINT the colour, and what is shown of
-        // light from everywhere, are the last.
+        // Three fields of each light, one after the other; for POINT the colour, and what is shown
+        // of light from everywhere, are the last.
         std::vector<const Field*> fields;
         for (const SideLight& light : onSides) {
             fields.push_back(&light.shown.direct);

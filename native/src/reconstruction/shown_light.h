@@ -2,8 +2,9 @@
 //
 // What outputs show of the light on patches, and on which: that of the front, and where a patch is
 // translucent the mean of both sides, weighted by what the side sends of each; times its colour it
-// is what the side sends without gloss. Of materials that reflect light by its angle it is what they
-// send straight up: light of the sources by its angles, all else as if it came from everywhere.
+// is what the side sends without gloss. Of materials that reflect light by its angle it is what
+// they send straight up: light of the sources by its angles, all else as if it came from
+// everywhere.
 //
 // Source: measured against Cycles' Diffuse bake, which sees surfaces from straight above and counts
 // Translucent BSDFs among the diffuse.
