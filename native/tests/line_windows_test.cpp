@@ -7,6 +7,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "bundles/bundle_tracer.h"
@@ -81,34 +82,34 @@ TEST(LineWindows, CountsFollowTheAreasInsideAndOutside) {
 
 TEST(LineWindows, ExchangesHaveTheMeanOfUniformLines) {
     const Patches patches = subdivide(hallWithSmallThings(0.5f), 5, kMany);
-    auto between = [&](const LineCounts& counts, uint32_t from, uint32_t to) {
-        double lines = 0;
+    auto betweenInstances = [&](const LineCounts& counts) {
+        std::array<std::array<double, 4>, 4> lines{};
         for (uint32_t i = 0; i < counts.sideCount(); ++i) {
-            if (patches.parents[patches.parentOf[i / 2]].instance != from) continue;
+            auto& from = lines[patches.parents[patches.parentOf[i / 2]].instance];
             for (const LineCount& c : counts.row(i))
-                if (patches.parents[patches.parentOf[c.side / 2]].instance == to)
-                    lines += double(c.lines[0]) + c.lines[1];
+                from[patches.parents[patches.parentOf[c.side / 2]].instance] +=
+                    double(c.lines[0]) + c.lines[1];
         }
         return lines;
     };
     constexpr int kSeeds = 24;
     double sum[4][4] = {}, squares[4][4] = {};
     for (int seed = 0; seed < kSeeds; ++seed) {
-        const LineCounts counts = trace(patches, kPixel, smallWindows(), 64, uint32_t(seed)).counts;
+        const auto lines =
+            betweenInstances(trace(patches, kPixel, smallWindows(), 64, uint32_t(seed)).counts);
         for (uint32_t i = 0; i < 4; ++i)
             for (uint32_t j = 0; j < 4; ++j) {
-                const double lines = between(counts, i, j);
-                sum[i][j] += lines;
-                squares[i][j] += lines * lines;
+                sum[i][j] += lines[i][j];
+                squares[i][j] += lines[i][j] * lines[i][j];
             }
     }
     // Uniform lines as fine as the finest window: hardly any noise.
     const uint32_t kCount = 512;
-    const LineCounts uniform = trace(patches, float(kFinest), {}, kCount, 99).counts;
+    const auto uniform = betweenInstances(trace(patches, float(kFinest), {}, kCount, 99).counts);
     for (uint32_t i = 0; i < 4; ++i)
         for (uint32_t j = 0; j < 4; ++j) {
             const double mean = sum[i][j] / kSeeds;
-            const double exact = between(uniform, i, j) * 64 / kCount;
+            const double exact = uniform[i][j] * 64 / kCount;
             const double error =
                 std::sqrt(std::max(0.0, squares[i][j] / kSeeds - mean * mean) / (kSeeds - 1));
             EXPECT_NEAR(mean, exact, 4 * error + 0.004 * exact) << i << " and " << j;
