@@ -41,9 +41,7 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
             continue;
         // Slopes that make less than a part of the target error are no matter.
         light.direct.unblocked(at, points.data(), count, 0.25f * targetError, values.data());
-        const glm::vec3 factor = light.shot.angles.empty()
-                                     ? shown.byAngle(at, kEverywhere)
-                                     : shown.byAngle(at, light.shot.angles[at]);
+        const glm::vec3 factor = shown.ofSources(at, light.shot);
         glm::vec3 mean(0.0f), share(0.0f);
         for (size_t k = 0; k < count; ++k) mean += values[k] / float(count);
         for (int c = 0; c < 3; ++c)

@@ -31,7 +31,7 @@ struct SideLight {
     Irradiance shown;
     Field emission;  // W/m^2
     Field exitance;  // emission included, W/m^2
-    // As if all of it were shown, whatever its angle, W/m^2.
+    // For POINT: as if all of it were shown, whatever its angle, W/m^2.
     Field carried;  // direct light without that of the sources
     Field indirect;
 };
@@ -50,18 +50,24 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
 }
 
 std::vector<SideLight> sideLights(const Patches& patches, const ShownLight& shown,
-                                  const std::vector<float>& exposed, const SetLights& lights) {
+                                  const std::vector<float>& exposed, const SetLights& lights,
+                                  bool isPoint) {
     std::vector<SideLight> result;
     for (const SetLight& light : lights) {
-        Irradiance all = shown.of(light.irradiance, exposed);
-        SideLight out{shown.of(light, exposed), light.direct.emission(), Field(patches.sideCount()),
-                      std::move(all.direct), std::move(all.indirect)};
+        SideLight out{
+            shown.of(light, exposed), light.direct.emission(), Field(patches.sideCount()), {}, {}};
         for (size_t side = 0; side < out.exitance.size(); ++side) {
             // Of the whole patch, what lets light through included.
             const float opacity = patches.opacityOf(uint32_t(side / 2));
             out.emission[side] *= opacity;
             out.exitance[side] = out.emission[side] + shown.color()[side] * out.shown.all(side);
-            out.carried[side] -= all.gathered[side];
+        }
+        if (isPoint) {
+            Irradiance all = shown.of(light.irradiance, exposed);
+            for (size_t side = 0; side < all.direct.size(); ++side)
+                all.direct[side] -= all.gathered[side];
+            out.carried = std::move(all.direct);
+            out.indirect = std::move(all.indirect);
         }
         result.push_back(std::move(out));
     }
@@ -103,7 +109,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                                        const std::vector<float>& exposed, const Settings& settings,
                                        const Progress& progress, Report& report) {
     const bool isPoint = settings.reconstruction == "POINT";
-    const std::vector<SideLight> onSides = sideLights(patches, shown, exposed, lights);
+    const std::vector<SideLight> onSides = sideLights(patches, shown, exposed, lights, isPoint);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
     std::optional<CornerGather> atCorners;
     if (isPoint)

@@ -81,9 +81,7 @@ Irradiance ShownLight::of(Irradiance light, const std::vector<float>& exposed) c
 Irradiance ShownLight::of(const SetLight& light, const std::vector<float>& exposed) const {
     Irradiance own = light.irradiance;
     for (size_t side = 0; side < fromEverywhere.size(); ++side) {
-        const glm::vec3 factor = fromEverywhere[side];
-        const glm::vec3 fromSources =
-            light.shot.angles.empty() ? factor : byAngle(side, light.shot.angles[side]);
+        const glm::vec3 factor = fromEverywhere[side], fromSources = ofSources(side, light.shot);
         own.direct[side] =
             fromSources * own.gathered[side] + factor * (own.direct[side] - own.gathered[side]);
         own.gathered[side] *= fromSources;

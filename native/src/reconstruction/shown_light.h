@@ -39,6 +39,10 @@ class ShownLight {
 
     // What a side shows of light that reaches it, by the means of its angleTerms.
     glm::vec3 byAngle(size_t side, const glm::vec4& angles) const;
+    // The same of the light of the sources, by a first shot.
+    glm::vec3 ofSources(size_t side, const FirstShot& shot) const {
+        return byAngle(side, shot.angles.empty() ? kEverywhere : shot.angles[side]);
+    }
     // The same of light from everywhere, per side; empty where all show all of it.
     const std::vector<glm::vec3>& everywhere() const { return fromEverywhere; }
 
