@@ -155,7 +155,7 @@ void addMaterial(Bytes& in, rb_scene scene) {
     const auto a = in.numbers<6>(), b = in.numbers<6>();
     expectMessage(rb_add_material(scene, in.text().c_str(), a.data(), b.data(), &id));
     const int32_t target = in.flag() ? id : in.small();
-    switch (in.below(8)) {
+    switch (in.below(10)) {
         case 0:
             expectMessage(rb_set_material_image(scene, target, in.small(), a.data()));
             break;
@@ -178,6 +178,18 @@ void addMaterial(Bytes& in, rb_scene scene) {
         case 6:
             expectMessage(
                 rb_set_material_translucence(scene, target, a.data(), in.small(), b.data()));
+            break;
+        case 7: {
+            const auto byAngle = in.numbers<24>();
+            const auto roughness = in.numbers<2>();
+            expectMessage(rb_set_material_gloss(scene, target, a.data(), b.data(), byAngle.data(),
+                                                roughness.data()));
+            break;
+        }
+        case 8:
+            expectMessage(rb_set_material_diffuse_model(scene, target, rb_diffuse_model(in.small()),
+                                                        a.data()));
+            expectMessage(rb_set_material_leaving(scene, target, in.numbers<8>().data()));
             break;
         default: {
             const auto reflected = in.numbers<24>();

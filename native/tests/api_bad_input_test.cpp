@@ -82,6 +82,9 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_set_material_angles(scene, 0, nullptr, kAngles), "reflected");
     expectInvalid(rb_set_material_angles(scene, 0, kAngles, nullptr), "shown");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, nullptr), "offset");
+    expectInvalid(rb_set_material_gloss(scene, 0, nullptr, kGrey, kAngles, kGrey), "scale");
+    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, nullptr, kAngles, kGrey), "offset");
+    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, kGrey, nullptr, kGrey), "by_angle");
     expectInvalid(rb_set_material_translucence(scene, 0, nullptr, -1, nullptr), "translucence");
     expectInvalid(rb_add_mesh(scene, "", nullptr, 8, kCorners, 24, kFaces, 6, nullptr, &id),
                   "vertices");
@@ -124,6 +127,10 @@ TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
         expectInvalid(rb_set_material_angles(scene, bad, kAngles, kAngles),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_diffuse(scene, bad, kGrey, kBlack),
+                      "material " + std::to_string(bad));
+        expectInvalid(rb_set_material_gloss(scene, bad, kGrey, kBlack, kAngles, kBlack),
+                      "material " + std::to_string(bad));
+        expectInvalid(rb_set_material_diffuse_model(scene, bad, RB_DIFFUSE_BURLEY, kBlack),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_translucence(scene, bad, kGrey, -1, nullptr),
                       "material " + std::to_string(bad));
@@ -224,6 +231,25 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     badAngles[29] = NAN;
     expectInvalid(rb_set_material_angles(scene, 0, kAngles, badAngles), "shown");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, bad), "offset");
+    expectInvalid(rb_set_material_gloss(scene, 0, bad, kGrey, kAngles, kGrey), "scale");
+    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, bad, kAngles, kGrey), "offset");
+    badAngles[23] = NAN;
+    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, kGrey, badAngles, kGrey), "by_angle");
+    const int32_t paint = addMaterial();
+    const float leaving[8] = {0, 0, 0, 0, 0, 0, 0, NAN};
+    expectInvalid(rb_set_material_leaving(scene, paint, leaving), "factors");
+    expectInvalid(rb_set_material_leaving(scene, paint, nullptr), "factors");
+    expectInvalid(rb_set_material_leaving(scene, paint + 1, kAngles), "material");
+    for (float rough : {-0.1f, 1.1f, NAN, INFINITY}) {
+        const float roughness[2] = {0.5f, rough};
+        expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, roughness),
+                      "roughness");
+        expectInvalid(rb_set_material_diffuse_model(scene, paint, RB_DIFFUSE_BURLEY, roughness),
+                      "roughness");
+    }
+    expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, nullptr), "roughness");
+    expectInvalid(rb_set_material_diffuse_model(scene, paint, rb_diffuse_model(3), kBlack),
+                  "diffuse model 3");
     expectInvalid(rb_set_material_translucence(scene, 0, bad, -1, nullptr), "translucence");
     const float infinite[3] = {0, INFINITY, 0}, zero[3] = {0, 0, 0};
     expectInvalid(rb_add_point_light(scene, "bulb", infinite, kOne, 0, RB_POINT_DISK, &id), "bulb");

@@ -95,9 +95,8 @@ RB_API rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, in
                              const float* rgb, rb_image_extension extension, int32_t* image);
 
 /* Adds a material. reflectance and emission hold six floats: RGB of the front side, then of the
- * back side. reflectance is the albedo; all of it spreads as if it were diffuse. Values of 1 or more
- * are clamped to 0.999 with a warning in the report. emission is the exitance in W/m^2 (pi times the radiance). Id in
- * *material. */
+ * back side. reflectance is the albedo. Values of 1 or more are clamped to 0.999 with a warning in
+ * the report. emission is the exitance in W/m^2 (pi times the radiance). Id in *material. */
 RB_API rb_error rb_add_material(rb_scene scene, const char* name, const float reflectance[6],
                                 const float emission[6], int32_t* material);
 
@@ -134,6 +133,33 @@ RB_API rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const 
  * Without it 0 and, for light from straight above, 1. */
 RB_API rb_error rb_set_material_angles(rb_scene scene, int32_t material, const float reflected[24],
                                        const float shown[30]);
+
+/* What of the reflectance is mirrored: scale times it plus offset (six floats each, likewise), for
+ * light from everywhere; by_angle: how that depends on the angle of the sources' light, as
+ * `reflected` of rb_set_material_angles, of which it is a part. roughness: of the front and of the
+ * back, 0 to 1, whose square is alpha of GGX. With first shot GATHER and solver LINE_REUSE that
+ * light of the sources goes where GGX mirrors it to; all other reflected light spreads as if it
+ * were diffuse. Without it nothing is mirrored. */
+RB_API rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float scale[6],
+                                      const float offset[6], const float by_angle[24],
+                                      const float roughness[2]);
+
+/* Where what is not mirrored goes, likewise: as by Lambert's law, or as Burley's or Oren and
+ * Nayar's model has it, with a roughness (of the front and of the back), 0 to 1. */
+typedef enum rb_diffuse_model {
+    RB_DIFFUSE_LAMBERT = 0,
+    RB_DIFFUSE_BURLEY = 1,
+    RB_DIFFUSE_OREN_NAYAR = 2
+} rb_diffuse_model;
+
+RB_API rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material,
+                                              rb_diffuse_model model, const float roughness[2]);
+
+/* How what is not mirrored leaves a layer that lets less of it out at some angles, whatever light
+ * it is (LINE_REUSE): 1 plus the sum of these factors times the term of rb_set_material_angles at
+ * the angle at which it leaves, less the term's mean (two floats for each term: front, back).
+ * Without it 0. */
+RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[8]);
 
 /* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.
  * Reflectance and emission remain those of the whole surface, so reflectance is at most the

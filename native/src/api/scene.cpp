@@ -109,6 +109,69 @@ rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float s
     });
 }
 
+namespace {
+
+void needRoughness(const Material& material, const float roughness[2]) {
+    need(roughness, "roughness");
+    for (size_t side = 0; side < 2; ++side)
+        if (!(roughness[side] >= 0 && roughness[side] <= 1))
+            throw invalidArgument("material \"" + material.name + "\": roughness must be 0 to 1");
+}
+
+}  // namespace
+
+rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float scale[6],
+                               const float offset[6], const float by_angle[24],
+                               const float roughness[2]) {
+    return guarded([&] {
+        const HeldScene held(scene, "scene");
+        need(scale, "scale");
+        need(offset, "offset");
+        need(by_angle, "by_angle");
+        needFinite(scale, 6, "scale");
+        needFinite(offset, 6, "offset");
+        needFinite(by_angle, 24, "by_angle");
+        Material& target = held->material(material);
+        needRoughness(target, roughness);
+        for (size_t side = 0; side < 2; ++side) {
+            Scattering& scattering = target.scattering[side];
+            scattering.glossScale = vec3(scale + 3 * side);
+            scattering.glossOffset = vec3(offset + 3 * side);
+            for (size_t term = 0; term < scattering.glossByAngle.size(); ++term)
+                scattering.glossByAngle[term] = vec3(by_angle + 6 * term + 3 * side);
+            scattering.glossRoughness = roughness[side];
+        }
+    });
+}
+
+rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material, rb_diffuse_model model,
+                                       const float roughness[2]) {
+    return guarded([&] {
+        const HeldScene held(scene, "scene");
+        Material& target = held->material(material);
+        needRoughness(target, roughness);
+        if (int(model) < RB_DIFFUSE_LAMBERT || int(model) > RB_DIFFUSE_OREN_NAYAR)
+            throw invalidArgument("material \"" + target.name + "\": unknown diffuse model " +
+                                  std::to_string(int(model)));
+        for (size_t side = 0; side < 2; ++side) {
+            target.scattering[side].diffuseModel = model;
+            target.scattering[side].diffuseRoughness = roughness[side];
+        }
+    });
+}
+
+rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[8]) {
+    return guarded([&] {
+        const HeldScene held(scene, "scene");
+        need(factors, "factors");
+        needFinite(factors, 8, "factors");
+        Material& target = held->material(material);
+        for (int side = 0; side < 2; ++side)
+            for (int term = 0; term < 4; ++term)
+                target.scattering[size_t(side)].leaving[term] = factors[2 * term + side];
+    });
+}
+
 rb_error rb_set_material_angles(rb_scene scene, int32_t material, const float reflected[24],
                                 const float shown[30]) {
     return guarded([&] {

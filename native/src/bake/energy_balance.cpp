@@ -34,14 +34,16 @@ void balanceEnergy(const Patches& patches, const SetLight& light,
             continue;
         }
         const glm::vec3 total = irradiance.all(side);
-        const glm::vec3 reflected =
-            patches.reflectance[side] * (total - irradiance.gathered[side]) +
-            shotReflectance(patches, shot, side) * irradiance.gathered[side] +
-            passedOn(patches, exposedShare, side, irradiance.all(side ^ 1));
+        glm::vec3 reflected = patches.reflectance[side] * (total - irradiance.gathered[side]) +
+                              shotReflectance(patches, shot, side) * irradiance.gathered[side] +
+                              passedOn(patches, exposedShare, side, irradiance.all(side ^ 1));
+        if (!irradiance.byAngle.empty()) reflected += irradiance.byAngle[side];
         emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
         absorbed += exposed * power(patches, side, total - reflected);
         escaped += exposed * power(patches, side, open * (shot.emission[side] + reflected));
     }
+    // In a closed scene that is noise, and stays in the balance.
+    if (sum(escaped) > sum(shot.escaped)) escaped -= irradiance.redirected;
     report.emitted += sum(emitted);
     report.absorbed += sum(absorbed);
     report.escaped += sum(escaped);

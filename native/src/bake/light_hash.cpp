@@ -5,8 +5,9 @@
 
 namespace raybundle {
 
-uint64_t shotHash(const Settings& settings, const std::vector<bool>& isShown) {
+uint64_t shotHash(const Settings& settings, const std::vector<bool>& isShown, bool hasDirections) {
     Hasher hasher;
+    hasher.add(hasDirections);
     hasher.add(std::vector<uint8_t>(isShown.begin(), isShown.end()));
     hasher.add(settings.targetError, settings.seed, settings.skipFacing, settings.skipLit,
                settings.skipWeak, settings.skipInside);

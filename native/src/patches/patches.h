@@ -48,8 +48,9 @@ struct Parent {
     bool isSolid = false;  // part of a surface that encloses a volume
     // As the instance has it.
     bool stopsDirect = true, exchanges = true;
-    uint32_t instance = 0;  // into Scene::instances
-    int32_t face = 0;       // of the instance's mesh
+    uint32_t instance = 0;    // into Scene::instances
+    int32_t face = 0;         // of the instance's mesh
+    uint32_t scattering = 0;  // half the index of its front's in Patches::scattering
     // The mesh triangle or quad that the parent is part of, for interpolation between its corners:
     // one of Patches::cells.
     uint32_t cell = 0;
@@ -113,6 +114,7 @@ struct Patches {
     std::vector<float> opacity;          // per patch; empty where all are opaque
     std::vector<glm::vec3> reflectance;  // per side
     std::vector<AngleFactors> byAngle;   // per side: of the reflectance; empty where all are 0
+    std::vector<Scattering> scattering;  // per Parent::scattering and side; empty: all Lambert's
     std::vector<glm::vec3> emission;     // per side, W/m^2
     // Per side: what leaves it of the light that arrives at the other side of the patch; empty
     // where all are 0.

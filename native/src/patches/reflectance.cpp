@@ -153,6 +153,28 @@ void assignOpacity(const Scene& scene, Patches& patches) {
     });
 }
 
+namespace {
+
+void assignScattering(const Scene& scene, Patches& patches) {
+    patches.scattering.clear();
+    if (std::all_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
+            return material.scattering[0].isLambert() && material.scattering[1].isLambert();
+        }))
+        return;
+    for (const Material& material : scene.materials)
+        patches.scattering.insert(patches.scattering.end(), material.scattering.begin(),
+                                  material.scattering.end());
+    const uint32_t ofDefault = uint32_t(scene.materials.size());
+    patches.scattering.resize(patches.scattering.size() + 2);
+    for (Parent& parent : patches.parents) {
+        const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
+        const int32_t material = mesh.faceMaterials[size_t(parent.face)];
+        parent.scattering = material < 0 ? ofDefault : uint32_t(material);
+    }
+}
+
+}  // namespace
+
 void assignMaterials(const Scene& scene, Patches& patches) {
     patches.reflectance.resize(patches.sideCount());
     patches.emission.resize(patches.sideCount());
@@ -165,6 +187,7 @@ void assignMaterials(const Scene& scene, Patches& patches) {
         std::any_of(scene.materials.begin(), scene.materials.end(),
                     [](const Material& material) { return material.isTranslucent(); });
     patches.translucence.assign(hasTranslucence ? patches.sideCount() : 0, glm::vec3(0.0f));
+    assignScattering(scene, patches);
     tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
         const Parent& parent = patches.parents[i];
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];

@@ -41,6 +41,8 @@ FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
       light(light),
       emission(light.direct.bundledEmission()),
       reflected(patches.sideCount()),
+      directed(patches, light.shot),
+      exposed(exposed),
       world(glm::pi<float>() * light.worldRadiance),
       targetError(targetError),
       error(targetError * meanLight) {
@@ -51,6 +53,8 @@ FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
                  light.irradiance.indirect[side]) +
             shotReflectance(patches, light.shot, side) * light.irradiance.gathered[side] +
             passedOn(patches, exposed, side, light.irradiance.all(side ^ 1));
+    for (size_t side = 0; side < light.irradiance.byAngle.size(); ++side)
+        reflected[side] += light.irradiance.byAngle[side];
 }
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
@@ -105,6 +109,10 @@ void FinalGather::addRays(const Receiver& receiver, uint32_t set, uint32_t first
         sum.carried += hit ? emission[*hit] : world;
         if (!hit) continue;
         sum.reflected += reflected[*hit];
+        if (directed.hasLayers())
+            sum.reflected += directed.layer(*hit, -direction) * reflected[*hit];
+        if (!directed.isNone(*hit) && exposed[*hit] > 0)
+            sum.reflected += directed.towards(*hit, -direction) / exposed[*hit];
         if (distance >= width(*hit)) continue;
         const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
                            hash(receiver.seed, kSets + set)};

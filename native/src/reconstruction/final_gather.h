@@ -23,6 +23,7 @@
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
 #include "transport/direct_light.h"
+#include "transport/directed_light.h"
 #include "transport/set_light.h"
 #include "visibility/visibility.h"
 
@@ -73,7 +74,9 @@ class FinalGather {
     const SetLight& light;
     const std::vector<glm::vec3>& emission;  // per side, without sources, W/m^2
     std::vector<glm::vec3> reflected;        // per side, W/m^2
-    const glm::vec3 world;                   // exitance, W/m^2
+    const DirectedLight directed;
+    const std::vector<float>& exposed;
+    const glm::vec3 world;  // exitance, W/m^2
     const float targetError;
     const float error;  // W/m^2
 };

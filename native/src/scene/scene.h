@@ -22,6 +22,26 @@ struct Image {
     std::vector<glm::vec3> pixels;
 };
 
+// Where a side of a surface that is not Lambert's sends light of the sources, see
+// rb_set_material_gloss, rb_set_material_diffuse_model and rb_set_material_leaving.
+struct Scattering {
+    glm::vec3 glossScale{0.0f}, glossOffset{0.0f};
+    AngleFactors glossByAngle{};
+    float glossRoughness = 0;
+    rb_diffuse_model diffuseModel = RB_DIFFUSE_LAMBERT;
+    float diffuseRoughness = 0;
+    glm::vec4 leaving{0.0f};  // by the angle at which diffuse light leaves
+
+    bool hasGloss() const {
+        return glossScale != glm::vec3(0.0f) || glossOffset != glm::vec3(0.0f) ||
+               glossByAngle != AngleFactors{};
+    }
+    bool hasLayer() const { return leaving != glm::vec4(0.0f); }
+    bool isLambert() const {
+        return !hasGloss() && diffuseModel == RB_DIFFUSE_LAMBERT && !hasLayer();
+    }
+};
+
 // Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The
 // optional image and corner colours, each times its weight, are added to both reflectances.
 struct Material {
@@ -44,6 +64,7 @@ struct Material {
     std::array<AngleFactors, 2> reflectanceByAngle{};
     std::array<glm::vec3, 2> shownFromAbove{glm::vec3(1.0f), glm::vec3(1.0f)};
     std::array<AngleFactors, 2> shownByAngle{};
+    std::array<Scattering, 2> scattering{};
     // Share of the light that does not pass straight through, and an image (its mean channel) that
     // multiplies it. Reflectance and emission are those of the whole, what passes through included.
     float opacity = 1;

@@ -102,6 +102,7 @@ class DirectLight {
 
   private:
     struct Block;
+    struct Origins;
     using Place = ReceiverPlace;
     static constexpr size_t kBlocks = 4;          // of a receiver's samples, to see how they differ
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
@@ -120,11 +121,12 @@ class DirectLight {
                          const Aim& aim, Seen& seen, Sightings* sightings, Gathered& sum) const;
     // Whether the light that a side gets from a source comes on top of the source's power.
     bool isUnpowered(size_t source, uint32_t side) const;
-    // sampleAt(point, uv): a sample of the source.
+    // sampleAt(point, uv): a sample of the source. origins: to be added to; or null.
     template <class SampleAt>
     void takeSamples(const LightSource& source, const SampleAt& sampleAt, const SobolPoints& points,
                      uint32_t side, const Place& place, int first, int each,
-                     std::array<Block, kBlocks>& blocks, Sightings* sightings, Gathered& sum) const;
+                     std::array<Block, kBlocks>& blocks, Sightings* sightings, Origins* origins,
+                     Gathered& sum) const;
     const LightSource* surrounding() const;  // the source that has parts, if there is one
     // Gives the aims of receivers that see little of it their outlooks, which are returned: from
     // the sightings of all of them, and then from samples by these. Counts the rays in `results`.

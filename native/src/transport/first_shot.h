@@ -25,6 +25,7 @@ struct FirstShot {
     // exitance that is left to the transport, per side, W/m^2; else both are empty.
     std::vector<glm::vec3> indirect, unshot;
     std::vector<glm::vec4> angles;    // per side, of GATHER: means of angleTerms; else empty
+    std::vector<Incoming> incoming;   // per side, of GATHER, if any surface is not Lambert's
     std::vector<float> error;         // per side, standard error of all irradiance, W/m^2
     std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2
     std::shared_ptr<const LightBySource> bySource;  // of GATHER: what came from each source

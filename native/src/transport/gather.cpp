@@ -74,6 +74,7 @@ FirstShot gather(const FirstShotInput& input) {
     shot.emission = light.bundledEmission();
     shot.irradiance.resize(n);
     shot.angles.resize(n);
+    if (!patches.scattering.empty()) shot.incoming.resize(n);
     shot.error.resize(n);
     auto report = [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); };
     auto receiverAt = [&](size_t side) {
@@ -113,6 +114,7 @@ FirstShot gather(const FirstShotInput& input) {
         shot.irradiance[side] = result.irradiance;
         shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
         shot.angles[side] = result.meanAngles();
+        if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
         shot.error[side] = std::sqrt(result.variance);
         shot.rays += result.rays;
         shot.unblockedSides += result.unblocked;

@@ -6,7 +6,7 @@
 namespace raybundle {
 namespace {
 
-constexpr size_t kMostParts = size_t(1) << 21;  // 72 MB
+constexpr size_t kMostParts = size_t(1) << 21;  // 104 MB
 // A source whose share of the light becomes so many times what it was would have got more samples.
 constexpr double kMostGrowth = 2;
 

@@ -56,7 +56,8 @@ class LightBySource {
                 if (const auto source = matches[k].source)
                     results[receiver].add(
                         parts[receiver * matches.size() + k].scaled(matches[k].factor),
-                        isUnpowered(*source, receiver));
+                        isUnpowered(*source, receiver),
+                        hash(uint32_t(receiver), uint32_t(*source)));
         return results;
     }
 

@@ -119,6 +119,7 @@ LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const Fir
       worldRadiance(worldRadiance),
       exposed(exposed),
       isShown(isShown),
+      directedLight(patches, shot),
       hasEmission(std::any_of(shot.emission.begin(), shot.emission.end(),
                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
 
@@ -156,8 +157,18 @@ LineWeights LineReuse::lineWeights(Half half) const {
 
 Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected, Field& passed,
                             const LineWeights& weights) const {
+    ByAngle byAngle{directed(half, weights), {}};
+    Irradiance light = solvePassed(half, tolerance, reflected, passed, weights, byAngle);
+    // Halves tell of noise alone.
+    if (half != Half::BOTH || !directedLight.hasAngles()) return light;
+    findAngles(half, weights, reflected, light, byAngle);
+    return solvePassed(half, tolerance, reflected, passed, weights, byAngle);
+}
+
+Irradiance LineReuse::solvePassed(Half half, float tolerance, Field& reflected, Field& passed,
+                                  const LineWeights& weights, const ByAngle& byAngle) const {
     if (patches.translucence.empty())
-        return solveReflected(half, tolerance, reflected, weights, {});
+        return solveReflected(half, tolerance, reflected, weights, {}, byAngle);
     const std::vector<float> exposed = exposedShare();
     const size_t n = counts.sideCount();
     Field next(n), change(n);
@@ -172,7 +183,7 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected, Field&
         passed = next;
     }
     for (int pass = 1;; ++pass) {
-        Irradiance light = solveReflected(half, tolerance, reflected, weights, passed);
+        Irradiance light = solveReflected(half, tolerance, reflected, weights, passed, byAngle);
         passOn(light.direct, light.indirect);
         forEachSide(n, [&](size_t i) { change[i] = next[i] - passed[i]; });
         passed.swap(next);
@@ -184,10 +195,12 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected, Field&
 }
 
 Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflected,
-                                     const LineWeights& weights, const Field& passed) const {
+                                     const LineWeights& weights, const Field& passed,
+                                     const ByAngle& byAngle) const {
     const size_t n = counts.sideCount();
     Irradiance result(n);
-    const HandOver first = handOver(patches, shot, exposedShare());
+    const std::vector<float> exposed = exposedShare();
+    const HandOver first = handOver(patches, shot, exposed);
     const std::vector<float>&x = weights.x, &m = weights.m;
     PaddedField scaled(n);  // what the matrix multiplies next
 
@@ -201,12 +214,15 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         if (hasEmission) sum += rowTimes(counts, half, i, scaled);
         result.direct[i] += x[i] * sum / m[i];
     });
-    Field passedBrought(passed.size());  // by the lines, W/m^2
+    // By the lines, of what is not solved for, W/m^2.
+    Field known = byAngle.brought;
+    result.byAngle = byAngle.reflected;
+    addPower(known, exposed, result.redirected);
     if (!passed.empty()) {
+        known.resize(n, glm::vec3(0.0f));
         forEachSide(n, [&](size_t i) { scaled[i] = padded(x[i] * passed[i]); });
         forEachSide(n, [&](size_t i) {
-            passedBrought[i] =
-                m[i] > 0 ? x[i] * rowTimes(counts, half, i, scaled) / m[i] : glm::vec3(0.0f);
+            if (m[i] > 0) known[i] += x[i] * rowTimes(counts, half, i, scaled) / m[i];
         });
     }
 
@@ -221,8 +237,9 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         }
         // The right-hand side, until the loop: unshot and what the lines brought, over the scale.
         glm::vec3 carried = result.direct[i] - first.gathered[i];
-        if (!passed.empty()) carried += passedBrought[i];
-        const glm::vec3 unshot = patches.reflectance[i] * carried;
+        if (!known.empty()) carried += known[i];
+        glm::vec3 unshot = patches.reflectance[i] * carried;
+        if (!byAngle.reflected.empty()) unshot += byAngle.reflected[i];
         for (int c = 0; c < 3; ++c)
             product[i][c] = scale[i][c] > 0 ? (first.unshot[i][c] + unshot[c]) / scale[i][c] : 0;
         // Lines' product with the guess, to the last bit as at the end of the solve that found it.
@@ -284,9 +301,15 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         brought[i] = isSolved ? share * brought[i] : rowTimes(counts, half, i, scaled);
         result.indirect[i] = first.indirect[i];
         if (m[i] > 0) result.indirect[i] += x[i] * brought[i] / m[i];
-        if (!passed.empty()) result.indirect[i] += passedBrought[i];
+        if (!known.empty()) result.indirect[i] += known[i];
     });
     return result;
+}
+
+void LineReuse::addPower(const Field& light, const std::vector<float>& exposed,
+                         glm::dvec3& power) const {
+    for (size_t i = 0; i < light.size(); ++i)
+        power += double(patches.area[i / 2] * exposed[i]) * glm::dvec3(light[i]);
 }
 
 size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDistance,
@@ -314,20 +337,21 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
     // cosine-distributed too: weigh all alike.
     constexpr uint32_t kNone = UINT32_MAX;
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
-    const HandOver shotLight = handOver(patches, shot, exposedShare());
+    const std::vector<float> exposed = exposedShare();
+    const HandOver shotLight = handOver(patches, shot, exposed);
     std::vector<uint32_t> hits;
     std::vector<float> weights;  // of what lines and rays bring: the number of both
-    Field fromLines;             // indirect irradiance times the lines
+    Field known;  // indirect irradiance times the lines, and what rays brought by direction
     for (size_t first = 0; first < starved.size();) {
         const size_t last = starved.size();
         hits.resize(last * rays, kNone);
         weights.resize(last);
-        fromLines.resize(last);
+        known.resize(last);
         tbb::parallel_for(first, last, [&](size_t k) {
             const uint32_t side = starved[k];
             const glm::vec3 normal = patches.normal(side);
             const float m = linesAt(side);
-            glm::vec3 direct(0.0f);
+            glm::vec3 direct(0.0f), byDirection(0.0f);
             weights[k] = m;
             for (size_t i = 0; i < rays; ++i) {
                 const glm::vec4 u = sobolPoint(uint32_t(i), hash(seed, side));
@@ -338,6 +362,8 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
                 if (hit && isCovered(patches, side, *hit, direction, distance, touchDistance))
                     continue;
                 if (hit) hits[k * rays + i] = *hit;
+                if (hit && !directedLight.isNone(*hit) && exposed[*hit] > 0)
+                    byDirection += directedLight.towards(*hit, -direction) / exposed[*hit];
                 direct += hit ? shot.emission[*hit] : worldExitance;
                 ++weights[k];
             }
@@ -345,7 +371,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
             const glm::vec3 fromSources = shotLight.gathered[side];
             const glm::vec3 lineDirect = irradiance.direct[side] - fromSources;
             irradiance.direct[side] = fromSources + (m * lineDirect + direct) / weights[k];
-            fromLines[k] = m * (irradiance.indirect[side] - shotLight.indirect[side]);
+            known[k] = m * (irradiance.indirect[side] - shotLight.indirect[side]) + byDirection;
         });
         for (size_t k = first * rays; k < last * rays; ++k)
             if (hits[k] != kNone && isOther[hits[k]]) {
@@ -356,17 +382,16 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
     }
 
     // Starved sides may see each other: sweep until their reflected light has settled.
-    const std::vector<float> exposed = exposedShare();
-    Field known = reflected, next(starved.size());
+    Field sent = reflected, next(starved.size());
     if (!patches.translucence.empty())
-        for (size_t i = 0; i < known.size(); ++i)
-            known[i] += passedOn(patches, exposed, i, irradiance.all(i ^ 1));
+        for (size_t i = 0; i < sent.size(); ++i)
+            sent[i] += passedOn(patches, exposed, i, irradiance.all(i ^ 1));
     for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
         tbb::parallel_for(size_t(0), starved.size(), [&](size_t k) {
             const uint32_t side = starved[k];
-            glm::vec3 sum = fromLines[k];
+            glm::vec3 sum = known[k];
             for (size_t i = 0; i < rays; ++i)
-                if (const uint32_t hit = hits[k * rays + i]; hit != kNone) sum += known[hit];
+                if (const uint32_t hit = hits[k * rays + i]; hit != kNone) sum += sent[hit];
             const glm::vec3 arriving = weights[k] > 0 ? sum / weights[k] : glm::vec3(0.0f);
             irradiance.indirect[side] = shotLight.indirect[side] + arriving;
             next[k] = shotLight.unshot[side] +
@@ -376,9 +401,9 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
         glm::vec3 change(0.0f), most(0.0f);
         for (size_t k = 0; k < starved.size(); ++k) {
             next[k] += passedOn(patches, exposed, starved[k], irradiance.all(starved[k] ^ 1));
-            change = glm::max(change, glm::abs(next[k] - known[starved[k]]));
+            change = glm::max(change, glm::abs(next[k] - sent[starved[k]]));
             most = glm::max(most, next[k]);
-            known[starved[k]] = next[k];
+            sent[starved[k]] = next[k];
         }
         if (glm::all(glm::lessThanEqual(change, kSettled * most))) break;
     }

@@ -25,6 +25,7 @@
 // - The last solve weights each line by x_i x_j, so that m_i becomes proportional to the true area
 //   of the patch while rows still sum to 1 and the matrix stays symmetric (Sinkhorn scaling): then
 //   no power is lost or made between patches.
+// - Surfaces need not be Lambert's (line_reuse_angles.cpp).
 #pragma once
 
 #include <glm/glm.hpp>
@@ -32,6 +33,7 @@
 
 #include "bundles/line_counts.h"
 #include "patches/patches.h"
+#include "transport/directed_light.h"
 #include "transport/first_shot.h"
 #include "transport/transport.h"
 #include "visibility/visibility.h"
@@ -77,11 +79,36 @@ class LineReuse {
                               const std::vector<glm::vec3>& reflected,
                               Irradiance& irradiance) const;
 
+    // Per side: what the lines of a half bring of light by direction, beyond what they bring of it
+    // as by Lambert's law, W/m^2. Empty where there is none. weights: of the same half.
+    std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
+
   private:
+    // What the lines of a half bring, W/m^2, by a share of them (kLeastEntries of each row at
+    // least). sent(from, to, entry): exitance of a side towards another one, W/m^2; entry: of the
+    // row.
+    template <class Value, class Sent>
+    std::vector<Value> alongLines(Half half, const LineWeights& weights, double share,
+                                  const Value& zero, const Sent& sent) const;
+    // light: per side, W/m^2, of the share that is exposed; power: W.
+    void addPower(const std::vector<glm::vec3>& light, const std::vector<float>& exposed,
+                  glm::dvec3& power) const;
+    // What differs from Lambert's surfaces, per side, W/m^2; empty: nothing.
+    struct ByAngle {
+        std::vector<glm::vec3> brought;    // irradiance along lines, see directed
+        std::vector<glm::vec3> reflected;  // exitance by light along lines
+    };
+    // Adds what is known of it once it is solved without. light: that solution.
+    void findAngles(Half half, const LineWeights& weights, const std::vector<glm::vec3>& reflected,
+                    const Irradiance& light, ByAngle& byAngle) const;
+    // With what passes through translucent patches.
+    Irradiance solvePassed(Half half, float tolerance, std::vector<glm::vec3>& reflected,
+                           std::vector<glm::vec3>& passed, const LineWeights& weights,
+                           const ByAngle& byAngle) const;
     // passed: per side, exitance that is known besides; empty: none.
     Irradiance solveReflected(Half half, float tolerance, std::vector<glm::vec3>& reflected,
-                              const LineWeights& weights,
-                              const std::vector<glm::vec3>& passed) const;
+                              const LineWeights& weights, const std::vector<glm::vec3>& passed,
+                              const ByAngle& byAngle) const;
 
     const Patches& patches;
     const LineCounts& counts;
@@ -89,6 +116,7 @@ class LineReuse {
     const glm::vec3 worldRadiance;
     const std::vector<float>& exposed;
     const std::vector<bool>* const isShown;
+    const DirectedLight directedLight;
     bool hasEmission = false;
 };
 

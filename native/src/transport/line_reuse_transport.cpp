@@ -139,7 +139,14 @@ class LineReuseTransport : public Transport {
     void startStreaming() {
         const std::vector<float> exposed = solver.exposedShare();
         first = handOver(input.patches, input.shot, exposed);
+        // Light by direction as the lines so far have it: those that follow are not kept.
+        const std::vector<glm::vec3> byDirection =
+            solver.directed(Half::BOTH, solver.lineWeights(Half::BOTH));
         std::vector<glm::vec3> source = first.unshot;
+        for (size_t i = 0; i < byDirection.size(); ++i) {
+            first.indirect[i] += byDirection[i];
+            source[i] += input.patches.reflectance[i] * byDirection[i];
+        }
         for (size_t i = 0; i < source.size(); ++i)
             source[i] +=
                 passedOn(input.patches, exposed, i, first.gathered[i ^ 1] + first.indirect[i ^ 1]);

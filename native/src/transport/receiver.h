@@ -14,6 +14,7 @@
 #include "patches/patches.h"
 #include "scene/angles.h"
 #include "scene/channels.h"
+#include "transport/incoming.h"
 
 namespace raybundle {
 
@@ -42,13 +43,14 @@ struct LightPart {
     float variance = 0;          // of the brightest channel
     float contrast = 0;          // standard deviation over the receiver that shadows make, W/m^2
     glm::vec4 angles{0.0f};      // the brightest channel times the means of angleTerms
+    Incoming incoming;           // where surfaces scatter by direction
 
     // From a source so many times as strong. The samples have the colour of the light.
     LightPart scaled(const glm::vec3& factor) const {
         const glm::vec3 light = factor * irradiance;
         const float most = brightest(irradiance) > 0 ? brightest(light) / brightest(irradiance)
                                                      : brightest(factor);
-        return {light, most * most * variance, most * contrast, most * angles};
+        return {light, most * most * variance, most * contrast, most * angles, incoming};
     }
 };
 
@@ -60,19 +62,23 @@ struct Gathered {
     float contrast = 0;          // sums over the sources: of theirs
     glm::vec4 angles{0.0f};      // of theirs
     float brightness = 0;        // of their brightest channels
+    Incoming incoming;           // of theirs, by brightness
     uint64_t rays = 0;
     uint64_t unblocked = 0;  // sources without noise: wholly visible
     uint64_t hidden = 0;     // sources that it cannot face, without a sample
     uint64_t weak = 0;       // sources that took fewer rays since they give little of the light
     uint64_t inside = 0;     // sources that took fewer rays since it is the inside of a solid
 
-    void add(const LightPart& part, bool isUnpowered) {
+    // random: see Incoming::add.
+    void add(const LightPart& part, bool isUnpowered, uint32_t random) {
         irradiance += part.irradiance;
         if (isUnpowered) unpowered += part.irradiance;
         variance += part.variance;
         contrast += part.contrast;
         angles += part.angles;
-        brightness += brightest(part.irradiance);
+        const float more = brightest(part.irradiance);
+        brightness += more;
+        if (more > 0) incoming.add(part.incoming, more / brightness, random);
     }
     // Means of angleTerms.
     glm::vec4 meanAngles() const { return brightness > 0 ? angles / brightness : kEverywhere; }

@@ -58,6 +58,19 @@ struct DirectLight::Block {
     }
 };
 
+// Where the light of a source comes from.
+struct DirectLight::Origins {
+    uint32_t random;  // differs from receiver to receiver
+    Incoming incoming;
+    float brightness = 0;
+
+    void add(const glm::vec3& direction, float more) {
+        brightness += more;
+        random = hash(random, 0);
+        if (more > 0) incoming.add(direction, more / brightness, random);
+    }
+};
+
 // About what each source would give without occluders, to share out the samples; empty where
 // there are so few sources that it does not pay.
 std::vector<float> DirectLight::unblockedWeights(const Place& place) const {
@@ -92,7 +105,7 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
             own.samples = std::max(kFewSamples, aim.samples / 2);
         if (own.samples < aim.samples) ++sum.weak;
         const LightPart part = gatherFrom(k, receiver, place, own, seen, sightings, sum);
-        sum.add(part, isUnpowered(k, receiver.side));
+        sum.add(part, isUnpowered(k, receiver.side), hash(receiver.seed, uint32_t(k)));
         if (parts) parts[k] = part;
     }
     return sum;
@@ -154,7 +167,7 @@ template <class SampleAt>
 void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleAt,
                               const SobolPoints& points, uint32_t side, const Place& place,
                               int first, int each, std::array<Block, kBlocks>& blocks,
-                              Sightings* sightings, Gathered& sum) const {
+                              Sightings* sightings, Origins* origins, Gathered& sum) const {
     std::array<ShadowRay, Visibility::kPacket> rays;
     struct Held {
         glm::vec3 irradiance;
@@ -165,7 +178,9 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
     int count = 0;
     auto see = [&](Block& block, const glm::vec3& irradiance, const glm::vec3& direction) {
         block.visible += irradiance;
-        block.angles += brightest(irradiance) * angleTerms(glm::dot(direction, place.normal));
+        const float brightness = brightest(irradiance);
+        block.angles += brightness * angleTerms(glm::dot(direction, place.normal));
+        if (origins) origins->add(direction, brightness);
     };
     auto trace = [&] {
         std::array<float, Visibility::kPacket> shares;
@@ -217,7 +232,10 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
     std::array<Block, kBlocks> blocks;
     Block all;
-    const SobolPoints points(hash(seed, hash(receiver.seed, uint32_t(index))));
+    const uint32_t ownSeed = hash(seed, hash(receiver.seed, uint32_t(index)));
+    const SobolPoints points(ownSeed);
+    Origins origins{ownSeed, {}};
+    const bool keepsOrigins = !patches.scattering.empty() && !receiver.point;
     std::optional<glm::vec3> closed;
     float closedError = 0, variance = 0;
     const std::vector<float> sumOfSeen =
@@ -228,7 +246,8 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     };
     for (;;) {
         takeSamples(source, sampleAt, points, receiver.side, place, all.count,
-                    (next - all.count) / int(kBlocks), blocks, hasParts ? sightings : nullptr, sum);
+                    (next - all.count) / int(kBlocks), blocks, hasParts ? sightings : nullptr,
+                    keepsOrigins ? &origins : nullptr, sum);
         all = {};
         for (const Block& block : blocks) all.add(block);
         if (skips.skipLit && !closed && !isGuided &&
@@ -251,7 +270,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                 next = 4 * all.count;
                 continue;
             }
-            return {glm::vec3(0.0f), missed * missed, 0, glm::vec4(0.0f)};
+            return {glm::vec3(0.0f), missed * missed, 0, glm::vec4(0.0f), {}};
         }
         // By the first pass alone, so that the order of the receivers does not matter.
         if (std::isinf(tolerance)) seen[index] = true;
@@ -272,7 +291,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     return {irradiance, variance + closedError * closedError,
             brightest(closed ? *closed : all.open / float(all.count)) *
                 std::sqrt(visible * (1 - visible)),
-            brightest(irradiance) / brightest(all.visible) * all.angles};
+            brightest(irradiance) / brightest(all.visible) * all.angles, origins.incoming};
 }
 
 void DirectLight::look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,
@@ -286,7 +305,7 @@ void DirectLight::look(const LightSource& source, const Receiver& receiver, cons
             return source.sampleSeen(place.normal, uv, sumOfSeen);
         },
         SobolPoints(hash(seed, ~receiver.seed)), receiver.side, place, 0,
-        Sightings::kMost / int(kBlocks), blocks, &sightings, sum);
+        Sightings::kMost / int(kBlocks), blocks, &sightings, nullptr, sum);
 }
 
 }  // namespace raybundle

@@ -31,6 +31,11 @@ struct Irradiance {
     std::vector<glm::vec3> direct;    // straight from sources, emission and world
     std::vector<glm::vec3> gathered;  // part of it: from the sources of the first shot
     std::vector<glm::vec3> indirect;  // after one reflection or more
+    // Exitance by indirect light that comes in at angles at which a side reflects more than of
+    // light from everywhere, or less; empty: none.
+    std::vector<glm::vec3> byAngle;
+    // Power that arrives and would leave the scene if all surfaces were Lambert's, W.
+    glm::dvec3 redirected{0.0};
 
     glm::vec3 all(size_t side) const { return direct[side] + indirect[side]; }
     void add(const Irradiance& other) {
@@ -39,6 +44,7 @@ struct Irradiance {
             gathered[side] += other.gathered[side];
             indirect[side] += other.indirect[side];
         }
+        redirected += other.redirected;
     }
 };
 

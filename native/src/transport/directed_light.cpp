@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/directed_light.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "bake/noise.h"
+#include "scene/channels.h"
+#include "transport/sobol.h"
+
+namespace raybundle {
+namespace {
+
+// Directions that are all within the angle of this cosine of their mean are one.
+constexpr float kSameDirection = 0.97f;
+// Of more sides than this each has one of its directions: 70 bytes a lobe.
+constexpr size_t kManySides = size_t(1) << 18;
+// Less than this share of what arrives makes no difference.
+constexpr float kLeastShare = 1e-4f;
+// Patches nearer to each other than so many of their widths see each other in many directions,
+// which so many pairs of points tell.
+constexpr float kNear = 1.5f;
+constexpr uint32_t kNearPairs = 8;
+// Of the noise of all reflected light, what this may add.
+constexpr double kNoiseShare = 0.3;
+constexpr size_t kBlock = 256;  // sides per task
+
+}  // namespace
+
+DirectedLight::DirectedLight(const Patches& patches, const FirstShot& shot) : patches(patches) {
+    if (patches.scattering.empty() && patches.byAngle.empty()) return;
+    findMiddles();
+    findLayers();
+    if (patches.scattering.empty() || shot.incoming.empty()) return;
+    const size_t n = patches.sideCount(), blocks = (n + kBlock - 1) / kBlock;
+    std::vector<std::vector<Part>> ofBlock(blocks);
+    first.assign(n + 1, 0);
+    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+        std::vector<Part>& parts = ofBlock[block];
+        for (size_t side = block * kBlock; side < std::min(n, (block + 1) * kBlock); ++side) {
+            const size_t before = parts.size();
+            addParts(uint32_t(side), shot, parts);
+            first[side + 1] = uint32_t(parts.size() - before);
+        }
+    });
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    all.reserve(first.back());
+    for (const std::vector<Part>& parts : ofBlock)
+        all.insert(all.end(), parts.begin(), parts.end());
+    if (isNone()) return;
+    lineShare = enoughLines(shot);
+}
+
+void DirectedLight::findMiddles() {
+    middles.resize(patches.count());
+    tbb::parallel_for(size_t(0), middles.size(), [&](size_t p) {
+        const bool isTriangle = patches.parents[patches.parentOf[p]].isTriangle;
+        middles[p] = {patches.point(uint32_t(p), glm::vec2(isTriangle ? 1.0f / 3 : 0.5f)),
+                      std::sqrt(patches.area[p])};
+    });
+}
+
+void DirectedLight::findLayers() {
+    if (std::none_of(patches.scattering.begin(), patches.scattering.end(),
+                     [](const Scattering& surface) { return surface.hasLayer(); }))
+        return;
+    layers.resize(patches.sideCount());
+    for (uint32_t side = 0; side < layers.size(); ++side) {
+        const float all = brightest(patches.reflectance[side]);
+        if (!(all > 0)) continue;
+        const float diffuse = brightest(patches.reflectance[side] - mirroredMean(side)) / all;
+        layers[side] = {patches.normal(side), diffuse * scatteringOf(side).leaving};
+    }
+}
+
+const Scattering& DirectedLight::scatteringOf(uint32_t side) const {
+    return patches.scattering[2 * patches.parentAt(side).scattering + side % 2];
+}
+
+float DirectedLight::wholeOf(uint32_t side) const {
+    return 1 / std::max(patches.opacityOf(side / 2), 1e-6f);
+}
+
+glm::vec3 DirectedLight::mirroredMean(uint32_t side) const {
+    const Scattering& surface = scatteringOf(side);
+    const glm::vec3& reflectance = patches.reflectance[side];
+    return glm::clamp(surface.glossScale * reflectance + wholeOf(side) * surface.glossOffset,
+                      glm::vec3(0.0f), reflectance);
+}
+
+double DirectedLight::enoughLines(const FirstShot& shot) const {
+    double reflected = 0, bent = 0;
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        const double area = double(patches.area[side / 2]);
+        reflected += area * double(brightest(patches.reflectance[side] * shot.irradiance[side]));
+        for (uint32_t k = first[side]; k < first[side + 1]; ++k)
+            bent += area * double(all[k].lobe.contrast() * brightest(all[k].exitance));
+    }
+    if (!(bent > 0)) return 0;
+    return std::min(1.0, std::pow(bent / (kNoiseShare * reflected), 1 / kNoiseSlope));
+}
+
+void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<Part>& parts) const {
+    const Parent& parent = patches.parentAt(side);
+    const glm::vec3& light = shot.irradiance[side];
+    if (!parent.exchanges || brightest(light) <= 0) return;
+    const Scattering& surface = scatteringOf(side);
+    if (surface.isLambert()) return;
+    const glm::vec3& reflectance = patches.reflectance[side];
+    const glm::vec3 mirrored = mirroredMean(side);
+    const float whole = wholeOf(side);
+    auto mirroredAt = [&](const glm::vec4& terms) {
+        return glm::clamp(mirrored + whole * sumOfTerms(surface.glossByAngle, terms - kEverywhere),
+                          0.0f, 1.0f);
+    };
+    const float f0 = brightest(mirroredAt(glm::vec4(0.0f)));
+    const glm::vec3 normal = patches.normal(side);
+    const Incoming& incoming = shot.incoming[side];
+    std::array<glm::vec3, Incoming::kCount> directions;
+    glm::vec3 mean(0.0f);
+    for (size_t k = 0; k < directions.size(); ++k) mean += directions[k] = incoming.direction(k);
+    const bool areOne =
+        std::all_of(directions.begin(), directions.end(), [&](const glm::vec3& direction) {
+            return glm::dot(direction, mean) > kSameDirection * glm::length(mean);
+        });
+    if (areOne) directions[0] = glm::normalize(mean);
+    const size_t count = areOne || patches.sideCount() > kManySides ? 1 : directions.size();
+    for (size_t k = 0; k < count; ++k) {
+        const glm::vec3 direction = directions[k];
+        const glm::vec3 part = light / float(count);
+        const glm::vec4 terms = angleTerms(glm::dot(normal, direction));
+        const glm::vec3 gloss = mirroredAt(terms);
+        if (brightest(gloss) > kLeastShare)
+            parts.push_back(
+                {Lobe::gloss(normal, direction, surface.glossRoughness, f0), gloss * part});
+        if (surface.diffuseModel != RB_DIFFUSE_BURLEY &&
+            surface.diffuseModel != RB_DIFFUSE_OREN_NAYAR)
+            continue;
+        glm::vec3 all = reflectance;
+        if (!patches.byAngle.empty()) all += sumOfTerms(patches.byAngle[side], terms - kEverywhere);
+        const glm::vec3 diffuse = glm::clamp(all - gloss, 0.0f, 1.0f);
+        if (brightest(diffuse) > kLeastShare)
+            parts.push_back(
+                {Lobe::diffuse(normal, direction, surface.diffuseModel, surface.diffuseRoughness),
+                 diffuse * part});
+    }
+}
+
+glm::vec3 DirectedLight::towards(uint32_t side, const glm::vec3& direction) const {
+    glm::vec3 sum(0.0f);
+    for (uint32_t k = first[side]; k < first[side + 1]; ++k)
+        sum += (all[k].lobe.towards(direction) - 1) * all[k].exitance;
+    return sum;
+}
+
+float DirectedLight::layer(uint32_t side, const glm::vec3& direction) const {
+    const Layer& layer = layers[side];
+    return glm::dot(layer.factors, angleTerms(glm::dot(layer.normal, direction)) - kEverywhere);
+}
+
+glm::vec3 DirectedLight::wayBetween(uint32_t side, uint32_t other) const {
+    const glm::vec3 way = glm::vec3(middles[other / 2]) - glm::vec3(middles[side / 2]);
+    const float square = glm::dot(way, way);
+    return square > 0 ? way / std::sqrt(square) : patches.normal(side);
+}
+
+glm::vec3 DirectedLight::between(uint32_t side, uint32_t other, uint32_t random) const {
+    const glm::vec4 &from = middles[side / 2], &to = middles[other / 2];
+    const glm::vec3 way = glm::vec3(to) - glm::vec3(from);
+    const float square = glm::dot(way, way), near = kNear * (from.w + to.w);
+    if (square < near * near) return betweenNear(side, other, random);
+    return towards(side, way / std::sqrt(square));
+}
+
+// By points on both patches, each pair for the lines that join it.
+glm::vec3 DirectedLight::betweenNear(uint32_t side, uint32_t other, uint32_t random) const {
+    const glm::vec3 normal = patches.normal(side), otherNormal = patches.normal(other);
+    const SobolPoints points(random);
+    glm::vec3 sum(0.0f);
+    float weights = 0;
+    for (uint32_t k = 0; k < kNearPairs; ++k) {
+        const glm::vec4 u = points[k];
+        const glm::vec3 way =
+            patches.point(other / 2, {u.z, u.w}) - patches.point(side / 2, {u.x, u.y});
+        const float square = glm::dot(way, way);
+        const float cosines = -glm::dot(normal, way) * glm::dot(otherNormal, way);
+        if (!(square > 0) || glm::dot(normal, way) <= 0 || cosines <= 0) continue;
+        const float weight = cosines / (square * square);
+        sum += weight * towards(side, way / std::sqrt(square));
+        weights += weight;
+    }
+    return weights > 0 ? sum / weights : glm::vec3(0.0f);
+}
+
+}  // namespace raybundle

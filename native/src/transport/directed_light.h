@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What surfaces that are not Lambert's send towards a direction more, or less, than in the mean
+// over all of them. Light of the sources by the direction it comes from: a glossy surface mirrors
+// it, a rough one sends some of it back. And of all light, what leaves from under a layer by the
+// angle at which it leaves.
+//
+// Source: none; the thesis has Lambert's surfaces only. Lines join two patches in proportion to
+// what one gets of the other's light by Lambert's law; where their middles lie tells the direction,
+// and where they are near, points on both.
+// What is left out: light that was reflected before, or came along lines (the constant part of the
+// world, emission without a source), is mirrored and scattered as by Lambert's law.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "patches/patches.h"
+#include "transport/first_shot.h"
+#include "transport/lobe.h"
+
+namespace raybundle {
+
+class DirectedLight {
+  public:
+    // Of the light of a first shot; none, if that knows no directions or all surfaces are
+    // Lambert's. patches must outlive the object.
+    DirectedLight(const Patches& patches, const FirstShot& shot);
+
+    bool isNone() const { return all.empty(); }
+    bool isNone(uint32_t side) const { return isNone() || first[side] == first[side + 1]; }
+
+    // How much less noise it makes along lines than all reflected light: a share of the lines that
+    // is enough for it, 0 to 1.
+    double shareOfLines() const { return lineShare; }
+
+    // Exitance of a side towards a direction (unit) away from it, less the mean over all
+    // directions, W/m^2 over its whole area: positive or negative.
+    glm::vec3 towards(uint32_t side, const glm::vec3& direction) const;
+    // Towards the side of another patch, the mean over the lines between the two; random: differs
+    // from call to call.
+    glm::vec3 between(uint32_t side, uint32_t other, uint32_t random) const;
+
+    // Whether diffuse light leaves from under a layer anywhere: of that all light has directions.
+    bool hasLayers() const { return !layers.empty(); }
+    // Of what a side reflects in all, the share that goes towards a direction more than by
+    // Lambert's law, or less.
+    float layer(uint32_t side, const glm::vec3& direction) const;
+    // Whether it matters at which angle light that was reflected leaves or arrives.
+    bool hasAngles() const { return !middles.empty(); }
+    // From the middle of a side's patch to that of another, unit.
+    glm::vec3 wayBetween(uint32_t side, uint32_t other) const;
+
+  private:
+    struct Layer {
+        glm::vec3 normal{0.0f};
+        glm::vec4 factors{0.0f};  // of angleTerms less their means
+    };
+    struct Part {
+        Lobe lobe;
+        glm::vec3 exitance;  // W/m^2
+    };
+    void findMiddles();
+    void findLayers();
+    const Scattering& scatteringOf(uint32_t side) const;
+    // Of its opaque share, what the whole patch has is so many times as much.
+    float wholeOf(uint32_t side) const;
+    glm::vec3 mirroredMean(uint32_t side) const;  // of light from everywhere
+    double enoughLines(const FirstShot& shot) const;
+    void addParts(uint32_t side, const FirstShot& shot, std::vector<Part>& parts) const;
+    glm::vec3 betweenNear(uint32_t side, uint32_t other, uint32_t random) const;
+
+    const Patches& patches;
+    std::vector<uint32_t> first;  // per side, into all; one more at the end
+    std::vector<Part> all;
+    std::vector<glm::vec4> middles;  // per patch, and its width, metres
+    double lineShare = 0;
+    std::vector<Layer> layers;  // per side; empty where there are none
+};
+
+}  // namespace raybundle

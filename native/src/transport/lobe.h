@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Where a surface that is not Lambert's sends the light that arrives from one direction: exitance
+// towards a direction, so that the radiance is 1 / pi of it, over its mean by Lambert's cosine.
+//
+// Sources: Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007), GGX
+// with Smith's masking, height-correlated (Heitz 2014), sampled as in Heitz, "Sampling the GGX
+// Distribution of Visible Normals" (2018), with Fresnel's reflectance from f0 to 1 as Cycles has
+// it. Burley, "Physically-Based Shading at Disney" (2012). Fujii, "A tiny
+// improvement of Oren-Nayar reflectance model" (2012).
+// Differs: each is brought to a mean of 1. How much a surface reflects, light that meets several
+// facets included, is known (scene/scene.h); here is only where to.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "raybundle/raybundle.h"
+
+namespace raybundle {
+
+class Lobe {
+  public:
+    static constexpr float kLeastRoughness = 0.45f;
+
+    // normal, incoming: unit vectors, incoming towards the source and above the surface.
+    // roughness: 0 to 1, GGX alpha is its square, but what is smoother than kLeastRoughness is that
+    // rough: patches do not tell narrower lobes apart. f0: reflectance at right angles, 0 to 1.
+    static Lobe gloss(const glm::vec3& normal, const glm::vec3& incoming, float roughness,
+                      float f0);
+    static Lobe diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,
+                        float roughness);
+
+    // Of a unit vector away from the surface: 0 or more, 0 below the surface.
+    float towards(const glm::vec3& direction) const;
+
+    // RMS of what it is off its mean, by Lambert's cosine.
+    float contrast() const { return rms; }
+
+  private:
+    enum class Kind { GLOSS, BURLEY, OREN_NAYAR };
+    struct Moments;
+    class GlossTable;
+    Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness, float f0);
+    static Moments momentsOfGloss(float roughness, float cosine);
+    void normalise(float mean, float meanSquare);
+
+    Kind kind;
+    glm::vec3 normal, incoming;
+    float cosine;     // of the two
+    float masking;    // GLOSS: 2 / G1 - 1, times the cosine
+    float roughness;  // of GLOSS: alpha squared
+    float f0;
+    float scale = 1, rms = 0;
+};
+
+}  // namespace raybundle

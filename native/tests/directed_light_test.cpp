@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Where surfaces that are not Lambert's send the light of the sources: single lobes, and what the
+// walls of a black room get from its floor, against the models as they are published.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "bake/bake.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+#include "transport/lobe.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+// A BSDF over a surface that looks along z: of unit vectors to the light and to the eye, 1/sr.
+using Bsdf = std::function<double(const glm::dvec3& in, const glm::dvec3& out)>;
+
+// Fresnel's law for an index of refraction of 1.5, from 0 at right angles to 1.
+double fresnelEdge(double cosine) {
+    const double g = std::sqrt(1.5 * 1.5 - 1 + cosine * cosine), a = (g - cosine) / (g + cosine);
+    const double b = ((g + cosine) * cosine - 1) / ((g - cosine) * cosine + 1);
+    return (a * a * (1 + b * b) / 2 - 0.04) / 0.96;
+}
+
+// Walter et al. (2007), with height-correlated masking (Heitz 2014).
+Bsdf ggx(double roughness, double f0) {
+    const double a2 = std::pow(roughness, 4);
+    return [=](const glm::dvec3& in, const glm::dvec3& out) {
+        const glm::dvec3 h = glm::normalize(in + out);
+        auto lambda = [&](double z) { return (std::sqrt(1 + a2 * (1 - z * z) / (z * z)) - 1) / 2; };
+        const double d = a2 / (kPi * std::pow(h.z * h.z * (a2 - 1) + 1, 2));
+        const double g = 1 / (1 + lambda(in.z) + lambda(out.z));
+        const double f = f0 + (1 - f0) * fresnelEdge(glm::dot(in, h));
+        return d * f * g / (4 * in.z * out.z);
+    };
+}
+
+// Burley (2012).
+Bsdf burley(double roughness) {
+    return [=](const glm::dvec3& in, const glm::dvec3& out) {
+        const double ih = glm::dot(in, glm::normalize(in + out));
+        const double grazing = 0.5 + 2 * roughness * ih * ih;
+        auto fresnel = [&](double z) { return 1 + (grazing - 1) * std::pow(1 - z, 5); };
+        return fresnel(in.z) * fresnel(out.z) / kPi;
+    };
+}
+
+// Fujii (2012).
+Bsdf orenNayar(double sigma) {
+    return [=](const glm::dvec3& in, const glm::dvec3& out) {
+        const double s = glm::dot(in, out) - in.z * out.z;
+        const double t = s > 0 ? std::max(in.z, out.z) : 1;
+        return (1 + sigma * s / t) / (kPi + (kPi / 2 - 2.0 / 3) * sigma);
+    };
+}
+
+// Calls visit(direction, share) for n^2 directions that stand for shares of Lambert's light along
+// z: many of them grazing, where models are steep.
+void forCosine(int n, const std::function<void(const glm::dvec3&, double)>& visit) {
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+            const double z = (i + 0.5) / n, r = std::sqrt(1 - z * z), phi = 2 * kPi * (j + 0.5) / n;
+            // The midpoint rule has the sum of 2 z / n^2 right.
+            visit({r * std::cos(phi), r * std::sin(phi), z}, 2 * z / (n * n));
+        }
+}
+
+// Mean and mean square of the exitance by a BSDF.
+glm::dvec2 moments(const Bsdf& bsdf, const glm::dvec3& in) {
+    glm::dvec2 sum(0.0);
+    forCosine(400, [&](const glm::dvec3& out, double share) {
+        const double value = kPi * bsdf(in, out);
+        sum += share * glm::dvec2(value, value * value);
+    });
+    return sum;
+}
+
+glm::dvec3 inclined(double cosine) { return {std::sqrt(1 - cosine * cosine), 0, cosine}; }
+
+TEST(Lobe, IsTheModelOverItsMean) {
+    const glm::vec3 normal(0, 0, 1);
+    for (double cosine : {1.0, 0.7, 0.3, 0.1})
+        for (double roughness : {0.5, 0.7, 1.0})
+            for (int model = 0; model < 3; ++model) {
+                const glm::dvec3 in = inclined(cosine);
+                const Bsdf bsdf = model == 0   ? ggx(roughness, 0.04)
+                                  : model == 1 ? burley(roughness)
+                                               : orenNayar(roughness);
+                const Lobe lobe = model == 0 ? Lobe::gloss(normal, in, float(roughness), 0.04f)
+                                             : Lobe::diffuse(normal, in,
+                                                             model == 1 ? RB_DIFFUSE_BURLEY
+                                                                        : RB_DIFFUSE_OREN_NAYAR,
+                                                             float(roughness));
+                const glm::dvec2 mean = moments(bsdf, in);
+                forCosine(32, [&](const glm::dvec3& out, double) {
+                    const double expected = kPi * bsdf(in, out) / mean.x;
+                    // The mean is by a table, which is good to 5 % at grazing angles.
+                    EXPECT_NEAR(double(lobe.towards(out)), expected, 0.05 * expected + 1e-3)
+                        << cosine << " " << roughness << " " << model;
+                });
+                const double contrast = std::sqrt(std::max(0.0, mean.y / (mean.x * mean.x) - 1));
+                EXPECT_NEAR(double(lobe.contrast()), contrast, 0.1 * contrast + 0.01)
+                    << cosine << " " << roughness << " " << model;
+            }
+}
+
+TEST(Lobe, HasNothingBelowTheSurfaceAndIsFiniteAtItsEdge) {
+    const glm::vec3 normal(0, 0, 1);
+    for (const glm::vec3& in : {glm::vec3(0, 0, 1), glm::vec3(1, 0, 1e-6f), glm::vec3(1, 0, -0.1f)})
+        for (float roughness : {0.0f, 0.45f, 1.0f})
+            for (float f0 : {0.0f, 1.0f}) {
+                const Lobe lobe = Lobe::gloss(normal, glm::normalize(in), roughness, f0);
+                EXPECT_EQ(lobe.towards({0.6f, 0, -0.8f}), 0);
+                for (const glm::vec3& out : {glm::vec3(0, 0, 1), glm::vec3(-1, 0, 1e-6f),
+                                             glm::vec3(1, 0, 1e-6f), glm::vec3(0, 1, 1)}) {
+                    const float value = lobe.towards(glm::normalize(out));
+                    EXPECT_TRUE(std::isfinite(value) && value >= 0);
+                }
+            }
+}
+
+// -------------------------------------------------------------------------------------------------
+// A black unit cube whose floor a sun lights, which nothing stops
+// -------------------------------------------------------------------------------------------------
+
+constexpr double kSunCosine = 0.6;
+// Of the floor: what it mirrors is as much for light from everywhere as from above.
+constexpr float kMirrored = 0.3f, kReflected = 0.5f, kRoughness = 0.6f;
+
+Scene studio(bool isBurley = false) {
+    Scene scene;
+    Material paint = grey("paint", kReflected);
+    if (isBurley) {
+        paint.scattering[0].diffuseModel = RB_DIFFUSE_BURLEY;
+        paint.scattering[0].diffuseRoughness = 1;
+    } else {
+        paint.scattering[0].glossScale = glm::vec3(kMirrored / kReflected);
+        paint.scattering[0].glossRoughness = kRoughness;
+    }
+    const Material black = grey("black", 0);
+    place(scene, rectangle("floor", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), paint);
+    place(scene, rectangle("behind", {0, 0, 0}, {0, 1, 0}, {0, 0, 1}), black);
+    place(scene, rectangle("ahead", {1, 0, 0}, {0, 0, 1}, {0, 1, 0}), black);
+    place(scene, rectangle("right", {0, 0, 0}, {0, 0, 1}, {1, 0, 0}), black);
+    place(scene, rectangle("left", {0, 1, 0}, {1, 0, 0}, {0, 0, 1}), black);
+    place(scene, rectangle("ceiling", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}), black);
+    // From behind, so that it is mirrored ahead.
+    Light sun = sunLight({-std::sqrt(1 - kSunCosine * kSunCosine), 0, kSunCosine}, glm::dvec3(1));
+    sun.castsShadows = false;
+    scene.addLight(sun);
+    return scene;
+}
+
+// The floor's exitance towards a direction over its reflectance and irradiance.
+std::function<double(const glm::dvec3&)> sentBy(bool isBurley) {
+    const glm::dvec3 in(-std::sqrt(1 - kSunCosine * kSunCosine), 0, kSunCosine);
+    const Bsdf bsdf = isBurley ? burley(1) : ggx(kRoughness, double(kMirrored));
+    const double share = isBurley ? 1 : double(kMirrored / kReflected), mean = moments(bsdf, in).x;
+    return [=](const glm::dvec3& out) { return 1 - share + share * kPi * bsdf(in, out) / mean; };
+}
+
+// Distance to the wall of the cube in which a ray from inside ends, and the wall (axis, upper).
+std::pair<int, bool> wallAhead(const glm::dvec3& point, const glm::dvec3& direction) {
+    int wall = 0;
+    double nearest = INFINITY;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double distance = ((direction[axis] > 0 ? 1 : 0) - point[axis]) / direction[axis];
+        if (direction[axis] != 0 && distance < nearest) {
+            nearest = distance;
+            wall = axis;
+        }
+    }
+    return {wall, direction[wall] > 0};
+}
+
+class Studio : public testing::TestWithParam<bool> {};
+
+TEST_P(Studio, GoesWhereTheModelSendsIt) {
+    // Of the instances after the floor: what reaches the wall of the floor's light.
+    constexpr int kPoints = 24, kDirections = 96;
+    std::array<double, 6> expected{};
+    const auto sent = sentBy(GetParam());
+    forCosine(kDirections, [&](const glm::dvec3& out, double share) {
+        const double power = share * sent(out) / (kPoints * kPoints);
+        for (int i = 0; i < kPoints; ++i)
+            for (int j = 0; j < kPoints; ++j) {
+                const auto [axis, isUpper] =
+                    wallAhead({(i + 0.5) / kPoints, (j + 0.5) / kPoints, 0}, out);
+                const size_t instance = axis == 2 ? 5 : size_t(1 + 2 * axis + isUpper);
+                expected[instance] += power;
+            }
+    });
+    const Scene scene = studio(GetParam());
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.settings.targetError = 0.003f;
+    bake.run(scene);
+    std::array<double, 6> found{};
+    const Patches& patches = bake.patches();
+    for (uint32_t side = 0; side < patches.sideCount(); side += 2)
+        found[patches.parentAt(side).instance] +=
+            double(patches.area[side / 2] * bake.patchIrradiance().indirect[side].x);
+    for (size_t instance = 1; instance < 6; ++instance)
+        // Of all that the floor reflects. The noise of a wall is 0.2 %; patches send from their
+        // middles.
+        EXPECT_NEAR(found[instance] / (double(kReflected) * kSunCosine), expected[instance], 0.005)
+            << instance;
+    EXPECT_NEAR(expected[1] + expected[2] + expected[3] + expected[4] + expected[5], 1, 0.003);
+    // As by Lambert's law the two would get the same.
+    EXPECT_GT(std::abs(expected[1] - expected[2]), GetParam() ? 0.015 : 0.25);
+    EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 2e-3);
+}
+
+TEST_P(Studio, IsGatheredAtPointsToo) {
+    const auto sent = sentBy(GetParam());
+    const Scene scene = studio(GetParam());
+    Bake bake;
+    bake.settings.patchSize = 1;
+    bake.settings.targetError = 0.005f;
+    bake.settings.reconstruction = "POINT";
+    bake.run(scene);
+    double most = 0, worst = 0;
+    for (int32_t instance = 1; instance < 6; ++instance) {
+        const Mesh& mesh = scene.meshes[size_t(scene.instances[size_t(instance)].mesh)];
+        const glm::dvec3 middle =
+            glm::dvec3(mesh.vertices[0] + mesh.vertices[1] + mesh.vertices[2] + mesh.vertices[3]) /
+            4.0;
+        const glm::dvec3 normal = glm::round(2.0 * (glm::dvec3(0.5) - middle));
+        const glm::dvec3 x(normal.z, normal.x, normal.y), y = glm::cross(normal, x);
+        const auto found = cornerLight(bake, instance, RB_OUTPUT_INDIRECT);
+        for (size_t corner = 0; corner < 4; ++corner) {
+            const glm::dvec3 at(mesh.vertices[size_t(mesh.cornerVertices[corner])]);
+            const glm::dvec3 point = at + 1e-6 * (middle - at);
+            double light = 0;
+            forCosine(256, [&](const glm::dvec3& d, double share) {
+                const glm::dvec3 direction = d.x * x + d.y * y + d.z * normal;
+                const auto [axis, isUpper] = wallAhead(point, direction);
+                if (axis == 2 && !isUpper) light += share * sent(-direction);
+            });
+            const double expected = double(kReflected) * kSunCosine * light / kPi;
+            most = std::max(most, expected);
+            worst = std::max(worst, std::abs(double(found[corner].x) - expected));
+        }
+    }
+    // Final gather has a noise of 0.3 % of the mean light (kNoiseShare of the target), sources
+    // included, which is a tenth of that.
+    EXPECT_LT(worst, 0.04 * most);
+}
+
+INSTANTIATE_TEST_SUITE_P(, Studio, testing::Bool(),
+                         [](const auto& model) { return model.param ? "Burley" : "Gloss"; });
+
+TEST(DirectedLight, IsTheSameAfterLightsAndPaintWereChanged) {
+    auto make = [](bool hasGloss, double red) {
+        Scene scene = studio();
+        if (!hasGloss) scene.materials.front().scattering = {};
+        scene.lights.front().strength.x = red;
+        Light other = sunLight({0.6, 0, 0.8}, glm::dvec3(1));
+        other.castsShadows = false;
+        scene.addLight(other);
+        return scene;
+    };
+    Bake again, fresh;
+    setQuick(again);
+    setQuick(fresh);
+    fresh.run(make(true, 2));
+    again.run(make(false, 1));
+    again.run(make(true, 1));
+    again.run(make(true, 2));
+    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "only strengths of lights changed"));
+    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
+    again.run(make(false, 2));
+    EXPECT_GT(difference(everything(again), everything(fresh)), 1e-2);
+}
+
+}  // namespace
+}  // namespace raybundle
