@@ -31,8 +31,12 @@ def bakeable_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
             and not item.hide_render and item.visible_get()]
 
 
-def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int) -> None:
-    """Sets Cycles to an unbiased bake: every bounce, nothing clamped, denoised or adapted."""
+def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int,
+                  filter_glossy: float = 0.0) -> None:
+    """Sets Cycles to an unbiased bake: every bounce, nothing clamped, denoised or adapted.
+
+    filter_glossy: what is not 0 makes gloss rougher, as a new scene's 1 does.
+    """
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device = "CPU"
@@ -48,7 +52,7 @@ def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int) -> None:
     cycles.min_light_bounces = cycles.min_transparent_bounces = 0
     cycles.light_sampling_threshold = 0.0
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
-    cycles.blur_glossy = 0.0
+    cycles.blur_glossy = filter_glossy
     scene.render.use_simplify = False
 
 
@@ -87,8 +91,8 @@ def rounds_of_distinct_meshes(objects: Sequence[bpy.types.Object]
 
 
 def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int,
-                 kind: str = "DIFFUSE", passes: frozenset[str] = frozenset({"DIRECT", "INDIRECT"})
-                 ) -> dict[str, np.ndarray]:
+                 kind: str = "DIFFUSE", passes: frozenset[str] = frozenset({"DIRECT", "INDIRECT"}),
+                 filter_glossy: float = 0.0) -> dict[str, np.ndarray]:
     """Bakes the objects, irradiance / pi by default; RGB by corner, keyed by the object's name.
 
     kind and passes are type and pass_filter of Blender's bake. "INDIRECT" alone is no reference:
@@ -97,7 +101,7 @@ def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int,
     The scene's render settings, the selection and the meshes' active colour attribute change.
     """
     context = bpy.context
-    prepare_scene(context.scene, samples, seed)
+    prepare_scene(context.scene, samples, seed, filter_glossy)
     result: dict[str, np.ndarray] = {}
     for group in rounds_of_distinct_meshes(objects):
         for item in context.view_layer.objects:

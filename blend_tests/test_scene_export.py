@@ -19,7 +19,7 @@ from raybundle.principled import principled_albedo
 from raybundle.scene_export import export_scene
 
 # Diffuse part of a Principled shader of roughness 0.5, without specular reflection.
-ALBEDO = principled_albedo(0.5, 0.0, 1.5, 0.0, False, 0.5, True).diffuse[0]
+ALBEDO = principled_albedo(0.5, 0.0, 1.5, 0.0, False, 0.5, 1.0).diffuse[0]
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
 
@@ -403,7 +403,7 @@ def test_principled(principled):
     material, result = exported_material(principled)
     base = np.array([0.8, 0.4, 0.2])
     albedo = principled_albedo(0.5, 0.0, shader.inputs['IOR'].default_value, 0.0,
-                               shader.distribution == 'MULTI_GGX', base, True)
+                               shader.distribution == 'MULTI_GGX', base, 1.0)
     assert any('"Principled"' in text and "mirrors" in text for text in result.warnings)
     for side in range(2):
         assert material.reflectance[side] == pytest.approx(
@@ -643,7 +643,7 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
     base = np.array([0.8, 0.4, 0.0])
     shader.inputs['Base Color'].default_value = (*base, 1.0)
     albedo = principled_albedo(0.5, 0.5, shader.inputs['IOR'].default_value, 0.0,
-                               shader.distribution == 'MULTI_GGX', base, True)
+                               shader.distribution == 'MULTI_GGX', base, 1.0)
     material, result = exported_material(principled)
     assert result.warnings == []
     # Of F0 = 0.04 or a little less.
@@ -711,7 +711,14 @@ def test_gloss_alone(principled):
     node.inputs['Roughness'].default_value = 0.0
     output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
     tree.links.new(node.outputs[0], output.inputs['Surface'])
+    # By default diffuse light sees it rougher than it is.
+    material, _ = exported_material(principled)
+    assert 0.6 < material.gloss_roughness[0] < 0.7
+    assert (material.reflectance[0] < [0.7, 0.35, 0.18]).all()
+    bpy.context.scene.cycles.blur_glossy = 0.0
     material, result = exported_material(principled)
+    assert material.gloss_roughness[0] == 0.0
+    assert material.gloss_scale[0] == pytest.approx(np.ones(3))
     assert material.reflectance[0] == pytest.approx([0.8, 0.4, 0.2], rel=1e-3)
     assert (diffuse_of(material) == 0.0).all()
     assert any("mirrors" in text for text in result.warnings)

@@ -26,6 +26,12 @@ _FACETS = np.array([0.23559, 1.07833, -0.38869, -0.96628])
 _FACETS_MEAN = float(_FACETS @ MEANS)
 
 
+def angle_terms(cosines: np.ndarray) -> np.ndarray:
+    """(n, TERMS) of (n,)."""
+    rest = 1.0 - cosines
+    return np.stack([rest, rest**2, rest**5, cosines * rest**5], axis=-1)
+
+
 @dataclass(frozen=True)
 class DiffuseAngles:
     """For a colour, and to be multiplied by it."""

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much light a glossy surface reflects in all: the albedo of Cycles' microfacets.
 
-The diffuse solver spreads what is mirrored as if it were diffuse. That has the right amount, so
-that a room of glossy paint is as bright as it is in Cycles, and not the direction.
+By the angle of the light, as a sum of the terms of diffuse_angles.py.
 
 Source: Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007), GGX with
 Smith's masking; sampled by its visible normals, Heitz, "Sampling the GGX Distribution of Visible
@@ -10,7 +9,8 @@ Normals" (2018). Fresnel's reflectance runs from F0, seen from straight above, t
 dielectric does: F = F0 + (1 - F0) f. The albedo is linear in F0 then: A = (a - b) F0 + b, where
 a is the albedo for F = 1 and b that for F = f.
 
-What differs: integrals by midpoints, good to 1e-3 (blend_tests/test_gloss.py); light that meets
+What differs: integrals by midpoints, good to 1e-3 (blend_tests/test_gloss.py), and the terms fitted
+to them, to 2 % up to 80 degrees; light that meets
 several facets is given back as Cycles' Multiscatter GGX does it (Turquin, "Practical multiple
 scattering compensation for microfacet models", 2019).
 """
@@ -21,11 +21,16 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 
+import bpy
 import numpy as np
+
+from .diffuse_angles import TERMS, angle_terms
 
 _ANGLES = 96  # of view, equal shares of the projected solid angle
 _NORMALS = 16  # along each side of the unit square
 _STEPS = 64  # of the roughness; between them nothing is lost that could be seen
+# Of the rays that meet gloss after a diffuse bounce: mean of the cosine over pi, their density.
+_DENSITY = 2.0 / (3.0 * math.pi)
 _ABOVE = 0.9999  # cosine of the view from straight above
 
 
@@ -36,6 +41,18 @@ class GlossAlbedo:
     white: float
     edge: float
     white_mean: float
+    # (2, TERMS), for F = 1 and F = f: the albedo at an angle is its mean plus the sum of these
+    # times what the terms differ from their means.
+    angles: np.ndarray
+
+    def by_angle(self, f0: np.ndarray | float) -> np.ndarray:
+        """(TERMS,) and the shape of f0: of(f0) by the angle, as `angles`."""
+        white, edge = (part.reshape(TERMS, *[1] * np.ndim(f0)) for part in self.angles)
+        return (white - edge) * f0 + edge
+
+    def gain(self, f0: np.ndarray | float, multiple: bool) -> np.ndarray:
+        """What light that meets several facets adds, as a factor."""
+        return self.of(f0, multiple) / np.maximum(self.of(f0), 1e-6)
 
     def of(self, f0: np.ndarray | float, multiple: bool = False) -> np.ndarray:
         """Albedo by F0. multiple: with light that meets several facets."""
@@ -48,6 +65,24 @@ class GlossAlbedo:
         return once * (1.0 + again * (1.0 - self.white) / self.white)
 
 
+def filter_glossy_of(scene: bpy.types.Scene) -> float | None:
+    """Cycles' setting Filter Glossy; None: diffuse light sees no gloss (Reflective Caustics is off).
+    Both are missing where that add-on is off."""
+    cycles = getattr(scene, 'cycles', None)
+    if not getattr(cycles, 'caustics_reflective', True):
+        return None
+    return getattr(cycles, 'blur_glossy', 1.0)
+
+
+def seen_roughness(roughness: float, filter_glossy: float) -> float:
+    """As diffuse light sees it: Filter Glossy makes alpha, the square of the roughness, at least
+    half of sqrt(1 - p / filter_glossy), p the density of the ray's direction (in the mean here)."""
+    alpha = min(max(roughness, 0.0), 1.0)**2
+    if filter_glossy > _DENSITY:
+        alpha = max(alpha, 0.5 * math.sqrt(1.0 - _DENSITY / filter_glossy))
+    return math.sqrt(alpha)
+
+
 def gloss_albedo(roughness: float, ior: float, from_above: bool = False,
                  correlated: bool = True) -> GlossAlbedo:
     """roughness: 0 to 1, of Blender's sockets. ior: of the dielectric whose Fresnel's it has.
@@ -57,16 +92,29 @@ def gloss_albedo(roughness: float, ior: float, from_above: bool = False,
     """
     step = round(_STEPS * min(max(roughness, 0.0), 1.0)) / _STEPS
     ior = round(max(ior, 1.0), 3)
-    white_mean = _integral(step, ior, False, correlated)[0]
-    return GlossAlbedo(*_integral(step, ior, from_above, correlated), white_mean)
+    white, edge, angles = _means(step, ior, correlated)
+    white_mean = white
+    if from_above:
+        white, edge = (float(values[0])
+                       for values in _integrals(np.array([_ABOVE]), step, ior, correlated))
+    return GlossAlbedo(white, edge, white_mean, angles)
 
 
 @lru_cache(maxsize=256)
-def _integral(roughness: float, ior: float, from_above: bool, correlated: bool
-              ) -> tuple[float, float]:
+def _means(roughness: float, ior: float, correlated: bool) -> tuple[float, float, np.ndarray]:
+    cosines = np.sqrt((np.arange(_ANGLES) + 0.5) / _ANGLES)
+    albedos = _integrals(cosines, roughness, ior, correlated)
+    terms = angle_terms(cosines)
+    terms -= terms.mean(axis=0)
+    angles = [np.linalg.lstsq(terms, albedo - albedo.mean(), rcond=None)[0] for albedo in albedos]
+    return float(albedos[0].mean()), float(albedos[1].mean()), np.array(angles)
+
+
+def _integrals(cosines: np.ndarray, roughness: float, ior: float, correlated: bool
+               ) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) each, for F = 1 and F = f, at some cosines of the view, (n,)."""
     alpha = max(roughness * roughness, 1e-4)
-    cosines = (np.array([_ABOVE]) if from_above
-               else np.sqrt((np.arange(_ANGLES) + 0.5) / _ANGLES))[:, None, None]
+    cosines = cosines[:, None, None]
     steps = (np.arange(_NORMALS) + 0.5) / _NORMALS
     view_x, view_z = np.sqrt(1.0 - cosines**2), cosines
 
@@ -90,7 +138,7 @@ def _integral(roughness: float, ior: float, from_above: bool, correlated: bool
     seen, lit = _masking(view_z, alpha), _masking(np.where(above, light_z, 1.0), alpha)
     weight = above * ((1.0 + seen) / (1.0 + seen + lit) if correlated else 1.0 / (1.0 + lit))
     edge = weight * _edge(np.clip(cosine, 0.0, 1.0), ior)
-    return float(weight.mean()), float(edge.mean())
+    return weight.mean(axis=(1, 2)), edge.mean(axis=(1, 2))
 
 
 def _masking(cosine: np.ndarray, alpha: float) -> np.ndarray:

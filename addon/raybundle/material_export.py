@@ -43,16 +43,17 @@ def _is_laid_out(translucence: ColorExpression, *others: ColorExpression) -> boo
     return translucence.attribute is None and _share_coordinates(translucence, *others)
 
 
-def _diffuse_of(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """scale and offset, (3,) each: the surface's diffuse colour is scale * reflectance + offset."""
-    whole, diffuse = surface.reflectance, surface.diffuse
-    if diffuse.texture and whole.texture and diffuse.texture.same_as(whole.texture):
-        scale = _ratio(diffuse.texture_weight, whole.texture_weight)
-    elif diffuse.attribute is not None and diffuse.attribute == whole.attribute:
-        scale = _ratio(diffuse.attribute_weight, whole.attribute_weight)
+def _line_to(part: ColorExpression, whole: ColorExpression) -> tuple[np.ndarray, np.ndarray]:
+    """scale and offset, (3,) each: the part of a reflectance is scale * whole + offset."""
+    if part.texture and whole.texture and part.texture.same_as(whole.texture):
+        scale = _ratio(part.texture_weight, whole.texture_weight)
+    elif part.attribute is not None and part.attribute == whole.attribute:
+        scale = _ratio(part.attribute_weight, whole.attribute_weight)
+    elif part.is_constant and not whole.is_constant:
+        scale = np.zeros(3)
     else:
-        return _ratio(diffuse.mean(), whole.mean()), np.zeros(3)
-    return scale, diffuse.constant - scale * whole.constant
+        return _ratio(part.mean(), whole.mean()), np.zeros(3)
+    return scale, part.constant - scale * whole.constant
 
 
 def _shown_by_angle(surface: Surface) -> np.ndarray:
@@ -74,13 +75,14 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
 class MaterialExporter:
     """Adds each material, and each image it uses, once to the scene.
 
-    mirrors: whether diffuse light sees gloss, Reflective Caustics of Cycles.
+    filter_glossy: see gloss.filter_glossy_of.
     """
 
-    def __init__(self, scene: SceneData, warnings: Warnings, mirrors: bool = True) -> None:
+    def __init__(self, scene: SceneData, warnings: Warnings,
+                 filter_glossy: float | None = 1.0) -> None:
         self.scene = scene
         self.warnings = warnings
-        self.mirrors = mirrors
+        self.filter_glossy = filter_glossy
         self.images = ImagePixels()
         self._materials: dict[bpy.types.Material | None, MaterialExport] = {}
         self._unread: dict[bpy.types.Material, str | None] = {}
@@ -128,6 +130,7 @@ class MaterialExporter:
             diffuse_offset=np.tile(baked.diffuse_offset, (2, 1)),
             reflected_by_angle=_by_side([surface.reflected_by_angle] * 2),
             shown_by_angle=_by_side([_shown_by_angle(surface)] * 2),
+            **self._scattering([surface] * 2),
             translucence_image=index.get('translucence'),
             translucence_image_weight=None if baked.translucence is None else np.ones((2, 3))))
         return MaterialExport(len(self.scene.materials) - 1, baked_uvs=True)
@@ -170,7 +173,8 @@ class MaterialExporter:
         if np.ptp(transmittance) > 1e-3:
             self.warnings.add(f'material "{name}": what it lets through differs between colours '
                               f'or sides: its mean is used')
-        scale, offset = (np.array(values) for values in zip(*map(_diffuse_of, sides)))
+        scale, offset = (np.array(values) for values in zip(
+            *(_line_to(side.diffuse, side.reflectance) for side in sides)))
         data = MaterialData(
             name,
             np.maximum([side.reflectance.constant for side in sides], 0.0),
@@ -186,6 +190,7 @@ class MaterialExporter:
             1.0 - float(transmittance.mean()), diffuse_scale=scale, diffuse_offset=offset,
             reflected_by_angle=_by_side([side.reflected_by_angle for side in sides]),
             shown_by_angle=_by_side([_shown_by_angle(side) for side in sides]),
+            **self._scattering(sides),
             translucence=np.array([color.constant for color in passed]),
             translucence_image=self._image_index(passed_texture) if passed_texture else None,
             translucence_image_weight=(np.array([color.texture_weight for color in passed])
@@ -210,11 +215,26 @@ class MaterialExporter:
             return Surface()
         reader = NodeReader(f'material "{material.name}"', self.images, warnings, backfacing,
                             None if unread is None else Warnings(), varying_emission=True,
-                            mirrors=self.mirrors, unread_color=unread_color)
+                            filter_glossy=self.filter_glossy, unread_color=unread_color)
         surface = reader.surface(output.inputs['Surface'])
         if unread is not None:
             unread += reader.unread
         return surface
+
+    @staticmethod
+    def _scattering(sides: list[Surface]) -> dict[str, np.ndarray | int]:
+        """Fields of MaterialData."""
+        lines = [_line_to(side.scattering.gloss, side.reflectance) for side in sides]
+        models = [side.scattering.diffuse_model() for side in sides]
+        return {
+            'gloss_scale': np.array([scale for scale, _ in lines]),
+            'gloss_offset': np.array([offset for _, offset in lines]),
+            'gloss_by_angle': _by_side([side.scattering.by_angle for side in sides]),
+            'gloss_roughness': np.array([side.scattering.gloss_roughness()
+                                         for side in sides]),
+            'diffuse_model': models[0][0],
+            'diffuse_roughness': np.array([roughness for _, roughness in models]),
+            'leaving': np.stack([side.scattering.leaving_factors() for side in sides], axis=1)}
 
     def _image_index(self, texture: Texture) -> int:
         key = (texture.image.name_full, texture.extension)

@@ -108,6 +108,9 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_material_emission_corner_colors': (_handle, _int, _floats),
     'rb_set_material_diffuse': (_handle, _int, _floats, _floats),
     'rb_set_material_angles': (_handle, _int, _floats, _floats),
+    'rb_set_material_gloss': (_handle, _int, _floats, _floats, _floats, _floats),
+    'rb_set_material_diffuse_model': (_handle, _int, _int, _floats),
+    'rb_set_material_leaving': (_handle, _int, _floats),
     'rb_set_material_translucence': (_handle, _int, _floats, _int, _floats),
     'rb_set_material_opacity': (_handle, _int, _float),
     'rb_set_material_opacity_image': (_handle, _int, _int),
@@ -358,6 +361,26 @@ class Scene(_Handle):
         offset = _float_array(offset, (2, 3), "offset")
         self._library.rb_set_material_diffuse(
             self._pointer, material, _as_floats(scale), _as_floats(offset))
+
+    def set_material_gloss(self, material: int, scale: np.ndarray, offset: np.ndarray,
+                           by_angle: np.ndarray, roughness: np.ndarray) -> None:
+        """(2, 3): of the reflectance, scale times it plus offset is mirrored; by_angle: (4, 2, 3),
+        how that depends on the light's angle; roughness: (2,), of GGX."""
+        arrays = [_float_array(values, shape, name) for values, shape, name in
+                  ((scale, (2, 3), "scale"), (offset, (2, 3), "offset"),
+                   (by_angle, (4, 2, 3), "by_angle"), (roughness, (2,), "roughness"))]
+        self._library.rb_set_material_gloss(self._pointer, material, *map(_as_floats, arrays))
+
+    def set_material_diffuse_model(self, material: int, model: int, roughness: np.ndarray) -> None:
+        """model: rb_diffuse_model, as in scattering.py; roughness: (2,)."""
+        roughness = _float_array(roughness, (2,), "roughness")
+        self._library.rb_set_material_diffuse_model(
+            self._pointer, material, model, _as_floats(roughness))
+
+    def set_material_leaving(self, material: int, factors: np.ndarray) -> None:
+        """(4, 2), by term and side: how diffuse light leaves by its angle."""
+        factors = _float_array(factors, (4, 2), "factors")
+        self._library.rb_set_material_leaving(self._pointer, material, _as_floats(factors))
 
     def set_material_angles(self, material: int, reflected: np.ndarray, shown: np.ndarray) -> None:
         """(4, 2, 3): by the terms of diffuse_angles.py, how the reflectance depends on the light's

@@ -26,6 +26,11 @@ def build_native_scene(data: SceneData) -> native.Scene:
             scene.set_material_emission_corner_colors(identifier, material.emission_color_weight)
         scene.set_material_diffuse(identifier, material.diffuse_scale, material.diffuse_offset)
         scene.set_material_angles(identifier, material.reflected_by_angle, material.shown_by_angle)
+        scene.set_material_gloss(identifier, material.gloss_scale, material.gloss_offset,
+                                 material.gloss_by_angle, material.gloss_roughness)
+        scene.set_material_diffuse_model(identifier, material.diffuse_model,
+                                         material.diffuse_roughness)
+        scene.set_material_leaving(identifier, material.leaving)
         scene.set_material_translucence(
             identifier, material.translucence,
             None if material.translucence_image is None else images[material.translucence_image],

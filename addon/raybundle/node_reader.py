@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Node trees of materials, lights and the world -> colours and shaders of the simple kind that
-radiosity needs: reflectance, what of it is diffuse, and emission. Gloss spreads as if it were
-diffuse.
+radiosity needs: reflectance, what of it is diffuse, where it goes, and emission.
 
 A tree is read from its output towards its inputs. What cannot be read takes the value of the socket
 (or the mean of the image) and is named in the warnings.
@@ -19,9 +18,10 @@ from mathutils import Euler, Matrix
 
 from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
 from .diffuse_angles import TERMS, oren_nayar
-from .gloss import GlossAlbedo, gloss_albedo
+from .gloss import GlossAlbedo, gloss_albedo, seen_roughness
 from .image_export import ImagePixels, sphere_mean
 from .principled import COAT_SOCKETS, GLOSS_SOCKETS, METAL_IOR, principled_albedo
+from .scattering import BURLEY, OREN_NAYAR, Scattering
 from .scene_data import Warnings
 
 # Values of the Light Path node as diffuse light sees a surface.
@@ -49,7 +49,7 @@ _MATH: dict[str, Callable[[float, float], float]] = {
 
 # Shaders that are gloss alone.
 GLOSSY = ('BSDF_GLOSSY', 'BSDF_ANISOTROPIC', 'BSDF_METALLIC')
-MIRRORS = "mirrors: what it mirrors spreads here as if it were diffuse"
+MIRRORS = "mirrors: what it mirrors of other surfaces spreads here as if it were diffuse"
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ class Surface:
     shown_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((1 + TERMS, 3)))
     # What leaves it, diffusely, of the light on the other side.
     translucence: ColorExpression = field(default_factory=ColorExpression)
+    scattering: Scattering = field(default_factory=Scattering)
 
     @staticmethod
     def matt(color: ColorExpression, roughness: float = 0.0) -> Surface:
@@ -74,7 +75,8 @@ class Surface:
         angles = oren_nayar(roughness, mean)
         return Surface(color.scaled(angles.albedo), diffuse=color,
                        reflected_by_angle=mean * angles.reflected,
-                       shown_by_angle=mean * angles.shown)
+                       shown_by_angle=mean * angles.shown,
+                       scattering=Scattering.matt(mean, OREN_NAYAR, roughness))
 
     @property
     def emission(self) -> np.ndarray:
@@ -85,7 +87,7 @@ class Surface:
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
                        self.transmittance * factor, self.diffuse.scaled(factor),
                        self.reflected_by_angle * factor, self.shown_by_angle * factor,
-                       self.translucence.scaled(factor))
+                       self.translucence.scaled(factor), self.scattering.scaled(factor))
 
 
 @dataclass(frozen=True)
@@ -103,14 +105,14 @@ class NodeReader:
 
     What is only approximated goes to the warnings. What a node does and the reader cannot express
     goes to `inexact`, for there is another way to it (surface_bake.py); by default it is a warning
-    too. varying_emission: whether emission may be more than a constant. mirrors: whether diffuse
-    light sees gloss. unread_color: (3,), what stands for colours that cannot be read; None: that of
-    the socket.
+    too. varying_emission: whether emission may be more than a constant. filter_glossy: see
+    gloss.filter_glossy_of. unread_color: (3,), what stands for colours that cannot be read; None:
+    that of the socket.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
                  backfacing: bool = False, inexact: Warnings | None = None,
-                 varying_emission: bool = False, mirrors: bool = True,
+                 varying_emission: bool = False, filter_glossy: float | None = 1.0,
                  unread_color: np.ndarray | None = None) -> None:
         self.owner = owner  # what warnings name, such as 'material "Wall"'
         self.images = images
@@ -118,7 +120,7 @@ class NodeReader:
         self.backfacing = backfacing
         self.inexact = warnings if inexact is None else inexact
         self.varying_emission = varying_emission
-        self.mirrors = mirrors
+        self.filter_glossy = filter_glossy
         self.unread_color = unread_color
         self.unread: list[str] = []  # what is inexact, without the consequences
 
@@ -188,17 +190,25 @@ class NodeReader:
         mean = np.clip(base.mean(), 0.0, 1.0)
         albedo = principled_albedo(
             *(self._usual(node, names, usual, path) for names, usual in GLOSS_SOCKETS),
-            node.distribution == 'MULTI_GGX', mean, self.mirrors).coated(
+            node.distribution == 'MULTI_GGX', mean, self.filter_glossy).coated(
                 *(self._usual(node, names, usual, path) for names, usual in COAT_SOCKETS),
-                self.mirrors)
+                self.filter_glossy)
         opaque = 1.0 - metallic - through
         reflectance = base.scaled(opaque * albedo.diffuse + metallic * albedo.metal).plus(
             ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
         shown = opaque * albedo.shown * alpha
+        mirrored = base.scaled(metallic * albedo.metal).plus(
+            ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
+        scattering = Scattering.mirror(
+            mirrored, albedo.mirrored_by_angle(opaque, metallic), albedo.roughness).plus(
+                Scattering.matt(
+                    opaque * mean, OREN_NAYAR if bpy.app.version >= (4, 0, 0) else BURLEY,
+                    albedo.diffuse_roughness, albedo.leaving))
         return Surface(reflectance.scaled(alpha), radiance.scaled(alpha), transmittance,
                        base.scaled(shown),
                        alpha * albedo.reflected_by_angle(mean, opaque, metallic),
-                       shown * mean * albedo.angles.shown)
+                       shown * mean * albedo.angles.shown,
+                       scattering=scattering.scaled(alpha))
 
     def _base_color(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]
                     ) -> ColorExpression:
@@ -213,12 +223,16 @@ class NodeReader:
         return self._plus(base.scaled(1.0 - share), under.scaled(share), node)
 
     def _glossy(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
-        if not self.mirrors:
+        if self.filter_glossy is None:
             return Surface()
         color = self.color(_input(node, 'Color', 'Base Color'), path)
-        albedo = glossy_albedo(node, self._usual(node, *GLOSS_SOCKETS[0], path))
+        roughness = self._usual(node, *GLOSS_SOCKETS[0], path)
         mean = np.maximum(np.clip(color.mean(), 0.0, 1.0), 1e-6)
-        return Surface(color.scaled(albedo.of(mean, node.distribution == 'MULTI_GGX') / mean))
+        albedo, gain, seen = glossy_albedo(node, roughness, mean, self.filter_glossy)
+        mirrored = color.scaled(albedo.of(mean) * gain / mean)
+        by_angle = albedo.by_angle(mean) * gain
+        return Surface(mirrored, reflected_by_angle=by_angle,
+                       scattering=Scattering.mirror(mirrored, by_angle, seen))
 
     def _usual(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                path: tuple[bpy.types.Node, ...]) -> float:
@@ -247,7 +261,8 @@ class NodeReader:
                             total.diffuse.plus(part.diffuse).simplified(),
                             total.reflected_by_angle + part.reflected_by_angle,
                             total.shown_by_angle + part.shown_by_angle,
-                            self._plus(total.translucence, part.translucence, node))
+                            self._plus(total.translucence, part.translucence, node),
+                            total.scattering.plus(part.scattering))
         return total
 
     # ----------------------------------------------------------------------------------------------
@@ -460,11 +475,20 @@ class NodeReader:
 _VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')
 
 
-def glossy_albedo(node: bpy.types.Node, roughness: float) -> GlossAlbedo:
-    """Of a Glossy shader (or a metal's, whose edge is as bright as it can be) of white colour."""
-    albedo = gloss_albedo(0.0 if node.distribution == 'SHARP' else roughness, METAL_IOR,
-                          correlated=bpy.app.version >= (4, 0, 0))
-    return albedo if node.type == 'BSDF_METALLIC' else replace(albedo, edge=0.0)
+def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray | float,
+                  filter_glossy: float) -> tuple[GlossAlbedo, np.ndarray, float]:
+    """Of a Glossy shader (or a metal's, whose edge is as bright as it can be) as diffuse light sees
+    it: the albedo of its color, what several facets add, and the roughness."""
+    if node.distribution == 'SHARP':
+        roughness = 0.0
+    seen = seen_roughness(roughness, filter_glossy)
+    albedos = []
+    for value in (roughness, seen):
+        albedo = gloss_albedo(value, METAL_IOR, correlated=bpy.app.version >= (4, 0, 0))
+        if node.type != 'BSDF_METALLIC':
+            albedo = replace(albedo, edge=0.0, angles=albedo.angles * [[1.0], [0.0]])
+        albedos.append(albedo)
+    return albedos[1], albedos[0].gain(color, node.distribution == 'MULTI_GGX'), seen
 
 
 def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:

@@ -43,6 +43,15 @@ class MaterialData:
     reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
     shown_by_angle: np.ndarray = field(
         default_factory=lambda: np.concatenate([np.ones((1, 2, 3)), np.zeros((4, 2, 3))]))
+    # (2, 3) each: scale * reflectance + offset is mirrored; (4, 2, 3): that by angle; (2,): the
+    # roughness of it.
+    gloss_scale: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    gloss_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    gloss_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
+    gloss_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    diffuse_model: int = 0  # of scattering.py
+    diffuse_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    leaving: np.ndarray = field(default_factory=lambda: np.zeros((4, 2)))  # by term and side
     # (2, 3): what leaves a side, diffusely, of the light that arrives at the other.
     translucence: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
     translucence_image: int | None = None

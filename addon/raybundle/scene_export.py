@@ -15,6 +15,7 @@ import numpy as np
 from mathutils import Vector
 
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
+from .gloss import filter_glossy_of
 from .light_export import export_light, is_portal
 from .light_sets import LightSet, LightSetMembers
 from .material_export import MaterialExporter
@@ -133,9 +134,8 @@ class _Exporter:
         self.context = context
         self.selected = selected
         self.result = SceneExport()
-        cycles = getattr(context.scene, 'cycles', None)  # missing where that add-on is off
         self.materials = MaterialExporter(self.result.scene, self.result.warnings,
-                                          getattr(cycles, 'caustics_reflective', True))
+                                          filter_glossy_of(context.scene))
         self.members = LightSetMembers(list(light_sets), self.result.scene)
         self._baked: dict[bpy.types.Object, BakedSurface] = {}
         self._meshes: dict[tuple, int | MeshError] = {}

@@ -32,9 +32,9 @@ class ShaderColors:
     """Rewrites trees that nobody else uses; copies of groups are in `groups`, to be removed."""
 
     def __init__(self, wanted: str, light_path: dict[str, float], backfacing: bool = False,
-                 mirrors: bool = True) -> None:
+                 filter_glossy: float | None = 1.0) -> None:
         self.wanted = wanted
-        self.mirrors = mirrors  # whether diffuse light sees gloss
+        self.filter_glossy = filter_glossy  # see gloss.filter_glossy_of
         self.light_path = light_path  # values of the Light Path node's outputs; others are 0
         self.backfacing = backfacing
         self.groups: list[bpy.types.NodeTree] = []
@@ -67,7 +67,7 @@ class ShaderColors:
         build = _SHADERS.get((node.type, self.wanted))
         # A muted shader passes nothing on.
         if build is not None and not node.mute:
-            color = build(_Formula(tree, self.mirrors), node)
+            color = build(_Formula(tree, self.filter_glossy), node)
             if not isinstance(color, tuple) or any(color):
                 self.found = True
                 emission = tree.nodes.new('ShaderNodeEmission')
@@ -108,9 +108,9 @@ def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: _Value) 
 class _Formula:
     """Adds the nodes of a formula to a tree; constants stay constants."""
 
-    def __init__(self, tree: bpy.types.NodeTree, mirrors: bool) -> None:
+    def __init__(self, tree: bpy.types.NodeTree, filter_glossy: float | None) -> None:
         self.tree = tree
-        self.mirrors = mirrors
+        self.filter_glossy = filter_glossy
 
     def value(self, node: bpy.types.Node, *names: str) -> _Value:
         """A number, clamped to 0 to 1, by the first of the names that exists."""
@@ -227,9 +227,10 @@ def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlb
     return principled_albedo(
         *(_usual(formula, node, names, usual) for names, usual in GLOSS_SOCKETS),
         node.distribution == 'MULTI_GGX',
-        float(np.mean(base)) if isinstance(base, tuple) else _USUAL_COLOR, formula.mirrors).coated(
+        float(np.mean(base)) if isinstance(base, tuple) else _USUAL_COLOR,
+        formula.filter_glossy).coated(
             *(_usual(formula, node, names, usual) for names, usual in COAT_SOCKETS),
-            formula.mirrors)
+            formula.filter_glossy)
 
 
 def _principled_shares(formula: _Formula, node: bpy.types.Node) -> tuple[_Value, _Value]:
@@ -258,13 +259,13 @@ def _principled_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
 
 
 def _glossy(formula: _Formula, node: bpy.types.Node) -> _Value:
-    if not formula.mirrors:
+    if formula.filter_glossy is None:
         return (0.0, 0.0, 0.0)
     color = formula.raw(node, 'Base Color' if 'Base Color' in node.inputs else 'Color')
-    mean = float(np.mean(color)) if isinstance(color, tuple) else _USUAL_COLOR
-    albedo = glossy_albedo(node, _usual(formula, node, *GLOSS_SOCKETS[0]))
-    return formula.scaled(color, float(albedo.of(mean, node.distribution == 'MULTI_GGX'))
-                          / max(mean, 1e-6))
+    mean = max(float(np.mean(color)) if isinstance(color, tuple) else _USUAL_COLOR, 1e-6)
+    albedo, gain, _ = glossy_albedo(node, _usual(formula, node, *GLOSS_SOCKETS[0]), mean,
+                                    formula.filter_glossy)
+    return formula.scaled(color, float(albedo.of(mean) * gain) / mean)
 
 
 def _principled_radiance(formula: _Formula, node: bpy.types.Node) -> _Value:

@@ -21,6 +21,7 @@ import bpy
 import numpy as np
 
 from .face_atlas import BORDER, FaceAtlas, face_atlas
+from .gloss import filter_glossy_of
 from .material_fingerprint import material_fingerprint
 from .node_reader import LIGHT_PATH
 from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSLUCENCE,
@@ -110,7 +111,8 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
             slots: list[int], pixel: float) -> bytes:
     content = hashlib.blake2b(digest_size=16)
     depsgraph = context.evaluated_depsgraph_get()
-    content.update(repr((slots, round(pixel, 9), context.scene.frame_current, _mirrors(context),
+    content.update(repr((slots, round(pixel, 9), context.scene.frame_current,
+                         filter_glossy_of(context.scene),
                          [tuple(row) for row in item.evaluated_get(depsgraph).matrix_world],
                          tuple(item.color), item.pass_index,
                          tuple(mesh.texspace_location), tuple(mesh.texspace_size))).encode())
@@ -225,11 +227,6 @@ def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return scale, np.where(varies, means[1] - scale * means[0], 0.0)
 
 
-def _mirrors(context: bpy.types.Context) -> bool:
-    """Reflective Caustics; Cycles' settings are missing where that add-on is off."""
-    return getattr(getattr(context.scene, 'cycles', None), 'caustics_reflective', True)
-
-
 def _atlas(mesh: bpy.types.Mesh, matrix: np.ndarray, wanted: np.ndarray, pixel: float
            ) -> FaceAtlas:
     vertices = np.empty(3 * len(mesh.vertices), np.float32)
@@ -281,7 +278,8 @@ class _Stage:
             if index in slots:
                 material = slot.material.copy()
                 made.append(material)
-                colors = ShaderColors(wanted, LIGHT_PATH, backfacing, _mirrors(self.context))
+                colors = ShaderColors(wanted, LIGHT_PATH, backfacing,
+                                      filter_glossy_of(self.context.scene))
                 try:
                     colors.rewrite(material.node_tree)
                 finally:

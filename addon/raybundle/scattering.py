@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where surfaces that are not Lambert's send the light of the sources.
+
+By the direction it comes from: gloss as GGX mirrors it, the diffuse rest as Burley's or Oren and
+Nayar's model has it (native/src/transport/lobe.h). What differs from Cycles: a surface has one
+gloss and one diffuse model, with the means of the roughnesses that it is mixed of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .color_expression import ColorExpression
+from .diffuse_angles import TERMS
+
+LAMBERT, BURLEY, OREN_NAYAR = range(3)  # rb_diffuse_model
+
+
+@dataclass(frozen=True)
+class Scattering:
+    """Sums over the shaders of a surface."""
+
+    gloss: ColorExpression = field(default_factory=ColorExpression)  # part of the reflectance
+    # (TERMS, 3): of it, by the terms of diffuse_angles.py.
+    by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
+    rough_gloss: float = 0.0  # means of gloss times roughness, as diffuse light sees it
+    # (2, 2): for Burley's model and for Oren and Nayar's, of which Lambert's is one, the mean of
+    # the diffuse colour, and that times the roughness.
+    diffuse: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    # (TERMS,): means of the diffuse colour times how it leaves by angle (rb_set_material_leaving).
+    leaving: np.ndarray = field(default_factory=lambda: np.zeros(TERMS))
+
+    @staticmethod
+    def mirror(gloss: ColorExpression, by_angle: np.ndarray, roughness: float) -> Scattering:
+        return Scattering(gloss, by_angle, roughness * float(gloss.mean().mean()))
+
+    @staticmethod
+    def matt(color: np.ndarray, model: int, roughness: float,
+             leaving: np.ndarray | float = 0.0) -> Scattering:
+        """color: (3,), mean."""
+        mean = float(np.mean(color))
+        diffuse = np.zeros((2, 2))
+        diffuse[0 if model == BURLEY else 1] = mean * np.array([1.0, roughness])
+        return Scattering(diffuse=diffuse, leaving=mean * leaving + np.zeros(TERMS))
+
+    def scaled(self, factor: float) -> Scattering:
+        return Scattering(self.gloss.scaled(factor), factor * self.by_angle,
+                          factor * self.rough_gloss, factor * self.diffuse,
+                          factor * self.leaving)
+
+    def plus(self, other: Scattering) -> Scattering:
+        return Scattering(self.gloss.plus(other.gloss).simplified(), self.by_angle + other.by_angle,
+                          self.rough_gloss + other.rough_gloss, self.diffuse + other.diffuse,
+                          self.leaving + other.leaving)
+
+    def gloss_roughness(self) -> float:
+        gloss = float(self.gloss.mean().mean())
+        return min(self.rough_gloss / gloss, 1.0) if gloss > 0.0 else 0.0
+
+    def diffuse_model(self) -> tuple[int, float]:
+        """The heavier one, and its roughness."""
+        weights = self.diffuse[:, 0]
+        model = int(weights[1] >= weights[0])
+        if weights[model] <= 0.0:
+            return LAMBERT, 0.0
+        roughness = float(np.clip(self.diffuse[model, 1] / weights[model], 0.0, 1.0))
+        if model == 0:
+            return BURLEY, roughness
+        return (OREN_NAYAR, roughness) if roughness > 0.0 else (LAMBERT, 0.0)
+
+    def leaving_factors(self) -> np.ndarray:
+        """(TERMS,), for rb_set_material_leaving."""
+        return self.leaving / max(float(self.diffuse[:, 0].sum()), 1e-6)
