@@ -5,8 +5,8 @@
 //
 // Light of the sources is known before the solve, and what it brings by direction with it.
 // Reflected light is known after it: then the system is solved once more, with what the solution
-// brings by the angle at which it leaves (from under a layer) and makes sides reflect by the angle at
-// which it arrives. A third solve would change a share of a share.
+// brings by the angle at which it leaves (from under a layer) and makes sides reflect by the angle
+// at which it arrives. A third solve would change a share of a share.
 //
 // A few lines are enough for what is little of the light, or changes slowly from side to side: the
 // first ones of each side stand for all.
@@ -79,8 +79,8 @@ std::vector<glm::vec3> LineReuse::directed(Half half, const LineWeights& weights
 void LineReuse::findAngles(Half half, const LineWeights& weights,
                            const std::vector<glm::vec3>& reflected, const Irradiance& light,
                            ByAngle& byAngle) const {
-    // Of light from under a layer, of the angles at which reflected light arrives (angleTerms), each
-    // times its brightness, and that.
+    // Of light from under a layer, of the angles at which reflected light arrives (angleTerms),
+    // each times its brightness, and that.
     using Arriving = Eigen::Array<float, 8, 1>;
     const std::vector<Arriving> arriving = alongLines(
         half, weights, 0, Arriving(Arriving::Zero()),
