@@ -10,9 +10,9 @@ dielectric does: F = F0 + (1 - F0) f. The albedo is linear in F0 then: A = (a - 
 a is the albedo for F = 1 and b that for F = f.
 
 What differs: integrals by midpoints, good to 1e-3 (blend_tests/test_gloss.py), and the terms fitted
-to them, to 2 % up to 80 degrees; light that meets
-several facets is given back as Cycles' Multiscatter GGX does it (Turquin, "Practical multiple
-scattering compensation for microfacet models", 2019).
+to them, to 2 % up to 80 degrees; light that meets several facets is given back as Cycles'
+Multiscatter GGX does it (Turquin, "Practical multiple scattering compensation for microfacet
+models", 2019).
 """
 
 from __future__ import annotations
