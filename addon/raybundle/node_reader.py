@@ -194,11 +194,10 @@ class NodeReader:
                 *(self._usual(node, names, usual, path) for names, usual in COAT_SOCKETS),
                 self.filter_glossy)
         opaque = 1.0 - metallic - through
-        reflectance = base.scaled(opaque * albedo.diffuse + metallic * albedo.metal).plus(
-            ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
-        shown = opaque * albedo.shown * alpha
         mirrored = base.scaled(metallic * albedo.metal).plus(
             ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
+        reflectance = mirrored.plus(base.scaled(opaque * albedo.diffuse))
+        shown = opaque * albedo.shown * alpha
         scattering = Scattering.mirror(
             mirrored, albedo.mirrored_by_angle(opaque, metallic), albedo.roughness).plus(
                 Scattering.matt(

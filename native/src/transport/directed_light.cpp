@@ -17,7 +17,7 @@ namespace {
 
 // Directions that are all within the angle of this cosine of their mean are one.
 constexpr float kSameDirection = 0.97f;
-// Of more sides than this each has one of its directions: 70 bytes a lobe.
+// Of more sides than this each has one of its directions: 80 bytes a lobe.
 constexpr size_t kManySides = size_t(1) << 18;
 // Less than this share of what arrives makes no difference.
 constexpr float kLeastShare = 1e-4f;
