@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Where surfaces that are not Lambert's send the light of the sources: single lobes, and what the
-// walls of a black room get from its floor, against the models as they are published.
+// Where surfaces that are not Lambert's send light: single lobes, what the walls of a black room get
+// from its floor, and what goes up and down between its floor and a white ceiling, against the
+// models as they are published.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -125,6 +126,25 @@ TEST(Lobe, HasNothingBelowTheSurfaceAndIsFiniteAtItsEdge) {
             }
 }
 
+TEST(Lobe, FindsF0ByHowTheReflectanceRises) {
+    for (double roughness : {0.5, 0.8, 1.0})
+        for (double f0 : {0.02, 0.04, 0.3}) {
+            const Bsdf bsdf = ggx(roughness, f0);
+            double everywhere = 0;
+            constexpr int kCosines = 12;
+            for (int i = 0; i < kCosines; ++i) {
+                const double cosine = (i + 0.5) / kCosines;
+                everywhere += 2 * cosine / kCosines * moments(bsdf, inclined(cosine)).x;
+            }
+            const double ratio = moments(bsdf, inclined(1)).x / everywhere;
+            // The table is good to 1 %, and the ratio says ever less the more is mirrored.
+            EXPECT_NEAR(double(Lobe::f0Of(float(ratio), float(roughness))), f0, 0.1 * f0)
+                << roughness << " " << f0;
+        }
+    EXPECT_EQ(Lobe::f0Of(1.1f, 0.5f), 1);
+    EXPECT_NEAR(Lobe::f0Of(0.04f / (0.04f + 0.96f * 0.0534f), 0), 0.04, 1e-3);
+}
+
 // -------------------------------------------------------------------------------------------------
 // A black unit cube whose floor a sun lights, which nothing stops
 // -------------------------------------------------------------------------------------------------
@@ -160,7 +180,7 @@ Scene studio(bool isBurley = false) {
 // The floor's exitance towards a direction over its reflectance and irradiance.
 std::function<double(const glm::dvec3&)> sentBy(bool isBurley) {
     const glm::dvec3 in(-std::sqrt(1 - kSunCosine * kSunCosine), 0, kSunCosine);
-    const Bsdf bsdf = isBurley ? burley(1) : ggx(kRoughness, double(kMirrored));
+    const Bsdf bsdf = isBurley ? burley(1) : ggx(kRoughness, 1);
     const double share = isBurley ? 1 : double(kMirrored / kReflected), mean = moments(bsdf, in).x;
     return [=](const glm::dvec3& out) { return 1 - share + share * kPi * bsdf(in, out) / mean; };
 }
@@ -255,6 +275,99 @@ TEST_P(Studio, IsGatheredAtPointsToo) {
 
 INSTANTIATE_TEST_SUITE_P(, Studio, testing::Bool(),
                          [](const auto& model) { return model.param ? "Burley" : "Gloss"; });
+
+// The same cube: a sun shines from below at its ceiling alone, which is white, as nothing stops it.
+struct UpAndDown {
+    double ceiling = 0, floor = 0;  // indirect irradiance, mean
+};
+
+UpAndDown upAndDown(double whiteness, double reflectance, double share, const Bsdf& bsdf) {
+    constexpr int kEdge = 10, kCount = kEdge * kEdge;
+    constexpr double kArea = 1.0 / kCount;
+    auto way = [&](int floor, int ceiling) {
+        return glm::dvec3(double(ceiling % kEdge - floor % kEdge) / kEdge,
+                          double(ceiling / kEdge - floor / kEdge) / kEdge, 1);
+    };
+    // Scaled, since that of opposite faces of a cube is known, and by so many cells 0.3 % too large.
+    double scale = 1;
+    auto factor = [&](const glm::dvec3& d) {
+        return scale * kArea / (kPi * std::pow(glm::dot(d, d), 2));
+    };
+    double all = 0;
+    for (int f = 0; f < kCount; ++f)
+        for (int c = 0; c < kCount; ++c) all += kArea * factor(way(f, c));
+    scale = 0.199825 / all;
+    // Of each direction the mean is that of its cosine, by a table.
+    std::vector<double> means;
+    for (int i = 0; i <= 100; ++i) {
+        double sum = 0;
+        forCosine(100, [&](const glm::dvec3& out, double part) {
+            sum += part * kPi * bsdf(inclined(0.5 + 0.005 * i), out);
+        });
+        means.push_back(sum);
+    }
+    // From the ceiling over the floor to the ceiling.
+    std::vector<double> back(kCount * kCount);
+    for (int f = 0; f < kCount; ++f)
+        for (int from = 0; from < kCount; ++from) {
+            const glm::dvec3 in = glm::normalize(way(f, from));
+            const double mean = means[size_t(std::lround((in.z - 0.5) / 0.005))];
+            for (int to = 0; to < kCount; ++to) {
+                const glm::dvec3 out = glm::normalize(way(f, to));
+                back[size_t(to * kCount + from)] +=
+                    factor(way(f, from)) * factor(way(f, to)) * reflectance *
+                    (1 - share + share * kPi * bsdf(in, out) / mean);
+            }
+        }
+    std::vector<double> sent(kCount, whiteness), light(kCount);
+    for (int bounce = 0; bounce < 8; ++bounce) {
+        for (int to = 0; to < kCount; ++to) {
+            light[size_t(to)] = 0;
+            for (int from = 0; from < kCount; ++from)
+                light[size_t(to)] += back[size_t(to * kCount + from)] * sent[size_t(from)];
+        }
+        for (int k = 0; k < kCount; ++k) sent[size_t(k)] = whiteness * (1 + light[size_t(k)]);
+    }
+    UpAndDown mean;
+    for (int c = 0; c < kCount; ++c) {
+        mean.ceiling += kArea * light[size_t(c)];
+        for (int f = 0; f < kCount; ++f) mean.floor += kArea * factor(way(f, c)) * sent[size_t(c)];
+    }
+    return mean;
+}
+
+TEST_P(Studio, SendsOnWhatOthersSentIt) {
+    constexpr float kWhiteness = 0.8f;
+    Scene scene = studio(GetParam());
+    scene.materials.back() = grey("white", kWhiteness);
+    scene.lights.clear();
+    Light sun = sunLight({0, 0, -1}, glm::dvec3(1));
+    sun.castsShadows = false;
+    scene.addLight(sun);
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.settings.targetError = 0.003f;
+    bake.run(scene);
+    const Patches& patches = bake.patches();
+    UpAndDown found;
+    for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
+        const uint32_t instance = patches.parentAt(side).instance;
+        const double power =
+            double(patches.area[side / 2] * bake.patchIrradiance().indirect[side].x);
+        if (instance == 0) found.floor += power;
+        if (instance == 5) found.ceiling += power;
+    }
+    const Bsdf bsdf = GetParam() ? burley(1) : ggx(kRoughness, 1);
+    const double share = GetParam() ? 1 : double(kMirrored / kReflected);
+    const UpAndDown expected = upAndDown(double(kWhiteness), double(kReflected), share, bsdf);
+    const UpAndDown ofLambert = upAndDown(double(kWhiteness), double(kReflected), 0, bsdf);
+    const double bent = expected.ceiling - ofLambert.ceiling;
+    // Noise of 0.3 %, patches that send from their middles and, twice on the way, cells of
+    // directions.
+    EXPECT_NEAR(found.floor, expected.floor, 0.005 * expected.floor);
+    EXPECT_NEAR(found.ceiling, expected.ceiling, 0.012 * expected.ceiling);
+    EXPECT_GT(std::abs(bent), 0.03 * expected.ceiling);
+}
 
 TEST(DirectedLight, IsTheSameAfterLightsAndPaintWereChanged) {
     auto make = [](bool hasGloss, double red) {

@@ -137,9 +137,9 @@ RB_API rb_error rb_set_material_angles(rb_scene scene, int32_t material, const f
 /* What of the reflectance is mirrored: scale times it plus offset (six floats each, likewise), for
  * light from everywhere; by_angle: how that depends on the angle of the sources' light, as
  * `reflected` of rb_set_material_angles, of which it is a part. roughness: of the front and of the
- * back, 0 to 1, whose square is alpha of GGX. With first shot GATHER and solver LINE_REUSE that
- * light of the sources goes where GGX mirrors it to; all other reflected light spreads as if it
- * were diffuse. Without it nothing is mirrored. */
+ * back, 0 to 1, whose square is alpha of GGX. With first shot GATHER and solver LINE_REUSE
+ * light goes where GGX mirrors it to, smoother than a roughness of 0.45 as by that; a constant
+ * world's spreads as if it were diffuse. Without it nothing is mirrored. */
 RB_API rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float scale[6],
                                       const float offset[6], const float by_angle[24],
                                       const float roughness[2]);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "transport/scattered_light.h"
 #include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
 #include "transport/translucence.h"
@@ -113,6 +114,8 @@ void FinalGather::addRays(const Receiver& receiver, uint32_t set, uint32_t first
             sum.reflected += directed.layer(*hit, -direction) * reflected[*hit];
         if (!directed.isNone(*hit) && exposed[*hit] > 0)
             sum.reflected += directed.towards(*hit, -direction) / exposed[*hit];
+        if (light.irradiance.scattered && !light.irradiance.scattered->isNone(*hit))
+            sum.reflected += light.irradiance.scattered->towards(*hit, -direction);
         if (distance >= width(*hit)) continue;
         const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
                            hash(receiver.seed, kSets + set)};

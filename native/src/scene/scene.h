@@ -36,10 +36,9 @@ struct Scattering {
         return glossScale != glm::vec3(0.0f) || glossOffset != glm::vec3(0.0f) ||
                glossByAngle != AngleFactors{};
     }
+    bool isRough() const { return diffuseModel != RB_DIFFUSE_LAMBERT; }
     bool hasLayer() const { return leaving != glm::vec4(0.0f); }
-    bool isLambert() const {
-        return !hasGloss() && diffuseModel == RB_DIFFUSE_LAMBERT && !hasLayer();
-    }
+    bool isLambert() const { return !hasGloss() && !isRough() && !hasLayer(); }
 };
 
 // Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The

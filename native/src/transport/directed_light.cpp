@@ -10,6 +10,7 @@
 
 #include "bake/noise.h"
 #include "scene/channels.h"
+#include "transport/side_reflectance.h"
 #include "transport/sobol.h"
 
 namespace raybundle {
@@ -26,7 +27,7 @@ constexpr float kLeastShare = 1e-4f;
 constexpr float kNear = 1.5f;
 constexpr uint32_t kNearPairs = 8;
 // Of the noise of all reflected light, what this may add.
-constexpr double kNoiseShare = 0.3;
+constexpr double kNoiseShare = 0.5;
 constexpr size_t kBlock = 256;  // sides per task
 
 }  // namespace
@@ -72,24 +73,10 @@ void DirectedLight::findLayers() {
     for (uint32_t side = 0; side < layers.size(); ++side) {
         const float all = brightest(patches.reflectance[side]);
         if (!(all > 0)) continue;
-        const float diffuse = brightest(patches.reflectance[side] - mirroredMean(side)) / all;
-        layers[side] = {patches.normal(side), diffuse * scatteringOf(side).leaving};
+        const SideReflectance surface(patches, side);
+        const float diffuse = brightest(patches.reflectance[side] - surface.mirroredMean()) / all;
+        layers[side] = {patches.normal(side), diffuse * surface.scattering().leaving};
     }
-}
-
-const Scattering& DirectedLight::scatteringOf(uint32_t side) const {
-    return patches.scattering[2 * patches.parentAt(side).scattering + side % 2];
-}
-
-float DirectedLight::wholeOf(uint32_t side) const {
-    return 1 / std::max(patches.opacityOf(side / 2), 1e-6f);
-}
-
-glm::vec3 DirectedLight::mirroredMean(uint32_t side) const {
-    const Scattering& surface = scatteringOf(side);
-    const glm::vec3& reflectance = patches.reflectance[side];
-    return glm::clamp(surface.glossScale * reflectance + wholeOf(side) * surface.glossOffset,
-                      glm::vec3(0.0f), reflectance);
 }
 
 double DirectedLight::enoughLines(const FirstShot& shot) const {
@@ -100,6 +87,10 @@ double DirectedLight::enoughLines(const FirstShot& shot) const {
         for (uint32_t k = first[side]; k < first[side + 1]; ++k)
             bent += area * double(all[k].lobe.contrast() * brightest(all[k].exitance));
     }
+    return shareOfLines(bent, reflected);
+}
+
+double shareOfLines(double bent, double reflected) {
     if (!(bent > 0)) return 0;
     return std::min(1.0, std::pow(bent / (kNoiseShare * reflected), 1 / kNoiseSlope));
 }
@@ -108,16 +99,10 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
     const Parent& parent = patches.parentAt(side);
     const glm::vec3& light = shot.irradiance[side];
     if (!parent.exchanges || brightest(light) <= 0) return;
-    const Scattering& surface = scatteringOf(side);
-    if (surface.isLambert()) return;
-    const glm::vec3& reflectance = patches.reflectance[side];
-    const glm::vec3 mirrored = mirroredMean(side);
-    const float whole = wholeOf(side);
-    auto mirroredAt = [&](const glm::vec4& terms) {
-        return glm::clamp(mirrored + whole * sumOfTerms(surface.glossByAngle, terms - kEverywhere),
-                          0.0f, 1.0f);
-    };
-    const float f0 = brightest(mirroredAt(glm::vec4(0.0f)));
+    const SideReflectance surface(patches, side);
+    const Scattering& scattering = surface.scattering();
+    if (scattering.isLambert()) return;
+    const float f0 = surface.f0();
     const glm::vec3 normal = patches.normal(side);
     const Incoming& incoming = shot.incoming[side];
     std::array<glm::vec3, Incoming::kCount> directions;
@@ -133,20 +118,16 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
         const glm::vec3 direction = directions[k];
         const glm::vec3 part = light / float(count);
         const glm::vec4 terms = angleTerms(glm::dot(normal, direction));
-        const glm::vec3 gloss = mirroredAt(terms);
+        const glm::vec3 gloss = surface.mirroredAt(terms);
         if (brightest(gloss) > kLeastShare)
             parts.push_back(
-                {Lobe::gloss(normal, direction, surface.glossRoughness, f0), gloss * part});
-        if (surface.diffuseModel != RB_DIFFUSE_BURLEY &&
-            surface.diffuseModel != RB_DIFFUSE_OREN_NAYAR)
-            continue;
-        glm::vec3 all = reflectance;
-        if (!patches.byAngle.empty()) all += sumOfTerms(patches.byAngle[side], terms - kEverywhere);
-        const glm::vec3 diffuse = glm::clamp(all - gloss, 0.0f, 1.0f);
+                {Lobe::gloss(normal, direction, scattering.glossRoughness, f0), gloss * part});
+        if (!scattering.isRough()) continue;
+        const glm::vec3 diffuse = surface.diffuseAt(terms);
         if (brightest(diffuse) > kLeastShare)
-            parts.push_back(
-                {Lobe::diffuse(normal, direction, surface.diffuseModel, surface.diffuseRoughness),
-                 diffuse * part});
+            parts.push_back({Lobe::diffuse(normal, direction, scattering.diffuseModel,
+                                           scattering.diffuseRoughness),
+                             diffuse * part});
     }
 }
 

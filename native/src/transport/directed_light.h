@@ -8,8 +8,8 @@
 // Source: none; the thesis has Lambert's surfaces only. Lines join two patches in proportion to
 // what one gets of the other's light by Lambert's law; where their middles lie tells the direction,
 // and where they are near, points on both.
-// What is left out: light that was reflected before, or came along lines (the constant part of the
-// world, emission without a source), is mirrored and scattered as by Lambert's law.
+// What is left out: light that was reflected before (transport/scattered_light.h has that), and the
+// constant part of the world, which is mirrored and scattered as by Lambert's law.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +22,11 @@
 
 namespace raybundle {
 
+// How much less noise light by direction makes along lines than all reflected light: a share of the
+// lines that is enough for it, 0 to 1. bent: what is sent to where Lambert's law would not, RMS over
+// the directions; reflected: all; W.
+double shareOfLines(double bent, double reflected);
+
 class DirectedLight {
   public:
     // Of the light of a first shot; none, if that knows no directions or all surfaces are
@@ -31,9 +36,8 @@ class DirectedLight {
     bool isNone() const { return all.empty(); }
     bool isNone(uint32_t side) const { return isNone() || first[side] == first[side + 1]; }
 
-    // How much less noise it makes along lines than all reflected light: a share of the lines that
-    // is enough for it, 0 to 1.
-    double shareOfLines() const { return lineShare; }
+    // See shareOfLines.
+    double neededLines() const { return lineShare; }
 
     // Exitance of a side towards a direction (unit) away from it, less the mean over all
     // directions, W/m^2 over its whole area: positive or negative.
@@ -63,10 +67,6 @@ class DirectedLight {
     };
     void findMiddles();
     void findLayers();
-    const Scattering& scatteringOf(uint32_t side) const;
-    // Of its opaque share, what the whole patch has is so many times as much.
-    float wholeOf(uint32_t side) const;
-    glm::vec3 mirroredMean(uint32_t side) const;  // of light from everywhere
     double enoughLines(const FirstShot& shot) const;
     void addParts(uint32_t side, const FirstShot& shot, std::vector<Part>& parts) const;
     glm::vec3 betweenNear(uint32_t side, uint32_t other, uint32_t random) const;

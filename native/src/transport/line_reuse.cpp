@@ -27,6 +27,10 @@ constexpr int kMaxPasses = 200;  // through translucent patches
 // A guess whose squared residual is this many times what is allowed is the solution of a solve to
 // about the same tolerance.
 constexpr double kSameSolution = 1.2;
+// What is sent by direction is found in turns, each from the solution before it, until what is left
+// out is this share of the reflected light, and at most so many.
+constexpr double kSettledTurns = 0.01;
+constexpr int kMostTurns = 6;
 constexpr size_t kGrain = 2048;  // sides per task
 constexpr int kMaxSweeps = 64;   // over the starved sides
 constexpr float kSettled = 1e-5f;
@@ -120,6 +124,7 @@ LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const Fir
       exposed(exposed),
       isShown(isShown),
       directedLight(patches, shot),
+      scatteredOfSources(patches, shot),
       hasEmission(std::any_of(shot.emission.begin(), shot.emission.end(),
                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
 
@@ -157,12 +162,20 @@ LineWeights LineReuse::lineWeights(Half half) const {
 
 Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected, Field& passed,
                             const LineWeights& weights) const {
-    ByAngle byAngle{directed(half, weights), {}};
+    ByAngle byAngle;
+    byAngle.brought = byAngle.ofSources = directed(half, weights);
     Irradiance light = solvePassed(half, tolerance, reflected, passed, weights, byAngle);
     // Halves tell of noise alone.
     if (half != Half::BOTH || !directedLight.hasAngles()) return light;
-    findAngles(half, weights, reflected, light, byAngle);
-    return solvePassed(half, tolerance, reflected, passed, weights, byAngle);
+    // Each turn leaves out what was sent by direction once more often.
+    double missing = 1;
+    for (int turn = 0; turn < kMostTurns && missing > kSettledTurns; ++turn) {
+        const double bent = findAngles(weights, reflected, light, byAngle);
+        light = solvePassed(half, tolerance, reflected, passed, weights, byAngle);
+        missing = bent * (turn == 0 ? bent : missing);
+    }
+    light.scattered = byAngle.scattered;
+    return light;
 }
 
 Irradiance LineReuse::solvePassed(Half half, float tolerance, Field& reflected, Field& passed,
@@ -364,6 +377,8 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
                 if (hit) hits[k * rays + i] = *hit;
                 if (hit && !directedLight.isNone(*hit) && exposed[*hit] > 0)
                     byDirection += directedLight.towards(*hit, -direction) / exposed[*hit];
+                if (hit && irradiance.scattered && !irradiance.scattered->isNone(*hit))
+                    byDirection += irradiance.scattered->towards(*hit, -direction);
                 direct += hit ? shot.emission[*hit] : worldExitance;
                 ++weights[k];
             }

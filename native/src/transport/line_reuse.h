@@ -35,6 +35,7 @@
 #include "patches/patches.h"
 #include "transport/directed_light.h"
 #include "transport/first_shot.h"
+#include "transport/scattered_light.h"
 #include "transport/transport.h"
 #include "visibility/visibility.h"
 
@@ -84,23 +85,26 @@ class LineReuse {
     std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
 
   private:
-    // What the lines of a half bring, W/m^2, by a share of them (kLeastEntries of each row at
-    // least). sent(from, to, entry): exitance of a side towards another one, W/m^2; entry: of the
-    // row.
-    template <class Value, class Sent>
-    std::vector<Value> alongLines(Half half, const LineWeights& weights, double share,
-                                  const Value& zero, const Sent& sent) const;
+    // The lines of a half to a side, or a share of them that stands for all (kLeastEntries of its
+    // row at least): add(share, from, entry), where of what leaves side `from` that share arrives,
+    // and entry is one of the row.
+    template <class Add>
+    void alongLines(Half half, const LineWeights& weights, double share, uint32_t side,
+                    const Add& add) const;
     // light: per side, W/m^2, of the share that is exposed; power: W.
     void addPower(const std::vector<glm::vec3>& light, const std::vector<float>& exposed,
                   glm::dvec3& power) const;
-    // What differs from Lambert's surfaces, per side, W/m^2; empty: nothing.
+    // What differs from Lambert's surfaces, per side, W/m^2; empty or null: nothing.
     struct ByAngle {
-        std::vector<glm::vec3> brought;    // irradiance along lines, see directed
+        std::vector<glm::vec3> ofSources;  // irradiance along lines, see directed
+        std::vector<glm::vec3> brought;    // likewise, of all light
         std::vector<glm::vec3> reflected;  // exitance by light along lines
+        std::shared_ptr<ScatteredLight> scattered;
     };
-    // Adds what is known of it once it is solved without. light: that solution.
-    void findAngles(Half half, const LineWeights& weights, const std::vector<glm::vec3>& reflected,
-                    const Irradiance& light, ByAngle& byAngle) const;
+    // Of a solution: light, and what is reflected of it. byAngle: of the solution before.
+    // Returns what share of reflected light is sent to where Lambert's law would not.
+    double findAngles(const LineWeights& weights, const std::vector<glm::vec3>& reflected,
+                      const Irradiance& light, ByAngle& byAngle) const;
     // With what passes through translucent patches.
     Irradiance solvePassed(Half half, float tolerance, std::vector<glm::vec3>& reflected,
                            std::vector<glm::vec3>& passed, const LineWeights& weights,
@@ -117,6 +121,7 @@ class LineReuse {
     const std::vector<float>& exposed;
     const std::vector<bool>* const isShown;
     const DirectedLight directedLight;
+    const ScatteredLight scatteredOfSources;
     bool hasEmission = false;
 };
 

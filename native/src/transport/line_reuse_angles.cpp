@@ -5,11 +5,12 @@
 //
 // Light of the sources is known before the solve, and what it brings by direction with it.
 // Reflected light is known after it: then the system is solved once more, with what the solution
-// brings by the angle at which it leaves (from under a layer) and makes sides reflect by the angle
-// at which it arrives. A third solve would change a share of a share.
+// brings by the angle at which it leaves (from under a layer), with where sides send what arrives
+// from where (transport/scattered_light.h), and what they reflect by the angle at which it arrives.
+// Where surfaces send much by direction, once more, and so on.
 //
-// A few lines are enough for what is little of the light, or changes slowly from side to side: the
-// first ones of each side stand for all.
+// A few lines are enough for what is little of the light, or changes slowly from side to side: some
+// of those of each side stand for all.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Core>
@@ -30,85 +31,112 @@ constexpr size_t kGrain = 256;  // sides per task
 template <class Body>
 void forEachSide(size_t n, const Body& body) {
     tbb::parallel_for(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
-        for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+        for (size_t i = range.begin(); i < range.end(); ++i) body(uint32_t(i));
     });
 }
 
 }  // namespace
 
-template <class Value, class Sent>
-std::vector<Value> LineReuse::alongLines(Half half, const LineWeights& weights, double share,
-                                         const Value& zero, const Sent& sent) const {
+template <class Add>
+void LineReuse::alongLines(Half half, const LineWeights& weights, double share, uint32_t side,
+                           const Add& add) const {
     const LineRows::LinesOf<float>& lines = LineRows::linesOf<float>();
-    const std::vector<float>&x = weights.x, &m = weights.m;
-    std::vector<Value> brought(counts.sideCount(), zero);
-    forEachSide(brought.size(), [&](size_t i) {
-        if (m[i] == 0) return;
-        Value all = zero;
-        for (size_t h = 0; h < 2; ++h) {
-            if (half != Half::BOTH && half != Half(h)) continue;
-            const uint32_t* const begin = counts.rows(h).first(uint32_t(i));
-            const size_t count = size_t(counts.rows(h).last(uint32_t(i)) - begin);
-            const size_t enough =
-                std::min(count, std::max(kLeastEntries, size_t(share * double(count))));
-            Value sum = zero;
-            float taken = 0;
-            for (const uint32_t* e = begin; e < begin + enough; ++e) {
-                const uint32_t from = LineRows::sideOf(*e);
-                taken += lines[*e & 255];
-                sum += lines[*e & 255] * x[from] * sent(from, uint32_t(i), uint32_t(e - begin));
-            }
-            if (taken > 0) all += float(counts.total[i][h] - counts.sky[i][h]) / taken * sum;
+    if (weights.m[side] == 0) return;
+    const float perLine = weights.x[side] / weights.m[side];
+    for (size_t h = 0; h < 2; ++h) {
+        if (half != Half::BOTH && half != Half(h)) continue;
+        const uint32_t* const begin = counts.rows(h).first(side);
+        const size_t count = size_t(counts.rows(h).last(side) - begin);
+        const size_t enough =
+            std::min(count, std::max(kLeastEntries, size_t(share * double(count))));
+        // From the whole row: it may be in the order of the bundles, or of the sides.
+        const float start = float(hash(side, uint32_t(h)) >> 8) * 0x1p-24f;
+        const double step = double(count) / double(enough);
+        auto entry = [&](size_t k) { return begin[size_t((double(k) + double(start)) * step)]; };
+        float taken = 0;
+        for (size_t k = 0; k < enough; ++k) taken += lines[entry(k) & 255];
+        const float all = float(counts.total[side][h] - counts.sky[side][h]);
+        for (size_t k = 0; k < enough; ++k) {
+            const uint32_t from = LineRows::sideOf(entry(k));
+            add(perLine * all / taken * lines[entry(k) & 255] * weights.x[from], from, uint32_t(k));
         }
-        brought[i] = x[i] * all / m[i];
-    });
-    return brought;
+    }
 }
 
 std::vector<glm::vec3> LineReuse::directed(Half half, const LineWeights& weights) const {
     if (directedLight.isNone()) return {};
     const std::vector<float> exposed = exposedShare();
-    return alongLines(half, weights, directedLight.shareOfLines(), glm::vec3(0.0f),
-                      [&](uint32_t from, uint32_t to, uint32_t entry) {
-                          if (directedLight.isNone(from) || exposed[from] <= 0)
-                              return glm::vec3(0.0f);
-                          return directedLight.between(from, to, hash(to, entry)) / exposed[from];
-                      });
+    std::vector<glm::vec3> brought(counts.sideCount(), glm::vec3(0.0f));
+    forEachSide(brought.size(), [&](uint32_t i) {
+        alongLines(half, weights, directedLight.neededLines(), i,
+                   [&](float share, uint32_t from, uint32_t entry) {
+                       if (directedLight.isNone(from) || exposed[from] <= 0) return;
+                       brought[i] +=
+                           share / exposed[from] *
+                           (half == Half::BOTH ? directedLight.between(from, i, hash(i, entry))
+                                               : scatteredOfSources.towards(
+                                                     from, directedLight.wayBetween(from, i)));
+                   });
+    });
+    return brought;
 }
 
-void LineReuse::findAngles(Half half, const LineWeights& weights,
-                           const std::vector<glm::vec3>& reflected, const Irradiance& light,
-                           ByAngle& byAngle) const {
-    // Of light from under a layer, of the angles at which reflected light arrives (angleTerms),
-    // each times its brightness, and that.
-    using Arriving = Eigen::Array<float, 8, 1>;
-    const std::vector<Arriving> arriving = alongLines(
-        half, weights, 0, Arriving(Arriving::Zero()),
-        [&](uint32_t from, uint32_t to, uint32_t /*entry*/) {
-            const glm::vec3 way = directedLight.wayBetween(from, to);
-            const glm::vec3 layered = directedLight.hasLayers()
-                                          ? directedLight.layer(from, way) * reflected[from]
-                                          : glm::vec3(0.0f);
-            const float brightness = brightest(reflected[from]);
-            const glm::vec4 terms = brightness * angleTerms(-glm::dot(way, patches.normal(to)));
-            Arriving value;
-            value << layered.x, layered.y, layered.z, terms.x, terms.y, terms.z, terms.w,
-                brightness;
-            return value;
-        });
-    const size_t n = arriving.size();
+double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::vec3>& reflected,
+                             const Irradiance& light, ByAngle& byAngle) const {
+    const size_t n = counts.sideCount();
+    const std::vector<float> exposed = exposedShare();
+    const auto before = std::move(byAngle.scattered);
+    byAngle.scattered = std::make_shared<ScatteredLight>(scatteredOfSources);
+    ScatteredLight& scattered = *byAngle.scattered;
+    byAngle.brought = byAngle.ofSources;
     byAngle.brought.resize(n, glm::vec3(0.0f));
     if (!patches.byAngle.empty()) byAngle.reflected.resize(n);
-    forEachSide(n, [&](size_t i) {
-        const Arriving& value = arriving[i];
-        byAngle.brought[i] += glm::vec3(value[0], value[1], value[2]);
-        if (byAngle.reflected.empty() || !(value[7] > 0)) return;
-        const glm::vec4 terms = glm::vec4(value[3], value[4], value[5], value[6]) / value[7];
-        const glm::vec3 more = sumOfTerms(patches.byAngle[i], terms - kEverywhere);
+    forEachSide(n, [&](uint32_t i) {
+        const glm::vec3 normal = patches.normal(i);
+        const bool scatters = !scattered.isNone(i);
+        glm::vec4 terms(0.0f);  // of the angles at which light arrives, times its brightness
+        float sum = 0;          // of that brightness
+        ScatteredLight::Cells arriving{};
+        alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
+            const glm::vec3 way = directedLight.wayBetween(from, i);
+            glm::vec3 all = reflected[from];
+            if (directedLight.hasLayers()) {
+                const glm::vec3 layered = directedLight.layer(from, way) * reflected[from];
+                byAngle.brought[i] += share * layered;
+                all += layered;
+            }
+            if (!scattered.isNone(from)) {
+                if (before) all += before->towards(from, way);
+                if (exposed[from] > 0) all += scatteredOfSources.towards(from, way) / exposed[from];
+            }
+            const float brightness = share * std::max(brightest(all), 0.0f);
+            terms += brightness * angleTerms(-glm::dot(way, normal));
+            sum += brightness;
+            if (scatters) scattered.add(i, -way, share * (all + shot.emission[from]), arriving);
+        });
+        if (scatters) scattered.set(i, arriving);
+        if (byAngle.reflected.empty() || !(sum > 0)) return;
+        const glm::vec3 more = sumOfTerms(patches.byAngle[i], terms / sum - kEverywhere);
         byAngle.reflected[i] =
             glm::clamp(more, -patches.reflectance[i], kMostReflectance - patches.reflectance[i]) *
             light.indirect[i];
     });
+    if (scattered.isNone()) return 0;
+    double bent = 0, all = 0;
+    for (uint32_t side = 0; side < n; ++side) {
+        const double area = double(patches.area[side / 2]);
+        all += area * double(brightest(reflected[side]));
+        if (!scattered.isNone(side)) bent += area * double(scattered.contrast(side));
+    }
+    const double needed = shareOfLines(bent, all);
+    forEachSide(n, [&](uint32_t i) {
+        alongLines(Half::BOTH, weights, needed, i, [&](float share, uint32_t from, uint32_t) {
+            if (scattered.isNone(from)) return;
+            byAngle.brought[i] +=
+                share * scattered.towards(from, directedLight.wayBetween(from, i));
+        });
+    });
+    return all > 0 ? bent / all : 0;
 }
 
 }  // namespace raybundle

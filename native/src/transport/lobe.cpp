@@ -20,6 +20,8 @@ constexpr float kWeight[kCosines] = {0.05061427f, 0.11119052f, 0.15685332f, 0.18
 // Of the table of gloss: steps of the roughness and of the cosine, and for each entry rings of
 // visible normals and normals in them.
 constexpr int kRoughnesses = 11, kTableCosines = 25, kRings = 24, kInRing = 24;
+// Of Fresnel's edge over Lambert's cosine.
+constexpr float kMeanEdge = 0.0534f;
 // Cosines below this are taken for it: V below stays finite.
 constexpr float kLeastCosine = 1e-3f;
 
@@ -92,6 +94,16 @@ class Lobe::GlossTable {
         return sum;
     }
 
+    // Of light from everywhere.
+    Moments everywhere(float roughness) const {
+        const float r = (roughness - kLeastRoughness) / (1 - kLeastRoughness) * (kRoughnesses - 1);
+        const int i = std::clamp(int(r), 0, kRoughnesses - 2);
+        Moments sum;
+        for (int di = 0; di < 2; ++di)
+            sum.add(di ? r - float(i) : 1 - r + float(i), means[size_t(i + di)]);
+        return sum;
+    }
+
   private:
     GlossTable() {
         for (int i = 0; i < kRoughnesses; ++i)
@@ -100,7 +112,14 @@ class Lobe::GlossTable {
                     kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
                     std::max(float(j * j) / ((kTableCosines - 1) * (kTableCosines - 1)),
                              kLeastCosine));
+        for (size_t i = 0; i < means.size(); ++i)
+            for (int k = 0; k < kCosines; ++k)
+                means[i].add(
+                    2 * kCosine[k] * kWeight[k],
+                    at(kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
+                       kCosine[k]));
     }
+    std::array<Moments, kRoughnesses> means;
     std::array<std::array<Moments, kTableCosines>, kRoughnesses> moments;
 };
 
@@ -139,6 +158,21 @@ Lobe Lobe::gloss(const glm::vec3& normal, const glm::vec3& incoming, float rough
     const Moments moments = GlossTable::instance().at(rough, lobe.cosine);
     lobe.normalise(moments.mean(f0), moments.meanSquare(f0));
     return lobe;
+}
+
+float Lobe::f0Of(float ratio, float roughness) {
+    const float rough = std::clamp(roughness, kLeastRoughness, 1.0f);
+    const GlossTable& table = GlossTable::instance();
+    // Below the table towards a mirror, about as alpha falls.
+    const float share = std::min(roughness * roughness / (kLeastRoughness * kLeastRoughness), 1.0f);
+    Moments above, all;
+    above.add(share, table.at(rough, 1));
+    above.add(1 - share, {1, 0});
+    all.add(share, table.everywhere(rough));
+    all.add(1 - share, {1, kMeanEdge});
+    // ratio = (white above f0 + edge above (1 - f0)) / (white f0 + edge (1 - f0)).
+    const float rest = above.white - above.edge - ratio * (all.white - all.edge);
+    return rest > 0 ? std::clamp((ratio * all.edge - above.edge) / rest, 0.0f, 1.0f) : 1;
 }
 
 Lobe Lobe::diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,

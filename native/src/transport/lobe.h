@@ -30,9 +30,15 @@ class Lobe {
     static Lobe diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,
                         float roughness);
 
+    // f0 of gloss that reflects so many times as much of light at right angles as of light from
+    // everywhere.
+    static float f0Of(float ratio, float roughness);
+
     // Of a unit vector away from the surface: 0 or more, 0 below the surface.
     float towards(const glm::vec3& direction) const;
 
+    // Its mean before it was brought to 1: lobes of gloss times theirs are linear in f0.
+    float mean() const { return scale > 0 ? 1 / scale : 0; }
     // RMS of what it is off its mean, by Lambert's cosine.
     float contrast() const { return rms; }
 

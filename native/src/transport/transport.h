@@ -24,6 +24,8 @@
 
 namespace raybundle {
 
+class ScatteredLight;
+
 // Irradiance per side, W/m^2, in two parts.
 struct Irradiance {
     explicit Irradiance(size_t sides = 0) : direct(sides), gathered(sides), indirect(sides) {}
@@ -34,6 +36,8 @@ struct Irradiance {
     // Exitance by indirect light that comes in at angles at which a side reflects more than of
     // light from everywhere, or less; empty: none.
     std::vector<glm::vec3> byAngle;
+    // What of reflected light goes where Lambert's surfaces would not send it; null: nothing.
+    std::shared_ptr<const ScatteredLight> scattered;
     // Power that arrives and would leave the scene if all surfaces were Lambert's, W.
     glm::dvec3 redirected{0.0};
 

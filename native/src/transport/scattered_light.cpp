@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/scattered_light.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "scene/channels.h"
+#include "transport/lobe.h"
+#include "transport/side_reflectance.h"
+#include "transport/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+constexpr uint32_t kEdge = ScatteredLight::kEdge, kCells = ScatteredLight::kCells;
+// Directions along an edge of the square, which Lambert's cosine weights alike, and in all.
+constexpr uint32_t kAlong = 2 * kEdge, kDirections = kAlong * kAlong;
+constexpr float kMostSteps = 127;
+
+// The inverse of onDisk, times kEdge.
+glm::vec2 cellsAt(glm::vec2 disk) {
+    const float r = glm::length(disk), perAngle = 4 * glm::one_over_pi<float>();
+    glm::vec2 p(0.0f);
+    if (std::abs(disk.x) > std::abs(disk.y)) {
+        p.x = std::copysign(r, disk.x);
+        p.y = p.x * perAngle * std::atan(disk.y / disk.x);
+    } else if (r > 0) {
+        p.y = std::copysign(r, disk.y);
+        p.x = p.y * perAngle * std::atan(disk.x / disk.y);
+    }
+    return (0.5f * p + 0.5f) * float(kEdge);
+}
+
+// The first of the four cells around a direction, and where in the square of their middles it is.
+struct Around {
+    uint8_t first = 0, s = 0, t = 0;  // s, t: of 255
+
+    Around() = default;
+    // At a point of the square, in cells.
+    explicit Around(const glm::vec2& point) {
+        const glm::vec2 p = glm::clamp(point - 0.5f, 0.0f, float(kEdge - 1));
+        const glm::uvec2 low = glm::min(glm::uvec2(p), glm::uvec2(kEdge - 2));
+        const glm::vec2 within = 255.0f * (p - glm::vec2(low)) + 0.5f;
+        first = uint8_t(low.y * kEdge + low.x);
+        s = uint8_t(within.x);
+        t = uint8_t(within.y);
+    }
+    std::array<uint32_t, 4> cells() const {
+        return {first, first + 1u, first + kEdge, first + kEdge + 1};
+    }
+    std::array<float, 4> shares() const {
+        const float x = float(s) / 255, y = float(t) / 255;
+        return {(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y};
+    }
+};
+
+// By the place on the disk: an arc tangent a line would be most of the work.
+class AroundTable {
+  public:
+    AroundTable() {
+        for (uint32_t k = 0; k < entries.size(); ++k) {
+            const glm::vec2 disk =
+                (glm::vec2(k % kSteps, k / kSteps) + 0.5f) * 2.0f / float(kSteps) - 1.0f;
+            entries[k] = Around(cellsAt(disk));
+        }
+    }
+    // x, y: of the frame that the disk has.
+    const Around& at(const glm::vec3& x, const glm::vec3& y, const glm::vec3& direction) const {
+        auto step = [&](const glm::vec3& axis) {
+            const float along = (glm::dot(axis, direction) + 1) * (0.5f * kSteps);
+            return std::min(uint32_t(std::max(along, 0.0f)), kSteps - 1);
+        };
+        return entries[step(y) * kSteps + step(x)];
+    }
+
+    static const AroundTable& instance() {
+        static const AroundTable table;
+        return table;
+    }
+
+  private:
+    static constexpr uint32_t kSteps = 64;
+    std::array<Around, kSteps * kSteps> entries;
+};
+
+// The directions, around z, and how cells follow from them.
+struct Samples {
+    std::array<glm::vec3, kDirections> directions;
+    std::array<glm::vec4, kCells> terms{};  // of the angles in each cell
+    // Cells, bilinear between their middles, that are nearest to values by direction: what is
+    // added to them spreads over four, and this takes it back.
+    Eigen::Matrix<float, kCells, kDirections> fit;
+
+    Samples() {
+        Eigen::Matrix<float, kDirections, kCells> shares;
+        shares.setZero();
+        for (uint32_t k = 0; k < kDirections; ++k) {
+            const glm::vec2 square = (glm::vec2(k % kAlong, k / kAlong) + 0.5f) / float(kAlong);
+            const glm::vec2 d = onDisk(square);
+            directions[k] = {d, std::sqrt(std::max(0.0f, 1 - glm::dot(d, d)))};
+            const glm::uvec2 cell(square * float(kEdge));
+            terms[cell.y * kEdge + cell.x] +=
+                angleTerms(directions[k].z) * (float(kCells) / kDirections);
+            const Around around(square * float(kEdge));
+            for (size_t corner = 0; corner < 4; ++corner)
+                shares(k, around.cells()[corner]) += around.shares()[corner];
+        }
+        fit = (shares.transpose() * shares).ldlt().solve(shares.transpose());
+    }
+
+    static const Samples& instance() {
+        static const Samples samples;
+        return samples;
+    }
+};
+
+}  // namespace
+
+// How what arrives is sent on: exitance over irradiance, to a cell (row) from a cell (column).
+struct ScatteredLight::Transfer {
+    using Matrix = Eigen::Matrix<float, kCells, kCells>;
+    // Gloss with f0 of 1 and of 0, that mirrors all else that it can; a white rough surface.
+    Matrix white = Matrix::Zero(), edge = white, rough = white;
+
+    explicit Transfer(const Scattering& surface) {
+        const float roughness = surface.glossRoughness;
+        const glm::vec3 z(0, 0, 1);
+        if (surface.hasGloss()) {
+            white = between(
+                [&](const glm::vec3& from) { return Lobe::gloss(z, from, roughness, 1); }, true);
+            edge = between(
+                [&](const glm::vec3& from) { return Lobe::gloss(z, from, roughness, 0); }, true);
+        }
+        if (surface.isRough())
+            rough = between(
+                [&](const glm::vec3& from) {
+                    return Lobe::diffuse(z, from, surface.diffuseModel, surface.diffuseRoughness);
+                },
+                false);
+    }
+
+  private:
+    template <class LobeOf>
+    static Matrix between(const LobeOf& lobeOf, bool timesMean) {
+        const Samples& samples = Samples::instance();
+        Eigen::MatrixXf values(kDirections, kDirections);
+        for (uint32_t in = 0; in < kDirections; ++in) {
+            const Lobe lobe = lobeOf(samples.directions[in]);
+            for (uint32_t out = 0; out < kDirections; ++out)
+                values(out, in) = lobe.towards(samples.directions[out]);
+            values.col(in) *= (timesMean ? lobe.mean() : 1) / values.col(in).mean();
+        }
+        return samples.fit * values * samples.fit.transpose();
+    }
+};
+
+ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot) : patches(patches) {
+    if (patches.scattering.empty()) return;
+    indices.assign(patches.sideCount(), kNone);
+    for (uint32_t side = 0; side < indices.size(); ++side) {
+        const Scattering& surface = SideReflectance(patches, side).scattering();
+        if (!patches.parentAt(side).exchanges || !(surface.hasGloss() || surface.isRough()))
+            continue;
+        const auto [x, y] = frame(patches.normal(side));
+        indices[side] = uint32_t(sent.size());
+        sent.push_back({x, y});
+    }
+    if (sent.empty()) {
+        indices.clear();
+        return;
+    }
+    findTransfers();
+    if (shot.incoming.empty()) return;
+    tbb::parallel_for(uint32_t(0), uint32_t(indices.size()), [&](uint32_t side) {
+        if (isNone(side)) return;
+        Cells arriving{};
+        for (size_t k = 0; k < Incoming::kCount; ++k)
+            add(side, shot.incoming[side].direction(k),
+                shot.irradiance[side] / float(Incoming::kCount), arriving);
+        set(side, arriving);
+    });
+}
+
+void ScatteredLight::findTransfers() {
+    // Alike to within a hundredth of the roughness.
+    auto rounded = [](float roughness) { return float(std::lround(100 * roughness)) / 100; };
+    using Kind = std::tuple<bool, float, rb_diffuse_model, float>;
+    std::map<Kind, std::vector<size_t>> alike;
+    transfers.resize(patches.scattering.size());
+    for (size_t k = 0; k < transfers.size(); ++k) {
+        const Scattering& surface = patches.scattering[k];
+        const float gloss = std::clamp(surface.glossRoughness, Lobe::kLeastRoughness, 1.0f);
+        alike[{surface.hasGloss(), surface.hasGloss() ? rounded(gloss) : 0, surface.diffuseModel,
+               surface.isRough() ? rounded(surface.diffuseRoughness) : 0}]
+            .push_back(k);
+    }
+    tbb::parallel_for_each(alike.begin(), alike.end(), [&](const auto& kind) {
+        const std::vector<size_t>& members = kind.second;
+        const auto transfer = std::make_shared<Transfer>(patches.scattering[members.front()]);
+        for (const size_t k : members) transfers[k] = transfer;
+    });
+}
+
+void ScatteredLight::add(uint32_t side, const glm::vec3& direction, const glm::vec3& light,
+                         Cells& cells) const {
+    const Sent& target = sent[indices[side]];
+    const Around& around = AroundTable::instance().at(target.x, target.y, direction);
+    const std::array<uint32_t, 4> at = around.cells();
+    const std::array<float, 4> shares = around.shares();
+    for (size_t k = 0; k < 4; ++k)
+        for (int c = 0; c < 3; ++c) cells[size_t(c)][at[k]] += shares[k] * light[c];
+}
+
+void ScatteredLight::set(uint32_t side, const Cells& arriving) {
+    const SideReflectance surface(patches, side);
+    const Transfer& transfer = *transfers[2 * patches.parentAt(side).scattering + side % 2];
+    using Light = Eigen::Matrix<float, kCells, 3>;
+    const Light light = Eigen::Map<const Light>(arriving.front().data());
+    Light leaving = Light::Zero();
+    if (surface.scattering().hasGloss()) {
+        const float f0 = surface.f0();
+        const float all = f0 * transfer.white.mean() + (1 - f0) * transfer.edge.mean();
+        leaving = f0 * (transfer.white * light) + (1 - f0) * (transfer.edge * light);
+        const glm::vec3 scale = surface.mirroredMean() / all;
+        leaving.array().rowwise() *= Eigen::Array<float, 1, 3>(scale.x, scale.y, scale.z);
+    }
+    if (surface.scattering().isRough()) {
+        Light diffuse = light;
+        for (uint32_t in = 0; in < kCells; ++in) {
+            const glm::vec3 share = surface.diffuseAt(Samples::instance().terms[in]);
+            for (int c = 0; c < 3; ++c) diffuse(in, c) *= share[c];
+        }
+        leaving += transfer.rough * diffuse;
+    }
+    leaving.rowwise() -= leaving.colwise().mean().eval();
+    Sent& target = sent[indices[side]];
+    target.unit = leaving.cwiseAbs().maxCoeff() / kMostSteps;
+    for (uint32_t out = 0; out < kCells && target.unit > 0; ++out)
+        for (int c = 0; c < 3; ++c)
+            target.cells[out][size_t(c)] = int8_t(
+                std::lround(std::clamp(leaving(out, c) / target.unit, -kMostSteps, kMostSteps)));
+}
+
+glm::vec3 ScatteredLight::towards(uint32_t side, const glm::vec3& direction) const {
+    const Sent& source = sent[indices[side]];
+    const Around& around = AroundTable::instance().at(source.x, source.y, direction);
+    glm::vec3 sum(0.0f);
+    const std::array<uint32_t, 4> at = around.cells();
+    const std::array<float, 4> shares = around.shares();
+    for (size_t k = 0; k < 4; ++k) {
+        const auto& cell = source.cells[at[k]];
+        sum += shares[k] * glm::vec3(cell[0], cell[1], cell[2]);
+    }
+    return source.unit * sum;
+}
+
+float ScatteredLight::contrast(uint32_t side) const {
+    const Sent& source = sent[indices[side]];
+    float sum = 0;
+    for (const auto& cell : source.cells) {
+        const float most = brightest(glm::abs(glm::vec3(cell[0], cell[1], cell[2])));
+        sum += most * most;
+    }
+    return source.unit * std::sqrt(sum / kCells);
+}
+
+}  // namespace raybundle

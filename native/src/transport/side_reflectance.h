@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// How much of light from one direction a side that is not Lambert's mirrors, and how much it
+// reflects diffusely.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+
+#include "patches/patches.h"
+#include "scene/channels.h"
+#include "transport/lobe.h"
+
+namespace raybundle {
+
+class SideReflectance {
+  public:
+    // patches must outlive the object, and have scattering.
+    SideReflectance(const Patches& patches, uint32_t side)
+        : surface(patches.scattering[2 * patches.parentAt(side).scattering + side % 2]),
+          all(patches.reflectance[side]),
+          byAngle(patches.byAngle.empty() ? nullptr : &patches.byAngle[side]),
+          // Of its opaque share, what the whole patch has is so many times as much.
+          whole(1 / std::max(patches.opacityOf(side / 2), 1e-6f)),
+          mirrored(glm::clamp(surface.glossScale * all + whole * surface.glossOffset,
+                              glm::vec3(0.0f), all)) {}
+
+    const Scattering& scattering() const { return surface; }
+
+    // Of light from everywhere.
+    const glm::vec3& mirroredMean() const { return mirrored; }
+    // Of light that comes in at an angle (scene/angles.h).
+    glm::vec3 mirroredAt(const glm::vec4& terms) const {
+        return glm::clamp(mirrored + whole * sumOfTerms(surface.glossByAngle, terms - kEverywhere),
+                          0.0f, 1.0f);
+    }
+    glm::vec3 diffuseAt(const glm::vec4& terms) const {
+        const glm::vec3 sum = byAngle ? all + sumOfTerms(*byAngle, terms - kEverywhere) : all;
+        return glm::clamp(sum - mirroredAt(terms), 0.0f, 1.0f);
+    }
+    // Of the gloss alone (transport/lobe.h): what is mixed with it does not count.
+    float f0() const {
+        const float mean = brightest(mirrored);
+        return mean > 0 ? Lobe::f0Of(brightest(mirroredAt(glm::vec4(0.0f))) / mean,
+                                     surface.glossRoughness)
+                        : 1;
+    }
+
+  private:
+    const Scattering& surface;
+    const glm::vec3& all;
+    const AngleFactors* byAngle;
+    float whole;
+    glm::vec3 mirrored;
+};
+
+}  // namespace raybundle
