@@ -49,7 +49,7 @@ _MATH: dict[str, Callable[[float, float], float]] = {
 
 # Shaders that are gloss alone.
 GLOSSY = ('BSDF_GLOSSY', 'BSDF_ANISOTROPIC', 'BSDF_METALLIC')
-MIRRORS = "mirrors: what it mirrors of other surfaces spreads here as if it were diffuse"
+MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughness of 0.45 or more"
 
 
 @dataclass(frozen=True)
