@@ -21,6 +21,16 @@ rb_error fail(rb_error code, const char* message) noexcept {
     return code;
 }
 
+void needProcessor() {
+#if defined(__x86_64__) && defined(__SSE4_2__)
+    static const bool isEnough =
+        __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
+    if (!isEnough)
+        throw Error(RB_ERROR_UNSUPPORTED_HARDWARE,
+                    "this processor has no SSE 4.2 and POPCNT, which Raybundle needs");
+#endif
+}
+
 uintptr_t nextHandle() {
     static std::atomic<uintptr_t> last{0};
     return ++last;

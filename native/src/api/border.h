@@ -21,10 +21,15 @@ namespace raybundle {
 // Keeps the message for rb_get_error_message of this thread and returns the code.
 rb_error fail(rb_error code, const char* message) noexcept;
 
+// Throws Error(UNSUPPORTED_HARDWARE) on a processor that lacks what the library was compiled for,
+// where all else would end the process.
+void needProcessor();
+
 // Runs the body of an API function; whatever it throws becomes a code and a message.
 template <class Body>
 rb_error guarded(const Body& body) noexcept {
     try {
+        needProcessor();
         body();
         return RB_ERROR_NONE;
     } catch (const Error& error) {
