@@ -344,26 +344,31 @@ TEST_P(Studio, SendsOnWhatOthersSentIt) {
     Light sun = sunLight({0, 0, -1}, glm::dvec3(1));
     sun.castsShadows = false;
     scene.addLight(sun);
-    Bake bake;
-    bake.settings.patchSize = 0.1f;
-    bake.settings.targetError = 0.003f;
-    bake.run(scene);
-    const Patches& patches = bake.patches();
+    constexpr int kSeeds = 4;
     UpAndDown found;
-    for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
-        const uint32_t instance = patches.parentAt(side).instance;
-        const double power =
-            double(patches.area[side / 2] * bake.patchIrradiance().indirect[side].x);
-        if (instance == 0) found.floor += power;
-        if (instance == 5) found.ceiling += power;
+    for (int seed = 0; seed < kSeeds; ++seed) {
+        Bake bake;
+        bake.settings.patchSize = 0.1f;
+        bake.settings.targetError = 0.003f;
+        bake.settings.seed = seed;
+        bake.run(scene);
+        const Patches& patches = bake.patches();
+        for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
+            const uint32_t instance = patches.parentAt(side).instance;
+            const double power =
+                double(patches.area[side / 2] * bake.patchIrradiance().indirect[side].x) / kSeeds;
+            if (instance == 0) found.floor += power;
+            if (instance == 5) found.ceiling += power;
+        }
     }
     const Bsdf bsdf = GetParam() ? burley(1) : ggx(kRoughness, 1);
     const double share = GetParam() ? 1 : double(kMirrored / kReflected);
     const UpAndDown expected = upAndDown(double(kWhiteness), double(kReflected), share, bsdf);
     const UpAndDown ofLambert = upAndDown(double(kWhiteness), double(kReflected), 0, bsdf);
     const double bent = expected.ceiling - ofLambert.ceiling;
-    // Noise of 0.3 %, patches that send from their middles and, twice on the way, cells of
-    // directions.
+    // The ceiling's light is little, and the few lines that stand for all give each seed 0.7 % of
+    // noise there: the tolerance is three times that of the mean. Cells of directions are 0.2 %
+    // (gloss) and 0.8 % (Burley) off with all lines.
     EXPECT_NEAR(found.floor, expected.floor, 0.005 * expected.floor);
     EXPECT_NEAR(found.ceiling, expected.ceiling, 0.012 * expected.ceiling);
     EXPECT_GT(std::abs(bent), 0.03 * expected.ceiling);
