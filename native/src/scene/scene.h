@@ -22,7 +22,7 @@ struct Image {
     std::vector<glm::vec3> pixels;
 };
 
-// Where a side of a surface that is not Lambert's sends light of the sources, see
+// Where a side of a surface that is not Lambert's sends light, see
 // rb_set_material_gloss, rb_set_material_diffuse_model and rb_set_material_leaving.
 struct Scattering {
     glm::vec3 glossScale{0.0f}, glossOffset{0.0f};

@@ -81,7 +81,8 @@ class LineReuse {
                               Irradiance& irradiance) const;
 
     // Per side: what the lines of a half bring of light by direction, beyond what they bring of it
-    // as by Lambert's law, W/m^2. Empty where there is none. weights: of the same half.
+    // as by Lambert's law, W/m^2; of a half alone by cells, which is quicker. Empty where there is
+    // none. weights: of the same half.
     std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
 
   private:

@@ -4,6 +4,7 @@
 // reflects diffusely.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
 
