@@ -124,7 +124,7 @@ LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const Fir
       exposed(exposed),
       isShown(isShown),
       directedLight(patches, shot),
-      scatteredOfSources(patches, shot),
+      scatteredOfSources(patches, shot, worldRadiance != glm::vec3(0.0f)),
       hasEmission(std::any_of(shot.emission.begin(), shot.emission.end(),
                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
 

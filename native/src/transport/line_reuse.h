@@ -102,6 +102,10 @@ class LineReuse {
         std::vector<glm::vec3> reflected;  // exitance by light along lines
         std::shared_ptr<ScatteredLight> scattered;
     };
+    // Of the lines of a side, those to an even sky, weighted; 0 if it is dark.
+    float skyShare(const LineWeights& weights, uint32_t side) const;
+    // Which directions are open to an even sky, by what the lines of each side meet.
+    void findOpen(const LineWeights& weights, ScatteredLight& scattered) const;
     // Of a solution: light, and what is reflected of it. byAngle: of the solution before.
     // Returns what share of reflected light is sent to where Lambert's law would not.
     double findAngles(const LineWeights& weights, const std::vector<glm::vec3>& reflected,

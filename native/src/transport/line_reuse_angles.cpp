@@ -81,13 +81,33 @@ std::vector<glm::vec3> LineReuse::directed(Half half, const LineWeights& weights
     return brought;
 }
 
+void LineReuse::findOpen(const LineWeights& weights, ScatteredLight& scattered) const {
+    forEachSide(counts.sideCount(), [&](uint32_t i) {
+        const float sky = skyShare(weights, i);
+        if (scattered.isNone(i) || sky == 0) return;
+        ScatteredLight::Hemisphere met{};
+        alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
+            scattered.add(i, -directedLight.wayBetween(from, i), share, met);
+        });
+        scattered.setOpen(i, met, sky);
+    });
+}
+
+float LineReuse::skyShare(const LineWeights& weights, uint32_t side) const {
+    if (worldRadiance == glm::vec3(0.0f) || weights.m[side] == 0) return 0;
+    const auto& lines = counts.sky[side];
+    return weights.x[side] * float(lines[0] + lines[1]) / weights.m[side];
+}
+
 double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::vec3>& reflected,
                              const Irradiance& light, ByAngle& byAngle) const {
     const size_t n = counts.sideCount();
     const std::vector<float> exposed = exposedShare();
     const auto before = std::move(byAngle.scattered);
-    byAngle.scattered = std::make_shared<ScatteredLight>(scatteredOfSources);
+    byAngle.scattered = std::make_shared<ScatteredLight>(before ? *before : scatteredOfSources);
     ScatteredLight& scattered = *byAngle.scattered;
+    if (!before) findOpen(weights, scattered);
+    const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
     byAngle.brought = byAngle.ofSources;
     byAngle.brought.resize(n, glm::vec3(0.0f));
     if (!patches.byAngle.empty()) byAngle.reflected.resize(n);
@@ -97,9 +117,15 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
         glm::vec4 terms(0.0f);  // of the angles at which light arrives, times its brightness
         float sum = 0;          // of that brightness
         ScatteredLight::Cells arriving{};
+        if (const float sky = skyShare(weights, i); sky > 0) {
+            const auto [angles, share] = scatters ? scattered.addSky(i, worldExitance, arriving)
+                                                  : std::pair(sky * kEverywhere, sky);
+            terms += brightest(worldExitance) * angles;
+            sum += brightest(worldExitance) * share;
+        }
         alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
             const glm::vec3 way = directedLight.wayBetween(from, i);
-            glm::vec3 all = reflected[from];
+            glm::vec3 all = shot.emission[from] + reflected[from];
             if (directedLight.hasLayers()) {
                 const glm::vec3 layered = directedLight.layer(from, way) * reflected[from];
                 byAngle.brought[i] += share * layered;
@@ -112,14 +138,14 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
             const float brightness = share * std::max(brightest(all), 0.0f);
             terms += brightness * angleTerms(-glm::dot(way, normal));
             sum += brightness;
-            if (scatters) scattered.add(i, -way, share * (all + shot.emission[from]), arriving);
+            if (scatters) scattered.add(i, -way, share * all, arriving);
         });
         if (scatters) scattered.set(i, arriving);
         if (byAngle.reflected.empty() || !(sum > 0)) return;
         const glm::vec3 more = sumOfTerms(patches.byAngle[i], terms / sum - kEverywhere);
         byAngle.reflected[i] =
             glm::clamp(more, -patches.reflectance[i], kMostReflectance - patches.reflectance[i]) *
-            light.indirect[i];
+            (light.all(i) - light.gathered[i]);
     });
     if (scattered.isNone()) return 0;
     double bent = 0, all = 0;

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <tuple>
 
 #include "scene/channels.h"
@@ -23,6 +24,11 @@ constexpr uint32_t kEdge = ScatteredLight::kEdge, kCells = ScatteredLight::kCell
 // Directions along an edge of the square, which Lambert's cosine weights alike, and in all.
 constexpr uint32_t kAlong = 2 * kEdge, kDirections = kAlong * kAlong;
 constexpr float kMostSteps = 127;
+constexpr float kOpenSteps = 48;  // those of a cell that is open
+
+int8_t rounded(float steps) {
+    return int8_t(std::lround(std::clamp(steps, -kMostSteps, kMostSteps)));
+}
 
 // The inverse of onDisk, times kEdge.
 glm::vec2 cellsAt(glm::vec2 disk) {
@@ -94,6 +100,7 @@ class AroundTable {
 struct Samples {
     std::array<glm::vec3, kDirections> directions;
     std::array<glm::vec4, kCells> terms{};  // of the angles in each cell
+    ScatteredLight::Hemisphere even{};      // what light from everywhere adds to each, 1 in all
     // Cells, bilinear between their middles, that are nearest to values by direction: what is
     // added to them spreads over four, and this takes it back.
     Eigen::Matrix<float, kCells, kDirections> fit;
@@ -109,8 +116,10 @@ struct Samples {
             terms[cell.y * kEdge + cell.x] +=
                 angleTerms(directions[k].z) * (float(kCells) / kDirections);
             const Around around(square * float(kEdge));
-            for (size_t corner = 0; corner < 4; ++corner)
+            for (size_t corner = 0; corner < 4; ++corner) {
                 shares(k, around.cells()[corner]) += around.shares()[corner];
+                even[around.cells()[corner]] += around.shares()[corner] / kDirections;
+            }
         }
         fit = (shares.transpose() * shares).ldlt().solve(shares.transpose());
     }
@@ -161,7 +170,8 @@ struct ScatteredLight::Transfer {
     }
 };
 
-ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot) : patches(patches) {
+ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bool seesSky)
+    : patches(patches) {
     if (patches.scattering.empty()) return;
     indices.assign(patches.sideCount(), kNone);
     for (uint32_t side = 0; side < indices.size(); ++side) {
@@ -177,6 +187,7 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot) : 
         return;
     }
     findTransfers();
+    if (seesSky) open.resize(sent.size());
     if (shot.incoming.empty()) return;
     tbb::parallel_for(uint32_t(0), uint32_t(indices.size()), [&](uint32_t side) {
         if (isNone(side)) return;
@@ -218,6 +229,38 @@ void ScatteredLight::add(uint32_t side, const glm::vec3& direction, const glm::v
         for (int c = 0; c < 3; ++c) cells[size_t(c)][at[k]] += shares[k] * light[c];
 }
 
+void ScatteredLight::add(uint32_t side, const glm::vec3& direction, float share,
+                         Hemisphere& cells) const {
+    const Sent& target = sent[indices[side]];
+    const Around& around = AroundTable::instance().at(target.x, target.y, direction);
+    for (size_t k = 0; k < 4; ++k) cells[around.cells()[k]] += around.shares()[k] * share;
+}
+
+void ScatteredLight::setOpen(uint32_t side, const Hemisphere& met, float sky) {
+    const Hemisphere& even = Samples::instance().even;
+    const float left = 1 - std::accumulate(met.begin(), met.end(), 0.0f);
+    const float scale = left > 0 ? sky / left : 0;
+    Open& target = open[indices[side]];
+    // Few lines may meet more in a cell than there is. That stays, for otherwise there would be too
+    // much of what is open elsewhere.
+    for (uint32_t k = 0; k < kCells; ++k)
+        target[k] = rounded(scale * (even[k] - met[k]) / even[k] * kOpenSteps);
+}
+
+std::pair<glm::vec4, float> ScatteredLight::addSky(uint32_t side, const glm::vec3& exitance,
+                                                   Cells& cells) const {
+    const Samples& samples = Samples::instance();
+    glm::vec4 terms(0.0f);
+    float sum = 0;
+    for (uint32_t k = 0; k < kCells; ++k) {
+        const float share = samples.even[k] * float(open[indices[side]][k]) / kOpenSteps;
+        terms += share * samples.terms[k];
+        sum += share;
+        for (int c = 0; c < 3; ++c) cells[size_t(c)][k] += share * exitance[c];
+    }
+    return {terms, sum};
+}
+
 void ScatteredLight::set(uint32_t side, const Cells& arriving) {
     const SideReflectance surface(patches, side);
     const Transfer& transfer = *transfers[2 * patches.parentAt(side).scattering + side % 2];
@@ -244,8 +287,7 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
     target.unit = leaving.cwiseAbs().maxCoeff() / kMostSteps;
     for (uint32_t out = 0; out < kCells && target.unit > 0; ++out)
         for (int c = 0; c < 3; ++c)
-            target.cells[out][size_t(c)] = int8_t(
-                std::lround(std::clamp(leaving(out, c) / target.unit, -kMostSteps, kMostSteps)));
+            target.cells[out][size_t(c)] = rounded(leaving(out, c) / target.unit);
 }
 
 glm::vec3 ScatteredLight::towards(uint32_t side, const glm::vec3& direction) const {
