@@ -647,7 +647,7 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
     material, result = exported_material(principled)
     assert result.warnings == []
     # Of F0 = 0.04 or a little less.
-    assert 0.04 < albedo.specular < 0.07
+    assert 0.04 < albedo.specular[0] < 0.07
     assert material.reflectance[0] == pytest.approx(albedo.diffuse * base + albedo.specular)
     assert diffuse_of(material) == pytest.approx(albedo.shown * base)
     bpy.context.scene.cycles.caustics_reflective = False

@@ -152,10 +152,15 @@ def _edge(cosine: np.ndarray, ior: float) -> np.ndarray:
     f0 = ((ior - 1.0) / (ior + 1.0))**2
     if f0 <= 0.0:
         return np.zeros_like(cosine)
+    return (fresnel(cosine, ior) - f0) / (1.0 - f0)
+
+
+def fresnel(cosine: np.ndarray, ior: float) -> np.ndarray:
+    """Reflectance of a dielectric."""
     g = np.sqrt(ior**2 - 1.0 + cosine**2)
     a = (g - cosine) / (g + cosine)
     b = ((g + cosine) * cosine - 1.0) / ((g - cosine) * cosine + 1.0)
-    return (0.5 * a**2 * (1.0 + b**2) - f0) / (1.0 - f0)
+    return 0.5 * a**2 * (1.0 + b**2)
 
 
 def ior_of(f0: float) -> float:

@@ -234,7 +234,7 @@ class MaterialExporter:
                                          for side in sides]),
             'diffuse_model': models[0][0],
             'diffuse_roughness': np.array([roughness for _, roughness in models]),
-            'leaving': np.stack([side.scattering.leaving_factors() for side in sides], axis=1)}
+            'leaving': _by_side([side.scattering.leaving_factors() for side in sides])}
 
     def _image_index(self, texture: Texture) -> int:
         key = (texture.image.name_full, texture.extension)

@@ -378,8 +378,8 @@ class Scene(_Handle):
             self._pointer, material, model, _as_floats(roughness))
 
     def set_material_leaving(self, material: int, factors: np.ndarray) -> None:
-        """(4, 2), by term and side: how diffuse light leaves by its angle."""
-        factors = _float_array(factors, (4, 2), "factors")
+        """(4, 2, 3): how diffuse light leaves by its angle."""
+        factors = _float_array(factors, (4, 2, 3), "factors")
         self._library.rb_set_material_leaving(self._pointer, material, _as_floats(factors))
 
     def set_material_angles(self, material: int, reflected: np.ndarray, shown: np.ndarray) -> None:

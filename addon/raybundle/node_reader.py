@@ -20,7 +20,9 @@ from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
 from .diffuse_angles import TERMS, oren_nayar
 from .gloss import GlossAlbedo, gloss_albedo, seen_roughness
 from .image_export import ImagePixels, sphere_mean
-from .principled import COAT_SOCKETS, GLOSS_SOCKETS, METAL_IOR, principled_albedo
+from .layers import Layer, microfibers, velvet
+from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, METAL_IOR, SHEEN_SOCKETS,
+                         SHEEN_TINT, principled_albedo, sheen_on)
 from .scattering import BURLEY, OREN_NAYAR, Scattering
 from .scene_data import Warnings
 
@@ -49,6 +51,9 @@ _MATH: dict[str, Callable[[float, float], float]] = {
 
 # Shaders that are gloss alone.
 GLOSSY = ('BSDF_GLOSSY', 'BSDF_ANISOTROPIC', 'BSDF_METALLIC')
+# Those that are a layer alone; names of the socket of its roughness, and what it usually is.
+CLOTH = ('BSDF_SHEEN', 'BSDF_VELVET')
+CLOTH_ROUGHNESS = ('Roughness', 'Sigma'), 0.5
 MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughness of 0.45 or more"
 
 
@@ -82,6 +87,21 @@ class Surface:
     def emission(self) -> np.ndarray:
         """(3,), the mean radiance."""
         return self.radiance.mean()
+
+    def covered(self, layer: Layer, color: np.ndarray) -> Surface:
+        """Beneath a layer. color: (3,), times the layer's albedo."""
+        share = layer.taken(color)
+        under, above = 1.0 - share * layer.albedo, 1.0 - share * layer.above
+        return Surface(
+            self.reflectance.scaled(under).plus(ColorExpression(color * layer.albedo)),
+            self.radiance.scaled(under), self.transmittance * under,
+            self.diffuse.scaled(above).plus(ColorExpression(color * layer.above)),
+            self.reflected_by_angle * under + layer.by_angle[:, None] * color,
+            self.shown_by_angle * above + layer.shown[:, None] * color,
+            self.translucence.scaled(under),
+            self.scattering.covered(share, layer).plus(Scattering.matt(
+                color * layer.albedo, OREN_NAYAR, 0.0,
+                layer.by_angle[:, None] / max(layer.albedo, 1e-6))))
 
     def scaled(self, factor: float) -> Surface:
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
@@ -163,6 +183,8 @@ class NodeReader:
             return self._sum(parts, node)
         if node.type == 'ADD_SHADER':
             return self._sum([self.surface(socket, path) for socket in node.inputs], node)
+        if node.type in CLOTH:
+            return self._cloth(node, path)
         if node.type == 'SUBSURFACE_SCATTERING':
             self._warn(node, "is read as a diffuse surface")
             return Surface.matt(self.color(node.inputs['Color'], path))
@@ -179,35 +201,43 @@ class NodeReader:
         if strength:
             radiance = self._emission_color(emission, path).scaled(strength)
         base = self._base_color(node, path)
-        transmittance = WHITE * (1.0 - alpha)
         metallic = float(np.clip(self.value(node.inputs['Metallic'], path), 0.0, 1.0))
         if metallic > 0.0:
             self._warn(node, MIRRORS)
         through = float(np.clip(self.value(transmission, path), 0.0, 1.0)) * (1.0 - metallic)
         if through > 0.0:
             self._warn(node, "lets light through: it goes straight on here")
-            transmittance = transmittance + alpha * through * np.clip(base.mean(), 0.0, 1.0)
         mean = np.clip(base.mean(), 0.0, 1.0)
         albedo = principled_albedo(
-            *(self._usual(node, names, usual, path) for names, usual in GLOSS_SOCKETS),
-            node.distribution == 'MULTI_GGX', mean, self.filter_glossy).coated(
-                *(self._usual(node, names, usual, path) for names, usual in COAT_SOCKETS),
-                self.filter_glossy)
+            *self._values(node, GLOSS_SOCKETS, path), node.distribution == 'MULTI_GGX', mean,
+            self.filter_glossy).coated(
+                *self._values(node, COAT_SOCKETS, path),
+                self._usual_color(node, *COAT_TINT, path), self.filter_glossy)
         opaque = 1.0 - metallic - through
         mirrored = base.scaled(metallic * albedo.metal).plus(
-            ColorExpression(WHITE * (opaque * albedo.specular + metallic * albedo.metal_edge)))
-        reflectance = mirrored.plus(base.scaled(opaque * albedo.diffuse))
-        shown = opaque * albedo.shown * alpha
+            ColorExpression(opaque * albedo.specular + metallic * albedo.metal_edge))
+        shown = opaque * albedo.shown
         scattering = Scattering.mirror(
             mirrored, albedo.mirrored_by_angle(opaque, metallic), albedo.roughness).plus(
                 Scattering.matt(
                     opaque * mean, OREN_NAYAR if bpy.app.version >= (4, 0, 0) else BURLEY,
                     albedo.diffuse_roughness, albedo.leaving))
-        return Surface(reflectance.scaled(alpha), radiance.scaled(alpha), transmittance,
-                       base.scaled(shown),
-                       alpha * albedo.reflected_by_angle(mean, opaque, metallic),
-                       shown * mean * albedo.angles.shown,
-                       scattering=scattering.scaled(alpha))
+        surface = Surface(
+            mirrored.plus(base.scaled(opaque * albedo.diffuse)), radiance.scaled(albedo.uncoated),
+            through * mean * albedo.uncoated, base.scaled(shown),
+            albedo.reflected_by_angle(mean, opaque, metallic), shown * mean * albedo.angles.shown,
+            scattering=scattering)
+        surface = surface.covered(*sheen_on(*self._values(node, SHEEN_SOCKETS, path),
+                                            self._usual_color(node, *SHEEN_TINT, path), mean,
+                                            opaque)).scaled(alpha)
+        return replace(surface, transmittance=surface.transmittance + WHITE * (1.0 - alpha))
+
+    def _cloth(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
+        color = self.color(node.inputs['Color'], path)
+        layer = cloth_layer(node, self._usual(node, *CLOTH_ROUGHNESS, path))
+        surface = Surface().covered(layer, np.maximum(color.mean(), 0.0))
+        return replace(surface, reflectance=color.scaled(layer.albedo),
+                       diffuse=color.scaled(layer.above))
 
     def _base_color(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]
                     ) -> ColorExpression:
@@ -243,6 +273,20 @@ class NodeReader:
         if source.node is None:
             return _default_value(source.socket)
         return source.output.default_value if source.node.type == 'VALUE' else usual
+
+    def _values(self, node: bpy.types.Node, sockets: tuple[tuple[tuple[str, ...], float], ...],
+                path: tuple[bpy.types.Node, ...]) -> list[float]:
+        return [self._usual(node, names, usual, path) for names, usual in sockets]
+
+    def _usual_color(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
+                     path: tuple[bpy.types.Node, ...]) -> np.ndarray:
+        """(3,), likewise."""
+        if not any(name in node.inputs for name in names):
+            return WHITE * usual
+        source = _follow(_input(node, *names), path)
+        if source.node is None:
+            return _default_color(source.socket)
+        return _default_color(source.output) if source.node.type == 'RGB' else WHITE * usual
 
     def _transmitted(self, node: bpy.types.Node, socket: bpy.types.NodeSocket,
                      path: tuple[bpy.types.Node, ...]) -> np.ndarray:
@@ -488,6 +532,13 @@ def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray | fl
             albedo = replace(albedo, edge=0.0, angles=albedo.angles * [[1.0], [0.0]])
         albedos.append(albedo)
     return albedos[1], albedos[0].gain(color, node.distribution == 'MULTI_GGX'), seen
+
+
+def cloth_layer(node: bpy.types.Node, roughness: float) -> Layer:
+    """Of a Sheen shader, or Velvet as it was before 4.0."""
+    if node.type == 'BSDF_VELVET' or node.distribution == 'ASHIKHMIN':
+        return velvet(roughness)
+    return microfibers(roughness)
 
 
 def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:

@@ -8,12 +8,13 @@ gloss and one diffuse model, with the means of the roughnesses that it is mixed 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .color_expression import ColorExpression
 from .diffuse_angles import TERMS
+from .layers import Layer
 
 LAMBERT, BURLEY, OREN_NAYAR = range(3)  # rb_diffuse_model
 
@@ -26,11 +27,11 @@ class Scattering:
     # (TERMS, 3): of it, by the terms of diffuse_angles.py.
     by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
     rough_gloss: float = 0.0  # means of gloss times roughness, as diffuse light sees it
-    # (2, 2): for Burley's model and for Oren and Nayar's, of which Lambert's is one, the mean of
-    # the diffuse colour, and that times the roughness.
-    diffuse: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
-    # (TERMS,): means of the diffuse colour times how it leaves by angle (rb_set_material_leaving).
-    leaving: np.ndarray = field(default_factory=lambda: np.zeros(TERMS))
+    # (2, 2, 3): for Burley's model and for Oren and Nayar's, of which Lambert's is one, the mean
+    # diffuse colour, and that times the roughness.
+    diffuse: np.ndarray = field(default_factory=lambda: np.zeros((2, 2, 3)))
+    # (TERMS, 3): that times how it leaves by angle (rb_set_material_leaving).
+    leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
 
     @staticmethod
     def mirror(gloss: ColorExpression, by_angle: np.ndarray, roughness: float) -> Scattering:
@@ -39,16 +40,21 @@ class Scattering:
     @staticmethod
     def matt(color: np.ndarray, model: int, roughness: float,
              leaving: np.ndarray | float = 0.0) -> Scattering:
-        """color: (3,), mean."""
-        mean = float(np.mean(color))
-        diffuse = np.zeros((2, 2))
-        diffuse[0 if model == BURLEY else 1] = mean * np.array([1.0, roughness])
-        return Scattering(diffuse=diffuse, leaving=mean * leaving + np.zeros(TERMS))
+        """color: (3,), mean. leaving: (TERMS, 3), for a colour of 1."""
+        diffuse = np.zeros((2, 2, 3))
+        diffuse[0 if model == BURLEY else 1] = [color, roughness * color]
+        return Scattering(diffuse=diffuse, leaving=color * leaving + np.zeros((TERMS, 3)))
 
     def scaled(self, factor: float) -> Scattering:
         return Scattering(self.gloss.scaled(factor), factor * self.by_angle,
                           factor * self.rough_gloss, factor * self.diffuse,
                           factor * self.leaving)
+
+    def covered(self, share: float, layer: Layer) -> Scattering:
+        """Without what a layer, of so much weight, sends back."""
+        under = self.scaled(1.0 - share * layer.albedo)
+        return replace(under, leaving=under.leaving
+                       - share * layer.by_angle[:, None] * self.diffuse[:, 0].sum(axis=0))
 
     def plus(self, other: Scattering) -> Scattering:
         return Scattering(self.gloss.plus(other.gloss).simplified(), self.by_angle + other.by_angle,
@@ -61,15 +67,15 @@ class Scattering:
 
     def diffuse_model(self) -> tuple[int, float]:
         """The heavier one, and its roughness."""
-        weights = self.diffuse[:, 0]
+        weights, rough = self.diffuse.mean(axis=2).T
         model = int(weights[1] >= weights[0])
         if weights[model] <= 0.0:
             return LAMBERT, 0.0
-        roughness = float(np.clip(self.diffuse[model, 1] / weights[model], 0.0, 1.0))
+        roughness = float(np.clip(rough[model] / weights[model], 0.0, 1.0))
         if model == 0:
             return BURLEY, roughness
         return (OREN_NAYAR, roughness) if roughness > 0.0 else (LAMBERT, 0.0)
 
     def leaving_factors(self) -> np.ndarray:
-        """(TERMS,), for rb_set_material_leaving."""
-        return self.leaving / max(float(self.diffuse[:, 0].sum()), 1e-6)
+        """(TERMS, 3), for rb_set_material_leaving."""
+        return self.leaving / np.maximum(self.diffuse[:, 0].sum(axis=0), 1e-6)

@@ -51,7 +51,7 @@ class MaterialData:
     gloss_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
     diffuse_model: int = 0  # of scattering.py
     diffuse_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    leaving: np.ndarray = field(default_factory=lambda: np.zeros((4, 2)))  # by term and side
+    leaving: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))  # likewise by angle
     # (2, 3): what leaves a side, diffusely, of the light that arrives at the other.
     translucence: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
     translucence_image: int | None = None

@@ -15,12 +15,14 @@ import bpy
 import numpy as np
 
 from .diffuse_angles import facet_shares, oren_nayar
-from .node_reader import GLOSSY, glossy_albedo
-from .principled import COAT_SOCKETS, GLOSS_SOCKETS, PrincipledAlbedo, principled_albedo
+from .layers import Layer
+from .node_reader import CLOTH, CLOTH_ROUGHNESS, GLOSSY, cloth_layer, glossy_albedo
+from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, SHEEN_TINT,
+                         PrincipledAlbedo, principled_albedo, sheen_on)
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
     'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
-# DIFFUSE is the reflectance where nothing has gloss and nothing diffuse is rough.
+# DIFFUSE is the reflectance where nothing has gloss, and nothing diffuse is rough or cloth.
 PROPERTIES = (REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE)
 _USUAL_COLOR = 0.5  # of a metal whose colour varies
 
@@ -62,7 +64,7 @@ class ShaderColors:
                 self._rewrite_shader(tree, node)
 
     def _rewrite_shader(self, tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
-        self.has_gloss |= (node.type == 'BSDF_PRINCIPLED' or node.type in GLOSSY
+        self.has_gloss |= (node.type == 'BSDF_PRINCIPLED' or node.type in GLOSSY + CLOTH
                            or node.type == 'BSDF_DIFFUSE' and _is_rough(node))
         build = _SHADERS.get((node.type, self.wanted))
         # A muted shader passes nothing on.
@@ -155,6 +157,14 @@ class _Formula:
             return tuple(x + y for x, y in zip(a, b))
         return self.vector('ADD', a, b)
 
+    def tinted(self, color: _Value, tint: np.ndarray) -> _Value:
+        """tint: (3,)."""
+        if isinstance(color, tuple):
+            return tuple(np.array(color) * tint)
+        if np.ptp(tint) == 0.0:
+            return self.scaled(color, float(tint[0]))
+        return self.vector('MULTIPLY', color, tuple(tint))
+
     def vector(self, operation: str, a: _Value, b: _Value) -> _Value:
         """Of colours, channel by channel."""
         node = self.tree.nodes.new('ShaderNodeVectorMath')
@@ -190,6 +200,17 @@ def _usual(formula: _Formula, node: bpy.types.Node, names: tuple[str, ...], usua
     return usual if isinstance(value, bpy.types.NodeSocket) else value
 
 
+def _values(formula: _Formula, node: bpy.types.Node,
+            sockets: tuple[tuple[tuple[str, ...], float], ...]) -> list[float]:
+    return [_usual(formula, node, names, usual) for names, usual in sockets]
+
+
+def _usual_color(formula: _Formula, node: bpy.types.Node, names: tuple[str, ...], usual: float
+                 ) -> np.ndarray:
+    value = _usual(formula, node, names, usual)
+    return np.array(value) if isinstance(value, tuple) else np.full(3, value)
+
+
 def _is_rough(node: bpy.types.Node) -> bool:
     socket = node.inputs['Roughness']
     return socket.is_linked or socket.default_value > 0.0
@@ -223,39 +244,79 @@ def _base_color(formula: _Formula, node: bpy.types.Node) -> _Value:
 
 
 def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlbedo:
-    base = _base_color(formula, node)
     return principled_albedo(
-        *(_usual(formula, node, names, usual) for names, usual in GLOSS_SOCKETS),
-        node.distribution == 'MULTI_GGX',
-        float(np.mean(base)) if isinstance(base, tuple) else _USUAL_COLOR,
-        formula.filter_glossy).coated(
-            *(_usual(formula, node, names, usual) for names, usual in COAT_SOCKETS),
+        *_values(formula, node, GLOSS_SOCKETS), node.distribution == 'MULTI_GGX',
+        float(_mean_base(formula, node).mean()), formula.filter_glossy).coated(
+            *_values(formula, node, COAT_SOCKETS), _usual_color(formula, node, *COAT_TINT),
             formula.filter_glossy)
+
+
+def _mean_base(formula: _Formula, node: bpy.types.Node) -> np.ndarray:
+    base = _base_color(formula, node)
+    return np.array(base) if isinstance(base, tuple) else np.full(3, _USUAL_COLOR)
 
 
 def _principled_shares(formula: _Formula, node: bpy.types.Node) -> tuple[_Value, _Value]:
     """What is neither metal nor lets light through, and metal."""
-    alpha, metallic = formula.value(node, 'Alpha'), formula.value(node, 'Metallic')
+    metallic = formula.value(node, 'Metallic')
     opaque = formula.times(formula.rest(metallic),
                            formula.rest(formula.value(node, *_TRANSMISSION)))
-    return formula.times(opaque, alpha), formula.times(metallic, alpha)
+    return opaque, metallic
 
 
 def _principled_reflectance(formula: _Formula, node: bpy.types.Node) -> _Value:
     albedo, base = _principled_albedo(formula, node), _base_color(formula, node)
     opaque, metal = _principled_shares(formula, node)
-    white = (1.0, 1.0, 1.0)
-    return formula.plus(
-        formula.plus(formula.scaled(base, formula.times(opaque, float(albedo.diffuse.mean()))),
-                     formula.scaled(base, formula.times(metal, float(albedo.metal)))),
-        formula.plus(formula.scaled(white, formula.times(opaque, albedo.specular)),
-                     formula.scaled(white, formula.times(metal, float(albedo.metal_edge)))))
+    color = formula.plus(
+        formula.plus(formula.scaled(formula.tinted(base, albedo.diffuse), opaque),
+                     formula.scaled(formula.tinted(base, albedo.metal), metal)),
+        formula.plus(formula.scaled(tuple(albedo.specular), opaque),
+                     formula.scaled(tuple(albedo.metal_edge), metal)))
+    layer, sheen = _sheen(formula, node)
+    return formula.scaled(_covered(formula, color, layer, sheen, layer.albedo),
+                          formula.value(node, 'Alpha'))
 
 
 def _principled_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
     opaque, _ = _principled_shares(formula, node)
-    return formula.scaled(_base_color(formula, node),
-                          formula.times(opaque, _principled_albedo(formula, node).shown))
+    base = formula.tinted(_base_color(formula, node), _principled_albedo(formula, node).shown)
+    layer, sheen = _sheen(formula, node)
+    return formula.scaled(
+        _covered(formula, formula.scaled(base, opaque), layer, sheen, layer.above),
+        formula.value(node, 'Alpha'))
+
+
+def _sheen(formula: _Formula, node: bpy.types.Node) -> tuple[Layer, np.ndarray]:
+    opaque, _ = _principled_shares(formula, node)
+    return sheen_on(*_values(formula, node, SHEEN_SOCKETS),
+                    _usual_color(formula, node, *SHEEN_TINT), _mean_base(formula, node),
+                    1.0 if isinstance(opaque, bpy.types.NodeSocket) else opaque)
+
+
+def _covered(formula: _Formula, color: _Value, layer: Layer, sheen: np.ndarray, albedo: float
+             ) -> _Value:
+    """albedo: that of the layer or what is seen from above."""
+    return formula.plus(formula.scaled(color, 1.0 - layer.taken(sheen) * albedo),
+                        tuple(sheen * albedo))
+
+
+def _under_layers(formula: _Formula, node: bpy.types.Node) -> np.ndarray:
+    """(3,), what coat and sheen leave of emission and of light that goes through."""
+    layer, sheen = _sheen(formula, node)
+    return (_principled_albedo(formula, node).uncoated
+            * (1.0 - layer.taken(sheen) * layer.albedo))
+
+
+def _cloth(formula: _Formula, node: bpy.types.Node) -> _Value:
+    return formula.scaled(formula.raw(node, 'Color'), _cloth_layer(formula, node).albedo)
+
+
+def _cloth_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
+    return formula.scaled(formula.raw(node, 'Color'), _cloth_layer(formula, node).above)
+
+
+def _cloth_layer(formula: _Formula, node: bpy.types.Node) -> Layer:
+    return cloth_layer(node, _usual(formula, node, *CLOTH_ROUGHNESS))
 
 
 def _glossy(formula: _Formula, node: bpy.types.Node) -> _Value:
@@ -270,7 +331,9 @@ def _glossy(formula: _Formula, node: bpy.types.Node) -> _Value:
 
 def _principled_radiance(formula: _Formula, node: bpy.types.Node) -> _Value:
     strength = formula.times(formula.raw(node, 'Emission Strength'), formula.value(node, 'Alpha'))
-    return formula.scaled(formula.raw(node, 'Emission Color', 'Emission'), strength)
+    color = formula.tinted(formula.raw(node, 'Emission Color', 'Emission'),
+                           _under_layers(formula, node))
+    return formula.scaled(color, strength)
 
 
 def _principled_transmittance(formula: _Formula, node: bpy.types.Node) -> _Value:
@@ -279,7 +342,9 @@ def _principled_transmittance(formula: _Formula, node: bpy.types.Node) -> _Value
                             formula.rest(formula.value(node, 'Metallic')))
     return formula.plus(
         formula.scaled((1.0, 1.0, 1.0), formula.rest(alpha)),
-        formula.scaled(formula.raw(node, 'Base Color'), formula.times(alpha, through)))
+        formula.scaled(
+            formula.tinted(formula.raw(node, 'Base Color'), _under_layers(formula, node)),
+            formula.times(alpha, through)))
 
 
 # The colour of a property, by kind of shader; a shader that is not here has none of it.
@@ -298,4 +363,6 @@ _SHADERS: dict[tuple[str, str], Callable[[_Formula, bpy.types.Node], _Value]] = 
     ('BSDF_PRINCIPLED', RADIANCE): _principled_radiance,
     ('BSDF_PRINCIPLED', TRANSMITTANCE): _principled_transmittance,
     **{(kind, REFLECTANCE): _glossy for kind in GLOSSY},
+    **{(kind, REFLECTANCE): _cloth for kind in CLOTH},
+    **{(kind, DIFFUSE): _cloth_diffuse for kind in CLOTH},
 }

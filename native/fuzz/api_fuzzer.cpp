@@ -189,7 +189,7 @@ void addMaterial(Bytes& in, rb_scene scene) {
         case 8:
             expectMessage(rb_set_material_diffuse_model(scene, target, rb_diffuse_model(in.small()),
                                                         a.data()));
-            expectMessage(rb_set_material_leaving(scene, target, in.numbers<8>().data()));
+            expectMessage(rb_set_material_leaving(scene, target, in.numbers<24>().data()));
             break;
         default: {
             const auto reflected = in.numbers<24>();

@@ -236,8 +236,7 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     badAngles[23] = NAN;
     expectInvalid(rb_set_material_gloss(scene, 0, kGrey, kGrey, badAngles, kGrey), "by_angle");
     const int32_t paint = addMaterial();
-    const float leaving[8] = {0, 0, 0, 0, 0, 0, 0, NAN};
-    expectInvalid(rb_set_material_leaving(scene, paint, leaving), "factors");
+    expectInvalid(rb_set_material_leaving(scene, paint, badAngles), "factors");
     expectInvalid(rb_set_material_leaving(scene, paint, nullptr), "factors");
     expectInvalid(rb_set_material_leaving(scene, paint + 1, kAngles), "material");
     for (float rough : {-0.1f, 1.1f, NAN, INFINITY}) {

@@ -138,8 +138,8 @@ RB_API rb_error rb_set_material_angles(rb_scene scene, int32_t material, const f
  * light from everywhere; by_angle: how that depends on the angle of the sources' light, as
  * `reflected` of rb_set_material_angles, of which it is a part. roughness: of the front and of the
  * back, 0 to 1, whose square is alpha of GGX. With first shot GATHER and solver LINE_REUSE
- * light goes where GGX mirrors it to, smoother than a roughness of 0.45 as by that; a constant
- * world's spreads as if it were diffuse. Without it nothing is mirrored. */
+ * light goes where GGX mirrors it to, smoother than a roughness of 0.45 as by that. Without it
+ * nothing is mirrored. */
 RB_API rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float scale[6],
                                       const float offset[6], const float by_angle[24],
                                       const float roughness[2]);
@@ -155,11 +155,11 @@ typedef enum rb_diffuse_model {
 RB_API rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material,
                                               rb_diffuse_model model, const float roughness[2]);
 
-/* How what is not mirrored leaves a layer that lets less of it out at some angles, whatever light
- * it is (LINE_REUSE): 1 plus the sum of these factors times the term of rb_set_material_angles at
- * the angle at which it leaves, less the term's mean (two floats for each term: front, back).
- * Without it 0. */
-RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[8]);
+/* How what is not mirrored leaves, by angle, whatever light it is (LINE_REUSE): from under a layer
+ * that lets less of it out at some angles, or from one that sends it there. 1 plus the sum of these
+ * factors times the term of rb_set_material_angles at the angle at which it leaves, less the term's
+ * mean (six floats for each term, likewise). Without it 0. */
+RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[24]);
 
 /* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.
  * Reflectance and emission remain those of the whole surface, so reflectance is at most the

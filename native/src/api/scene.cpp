@@ -160,15 +160,17 @@ rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material, rb_diff
     });
 }
 
-rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[8]) {
+rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[24]) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
         need(factors, "factors");
-        needFinite(factors, 8, "factors");
+        needFinite(factors, 24, "factors");
         Material& target = held->material(material);
-        for (int side = 0; side < 2; ++side)
-            for (int term = 0; term < 4; ++term)
-                target.scattering[size_t(side)].leaving[term] = factors[2 * term + side];
+        for (size_t side = 0; side < 2; ++side) {
+            AngleFactors& leaving = target.scattering[side].leaving;
+            for (size_t term = 0; term < leaving.size(); ++term)
+                leaving[term] = vec3(factors + 6 * term + 3 * side);
+        }
     });
 }
 

@@ -30,14 +30,14 @@ struct Scattering {
     float glossRoughness = 0;
     rb_diffuse_model diffuseModel = RB_DIFFUSE_LAMBERT;
     float diffuseRoughness = 0;
-    glm::vec4 leaving{0.0f};  // by the angle at which diffuse light leaves
+    AngleFactors leaving{};  // by the angle at which diffuse light leaves
 
     bool hasGloss() const {
         return glossScale != glm::vec3(0.0f) || glossOffset != glm::vec3(0.0f) ||
                glossByAngle != AngleFactors{};
     }
     bool isRough() const { return diffuseModel != RB_DIFFUSE_LAMBERT; }
-    bool hasLayer() const { return leaving != glm::vec4(0.0f); }
+    bool hasLayer() const { return leaving != AngleFactors{}; }
     bool isLambert() const { return !hasGloss() && !isRough() && !hasLayer(); }
 };
 

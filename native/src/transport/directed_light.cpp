@@ -22,6 +22,7 @@ constexpr float kSameDirection = 0.97f;
 constexpr size_t kManySides = size_t(1) << 18;
 // Less than this share of what arrives makes no difference.
 constexpr float kLeastShare = 1e-4f;
+constexpr float kLeastReflectance = 1e-6f;
 // Patches nearer to each other than so many of their widths see each other in many directions,
 // which so many pairs of points tell.
 constexpr float kNear = 1.5f;
@@ -71,11 +72,11 @@ void DirectedLight::findLayers() {
         return;
     layers.resize(patches.sideCount());
     for (uint32_t side = 0; side < layers.size(); ++side) {
-        const float all = brightest(patches.reflectance[side]);
-        if (!(all > 0)) continue;
-        const SideReflectance surface(patches, side);
-        const float diffuse = brightest(patches.reflectance[side] - surface.mirroredMean()) / all;
-        layers[side] = {patches.normal(side), diffuse * surface.scattering().leaving};
+        const glm::vec3& all = patches.reflectance[side];
+        if (!(brightest(all) > 0)) continue;
+        const glm::vec3 diffuse = all - SideReflectance(patches, side).mirroredMean();
+        layers[side] = {patches.normal(side), diffuse / glm::max(all, kLeastReflectance),
+                        2 * patches.parentAt(side).scattering + side % 2};
     }
 }
 
@@ -138,9 +139,10 @@ glm::vec3 DirectedLight::towards(uint32_t side, const glm::vec3& direction) cons
     return sum;
 }
 
-float DirectedLight::layer(uint32_t side, const glm::vec3& direction) const {
+glm::vec3 DirectedLight::layer(uint32_t side, const glm::vec3& direction) const {
     const Layer& layer = layers[side];
-    return glm::dot(layer.factors, angleTerms(glm::dot(layer.normal, direction)) - kEverywhere);
+    return layer.diffuse * sumOfTerms(patches.scattering[layer.scattering].leaving,
+                                      angleTerms(glm::dot(layer.normal, direction)) - kEverywhere);
 }
 
 glm::vec3 DirectedLight::wayBetween(uint32_t side, uint32_t other) const {

@@ -8,8 +8,8 @@
 // Source: none; the thesis has Lambert's surfaces only. Lines join two patches in proportion to
 // what one gets of the other's light by Lambert's law; where their middles lie tells the direction,
 // and where they are near, points on both.
-// What is left out: light that was reflected before (transport/scattered_light.h has that), and the
-// constant part of the world, which is mirrored and scattered as by Lambert's law.
+// What is left out: light that was reflected before, that bundles bring of emission, and the
+// constant part of the world (transport/scattered_light.h has all that).
 #pragma once
 
 #include <cstdint>
@@ -46,11 +46,11 @@ class DirectedLight {
     // from call to call.
     glm::vec3 between(uint32_t side, uint32_t other, uint32_t random) const;
 
-    // Whether diffuse light leaves from under a layer anywhere: of that all light has directions.
+    // Whether diffuse light leaves by angle anywhere: of that all light has directions.
     bool hasLayers() const { return !layers.empty(); }
     // Of what a side reflects in all, the share that goes towards a direction more than by
     // Lambert's law, or less.
-    float layer(uint32_t side, const glm::vec3& direction) const;
+    glm::vec3 layer(uint32_t side, const glm::vec3& direction) const;
     // Whether it matters at which angle light that was reflected leaves or arrives.
     bool hasAngles() const { return !middles.empty(); }
     // From the middle of a side's patch to that of another, unit.
@@ -59,7 +59,8 @@ class DirectedLight {
   private:
     struct Layer {
         glm::vec3 normal{0.0f};
-        glm::vec4 factors{0.0f};  // of angleTerms less their means
+        glm::vec3 diffuse{0.0f};  // share of what the side reflects
+        uint32_t scattering = 0;  // in that of the patches
     };
     struct Part {
         Lobe lobe;
