@@ -361,6 +361,19 @@ def test_canopy(floor, new_object, new_light, build):
         compare_sent(canopy)
 
 
+@pytest.mark.parametrize("build", (sheen, velvet), ids=lambda build: build.__name__)
+def test_canopy_of_cloth(floor, new_object, new_light, request, build):
+    """Does not hold yet: cloth sends more light back to where it comes from than follows from the
+    angles alone, so that the floor gets 6 (sheen from 4.0 on) and 15 % too little."""
+    if build is velvet or bpy.app.version >= (4, 0, 0):
+        request.applymarker(pytest.mark.xfail(strict=True, reason="no lobe of its own"))
+    place_canopy(new_object, build)
+    lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)
+    lamp.rotation_euler = (np.pi, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    compare(floor)
+
+
 @pytest.mark.parametrize("roughness", [0.1, 0.5])
 def test_filter_glossy(floor, new_object, new_light, roughness):
     """As new scenes have it: smooth gloss too is as rough as about 0.67. Otherwise the light would
