@@ -12,8 +12,6 @@ must not grow by more than 2 % from the second fifth of the bakes to the last, i
 from __future__ import annotations
 
 import argparse
-import ctypes
-import gc
 import resource
 import sys
 import time
@@ -152,11 +150,6 @@ def control_light() -> list[np.ndarray]:
 
 
 def resident_bytes() -> int:
-    """What was freed is given back first: how much of it allocators keep wanders from bake to bake."""
-    gc.collect()
-    trim = getattr(ctypes.CDLL(None), 'malloc_trim', None)  # of the GNU C library
-    if trim is not None:
-        trim(0)
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize()
 
