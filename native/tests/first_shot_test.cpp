@@ -201,6 +201,55 @@ TEST(AreaLight, ARectangleHasLambertsClosedForm) {
     EXPECT_NEAR(shot.front(2), upright, 10 * kExact * upright);
 }
 
+// Of a lamp as large as it is near few samples see much of its rim, from where little comes.
+TEST(AreaLight, ALargeOneNearByShinesFromWhereItIs) {
+    constexpr int kCells = 60, kSteps = 40;
+    constexpr double kWidth = 3, kHeight = 0.98, kLamp = 1.5;
+    Scene scene;
+    scene.addLight(
+        areaLight({0.2, 0.1, kHeight}, {kLamp / 2, 0, 0}, {0, -kLamp / 2, 0}, glm::dvec3(7)));
+    Material rough = grey("", 0.5f);
+    rough.scattering[0].diffuseModel = RB_DIFFUSE_OREN_NAYAR;
+    place(scene,
+          grid("floor", {-kWidth / 2, -kWidth / 2, 0}, {kWidth, 0, 0}, {0, kWidth, 0}, kCells,
+               kCells),
+          rough);
+    const Shot shot = shoot(scene);
+    // Means over all light of 1 - c and its square, by its angles and by its directions.
+    glm::dvec2 expected(0.0), angles(0.0), directions(0.0);
+    for (uint32_t p = 0; p < shot.patches.count(); ++p) {
+        const glm::dvec3 point(shot.patches.point(p, glm::vec2(0.5f)));
+        double all = 0;
+        glm::dvec2 terms(0.0);
+        for (int i = 0; i < kSteps; ++i)
+            for (int j = 0; j < kSteps; ++j) {
+                const glm::dvec3 way =
+                    glm::dvec3(0.2 + kLamp * ((i + 0.5) / kSteps - 0.5),
+                               0.1 + kLamp * ((j + 0.5) / kSteps - 0.5), kHeight) -
+                    point;
+                const double c = way.z / glm::length(way), e = c * c / glm::dot(way, way);
+                all += e;
+                terms += e * glm::dvec2(1 - c, (1 - c) * (1 - c));
+            }
+        const FirstShot& light = shot.light;
+        const double here = double(light.irradiance[2 * p].x);
+        expected += here / all * terms;
+        angles += here * glm::dvec2(light.angles[2 * p].x, light.angles[2 * p].y);
+        const Incoming& incoming = light.incoming[2 * p];
+        for (size_t k = 0; k < Incoming::kCount; ++k) {
+            const double rest = 1 - double(incoming.direction(k).z);
+            directions +=
+                here * double(incoming.weight) / Incoming::kCount * glm::dvec2(rest, rest * rest);
+        }
+    }
+    // Uncorrected they are 4 and 6 % too grazing. A square of the share of the samples' error is left
+    // of the angles, 1.5 %, and the noise of the directions is below 1 %.
+    for (int k = 0; k < 2; ++k) {
+        EXPECT_NEAR(angles[k] / expected[k], 1, 0.02) << k;
+        EXPECT_NEAR(directions[k] / expected[k], 1, 0.02) << k;
+    }
+}
+
 TEST(AreaLight, AnEllipseUnderItsCentreHasAClosedForm) {
     Scene scene;
     placeReceiver(scene);

@@ -117,7 +117,7 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
     const size_t count = areOne || patches.sideCount() > kManySides ? 1 : directions.size();
     for (size_t k = 0; k < count; ++k) {
         const glm::vec3 direction = directions[k];
-        const glm::vec3 part = light / float(count);
+        const glm::vec3 part = incoming.weight / float(count) * light;
         const glm::vec4 terms = angleTerms(glm::dot(normal, direction));
         const glm::vec3 gloss = surface.mirroredAt(terms);
         if (brightest(gloss) > kLeastShare)

@@ -3,7 +3,10 @@
 // Where the light of the sources comes from at a receiver: a few directions, each chosen with the
 // probability of its share of the light.
 //
-// Source: Vitter, "Random Sampling with a Reservoir" (1985), weighted by the light.
+// Source: Vitter, "Random Sampling with a Reservoir" (1985), weighted by the light. Talbot, Cline and
+// Egbert, "Importance Resampling for Global Illumination" (2005): what is chosen of few samples has
+// to be weighted with what they hold in all, or a large source near by seems to be more at its rim,
+// from where less comes.
 #pragma once
 
 #include <array>
@@ -19,6 +22,10 @@ namespace raybundle {
 class Incoming {
   public:
     static constexpr size_t kCount = 4;
+
+    // What the samples would have all light be, over what it is: light by direction counts so many
+    // times. 1 in the mean over receivers.
+    float weight = 1;
 
     // Unit vectors towards the sources, good to 1e-4; where no light was added, any.
     glm::vec3 direction(size_t k) const {

@@ -77,8 +77,12 @@ struct Gathered {
         contrast += part.contrast;
         angles += part.angles;
         const float more = brightest(part.irradiance);
+        const float sampled = more * part.incoming.weight;
+        const float all = brightness * incoming.weight + sampled;
         brightness += more;
-        if (more > 0) incoming.add(part.incoming, more / brightness, random);
+        if (!(all > 0)) return;
+        incoming.add(part.incoming, sampled / all, random);
+        incoming.weight = all / brightness;
     }
     // Means of angleTerms.
     glm::vec4 meanAngles() const { return brightness > 0 ? angles / brightness : kEverywhere; }

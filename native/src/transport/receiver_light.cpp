@@ -47,6 +47,20 @@ struct DirectLight::Block {
         angles += other.angles;
         count += other.count;
     }
+    // Means of angleTerms. Less what few samples of which some are much brighter are off in the mean
+    // (Quenouille, "Notes on Bias in Estimation", 1956).
+    template <class Blocks>
+    glm::vec4 meanAngles(const Blocks& blocks) const {
+        const glm::vec4 mean = angles / brightest(visible);
+        glm::vec4 sum(0.0f);
+        for (const Block& block : blocks) {
+            const float rest = brightest(visible - block.visible);
+            if (!(rest > 0)) return mean;
+            sum += (angles - block.angles) / rest;
+        }
+        const float n = float(blocks.size());
+        return glm::clamp(n * mean - (n - 1) / n * sum, 0.0f, 1.0f);
+    }
     // The closed form times the visible share; the plain mean where there is no closed form.
     glm::vec3 estimate(const std::optional<glm::vec3>& closed) const {
         if (count == 0) return glm::vec3(0.0f);
@@ -288,10 +302,13 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     if (closed && all.visible == all.open) ++sum.unblocked;
     const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
     const glm::vec3 irradiance = all.estimate(closed);
+    if (brightest(irradiance) > 0)
+        origins.incoming.weight =
+            brightest(all.visible) / (float(all.count) * brightest(irradiance));
     return {irradiance, variance + closedError * closedError,
             brightest(closed ? *closed : all.open / float(all.count)) *
                 std::sqrt(visible * (1 - visible)),
-            brightest(irradiance) / brightest(all.visible) * all.angles, origins.incoming};
+            brightest(irradiance) * all.meanAngles(blocks), origins.incoming};
 }
 
 void DirectLight::look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,

@@ -194,7 +194,8 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
         Cells arriving{};
         for (size_t k = 0; k < Incoming::kCount; ++k)
             add(side, shot.incoming[side].direction(k),
-                shot.irradiance[side] / float(Incoming::kCount), arriving);
+                shot.incoming[side].weight / float(Incoming::kCount) * shot.irradiance[side],
+                arriving);
         set(side, arriving);
     });
 }
