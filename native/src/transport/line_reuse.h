@@ -45,10 +45,11 @@ class LineReuse {
   public:
     // exposed: per side, the share of it that nothing covers; empty: as the counts have it.
     // isShown: per side, whether its light is shown, and not only that of what it lights; null: all
-    // is. All references must outlive the object.
+    // is. targetError: of all light, of which what is sent by direction leaves out a part. All
+    // references must outlive the object.
     LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
               const glm::vec3& worldRadiance, const std::vector<float>& exposed,
-              const std::vector<bool>* isShown = nullptr);
+              const std::vector<bool>* isShown = nullptr, float targetError = 0.01f);
 
     // Solves until the residual is below `tolerance` of the right-hand side in every channel, and
     // of the solution on the sides that are shown. `reflected` (R, per side, W/m^2) holds the first
@@ -125,6 +126,7 @@ class LineReuse {
     const glm::vec3 worldRadiance;
     const std::vector<float>& exposed;
     const std::vector<bool>* const isShown;
+    const float targetError;
     const DirectedLight directedLight;
     const ScatteredLight scatteredOfSources;
     bool hasEmission = false;
