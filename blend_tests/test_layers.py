@@ -7,13 +7,13 @@ import pytest
 from cycles_comparison import square
 from cycles_reference import bake_objects
 from raybundle.diffuse_angles import angle_terms
-from raybundle.layers import clearcoat, microfibers, schlick_sheen, velvet
+from raybundle.layers import burley_sheen, clearcoat, microfibers, velvet
 
 NEW = bpy.app.version >= (4, 0, 0)
 
 
 @pytest.mark.parametrize("view", [0.9, 0.5, 0.2])
-def test_schlick_sheen(view):
+def test_burley_sheen(view):
     """The integral of (1 - cos d)^5 cos i over the directions of the light, by midpoints in 200 x
     200 equal shares of the projected solid angle; d from the light to the half vector."""
     steps = (np.arange(200) + 0.5) / 200
@@ -22,7 +22,7 @@ def test_schlick_sheen(view):
     expected = np.pi * ((1 - np.sqrt((1 + between) / 2))**5).mean()
     terms = np.append(1.0, angle_terms(np.array([view]))[0])
     # The table is fitted to a ten thousandth.
-    assert terms @ schlick_sheen().angles == pytest.approx(expected, abs=2e-4)
+    assert terms @ burley_sheen().angles == pytest.approx(expected, abs=2e-4)
 
 
 @pytest.mark.parametrize("layer", [microfibers, velvet, clearcoat])

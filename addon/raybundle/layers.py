@@ -12,8 +12,11 @@ Clearcoat is computed, as its formula is. Cycles agrees by light of lamps; its r
 with a density that is not quite its own, and so what they bring of other light depends on the
 colour beneath (over red of 0.8 they bring 3 % of the light less).
 
-What differs: light that comes at an angle is sent back as much as is seen at that angle of light
-from everywhere (of microfibers within 15 %); between the steps of the roughness it is interpolated.
+Where cloth sends the light of one direction to has formulas (native/src/transport/lobe.h). They are
+reciprocal, so that of light by its angle is sent back what is seen at the angle, except for
+microfibers', whose table of it is the integral of the formula.
+
+What differs: between the steps of the roughness all is interpolated.
 """
 
 from __future__ import annotations
@@ -53,6 +56,19 @@ _MICROFIBERS_FROM_ABOVE = _MICROFIBERS[0], np.array([
     [0.1087, 0.1666, 0.1040, -0.0948, -0.0999],
     [0.1807, 0.2202, 0.0576, -0.0882, -0.1527],
     [0.2643, 0.2456, 0.0046, -0.0683, -0.1481]])
+# Terms of what is sent back of light by its angle.
+_MICROFIBERS_ARRIVING = _MICROFIBERS[0], np.array([
+    [0.0, 0.0, 0.0, 0.0],
+    [-0.0025, 0.0092, 0.0142, -0.0983],
+    [-0.0515, 0.1924, 0.4155, -2.2384],
+    [-0.0270, 0.1570, 0.8214, -2.0859],
+    [0.0352, 0.0698, 0.7866, 0.1488],
+    [0.0819, 0.1618, 0.4428, 1.6522],
+    [0.1331, 0.3447, 0.0493, 1.5226],
+    [0.2141, 0.4118, -0.1753, 0.6497],
+    [0.3008, 0.3176, -0.2197, -0.0071],
+    [0.3485, 0.1639, -0.1733, -0.2243],
+    [0.3462, 0.0444, -0.1153, -0.2212]])
 _VELVET = _MICROFIBERS[0], np.array([
     [0.0, 0.0, 0.0, 0.0, 0.0],
     [0.0035, -0.0755, 0.2721, 0.4400, -3.0410],
@@ -66,7 +82,11 @@ _VELVET = _MICROFIBERS[0], np.array([
     [0.1395, 0.5742, 0.7088, -0.3454, -1.6666],
     [0.1967, 0.5513, 0.7170, -0.3748, -1.9067]])
 # Schlick's fifth power of the angle between the light and the half vector.
-_SCHLICK_SHEEN = np.array([0.0004, 0.0037, 0.0452, 0.0375, 0.0550])
+_BURLEY_SHEEN = np.array([0.0004, 0.0037, 0.0452, 0.0375, 0.0550])
+
+
+MICROFIBERS, VELVET, BURLEY_SHEEN = range(3)  # rb_cloth
+CLOTHS = 3
 
 
 @dataclass(frozen=True)
@@ -76,6 +96,9 @@ class Layer:
     angles: np.ndarray  # (1 + TERMS,): albedo by the angle of view
     # (1 + TERMS,): what is seen from straight above, as diffuse light, of light by its angle.
     shown: np.ndarray = field(default_factory=lambda: np.zeros(1 + TERMS))
+    kind: int | None = None  # of cloth
+    roughness: float = 0.0
+    _arriving: np.ndarray | None = None  # (TERMS,), where that is not by_angle
     covers: bool = False  # whether what it sends back is missing from what lies beneath
 
     @property
@@ -85,8 +108,13 @@ class Layer:
 
     @property
     def by_angle(self) -> np.ndarray:
-        """(TERMS,)"""
+        """(TERMS,): how what is seen depends on the angle of view."""
         return self.angles[1:]
+
+    @property
+    def arriving(self) -> np.ndarray:
+        """(TERMS,): how what is sent back depends on the angle of the light."""
+        return self.by_angle if self._arriving is None else self._arriving
 
     @property
     def above(self) -> float:
@@ -100,17 +128,18 @@ class Layer:
 
 
 def microfibers(roughness: float) -> Layer:
-    return Layer(_row(_MICROFIBERS, roughness), _row(_MICROFIBERS_FROM_ABOVE, roughness), True)
+    return Layer(_row(_MICROFIBERS, roughness), _row(_MICROFIBERS_FROM_ABOVE, roughness),
+                 MICROFIBERS, roughness, _row(_MICROFIBERS_ARRIVING, roughness), covers=True)
 
 
-def schlick_sheen() -> Layer:
+def burley_sheen() -> Layer:
     """What is seen of it from straight above, 0.03 %, is left out."""
-    return Layer(_SCHLICK_SHEEN)
+    return Layer(_BURLEY_SHEEN, kind=BURLEY_SHEEN)
 
 
 def velvet(sigma: float) -> Layer:
     """To Cycles it is gloss: diffuse light does not show it."""
-    return Layer(_row(_VELVET, sigma))
+    return Layer(_row(_VELVET, sigma), kind=VELVET, roughness=sigma)
 
 
 @lru_cache(maxsize=64)

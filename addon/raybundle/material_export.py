@@ -225,6 +225,7 @@ class MaterialExporter:
     def _scattering(sides: list[Surface]) -> dict[str, np.ndarray | int]:
         """Fields of MaterialData."""
         lines = [_line_to(side.scattering.gloss, side.reflectance) for side in sides]
+        cloths = [side.scattering.cloth_kind() for side in sides]
         models = [side.scattering.diffuse_model() for side in sides]
         return {
             'gloss_scale': np.array([scale for scale, _ in lines]),
@@ -232,6 +233,10 @@ class MaterialExporter:
             'gloss_by_angle': _by_side([side.scattering.by_angle for side in sides]),
             'gloss_roughness': np.array([side.scattering.gloss_roughness()
                                          for side in sides]),
+            'cloth_kind': cloths[0][0],
+            'cloth': np.array([side.scattering.cloth[:, 0].sum(axis=0) for side in sides]),
+            'cloth_by_angle': _by_side([side.scattering.cloth_by_angle for side in sides]),
+            'cloth_roughness': np.array([roughness for _, roughness in cloths]),
             'diffuse_model': models[0][0],
             'diffuse_roughness': np.array([roughness for _, roughness in models]),
             'leaving': _by_side([side.scattering.leaving_factors() for side in sides])}

@@ -109,6 +109,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_material_diffuse': (_handle, _int, _floats, _floats),
     'rb_set_material_angles': (_handle, _int, _floats, _floats),
     'rb_set_material_gloss': (_handle, _int, _floats, _floats, _floats, _floats),
+    'rb_set_material_cloth': (_handle, _int, _int, _floats, _floats, _floats),
     'rb_set_material_diffuse_model': (_handle, _int, _int, _floats),
     'rb_set_material_leaving': (_handle, _int, _floats),
     'rb_set_material_translucence': (_handle, _int, _floats, _int, _floats),
@@ -370,6 +371,16 @@ class Scene(_Handle):
                   ((scale, (2, 3), "scale"), (offset, (2, 3), "offset"),
                    (by_angle, (4, 2, 3), "by_angle"), (roughness, (2,), "roughness"))]
         self._library.rb_set_material_gloss(self._pointer, material, *map(_as_floats, arrays))
+
+    def set_material_cloth(self, material: int, cloth: int, reflectance: np.ndarray,
+                           by_angle: np.ndarray, roughness: np.ndarray) -> None:
+        """cloth: rb_cloth, as in layers.py; (2, 3): what of the reflectance it sends back; (4, 2, 3):
+        how that depends on the light's angle; roughness: (2,)."""
+        arrays = [_float_array(values, shape, name) for values, shape, name in
+                  ((reflectance, (2, 3), "reflectance"), (by_angle, (4, 2, 3), "by_angle"),
+                   (roughness, (2,), "roughness"))]
+        self._library.rb_set_material_cloth(
+            self._pointer, material, cloth, *map(_as_floats, arrays))
 
     def set_material_diffuse_model(self, material: int, model: int, roughness: np.ndarray) -> None:
         """model: rb_diffuse_model, as in scattering.py; roughness: (2,)."""

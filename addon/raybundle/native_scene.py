@@ -28,6 +28,8 @@ def build_native_scene(data: SceneData) -> native.Scene:
         scene.set_material_angles(identifier, material.reflected_by_angle, material.shown_by_angle)
         scene.set_material_gloss(identifier, material.gloss_scale, material.gloss_offset,
                                  material.gloss_by_angle, material.gloss_roughness)
+        scene.set_material_cloth(identifier, material.cloth_kind, material.cloth,
+                                 material.cloth_by_angle, material.cloth_roughness)
         scene.set_material_diffuse_model(identifier, material.diffuse_model,
                                          material.diffuse_roughness)
         scene.set_material_leaving(identifier, material.leaving)

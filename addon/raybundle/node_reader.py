@@ -96,12 +96,10 @@ class Surface:
             self.reflectance.scaled(under).plus(ColorExpression(color * layer.albedo)),
             self.radiance.scaled(under), self.transmittance * under,
             self.diffuse.scaled(above).plus(ColorExpression(color * layer.above)),
-            self.reflected_by_angle * under + layer.by_angle[:, None] * color,
+            self.reflected_by_angle * under + layer.arriving[:, None] * color,
             self.shown_by_angle * above + layer.shown[:, None] * color,
             self.translucence.scaled(under),
-            self.scattering.covered(share, layer).plus(Scattering.matt(
-                color * layer.albedo, OREN_NAYAR, 0.0,
-                layer.by_angle[:, None] / max(layer.albedo, 1e-6))))
+            self.scattering.covered(share, layer).plus(Scattering.clothed(color, layer)))
 
     def scaled(self, factor: float) -> Surface:
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),

@@ -16,7 +16,7 @@ import numpy as np
 
 from .diffuse_angles import MEANS, TERMS, DiffuseAngles, angle_terms, burley, oren_nayar
 from .gloss import gloss_albedo, ior_of, seen_roughness
-from .layers import Layer, clearcoat, microfibers, schlick_sheen
+from .layers import Layer, burley_sheen, clearcoat, microfibers
 
 # Names of the sockets that gloss and angles depend on, the first arguments of principled_albedo,
 # and what they count as where they vary or are missing.
@@ -115,7 +115,7 @@ def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray
     # What is not metal and does not let light through has it, in white and the base's hue.
     luminance = float(_LUMINANCE @ base)
     hue = base / luminance if luminance > 0.0 else np.zeros(3)
-    return schlick_sheen(), max(weight, 0.0) * opaque * (1.0 + tint * (hue - 1.0))
+    return burley_sheen(), max(weight, 0.0) * opaque * (1.0 + tint * (hue - 1.0))
 
 
 def principled_albedo(roughness: float, specular: float, ior: float, diffuse_roughness: float,

@@ -49,6 +49,11 @@ class MaterialData:
     gloss_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
     gloss_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
     gloss_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    cloth_kind: int = 0  # of layers.py
+    # (2, 3): what of the reflectance cloth sends back; (4, 2, 3): that by angle; (2,): how rough.
+    cloth: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    cloth_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
+    cloth_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
     diffuse_model: int = 0  # of scattering.py
     diffuse_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))  # likewise by angle

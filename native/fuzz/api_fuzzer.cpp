@@ -155,7 +155,7 @@ void addMaterial(Bytes& in, rb_scene scene) {
     const auto a = in.numbers<6>(), b = in.numbers<6>();
     expectMessage(rb_add_material(scene, in.text().c_str(), a.data(), b.data(), &id));
     const int32_t target = in.flag() ? id : in.small();
-    switch (in.below(10)) {
+    switch (in.below(11)) {
         case 0:
             expectMessage(rb_set_material_image(scene, target, in.small(), a.data()));
             break;
@@ -191,6 +191,13 @@ void addMaterial(Bytes& in, rb_scene scene) {
                                                         a.data()));
             expectMessage(rb_set_material_leaving(scene, target, in.numbers<24>().data()));
             break;
+        case 9: {
+            const auto byAngle = in.numbers<24>();
+            const auto roughness = in.numbers<2>();
+            expectMessage(rb_set_material_cloth(scene, target, rb_cloth(in.small()), a.data(),
+                                                byAngle.data(), roughness.data()));
+            break;
+        }
         default: {
             const auto reflected = in.numbers<24>();
             const auto shown = in.numbers<30>();

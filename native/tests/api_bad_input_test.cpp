@@ -130,6 +130,8 @@ TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_gloss(scene, bad, kGrey, kBlack, kAngles, kBlack),
                       "material " + std::to_string(bad));
+        expectInvalid(rb_set_material_cloth(scene, bad, RB_CLOTH_VELVET, kGrey, kAngles, kBlack),
+                      "material " + std::to_string(bad));
         expectInvalid(rb_set_material_diffuse_model(scene, bad, RB_DIFFUSE_BURLEY, kBlack),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_translucence(scene, bad, kGrey, -1, nullptr),
@@ -236,6 +238,12 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     badAngles[23] = NAN;
     expectInvalid(rb_set_material_gloss(scene, 0, kGrey, kGrey, badAngles, kGrey), "by_angle");
     const int32_t paint = addMaterial();
+    expectInvalid(rb_set_material_cloth(scene, paint, RB_CLOTH_VELVET, bad, kAngles, kGrey),
+                  "reflectance");
+    expectInvalid(rb_set_material_cloth(scene, paint, RB_CLOTH_VELVET, kGrey, badAngles, kGrey),
+                  "by_angle");
+    expectInvalid(rb_set_material_cloth(scene, paint, rb_cloth(3), kGrey, kAngles, kGrey),
+                  "cloth 3");
     expectInvalid(rb_set_material_leaving(scene, paint, badAngles), "factors");
     expectInvalid(rb_set_material_leaving(scene, paint, nullptr), "factors");
     expectInvalid(rb_set_material_leaving(scene, paint + 1, kAngles), "material");
@@ -243,6 +251,9 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
         const float roughness[2] = {0.5f, rough};
         expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, roughness),
                       "roughness");
+        expectInvalid(
+            rb_set_material_cloth(scene, paint, RB_CLOTH_VELVET, kGrey, kAngles, roughness),
+            "roughness");
         expectInvalid(rb_set_material_diffuse_model(scene, paint, RB_DIFFUSE_BURLEY, roughness),
                       "roughness");
     }

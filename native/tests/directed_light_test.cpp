@@ -14,6 +14,7 @@
 #include "test_bakes.h"
 #include "test_scenes.h"
 #include "transport/lobe.h"
+#include "transport/microfibers.h"
 
 namespace raybundle {
 namespace {
@@ -59,6 +60,41 @@ Bsdf orenNayar(double sigma) {
         const double s = glm::dot(in, out) - in.z * out.z;
         const double t = s > 0 ? std::max(in.z, out.z) : 1;
         return (1 + sigma * s / t) / (kPi + (kPi / 2 - 2.0 / 3) * sigma);
+    };
+}
+
+// Ashikhmin, Premoze and Shirley (2000).
+Bsdf velvet(double sigma) {
+    return [=](const glm::dvec3& in, const glm::dvec3& out) {
+        const glm::dvec3 h = glm::normalize(in + out);
+        const double rest = std::max(1 - h.z * h.z, 1e-12);
+        const double d =
+            std::exp(-h.z * h.z / (rest * sigma * sigma)) / (kPi * sigma * sigma * rest * rest);
+        const double g = std::min(1.0, 2 * h.z * std::min(in.z, out.z) / glm::dot(in, h));
+        return d * g / (4 * in.z * out.z);
+    };
+}
+
+// Burley's sheen (2012).
+Bsdf burleySheen() {
+    return [](const glm::dvec3& in, const glm::dvec3& out) {
+        return std::pow(1 - glm::dot(in, glm::normalize(in + out)), 5);
+    };
+}
+
+// Zeltner et al. (2022): a cosine, transformed so that where light comes from that goes towards an
+// angle has the mass 1.
+Bsdf transformedCosine(double roughness) {
+    return [=](const glm::dvec3& in, const glm::dvec3& out) {
+        const Microfibers fibers = Microfibers::at(float(roughness), float(out.z));
+        const double a = double(fibers.a), b = double(fibers.b), sine = std::hypot(out.x, out.y);
+        const glm::dvec3 x = sine > 0 ? glm::dvec3(out.x, out.y, 0) / sine : glm::dvec3(1, 0, 0);
+        const double along = glm::dot(x, in),
+                     across = glm::dot(glm::cross(glm::dvec3(0, 0, 1), x), in);
+        const glm::dvec3 before(a * along + b * in.z, a * across, in.z);
+        const double length = glm::length(before);
+        return double(fibers.albedo) * before.z / length * a * a / std::pow(length, 3) /
+               (kPi * in.z);
     };
 }
 
@@ -112,19 +148,62 @@ TEST(Lobe, IsTheModelOverItsMean) {
             }
 }
 
+TEST(Lobe, OfClothIsTheModelOverItsMean) {
+    const glm::vec3 normal(0, 0, 1);
+    for (double cosine : {0.95, 0.6, 0.2})
+        for (double roughness : {0.5, 0.8, 1.0})
+            for (rb_cloth cloth : {RB_CLOTH_MICROFIBERS, RB_CLOTH_VELVET, RB_CLOTH_BURLEY}) {
+                const glm::dvec3 in = inclined(cosine);
+                const Bsdf bsdf = cloth == RB_CLOTH_MICROFIBERS ? transformedCosine(roughness)
+                                  : cloth == RB_CLOTH_VELVET    ? velvet(roughness)
+                                                                : burleySheen();
+                const Lobe lobe = Lobe::cloth(normal, in, cloth, float(roughness));
+                const glm::dvec2 mean = moments(bsdf, in);
+                forCosine(32, [&](const glm::dvec3& out, double) {
+                    const double expected = kPi * bsdf(in, out) / mean.x;
+                    // The mean is by 128 points.
+                    EXPECT_NEAR(double(lobe.towards(out)), expected, 0.02 * expected + 1e-3)
+                        << cosine << " " << roughness << " " << cloth;
+                });
+                const double contrast = std::sqrt(std::max(0.0, mean.y / (mean.x * mean.x) - 1));
+                EXPECT_NEAR(double(lobe.contrast()), contrast, 0.1 * contrast + 0.01)
+                    << cosine << " " << roughness << " " << cloth;
+            }
+}
+
+// What goes towards an angle comes from everywhere as the albedo there says.
+TEST(Lobe, MicrofibersSendTheirAlbedo) {
+    for (double cosine : {0.9, 0.5, 0.2})
+        for (double roughness : {0.3, 0.65, 1.0}) {
+            const Bsdf bsdf = transformedCosine(roughness);
+            const glm::dvec3 out = inclined(cosine);
+            double sum = 0;
+            forCosine(400, [&](const glm::dvec3& in, double share) {
+                sum += kPi * bsdf(in, out) * share;
+            });
+            const double albedo = double(Microfibers::at(float(roughness), float(cosine)).albedo);
+            EXPECT_NEAR(sum, albedo, 0.01 * albedo + 1e-4) << cosine << " " << roughness;
+        }
+}
+
 TEST(Lobe, HasNothingBelowTheSurfaceAndIsFiniteAtItsEdge) {
     const glm::vec3 normal(0, 0, 1);
     for (const glm::vec3& in : {glm::vec3(0, 0, 1), glm::vec3(1, 0, 1e-6f), glm::vec3(1, 0, -0.1f)})
-        for (float roughness : {0.0f, 0.45f, 1.0f})
-            for (float f0 : {0.0f, 1.0f}) {
-                const Lobe lobe = Lobe::gloss(normal, glm::normalize(in), roughness, f0);
+        for (float roughness : {0.0f, 0.45f, 1.0f}) {
+            const glm::vec3 to = glm::normalize(in);
+            for (const Lobe& lobe :
+                 {Lobe::gloss(normal, to, roughness, 0), Lobe::gloss(normal, to, roughness, 1),
+                  Lobe::cloth(normal, to, RB_CLOTH_MICROFIBERS, roughness),
+                  Lobe::cloth(normal, to, RB_CLOTH_VELVET, roughness),
+                  Lobe::cloth(normal, to, RB_CLOTH_BURLEY, roughness)}) {
                 EXPECT_EQ(lobe.towards({0.6f, 0, -0.8f}), 0);
                 for (const glm::vec3& out : {glm::vec3(0, 0, 1), glm::vec3(-1, 0, 1e-6f),
                                              glm::vec3(1, 0, 1e-6f), glm::vec3(0, 1, 1)}) {
                     const float value = lobe.towards(glm::normalize(out));
-                    EXPECT_TRUE(std::isfinite(value) && value >= 0);
+                    EXPECT_TRUE(std::isfinite(value) && value >= 0) << roughness;
                 }
             }
+        }
 }
 
 TEST(Lobe, FindsF0ByHowTheReflectanceRises) {

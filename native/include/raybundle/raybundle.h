@@ -144,9 +144,24 @@ RB_API rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const fl
                                       const float offset[6], const float by_angle[24],
                                       const float roughness[2]);
 
-/* Where what is not mirrored goes, likewise: as by Lambert's law, or as Burley's or Oren and
+/* What of the reflectance cloth sends back (six floats, of the whole surface: RGB of the front side,
+ * then of the back side), for light from everywhere, and how that depends on the angle of the light,
+ * likewise a part of `reflected` of rb_set_material_angles. Where it goes to: as Cycles' sheen has it
+ * from Blender 4.0 on, or its velvet, or its sheen before; roughness: of the front and of the back, 0
+ * to 1 (of velvet sigma; of Burley's sheen unused). Without it nothing. */
+typedef enum rb_cloth RB_INT {
+    RB_CLOTH_MICROFIBERS = 0,
+    RB_CLOTH_VELVET = 1,
+    RB_CLOTH_BURLEY = 2
+} rb_cloth;
+
+RB_API rb_error rb_set_material_cloth(rb_scene scene, int32_t material, rb_cloth cloth,
+                                      const float reflectance[6], const float by_angle[24],
+                                      const float roughness[2]);
+
+/* Where what is neither mirrored nor cloth's goes, likewise: as by Lambert's law, or as Burley's or Oren and
  * Nayar's model has it, with a roughness (of the front and of the back), 0 to 1. */
-typedef enum rb_diffuse_model {
+typedef enum rb_diffuse_model RB_INT {
     RB_DIFFUSE_LAMBERT = 0,
     RB_DIFFUSE_BURLEY = 1,
     RB_DIFFUSE_OREN_NAYAR = 2
@@ -155,8 +170,8 @@ typedef enum rb_diffuse_model {
 RB_API rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material,
                                               rb_diffuse_model model, const float roughness[2]);
 
-/* How what is not mirrored leaves, by angle, whatever light it is (LINE_REUSE): from under a layer
- * that lets less of it out at some angles, or from one that sends it there. 1 plus the sum of these
+/* How that leaves, by angle, whatever light it is (LINE_REUSE): from under a layer that lets less of
+ * it out at some angles. 1 plus the sum of these
  * factors times the term of rb_set_material_angles at the angle at which it leaves, less the term's
  * mean (six floats for each term, likewise). Without it 0. */
 RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[24]);

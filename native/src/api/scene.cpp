@@ -144,6 +144,31 @@ rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float sca
     });
 }
 
+rb_error rb_set_material_cloth(rb_scene scene, int32_t material, rb_cloth cloth,
+                               const float reflectance[6], const float by_angle[24],
+                               const float roughness[2]) {
+    return guarded([&] {
+        const HeldScene held(scene, "scene");
+        need(reflectance, "reflectance");
+        need(by_angle, "by_angle");
+        needFinite(reflectance, 6, "reflectance");
+        needFinite(by_angle, 24, "by_angle");
+        Material& target = held->material(material);
+        needRoughness(target, roughness);
+        if (int(cloth) < RB_CLOTH_MICROFIBERS || int(cloth) > RB_CLOTH_BURLEY)
+            throw invalidArgument("material \"" + target.name + "\": unknown cloth " +
+                                  std::to_string(int(cloth)));
+        for (size_t side = 0; side < 2; ++side) {
+            Scattering& scattering = target.scattering[side];
+            scattering.cloth = vec3(reflectance + 3 * side);
+            for (size_t term = 0; term < scattering.clothByAngle.size(); ++term)
+                scattering.clothByAngle[term] = vec3(by_angle + 6 * term + 3 * side);
+            scattering.clothKind = cloth;
+            scattering.clothRoughness = roughness[side];
+        }
+    });
+}
+
 rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material, rb_diffuse_model model,
                                        const float roughness[2]) {
     return guarded([&] {

@@ -74,7 +74,7 @@ void DirectedLight::findLayers() {
     for (uint32_t side = 0; side < layers.size(); ++side) {
         const glm::vec3& all = patches.reflectance[side];
         if (!(brightest(all) > 0)) continue;
-        const glm::vec3 diffuse = all - SideReflectance(patches, side).mirroredMean();
+        const glm::vec3 diffuse = SideReflectance(patches, side).diffuseMean();
         layers[side] = {patches.normal(side), diffuse / glm::max(all, kLeastReflectance),
                         2 * patches.parentAt(side).scattering + side % 2};
     }
@@ -123,6 +123,11 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
         if (brightest(gloss) > kLeastShare)
             parts.push_back(
                 {Lobe::gloss(normal, direction, scattering.glossRoughness, f0), gloss * part});
+        const glm::vec3 cloth = surface.clothAt(terms);
+        if (scattering.hasCloth() && brightest(cloth) > kLeastShare)
+            parts.push_back(
+                {Lobe::cloth(normal, direction, scattering.clothKind, scattering.clothRoughness),
+                 cloth * part});
         if (!scattering.isRough()) continue;
         const glm::vec3 diffuse = surface.diffuseAt(terms);
         if (brightest(diffuse) > kLeastShare)

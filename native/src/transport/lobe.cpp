@@ -6,12 +6,13 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "transport/microfibers.h"
 #include "transport/sphere_sampling.h"
 
 namespace raybundle {
 namespace {
 
-// Points of the mean of a diffuse lobe: Gauss and Legendre's along the cosine, and equal angles.
+// Points of the mean of a lobe that is wide: Gauss and Legendre's along the cosine, and equal angles.
 constexpr int kCosines = 8, kAngles = 16;
 constexpr float kCosine[kCosines] = {0.01985507f, 0.10166676f, 0.23723380f, 0.40828268f,
                                      0.59171732f, 0.76276620f, 0.89833324f, 0.98014493f};
@@ -24,6 +25,8 @@ constexpr int kRoughnesses = 11, kTableCosines = 25, kRings = 24, kInRing = 24;
 constexpr float kMeanEdge = 0.0534f;
 // Cosines below this are taken for it: V below stays finite.
 constexpr float kLeastCosine = 1e-3f;
+// Smoother cloth sends back a thousandth of the light, into lobes that the points of the mean miss.
+constexpr float kLeastClothRoughness = 0.2f;
 
 float fifthPower(float x) {
     const float square = x * x;
@@ -179,6 +182,21 @@ Lobe Lobe::diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffus
                    float roughness) {
     Lobe lobe(model == RB_DIFFUSE_BURLEY ? Kind::BURLEY : Kind::OREN_NAYAR, normal, incoming,
               roughness, 0);
+    lobe.normalise();
+    return lobe;
+}
+
+Lobe Lobe::cloth(const glm::vec3& normal, const glm::vec3& incoming, rb_cloth cloth,
+                 float roughness) {
+    const Kind kind = cloth == RB_CLOTH_MICROFIBERS ? Kind::MICROFIBERS
+                      : cloth == RB_CLOTH_VELVET    ? Kind::VELVET
+                                                    : Kind::BURLEY_SHEEN;
+    Lobe lobe(kind, normal, incoming, std::max(roughness, kLeastClothRoughness), 0);
+    lobe.normalise();
+    return lobe;
+}
+
+void Lobe::normalise() {
     const auto [x, y] = frame(normal);
     float mean = 0, meanSquare = 0;
     for (int i = 0; i < kCosines; ++i) {
@@ -186,13 +204,12 @@ Lobe Lobe::diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffus
         for (int j = 0; j < kAngles; ++j) {
             const float angle = glm::two_pi<float>() * float(j) / kAngles;
             const float value =
-                lobe.towards(sine * (std::cos(angle) * x + std::sin(angle) * y) + no * normal);
+                towards(sine * (std::cos(angle) * x + std::sin(angle) * y) + no * normal);
             mean += 2 * no * kWeight[i] / kAngles * value;
             meanSquare += 2 * no * kWeight[i] / kAngles * value * value;
         }
     }
-    lobe.normalise(mean, meanSquare);
-    return lobe;
+    normalise(mean, meanSquare);
 }
 
 void Lobe::normalise(float mean, float meanSquare) {
@@ -217,11 +234,27 @@ float Lobe::towards(const glm::vec3& direction) const {
             const float more = roughness * (1 + io) - 0.5f;
             return scale * (1 + more * fifthPower(1 - ni)) * (1 + more * fifthPower(1 - no));
         }
-        default: {
+        case Kind::OREN_NAYAR: {
             const float s = io - ni * no;
             return scale * std::max(0.0f, 1 + roughness * (s > 0 ? s / std::max(ni, no) : s));
         }
+        case Kind::MICROFIBERS: {
+            const float sine = std::sqrt(std::max(1 - no * no, 1e-6f));
+            return scale * Microfibers::at(roughness, no).towards((io - ni * no) / sine, ni);
+        }
+        case Kind::VELVET: {
+            // pi D G / (4 ni no), D by the cotangent of the half vector's angle.
+            const float nh2 = std::min((ni + no) * (ni + no) / std::max(2 + 2 * io, 1e-6f), 1.0f);
+            const float rest = std::max(1 - nh2, 1e-6f), square = roughness * roughness;
+            const float ih = std::sqrt(std::max(0.5f * (1 + io), 1e-6f));
+            const float g = std::min(1.0f, 2 * std::sqrt(nh2) * std::min(ni, no) / ih);
+            return 0.25f * scale * std::exp(-nh2 / (rest * square)) * g /
+                   (square * rest * rest * ni * std::max(no, kLeastCosine));
+        }
+        case Kind::BURLEY_SHEEN:
+            return scale * fifthPower(1 - std::sqrt(0.5f * std::max(1 + io, 0.0f)));
     }
+    return 0;
 }
 
 }  // namespace raybundle

@@ -7,7 +7,9 @@
 // with Smith's masking, height-correlated (Heitz 2014), sampled as in Heitz, "Sampling the GGX
 // Distribution of Visible Normals" (2018), with Fresnel's reflectance from f0 to 1 as Cycles has
 // it. Burley, "Physically-Based Shading at Disney" (2012). Fujii, "A tiny
-// improvement of Oren-Nayar reflectance model" (2012).
+// improvement of Oren-Nayar reflectance model" (2012). Cloth: transport/microfibers.h; Ashikhmin,
+// Premoze and Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen, Schlick's
+// fifth power of the angle between the light and the half vector.
 // Differs: each is brought to a mean of 1. How much a surface reflects, light that meets several
 // facets included, is known (scene/scene.h); here is only where to.
 #pragma once
@@ -29,6 +31,8 @@ class Lobe {
                       float f0);
     static Lobe diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,
                         float roughness);
+    static Lobe cloth(const glm::vec3& normal, const glm::vec3& incoming, rb_cloth cloth,
+                      float roughness);
 
     // f0 of gloss that reflects so many times as much of light at right angles as of light from
     // everywhere.
@@ -43,12 +47,13 @@ class Lobe {
     float contrast() const { return rms; }
 
   private:
-    enum class Kind { GLOSS, BURLEY, OREN_NAYAR };
+    enum class Kind { GLOSS, BURLEY, OREN_NAYAR, MICROFIBERS, VELVET, BURLEY_SHEEN };
     struct Moments;
     class GlossTable;
     Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness, float f0);
     static Moments momentsOfGloss(float roughness, float cosine);
     void normalise(float mean, float meanSquare);
+    void normalise();
 
     Kind kind;
     glm::vec3 normal, incoming;

@@ -135,8 +135,8 @@ struct Samples {
 // How what arrives is sent on: exitance over irradiance, to a cell (row) from a cell (column).
 struct ScatteredLight::Transfer {
     using Matrix = Eigen::Matrix<float, kCells, kCells>;
-    // Gloss with f0 of 1 and of 0, that mirrors all else that it can; a white rough surface.
-    Matrix white = Matrix::Zero(), edge = white, rough = white;
+    // Gloss with f0 of 1 and of 0, that mirrors all else that it can; cloth; a white rough surface.
+    Matrix white = Matrix::Zero(), edge = white, cloth = white, rough = white;
 
     explicit Transfer(const Scattering& surface) {
         const float roughness = surface.glossRoughness;
@@ -147,6 +147,12 @@ struct ScatteredLight::Transfer {
             edge = between(
                 [&](const glm::vec3& from) { return Lobe::gloss(z, from, roughness, 0); }, true);
         }
+        if (surface.hasCloth())
+            cloth = between(
+                [&](const glm::vec3& from) {
+                    return Lobe::cloth(z, from, surface.clothKind, surface.clothRoughness);
+                },
+                true);
         if (surface.isRough())
             rough = between(
                 [&](const glm::vec3& from) {
@@ -176,7 +182,8 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
     indices.assign(patches.sideCount(), kNone);
     for (uint32_t side = 0; side < indices.size(); ++side) {
         const Scattering& surface = SideReflectance(patches, side).scattering();
-        if (!patches.parentAt(side).exchanges || !(surface.hasGloss() || surface.isRough()))
+        if (!patches.parentAt(side).exchanges ||
+            !(surface.hasGloss() || surface.hasCloth() || surface.isRough()))
             continue;
         const auto [x, y] = frame(patches.normal(side));
         indices[side] = uint32_t(sent.size());
@@ -203,13 +210,16 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
 void ScatteredLight::findTransfers() {
     // Alike to within a hundredth of the roughness.
     auto rounded = [](float roughness) { return float(std::lround(100 * roughness)) / 100; };
-    using Kind = std::tuple<bool, float, rb_diffuse_model, float>;
+    // Gloss, cloth and the diffuse rest: whether there is, of which kind, how rough.
+    using Kind = std::tuple<bool, float, bool, rb_cloth, float, rb_diffuse_model, float>;
     std::map<Kind, std::vector<size_t>> alike;
     transfers.resize(patches.scattering.size());
     for (size_t k = 0; k < transfers.size(); ++k) {
         const Scattering& surface = patches.scattering[k];
         const float gloss = std::clamp(surface.glossRoughness, Lobe::kLeastRoughness, 1.0f);
-        alike[{surface.hasGloss(), surface.hasGloss() ? rounded(gloss) : 0, surface.diffuseModel,
+        alike[{surface.hasGloss(), surface.hasGloss() ? rounded(gloss) : 0, surface.hasCloth(),
+               surface.hasCloth() ? surface.clothKind : RB_CLOTH_MICROFIBERS,
+               surface.hasCloth() ? rounded(surface.clothRoughness) : 0, surface.diffuseModel,
                surface.isRough() ? rounded(surface.diffuseRoughness) : 0}]
             .push_back(k);
     }
@@ -274,6 +284,11 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
         leaving = f0 * (transfer.white * light) + (1 - f0) * (transfer.edge * light);
         const glm::vec3 scale = surface.mirroredMean() / all;
         leaving.array().rowwise() *= Eigen::Array<float, 1, 3>(scale.x, scale.y, scale.z);
+    }
+    if (surface.scattering().hasCloth()) {
+        const glm::vec3 scale = surface.clothMean() / transfer.cloth.mean();
+        leaving +=
+            (transfer.cloth * light) * Eigen::Vector3f(scale.x, scale.y, scale.z).asDiagonal();
     }
     if (surface.scattering().isRough()) {
         Light diffuse = light;
