@@ -219,6 +219,13 @@ def glossy_mix(tree):
                     _2=tree.add('BsdfGlossy', Color=(0.8, 0.8, 0.8, 1.0), Roughness=0.5))
 
 
+def rough_metal(tree):
+    shader = tree.principled(Base_Color=RED, Metallic=1.0, Roughness=0.9)
+    if bpy.app.version >= (4, 0, 0):
+        shader.distribution = 'MULTI_GGX'
+    return shader
+
+
 def sheen(tree):
     return tree.principled(Base_Color=RED, Sheen=1.0)
 
@@ -359,6 +366,18 @@ def test_canopy(floor, new_object, new_light, build):
     compare(floor)
     if build in UNIFORM + DIRECTED:
         compare_sent(canopy)
+
+
+@pytest.mark.xfail(strict=True, reason="what one facet keeps back depends on the angle of view")
+def test_canopy_of_rough_metal(floor, new_object, new_light):
+    """Does not hold yet: the floor gets 2.6 % too little (3.4, whose masking is another than that of
+    the lobes) and 1.7 % too much (from 4.0 on, where several facets add the more the more grazing
+    the view is)."""
+    place_canopy(new_object, rough_metal)
+    lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)
+    lamp.rotation_euler = (np.pi, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    compare(floor)
 
 
 @pytest.mark.parametrize("roughness", [0.1, 0.5])

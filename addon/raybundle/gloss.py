@@ -12,12 +12,14 @@ a is the albedo for F = 1 and b that for F = f.
 What differs: integrals by midpoints, good to 1e-3 (blend_tests/test_gloss.py), and the terms fitted
 to them, to 2 % up to 80 degrees; light that meets several facets is given back as Cycles'
 Multiscatter GGX does it (Turquin, "Practical multiple scattering compensation for microfacet
-models", 2019).
+models", 2019): by how much one facet keeps back towards the eye, most at grazing angles. Here what
+one facet mirrors goes where GGX sends it, and the rest spreads, by the angles of both.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -44,6 +46,9 @@ class GlossAlbedo:
     # (2, TERMS), for F = 1 and F = f: the albedo at an angle is its mean plus the sum of these
     # times what the terms differ from their means.
     angles: np.ndarray
+    # (2, TERMS): likewise what several facets add, over its mean, by the angle at which light
+    # arrives and by that at which it leaves.
+    several: np.ndarray
 
     def by_angle(self, f0: np.ndarray | float) -> np.ndarray:
         """(TERMS,) and the shape of f0: of(f0) by the angle, as `angles`."""
@@ -59,8 +64,8 @@ class GlossAlbedo:
         once = (self.white - self.edge) * f0 + self.edge
         if not multiple:
             return once
-        # Schlick's mean.
-        fresnel = f0 + (1.0 - f0) / 21.0
+        # Schlick's mean, or a colour that is the same at all angles.
+        fresnel = f0 + (1.0 - f0) / 21.0 if self.edge > 0.0 else f0
         again = fresnel * self.white_mean / (1.0 - fresnel * (1.0 - self.white_mean))
         return once * (1.0 + again * (1.0 - self.white) / self.white)
 
@@ -92,27 +97,38 @@ def gloss_albedo(roughness: float, ior: float, from_above: bool = False,
     """
     step = round(_STEPS * min(max(roughness, 0.0), 1.0)) / _STEPS
     ior = round(max(ior, 1.0), 3)
-    white, edge, angles = _means(step, ior, correlated)
+    white, edge, angles, several = _means(step, ior, correlated)
     white_mean = white
     if from_above:
         white, edge = (float(values[0])
                        for values in _integrals(np.array([_ABOVE]), step, ior, correlated))
-    return GlossAlbedo(white, edge, white_mean, angles)
+    return GlossAlbedo(white, edge, white_mean, angles, several)
 
 
 @lru_cache(maxsize=256)
-def _means(roughness: float, ior: float, correlated: bool) -> tuple[float, float, np.ndarray]:
+def _means(roughness: float, ior: float, correlated: bool
+           ) -> tuple[float, float, np.ndarray, np.ndarray]:
     cosines = np.sqrt((np.arange(_ANGLES) + 0.5) / _ANGLES)
-    albedos = _integrals(cosines, roughness, ior, correlated)
+    white, edge = _integrals(cosines, roughness, ior, correlated)
+    # The BSDF is the same with light and view exchanged.
+    arriving, _ = _integrals(cosines, roughness, ior, correlated,
+                             lambda light: np.interp(light, cosines, 1.0 / white - 1.0))
     terms = angle_terms(cosines)
     terms -= terms.mean(axis=0)
-    angles = [np.linalg.lstsq(terms, albedo - albedo.mean(), rcond=None)[0] for albedo in albedos]
-    return float(albedos[0].mean()), float(albedos[1].mean()), np.array(angles)
+
+    def fit(values: np.ndarray) -> np.ndarray:
+        return np.linalg.lstsq(terms, values - values.mean(), rcond=None)[0]
+
+    several = [fit(part) / max(part.mean(), 1e-6) for part in (arriving, 1.0 - white)]
+    return (float(white.mean()), float(edge.mean()), np.array([fit(white), fit(edge)]),
+            np.array(several))
 
 
-def _integrals(cosines: np.ndarray, roughness: float, ior: float, correlated: bool
+def _integrals(cosines: np.ndarray, roughness: float, ior: float, correlated: bool,
+               factor: Callable[[np.ndarray], np.ndarray] | None = None
                ) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) each, for F = 1 and F = f, at some cosines of the view, (n,)."""
+    """(n,) each, for F = 1 and F = f, at some cosines of the view, (n,). factor: by the cosine of
+    the light; None: 1."""
     alpha = max(roughness * roughness, 1e-4)
     cosines = cosines[:, None, None]
     steps = (np.arange(_NORMALS) + 0.5) / _NORMALS
@@ -137,6 +153,8 @@ def _integrals(cosines: np.ndarray, roughness: float, ior: float, correlated: bo
     above = light_z > 0.0
     seen, lit = _masking(view_z, alpha), _masking(np.where(above, light_z, 1.0), alpha)
     weight = above * ((1.0 + seen) / (1.0 + seen + lit) if correlated else 1.0 / (1.0 + lit))
+    if factor is not None:
+        weight = weight * factor(np.clip(light_z, 0.0, 1.0))
     edge = weight * _edge(np.clip(cosine, 0.0, 1.0), ior)
     return weight.mean(axis=(1, 2)), edge.mean(axis=(1, 2))
 

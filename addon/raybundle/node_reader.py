@@ -212,16 +212,22 @@ class NodeReader:
                 *self._values(node, COAT_SOCKETS, path),
                 self._usual_color(node, *COAT_TINT, path), self.filter_glossy)
         opaque = 1.0 - metallic - through
-        mirrored = base.scaled(metallic * albedo.metal).plus(
-            ColorExpression(opaque * albedo.specular + metallic * albedo.metal_edge))
+        # What several facets of the metal send back is in the reflectance, but spreads.
+        reflected, mirrored = (
+            base.scaled(metallic * (albedo.metal - less[0])).plus(ColorExpression(
+                opaque * albedo.specular + metallic * (albedo.metal_edge - less[1])))
+            for less in (np.zeros((2, 3)), albedo.several))
         shown = opaque * albedo.shown
         scattering = Scattering.mirror(
             mirrored, albedo.mirrored_by_angle(opaque, metallic), albedo.roughness).plus(
                 Scattering.matt(
                     opaque * mean, OREN_NAYAR if bpy.app.version >= (4, 0, 0) else BURLEY,
-                    albedo.diffuse_roughness, albedo.leaving))
+                    albedo.diffuse_roughness, albedo.leaving)).plus(
+                        Scattering.matt(
+                            metallic * (mean * albedo.several[0] + albedo.several[1]), OREN_NAYAR,
+                            0.0, albedo.several_leaving))
         surface = Surface(
-            mirrored.plus(base.scaled(opaque * albedo.diffuse)), radiance.scaled(albedo.uncoated),
+            reflected.plus(base.scaled(opaque * albedo.diffuse)), radiance.scaled(albedo.uncoated),
             through * mean * albedo.uncoated, base.scaled(shown),
             albedo.reflected_by_angle(mean, opaque, metallic), shown * mean * albedo.angles.shown,
             scattering=scattering)
@@ -255,11 +261,14 @@ class NodeReader:
         color = self.color(_input(node, 'Color', 'Base Color'), path)
         roughness = self._usual(node, *GLOSS_SOCKETS[0], path)
         mean = np.maximum(np.clip(color.mean(), 0.0, 1.0), 1e-6)
-        albedo, gain, seen = glossy_albedo(node, roughness, mean, self.filter_glossy)
-        mirrored = color.scaled(albedo.of(mean) * gain / mean)
-        by_angle = albedo.by_angle(mean) * gain
-        return Surface(mirrored, reflected_by_angle=by_angle,
-                       scattering=Scattering.mirror(mirrored, by_angle, seen))
+        albedo, gain, several, seen = glossy_albedo(node, roughness, mean, self.filter_glossy)
+        once, by_angle = albedo.of(mean), albedo.by_angle(mean)
+        again = once * (gain - 1.0)
+        return Surface(
+            color.scaled(once * gain / mean),
+            reflected_by_angle=by_angle + again * several[0][:, None],
+            scattering=Scattering.mirror(color.scaled(once / mean), by_angle, seen).plus(
+                Scattering.matt(again, OREN_NAYAR, 0.0, several[1][:, None])))
 
     def _usual(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                path: tuple[bpy.types.Node, ...]) -> float:
@@ -517,9 +526,10 @@ _VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')
 
 
 def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray | float,
-                  filter_glossy: float) -> tuple[GlossAlbedo, np.ndarray, float]:
+                  filter_glossy: float) -> tuple[GlossAlbedo, np.ndarray, np.ndarray, float]:
     """Of a Glossy shader (or a metal's, whose edge is as bright as it can be) as diffuse light sees
-    it: the albedo of its color, what several facets add, and the roughness."""
+    it: the albedo of its color, what several facets add as a factor and by the angles
+    (GlossAlbedo.several), and the roughness."""
     if node.distribution == 'SHARP':
         roughness = 0.0
     seen = seen_roughness(roughness, filter_glossy)
@@ -529,7 +539,8 @@ def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray | fl
         if node.type != 'BSDF_METALLIC':
             albedo = replace(albedo, edge=0.0, angles=albedo.angles * [[1.0], [0.0]])
         albedos.append(albedo)
-    return albedos[1], albedos[0].gain(color, node.distribution == 'MULTI_GGX'), seen
+    gain = albedos[0].gain(color, node.distribution == 'MULTI_GGX')
+    return albedos[1], gain, albedos[0].several, seen
 
 
 def cloth_layer(node: bpy.types.Node, roughness: float) -> Layer:

@@ -52,6 +52,11 @@ class PrincipledAlbedo:
     metal: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_edge: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
+    # (2, 3): the part of metal and metal_edge that several facets send back. (TERMS, 3): it by the
+    # angle at which light arrives, and over its mean by that at which it leaves.
+    several: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    several_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
+    several_leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
     # (TERMS, 3): how the layers let the diffuse light out (rb_set_material_leaving).
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
     # (3,): what the coat leaves of emission and of light that goes through.
@@ -61,7 +66,7 @@ class PrincipledAlbedo:
         """(TERMS, 3), of a whole surface."""
         under = self.diffuse / self.angles.albedo  # the share of light that the layers let through
         return (opaque * base * under * self.angles.reflected
-                + self.mirrored_by_angle(opaque, metallic))
+                + metallic * self.several_by_angle + self.mirrored_by_angle(opaque, metallic))
 
     def mirrored_by_angle(self, opaque: float, metallic: float) -> np.ndarray:
         """(TERMS, 3), likewise."""
@@ -104,7 +109,8 @@ class PrincipledAlbedo:
             self.angles, mean, self.diffuse_roughness, self.shown * above, self.diffuse * under,
             gloss, self.specular_by_angle * under + by_angle[:, None],
             self.metal * under, self.metal_edge * under + mirrored,
-            self.metal_by_angle * under + by_angle[:, None], leaving, under)
+            self.metal_by_angle * under + by_angle[:, None], self.several * under,
+            self.several_by_angle * under, self.several_leaving, leaving, under)
 
 
 def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray, opaque: float
@@ -152,10 +158,16 @@ def principled_albedo(roughness: float, specular: float, ior: float, diffuse_rou
     seen = seen_roughness(roughness, filter_glossy)
     metal_ior = METAL_IOR if is_layered else ior_of(f0)
     # What several facets add has the roughness of the socket.
-    metal_gain = gloss_albedo(roughness, metal_ior, False, is_layered).gain(base, multiple)
+    rough_metal = gloss_albedo(roughness, metal_ior, False, is_layered)
+    metal_gain = rough_metal.gain(base, multiple)
+    arriving, several_leaving = rough_metal.several
     layer, metal = (gloss_albedo(seen, of_ior, False, is_layered)
                     for of_ior in (ior_of(f0), metal_ior))
+    once = np.array([np.full(3, metal.white - metal.edge), np.full(3, metal.edge)])
+    several = once * (metal_gain - 1.0)
     return PrincipledAlbedo(
         angles, seen, diffuse_roughness, shown, diffuse, np.full(3, layer.of(f0) * gain),
-        np.tile(layer.by_angle(f0)[:, None] * gain, 3), (metal.white - metal.edge) * metal_gain,
-        metal.edge * metal_gain, metal.by_angle(base) * metal_gain, leaving)
+        np.tile(layer.by_angle(f0)[:, None] * gain, 3), once[0] * metal_gain,
+        once[1] * metal_gain, metal.by_angle(base), several,
+        arriving[:, None] * (base * several[0] + several[1]), np.tile(several_leaving[:, None], 3),
+        leaving)
