@@ -370,8 +370,8 @@ def test_canopy(floor, new_object, new_light, build):
 
 @pytest.mark.xfail(strict=True, reason="what one facet keeps back depends on the angle of view")
 def test_canopy_of_rough_metal(floor, new_object, new_light):
-    """Does not hold yet: the floor gets 2.6 % too little (3.4, whose masking is another than that of
-    the lobes) and 1.7 % too much (from 4.0 on, where several facets add the more the more grazing
+    """Does not hold yet: the floor gets 2.6 % too little (3.4, whose masking is another than that
+    of the lobes) and 1.7 % too much (from 4.0 on, where several facets add the more the more grazing
     the view is)."""
     place_canopy(new_object, rough_metal)
     lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)

@@ -84,7 +84,6 @@ _VELVET = _MICROFIBERS[0], np.array([
 # Schlick's fifth power of the angle between the light and the half vector.
 _BURLEY_SHEEN = np.array([0.0004, 0.0037, 0.0452, 0.0375, 0.0550])
 
-
 MICROFIBERS, VELVET, BURLEY_SHEEN = range(3)  # rb_cloth
 CLOTHS = 3
 

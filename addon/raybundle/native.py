@@ -374,8 +374,8 @@ class Scene(_Handle):
 
     def set_material_cloth(self, material: int, cloth: int, reflectance: np.ndarray,
                            by_angle: np.ndarray, roughness: np.ndarray) -> None:
-        """cloth: rb_cloth, as in layers.py; (2, 3): what of the reflectance it sends back; (4, 2, 3):
-        how that depends on the light's angle; roughness: (2,)."""
+        """cloth: rb_cloth, as in layers.py; (2, 3): what of the reflectance it sends back;
+        (4, 2, 3): how that depends on the light's angle; roughness: (2,)."""
         arrays = [_float_array(values, shape, name) for values, shape, name in
                   ((reflectance, (2, 3), "reflectance"), (by_angle, (4, 2, 3), "by_angle"),
                    (roughness, (2,), "roughness"))]

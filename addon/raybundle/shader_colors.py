@@ -325,7 +325,7 @@ def _glossy(formula: _Formula, node: bpy.types.Node) -> _Value:
     color = formula.raw(node, 'Base Color' if 'Base Color' in node.inputs else 'Color')
     mean = max(float(np.mean(color)) if isinstance(color, tuple) else _USUAL_COLOR, 1e-6)
     albedo, gain, _, _ = glossy_albedo(node, _usual(formula, node, *GLOSS_SOCKETS[0]), mean,
-                                    formula.filter_glossy)
+                                       formula.filter_glossy)
     return formula.scaled(color, float(albedo.of(mean) * gain) / mean)
 
 

@@ -144,11 +144,11 @@ RB_API rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const fl
                                       const float offset[6], const float by_angle[24],
                                       const float roughness[2]);
 
-/* What of the reflectance cloth sends back (six floats, of the whole surface: RGB of the front side,
- * then of the back side), for light from everywhere, and how that depends on the angle of the light,
- * likewise a part of `reflected` of rb_set_material_angles. Where it goes to: as Cycles' sheen has it
- * from Blender 4.0 on, or its velvet, or its sheen before; roughness: of the front and of the back, 0
- * to 1 (of velvet sigma; of Burley's sheen unused). Without it nothing. */
+/* What of the reflectance cloth sends back (six floats, of the whole surface: RGB of the front
+ * side, then of the back side), for light from everywhere, and how that depends on the angle of the
+ * light, likewise a part of `reflected` of rb_set_material_angles. Where it goes to: as Cycles'
+ * sheen has it from Blender 4.0 on, or its velvet, or its sheen before; roughness: of the front and
+ * of the back, 0 to 1 (of velvet sigma; of Burley's sheen unused). Without it nothing. */
 typedef enum rb_cloth RB_INT {
     RB_CLOTH_MICROFIBERS = 0,
     RB_CLOTH_VELVET = 1,
@@ -159,8 +159,8 @@ RB_API rb_error rb_set_material_cloth(rb_scene scene, int32_t material, rb_cloth
                                       const float reflectance[6], const float by_angle[24],
                                       const float roughness[2]);
 
-/* Where what is neither mirrored nor cloth's goes, likewise: as by Lambert's law, or as Burley's or Oren and
- * Nayar's model has it, with a roughness (of the front and of the back), 0 to 1. */
+/* Where what is neither mirrored nor cloth's goes, likewise: as by Lambert's law, or as Burley's or
+ * Oren and Nayar's model has it, with a roughness (of the front and of the back), 0 to 1. */
 typedef enum rb_diffuse_model RB_INT {
     RB_DIFFUSE_LAMBERT = 0,
     RB_DIFFUSE_BURLEY = 1,
@@ -170,10 +170,10 @@ typedef enum rb_diffuse_model RB_INT {
 RB_API rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material,
                                               rb_diffuse_model model, const float roughness[2]);
 
-/* How that leaves, by angle, whatever light it is (LINE_REUSE): from under a layer that lets less of
- * it out at some angles. 1 plus the sum of these
- * factors times the term of rb_set_material_angles at the angle at which it leaves, less the term's
- * mean (six floats for each term, likewise). Without it 0. */
+/* How that leaves, by angle, whatever light it is (LINE_REUSE): from under a layer that lets less
+ * of it out at some angles, or from facets that do. 1 plus the sum of these factors times the term of
+ * rb_set_material_angles at the angle at which it leaves, less the term's mean (six floats for each
+ * term, likewise). Without it 0. */
 RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[24]);
 
 /* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.

@@ -3,8 +3,8 @@
 // Where the light of the sources comes from at a receiver: a few directions, each chosen with the
 // probability of its share of the light.
 //
-// Source: Vitter, "Random Sampling with a Reservoir" (1985), weighted by the light. Talbot, Cline and
-// Egbert, "Importance Resampling for Global Illumination" (2005): what is chosen of few samples has
+// Source: Vitter, "Random Sampling with a Reservoir" (1985), weighted by the light. Talbot, Cline
+// and Egbert, "Importance Resampling for Global Illumination" (2005): what is chosen of few samples has
 // to be weighted with what they hold in all, or a large source near by seems to be more at its rim,
 // from where less comes.
 #pragma once

@@ -28,8 +28,8 @@ constexpr int kMaxPasses = 200;  // through translucent patches
 // about the same tolerance.
 constexpr double kSameSolution = 1.2;
 // What is sent by direction is found in turns, each from the solution before it, until the share of
-// the reflected light that is left out is so many times the target error, for it is amplified as all
-// light is (0.7 % left out made a bright room 1.1 % too bright), and at most so many.
+// the reflected light that is left out is so many times the target error, for it is amplified as
+// all light is (0.7 % left out made a bright room 1.1 % too bright), and at most so many.
 constexpr double kSettledTurns = 0.25;
 constexpr int kMostTurns = 6;
 constexpr size_t kGrain = 2048;  // sides per task

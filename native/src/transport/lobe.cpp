@@ -12,7 +12,7 @@
 namespace raybundle {
 namespace {
 
-// Points of the mean of a lobe that is wide: Gauss and Legendre's along the cosine, and equal angles.
+// Points of the mean of a wide lobe: Gauss and Legendre's along the cosine, and equal angles.
 constexpr int kCosines = 8, kAngles = 16;
 constexpr float kCosine[kCosines] = {0.01985507f, 0.10166676f, 0.23723380f, 0.40828268f,
                                      0.59171732f, 0.76276620f, 0.89833324f, 0.98014493f};

@@ -8,8 +8,8 @@
 // Distribution of Visible Normals" (2018), with Fresnel's reflectance from f0 to 1 as Cycles has
 // it. Burley, "Physically-Based Shading at Disney" (2012). Fujii, "A tiny
 // improvement of Oren-Nayar reflectance model" (2012). Cloth: transport/microfibers.h; Ashikhmin,
-// Premoze and Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen, Schlick's
-// fifth power of the angle between the light and the half vector.
+// Premoze and Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen,
+// Schlick's fifth power of the angle between the light and the half vector.
 // Differs: each is brought to a mean of 1. How much a surface reflects, light that meets several
 // facets included, is known (scene/scene.h); here is only where to.
 #pragma once

@@ -47,8 +47,8 @@ struct DirectLight::Block {
         angles += other.angles;
         count += other.count;
     }
-    // Means of angleTerms. Less what few samples of which some are much brighter are off in the mean
-    // (Quenouille, "Notes on Bias in Estimation", 1956).
+    // Means of angleTerms. Less what few samples of which some are much brighter are off in the
+    // mean (Quenouille, "Notes on Bias in Estimation", 1956).
     template <class Blocks>
     glm::vec4 meanAngles(const Blocks& blocks) const {
         const glm::vec4 mean = angles / brightest(visible);
