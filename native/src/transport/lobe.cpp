@@ -25,7 +25,8 @@ constexpr int kRoughnesses = 11, kTableCosines = 25, kRings = 24, kInRing = 24;
 constexpr float kMeanEdge = 0.0534f;
 // Cosines below this are taken for it: V below stays finite.
 constexpr float kLeastCosine = 1e-3f;
-// Smoother cloth sends back a thousandth of the light, into lobes that the points of the mean miss.
+// Smoother cloth sends back a few hundredths of the light, into lobes that the points of the mean
+// miss.
 constexpr float kLeastClothRoughness = 0.2f;
 
 float fifthPower(float x) {
