@@ -355,14 +355,19 @@ def place_canopy(new_object, build):
     return canopy
 
 
+def place_lamp_below(new_light):
+    """On the floor, and shines up."""
+    lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)
+    lamp.rotation_euler = (np.pi, 0.0, 0.0)
+    bpy.context.view_layer.update()
+
+
 @pytest.mark.parametrize("build", UNIFORM + DIRECTED + VARYING, ids=lambda build: build.__name__)
 def test_canopy(floor, new_object, new_light, build):
     canopy = place_canopy(new_object, build)
     if build not in (image_emission, procedural_emission):
         # The floor sees it from behind.
-        lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)
-        lamp.rotation_euler = (np.pi, 0.0, 0.0)
-        bpy.context.view_layer.update()
+        place_lamp_below(new_light)
     compare(floor)
     if build in UNIFORM + DIRECTED:
         compare_sent(canopy)
@@ -374,9 +379,7 @@ def test_canopy_of_rough_metal(floor, new_object, new_light):
     of the lobes) and 1.7 % too much (from 4.0 on, where several facets add the more the more grazing
     the view is)."""
     place_canopy(new_object, rough_metal)
-    lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)
-    lamp.rotation_euler = (np.pi, 0.0, 0.0)
-    bpy.context.view_layer.update()
+    place_lamp_below(new_light)
     compare(floor)
 
 
@@ -386,9 +389,7 @@ def test_filter_glossy(floor, new_object, new_light, roughness):
     be up to 2 % more."""
     place_canopy(new_object, lambda tree: tree.add('BsdfPrincipled', Base_Color=RED,
                                                    Roughness=roughness))
-    lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)
-    lamp.rotation_euler = (np.pi, 0.0, 0.0)
-    bpy.context.view_layer.update()
+    place_lamp_below(new_light)
     compare(floor, filter_glossy=1.0)
 
 

@@ -212,22 +212,20 @@ class NodeReader:
                 *self._values(node, COAT_SOCKETS, path),
                 self._usual_color(node, *COAT_TINT, path), self.filter_glossy)
         opaque = 1.0 - metallic - through
-        # What several facets of the metal send back is in the reflectance, but spreads.
-        reflected, mirrored = (
-            base.scaled(metallic * (albedo.metal - less[0])).plus(ColorExpression(
-                opaque * albedo.specular + metallic * (albedo.metal_edge - less[1])))
-            for less in (np.zeros((2, 3)), albedo.several))
+        several = metallic * albedo.several  # spreads, and is not mirrored
+        mirrored = base.scaled(metallic * albedo.metal - several[0]).plus(ColorExpression(
+            opaque * albedo.specular + metallic * albedo.metal_edge - several[1]))
         shown = opaque * albedo.shown
         scattering = Scattering.mirror(
             mirrored, albedo.mirrored_by_angle(opaque, metallic), albedo.roughness).plus(
                 Scattering.matt(
                     opaque * mean, OREN_NAYAR if bpy.app.version >= (4, 0, 0) else BURLEY,
                     albedo.diffuse_roughness, albedo.leaving)).plus(
-                        Scattering.matt(
-                            metallic * (mean * albedo.several[0] + albedo.several[1]), OREN_NAYAR,
-                            0.0, albedo.several_leaving))
+                        Scattering.matt(mean * several[0] + several[1], OREN_NAYAR, 0.0,
+                                        albedo.several_leaving))
         surface = Surface(
-            reflected.plus(base.scaled(opaque * albedo.diffuse)), radiance.scaled(albedo.uncoated),
+            mirrored.plus(base.scaled(opaque * albedo.diffuse + several[0])).plus(
+                ColorExpression(several[1])), radiance.scaled(albedo.uncoated),
             through * mean * albedo.uncoated, base.scaled(shown),
             albedo.reflected_by_angle(mean, opaque, metallic), shown * mean * albedo.angles.shown,
             scattering=scattering)
