@@ -6,14 +6,15 @@ By the angle of the light, as a sum of the terms of diffuse_angles.py.
 Source: Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007), GGX with
 Smith's masking; sampled by its visible normals, Heitz, "Sampling the GGX Distribution of Visible
 Normals" (2018). Fresnel's reflectance runs from F0, seen from straight above, to 1 as that of a
-dielectric does: F = F0 + (1 - F0) f. The albedo is linear in F0 then: A = (a - b) F0 + b, where
-a is the albedo for F = 1 and b that for F = f.
+dielectric does: F = F0 + (1 - F0) f. That of metals from Blender 4.0 on by Schlick's fifth power, less
+a dip around 82 degrees, where a tint multiplies it: Kutz, Hasan and Edmondson, "Novel aspects of the
+Adobe Standard Material" (2023). The albedo is linear in F0 then: A = (a - b) F0 + b, where a is the
+albedo for F = 1 and b that for F = f.
 
 What differs: integrals by midpoints, good to 1e-3 (blend_tests/test_gloss.py), and the terms fitted
 to them, to 2 % up to 80 degrees; light that meets several facets is given back as Cycles'
 Multiscatter GGX does it (Turquin, "Practical multiple scattering compensation for microfacet
-models", 2019): by how much one facet keeps back towards the eye, most at grazing angles. Here what
-one facet mirrors goes where GGX sends it, and the rest spreads, by the angles of both.
+models", 2019): by how much one facet keeps back towards the eye, most at grazing angles.
 """
 
 from __future__ import annotations
@@ -29,45 +30,56 @@ import numpy as np
 from .diffuse_angles import TERMS, angle_terms
 
 _ANGLES = 96  # of view, equal shares of the projected solid angle
-_NORMALS = 16  # along each side of the unit square
-_STEPS = 64  # of the roughness; between them nothing is lost that could be seen
+_RINGS, _IN_RING = 32, 8  # visible normals, on one side of the plane of view
 # Of the rays that meet gloss after a diffuse bounce: mean of the cosine over pi, their density.
 _DENSITY = 2.0 / (3.0 * math.pi)
 _ABOVE = 0.9999  # cosine of the view from straight above
 
 
+# The fifth power at the angle where the tint of a metal's edge counts, and c (1 - c)^6 there.
+_DIP_EDGE, _DIP = (6.0 / 7.0)**5, (6.0 / 7.0)**6 / 7.0
+
+
 @dataclass(frozen=True)
 class GlossAlbedo:
-    """For F = 1, for F = f, and for F = 1 over all directions; shares of the light."""
+    """For F = 1, for F = f, for F = c (1 - c)^6 and for F = 1 over all directions; shares of the
+    light."""
 
     white: float
     edge: float
+    dip: float
     white_mean: float
-    # (2, TERMS), for F = 1 and F = f: the albedo at an angle is its mean plus the sum of these
+    # (3, TERMS), for the first three: the albedo at an angle is its mean plus the sum of these
     # times what the terms differ from their means.
     angles: np.ndarray
-    # (2, TERMS): likewise what several facets add, over its mean, by the angle at which light
-    # arrives and by that at which it leaves.
+    # (TERMS,): likewise what several facets add, over its mean, by the angle at which light arrives.
     several: np.ndarray
 
-    def by_angle(self, f0: np.ndarray | float) -> np.ndarray:
+    def by_angle(self, f0: np.ndarray | float, tint: np.ndarray | float = 1.0) -> np.ndarray:
         """(TERMS,) and the shape of f0: of(f0) by the angle, as `angles`."""
-        white, edge = (part.reshape(TERMS, *[1] * np.ndim(f0)) for part in self.angles)
-        return (white - edge) * f0 + edge
+        white, edge, dip = (part.reshape(TERMS, *[1] * np.ndim(f0)) for part in self.angles)
+        return (white - edge) * f0 + edge - _dip_at(f0, tint) * dip
 
-    def gain(self, f0: np.ndarray | float, multiple: bool) -> np.ndarray:
+    def gain(self, f0: np.ndarray | float, multiple: bool, tint: np.ndarray | float = 1.0
+             ) -> np.ndarray:
         """What light that meets several facets adds, as a factor."""
-        return self.of(f0, multiple) / np.maximum(self.of(f0), 1e-6)
+        return self.of(f0, multiple, tint) / np.maximum(self.of(f0, tint=tint), 1e-6)
 
-    def of(self, f0: np.ndarray | float, multiple: bool = False) -> np.ndarray:
-        """Albedo by F0. multiple: with light that meets several facets."""
-        once = (self.white - self.edge) * f0 + self.edge
+    def of(self, f0: np.ndarray | float, multiple: bool = False, tint: np.ndarray | float = 1.0
+           ) -> np.ndarray:
+        """Albedo by F0. multiple: with light that meets several facets. tint: of a metal's edge."""
+        dip = _dip_at(f0, tint)
+        once = (self.white - self.edge) * f0 + self.edge - dip * self.dip
         if not multiple:
             return once
-        # Schlick's mean, or a colour that is the same at all angles.
-        fresnel = f0 + (1.0 - f0) / 21.0 if self.edge > 0.0 else f0
+        # Schlick's mean, less that of the dip, or a colour that is the same at all angles.
+        fresnel = f0 + (1.0 - f0) / 21.0 - dip / 126.0 if self.edge > 0.0 else f0
         again = fresnel * self.white_mean / (1.0 - fresnel * (1.0 - self.white_mean))
         return once * (1.0 + again * (1.0 - self.white) / self.white)
+
+
+def _dip_at(f0: np.ndarray | float, tint: np.ndarray | float) -> np.ndarray:
+    return (f0 + (1.0 - f0) * _DIP_EDGE) * (1.0 - tint) / _DIP
 
 
 def filter_glossy_of(scene: bpy.types.Scene) -> float | None:
@@ -88,56 +100,58 @@ def seen_roughness(roughness: float, filter_glossy: float) -> float:
     return math.sqrt(alpha)
 
 
-def gloss_albedo(roughness: float, ior: float, from_above: bool = False,
+def gloss_albedo(roughness: float, ior: float | None, from_above: bool = False,
                  correlated: bool = True) -> GlossAlbedo:
-    """roughness: 0 to 1, of Blender's sockets. ior: of the dielectric whose Fresnel's it has.
+    """roughness: 0 to 1, of Blender's sockets. ior: of the dielectric whose Fresnel's it has; None:
+    as metals from 4.0 on.
 
     The mean over all directions of view or that from straight above. correlated: masking and
     shadowing depend on each other, as in Cycles from 4.0 on.
     """
-    step = round(_STEPS * min(max(roughness, 0.0), 1.0)) / _STEPS
-    ior = round(max(ior, 1.0), 3)
-    white, edge, angles, several = _means(step, ior, correlated)
-    white_mean = white
+    roughness = round(min(max(roughness, 0.0), 1.0), 3)
+    ior = None if ior is None else round(max(ior, 1.0), 3)
+    means, angles, several = _means(roughness, ior, correlated)
+    values = means
     if from_above:
-        white, edge = (float(values[0])
-                       for values in _integrals(np.array([_ABOVE]), step, ior, correlated))
-    return GlossAlbedo(white, edge, white_mean, angles, several)
+        values = _integrals(np.array([_ABOVE]), roughness, ior, correlated)[:, 0]
+    return GlossAlbedo(*map(float, values), float(means[0]), angles, several)
 
 
 @lru_cache(maxsize=256)
-def _means(roughness: float, ior: float, correlated: bool
-           ) -> tuple[float, float, np.ndarray, np.ndarray]:
+def _means(roughness: float, ior: float | None, correlated: bool
+           ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cosines = np.sqrt((np.arange(_ANGLES) + 0.5) / _ANGLES)
-    white, edge = _integrals(cosines, roughness, ior, correlated)
+    albedos = _integrals(cosines, roughness, ior, correlated)
     # The BSDF is the same with light and view exchanged.
-    arriving, _ = _integrals(cosines, roughness, ior, correlated,
-                             lambda light: np.interp(light, cosines, 1.0 / white - 1.0))
+    lost = 1.0 / albedos[0] - 1.0
+    several = _integrals(cosines, roughness, ior, correlated,
+                         lambda light: np.interp(light, cosines, lost))[0]
     terms = angle_terms(cosines)
     terms -= terms.mean(axis=0)
 
     def fit(values: np.ndarray) -> np.ndarray:
         return np.linalg.lstsq(terms, values - values.mean(), rcond=None)[0]
 
-    several = [fit(part) / max(part.mean(), 1e-6) for part in (arriving, 1.0 - white)]
-    return (float(white.mean()), float(edge.mean()), np.array([fit(white), fit(edge)]),
-            np.array(several))
+    return (albedos.mean(axis=1), np.array([fit(part) for part in albedos]),
+            fit(several) / max(several.mean(), 1e-6))
 
 
-def _integrals(cosines: np.ndarray, roughness: float, ior: float, correlated: bool,
-               factor: Callable[[np.ndarray], np.ndarray] | None = None
-               ) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) each, for F = 1 and F = f, at some cosines of the view, (n,). factor: by the cosine of
-    the light; None: 1."""
+def _integrals(cosines: np.ndarray, roughness: float, ior: float | None, correlated: bool,
+               factor: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
+    """(3, n), for F = 1, F = f and F = c (1 - c)^6, at some cosines of the view, (n,). factor: by
+    the cosine of the light; None: 1."""
     alpha = max(roughness * roughness, 1e-4)
     cosines = cosines[:, None, None]
-    steps = (np.arange(_NORMALS) + 0.5) / _NORMALS
     view_x, view_z = np.sqrt(1.0 - cosines**2), cosines
 
     # Heitz, listing 1; the view has no y.
     length = np.sqrt((alpha * view_x)**2 + view_z**2)
     stretched_x, stretched_z = alpha * view_x / length, view_z / length
-    radius, angle = np.sqrt(steps)[:, None], 2.0 * np.pi * steps[None, :]
+    # Closer towards the rim, where what they mirror is near the surface.
+    inward = 1.0 - (np.arange(_RINGS)[:, None] + 0.5) / _RINGS
+    radius, share = 1.0 - inward**2, inward * (1.0 - inward**2)
+    share /= share.mean()
+    angle = np.pi * ((np.arange(_IN_RING) + 0.5) / _IN_RING - 0.5)
     t1, t2 = radius * np.cos(angle), radius * np.sin(angle)
     half = 0.5 * (1.0 + stretched_z)
     t2 = (1.0 - half) * np.sqrt(np.maximum(1.0 - t1**2, 0.0)) + half * t2
@@ -152,11 +166,12 @@ def _integrals(cosines: np.ndarray, roughness: float, ior: float, correlated: bo
     light_z = 2.0 * cosine * normal[2] - view_z
     above = light_z > 0.0
     seen, lit = _masking(view_z, alpha), _masking(np.where(above, light_z, 1.0), alpha)
-    weight = above * ((1.0 + seen) / (1.0 + seen + lit) if correlated else 1.0 / (1.0 + lit))
+    weight = share * above * ((1.0 + seen) / (1.0 + seen + lit) if correlated else 1.0 / (1.0 + lit))
     if factor is not None:
         weight = weight * factor(np.clip(light_z, 0.0, 1.0))
-    edge = weight * _edge(np.clip(cosine, 0.0, 1.0), ior)
-    return weight.mean(axis=(1, 2)), edge.mean(axis=(1, 2))
+    cosine = np.clip(cosine, 0.0, 1.0)
+    parts = weight, weight * _edge(cosine, ior), weight * cosine * (1.0 - cosine)**6
+    return np.array([part.mean(axis=(1, 2)) for part in parts])
 
 
 def _masking(cosine: np.ndarray, alpha: float) -> np.ndarray:
@@ -165,8 +180,10 @@ def _masking(cosine: np.ndarray, alpha: float) -> np.ndarray:
     return 0.5 * (np.sqrt(1.0 + alpha**2 * tangent) - 1.0)
 
 
-def _edge(cosine: np.ndarray, ior: float) -> np.ndarray:
-    """f: Fresnel's reflectance of a dielectric less that at right angles, 0 to 1."""
+def _edge(cosine: np.ndarray, ior: float | None) -> np.ndarray:
+    """f: how far Fresnel's reflectance is from that at right angles to 1."""
+    if ior is None:
+        return (1.0 - cosine)**5
     f0 = ((ior - 1.0) / (ior + 1.0))**2
     if f0 <= 0.0:
         return np.zeros_like(cosine)

@@ -84,8 +84,7 @@ _VELVET = _MICROFIBERS[0], np.array([
 # Schlick's fifth power of the angle between the light and the half vector.
 _BURLEY_SHEEN = np.array([0.0004, 0.0037, 0.0452, 0.0375, 0.0550])
 
-MICROFIBERS, VELVET, BURLEY_SHEEN = range(3)  # rb_cloth
-CLOTHS = 3
+MICROFIBERS, VELVET, BURLEY_SHEEN, SEVERAL_FACETS = LOBES = range(4)  # rb_lobe
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,7 @@ class Layer:
     angles: np.ndarray  # (1 + TERMS,): albedo by the angle of view
     # (1 + TERMS,): what is seen from straight above, as diffuse light, of light by its angle.
     shown: np.ndarray = field(default_factory=lambda: np.zeros(1 + TERMS))
-    kind: int | None = None  # of cloth
+    lobe: int | None = None  # of cloth
     roughness: float = 0.0
     _arriving: np.ndarray | None = None  # (TERMS,), where that is not by_angle
     covers: bool = False  # whether what it sends back is missing from what lies beneath
@@ -133,12 +132,12 @@ def microfibers(roughness: float) -> Layer:
 
 def burley_sheen() -> Layer:
     """What is seen of it from straight above, 0.03 %, is left out."""
-    return Layer(_BURLEY_SHEEN, kind=BURLEY_SHEEN)
+    return Layer(_BURLEY_SHEEN, lobe=BURLEY_SHEEN)
 
 
 def velvet(sigma: float) -> Layer:
     """To Cycles it is gloss: diffuse light does not show it."""
-    return Layer(_row(_VELVET, sigma), kind=VELVET, roughness=sigma)
+    return Layer(_row(_VELVET, sigma), lobe=VELVET, roughness=sigma)
 
 
 @lru_cache(maxsize=64)

@@ -11,6 +11,7 @@ import numpy as np
 from .color_expression import WHITE, ColorExpression, Texture
 from .diffuse_angles import lambert
 from .image_export import ImagePixels
+from .layers import LOBES
 from .node_reader import NodeReader, Surface, output_node
 from .scene_data import ImageData, MaterialData, SceneData, Warnings
 from .surface_bake import BakedMaterial
@@ -225,7 +226,6 @@ class MaterialExporter:
     def _scattering(sides: list[Surface]) -> dict[str, np.ndarray | int]:
         """Fields of MaterialData."""
         lines = [_line_to(side.scattering.gloss, side.reflectance) for side in sides]
-        cloths = [side.scattering.cloth_kind() for side in sides]
         models = [side.scattering.diffuse_model() for side in sides]
         return {
             'gloss_scale': np.array([scale for scale, _ in lines]),
@@ -233,10 +233,11 @@ class MaterialExporter:
             'gloss_by_angle': _by_side([side.scattering.by_angle for side in sides]),
             'gloss_roughness': np.array([side.scattering.gloss_roughness()
                                          for side in sides]),
-            'cloth_kind': cloths[0][0],
-            'cloth': np.array([side.scattering.cloth[:, 0].sum(axis=0) for side in sides]),
-            'cloth_by_angle': _by_side([side.scattering.cloth_by_angle for side in sides]),
-            'cloth_roughness': np.array([roughness for _, roughness in cloths]),
+            'separate_masking': bpy.app.version < (4, 0, 0),
+            'lobes': _by_side([side.scattering.lobes[:, 0] for side in sides]),
+            'lobes_by_angle': np.stack([side.scattering.lobes_by_angle for side in sides], axis=2),
+            'lobe_roughness': np.array([[side.scattering.lobe_roughness(lobe) for side in sides]
+                                        for lobe in LOBES]),
             'diffuse_model': models[0][0],
             'diffuse_roughness': np.array([roughness for _, roughness in models]),
             'leaving': _by_side([side.scattering.leaving_factors() for side in sides])}

@@ -108,8 +108,8 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_material_emission_corner_colors': (_handle, _int, _floats),
     'rb_set_material_diffuse': (_handle, _int, _floats, _floats),
     'rb_set_material_angles': (_handle, _int, _floats, _floats),
-    'rb_set_material_gloss': (_handle, _int, _floats, _floats, _floats, _floats),
-    'rb_set_material_cloth': (_handle, _int, _int, _floats, _floats, _floats),
+    'rb_set_material_gloss': (_handle, _int, _floats, _floats, _floats, _int, _floats),
+    'rb_set_material_lobe': (_handle, _int, _int, _floats, _floats, _floats),
     'rb_set_material_diffuse_model': (_handle, _int, _int, _floats),
     'rb_set_material_leaving': (_handle, _int, _floats),
     'rb_set_material_translucence': (_handle, _int, _floats, _int, _floats),
@@ -364,23 +364,28 @@ class Scene(_Handle):
             self._pointer, material, _as_floats(scale), _as_floats(offset))
 
     def set_material_gloss(self, material: int, scale: np.ndarray, offset: np.ndarray,
-                           by_angle: np.ndarray, roughness: np.ndarray) -> None:
+                           by_angle: np.ndarray, separate_masking: bool, roughness: np.ndarray
+                           ) -> None:
         """(2, 3): of the reflectance, scale times it plus offset is mirrored; by_angle: (4, 2, 3),
-        how that depends on the light's angle; roughness: (2,), of GGX."""
-        arrays = [_float_array(values, shape, name) for values, shape, name in
-                  ((scale, (2, 3), "scale"), (offset, (2, 3), "offset"),
-                   (by_angle, (4, 2, 3), "by_angle"), (roughness, (2,), "roughness"))]
-        self._library.rb_set_material_gloss(self._pointer, material, *map(_as_floats, arrays))
+        how that depends on the light's angle; separate_masking: rb_masking; roughness: (2,), of
+        GGX."""
+        scale = _float_array(scale, (2, 3), "scale")
+        offset = _float_array(offset, (2, 3), "offset")
+        by_angle = _float_array(by_angle, (4, 2, 3), "by_angle")
+        roughness = _float_array(roughness, (2,), "roughness")
+        self._library.rb_set_material_gloss(
+            self._pointer, material, _as_floats(scale), _as_floats(offset), _as_floats(by_angle),
+            int(separate_masking), _as_floats(roughness))
 
-    def set_material_cloth(self, material: int, cloth: int, reflectance: np.ndarray,
-                           by_angle: np.ndarray, roughness: np.ndarray) -> None:
-        """cloth: rb_cloth, as in layers.py; (2, 3): what of the reflectance it sends back;
+    def set_material_lobe(self, material: int, lobe: int, reflectance: np.ndarray,
+                          by_angle: np.ndarray, roughness: np.ndarray) -> None:
+        """lobe: rb_lobe, as in layers.py; (2, 3): what of the reflectance it sends;
         (4, 2, 3): how that depends on the light's angle; roughness: (2,)."""
         arrays = [_float_array(values, shape, name) for values, shape, name in
                   ((reflectance, (2, 3), "reflectance"), (by_angle, (4, 2, 3), "by_angle"),
                    (roughness, (2,), "roughness"))]
-        self._library.rb_set_material_cloth(
-            self._pointer, material, cloth, *map(_as_floats, arrays))
+        self._library.rb_set_material_lobe(
+            self._pointer, material, lobe, *map(_as_floats, arrays))
 
     def set_material_diffuse_model(self, material: int, model: int, roughness: np.ndarray) -> None:
         """model: rb_diffuse_model, as in scattering.py; roughness: (2,)."""

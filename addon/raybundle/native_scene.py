@@ -27,9 +27,11 @@ def build_native_scene(data: SceneData) -> native.Scene:
         scene.set_material_diffuse(identifier, material.diffuse_scale, material.diffuse_offset)
         scene.set_material_angles(identifier, material.reflected_by_angle, material.shown_by_angle)
         scene.set_material_gloss(identifier, material.gloss_scale, material.gloss_offset,
-                                 material.gloss_by_angle, material.gloss_roughness)
-        scene.set_material_cloth(identifier, material.cloth_kind, material.cloth,
-                                 material.cloth_by_angle, material.cloth_roughness)
+                                 material.gloss_by_angle, material.separate_masking,
+                                 material.gloss_roughness)
+        for lobe, parts in enumerate(zip(material.lobes, material.lobes_by_angle,
+                                         material.lobe_roughness)):
+            scene.set_material_lobe(identifier, lobe, *parts)
         scene.set_material_diffuse_model(identifier, material.diffuse_model,
                                          material.diffuse_roughness)
         scene.set_material_leaving(identifier, material.leaving)

@@ -18,11 +18,11 @@ from mathutils import Euler, Matrix
 
 from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
 from .diffuse_angles import TERMS, oren_nayar
-from .gloss import GlossAlbedo, gloss_albedo, seen_roughness
+from .gloss import gloss_albedo, seen_roughness
 from .image_export import ImagePixels, sphere_mean
 from .layers import Layer, microfibers, velvet
-from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, METAL_IOR, SHEEN_SOCKETS,
-                         SHEEN_TINT, principled_albedo, sheen_on)
+from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, SHEEN_TINT,
+                         SPECULAR_TINT, principled_albedo, sheen_on)
 from .scattering import BURLEY, OREN_NAYAR, Scattering
 from .scene_data import Warnings
 
@@ -54,6 +54,7 @@ GLOSSY = ('BSDF_GLOSSY', 'BSDF_ANISOTROPIC', 'BSDF_METALLIC')
 # Those that are a layer alone; names of the socket of its roughness, and what it usually is.
 CLOTH = ('BSDF_SHEEN', 'BSDF_VELVET')
 CLOTH_ROUGHNESS = ('Roughness', 'Sigma'), 0.5
+EDGE_TINT = ('Edge Tint',), 1.0  # of metals
 MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughness of 0.45 or more"
 
 
@@ -208,11 +209,11 @@ class NodeReader:
         mean = np.clip(base.mean(), 0.0, 1.0)
         albedo = principled_albedo(
             *self._values(node, GLOSS_SOCKETS, path), node.distribution == 'MULTI_GGX', mean,
-            self.filter_glossy).coated(
+            self.filter_glossy, self._usual_color(node, *SPECULAR_TINT, path)).coated(
                 *self._values(node, COAT_SOCKETS, path),
                 self._usual_color(node, *COAT_TINT, path), self.filter_glossy)
         opaque = 1.0 - metallic - through
-        several = metallic * albedo.several  # spreads, and is not mirrored
+        several = metallic * albedo.several
         mirrored = base.scaled(metallic * albedo.metal - several[0]).plus(ColorExpression(
             opaque * albedo.specular + metallic * albedo.metal_edge - several[1]))
         shown = opaque * albedo.shown
@@ -221,8 +222,9 @@ class NodeReader:
                 Scattering.matt(
                     opaque * mean, OREN_NAYAR if bpy.app.version >= (4, 0, 0) else BURLEY,
                     albedo.diffuse_roughness, albedo.leaving)).plus(
-                        Scattering.matt(mean * several[0] + several[1], OREN_NAYAR, 0.0,
-                                        albedo.several_leaving))
+                        Scattering.several_facets(
+                            mean * several[0] + several[1], metallic * albedo.several_by_angle,
+                            albedo.roughness))
         surface = Surface(
             mirrored.plus(base.scaled(opaque * albedo.diffuse + several[0])).plus(
                 ColorExpression(several[1])), radiance.scaled(albedo.uncoated),
@@ -259,14 +261,15 @@ class NodeReader:
         color = self.color(_input(node, 'Color', 'Base Color'), path)
         roughness = self._usual(node, *GLOSS_SOCKETS[0], path)
         mean = np.maximum(np.clip(color.mean(), 0.0, 1.0), 1e-6)
-        albedo, gain, several, seen = glossy_albedo(node, roughness, mean, self.filter_glossy)
-        once, by_angle = albedo.of(mean), albedo.by_angle(mean)
-        again = once * (gain - 1.0)
+        gloss = glossy_albedo(node, roughness, mean, self.filter_glossy,
+                              self._usual_color(node, *EDGE_TINT, path))
+        several_by_angle = gloss.several[:, None] * gloss.again
         return Surface(
-            color.scaled(once * gain / mean),
-            reflected_by_angle=by_angle + again * several[0][:, None],
-            scattering=Scattering.mirror(color.scaled(once / mean), by_angle, seen).plus(
-                Scattering.matt(again, OREN_NAYAR, 0.0, several[1][:, None])))
+            color.scaled((gloss.once + gloss.again) / mean),
+            reflected_by_angle=gloss.by_angle + several_by_angle,
+            scattering=Scattering.mirror(
+                color.scaled(gloss.once / mean), gloss.by_angle, gloss.roughness).plus(
+                    Scattering.several_facets(gloss.again, several_by_angle, gloss.roughness)))
 
     def _usual(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                path: tuple[bpy.types.Node, ...]) -> float:
@@ -523,22 +526,35 @@ class NodeReader:
 _VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')
 
 
-def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray | float,
-                  filter_glossy: float) -> tuple[GlossAlbedo, np.ndarray, np.ndarray, float]:
-    """Of a Glossy shader (or a metal's, whose edge is as bright as it can be) as diffuse light sees
-    it: the albedo of its color, what several facets add as a factor and by the angles
-    (GlossAlbedo.several), and the roughness."""
+@dataclass(frozen=True)
+class Glossy:
+    """A Glossy shader's albedo of its colour, as diffuse light sees it."""
+
+    once: np.ndarray  # (3,), by one facet, and (TERMS, 3) that by angle
+    by_angle: np.ndarray
+    again: np.ndarray  # (3,), what several facets add
+    several: np.ndarray  # (TERMS,), see GlossAlbedo
+    roughness: float
+
+
+def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray, filter_glossy: float,
+                  tint: np.ndarray) -> Glossy:
+    """color: (3,). tint: (3,), of the edge, which metals alone have. What several facets add has
+    the roughness of the socket."""
     if node.distribution == 'SHARP':
         roughness = 0.0
     seen = seen_roughness(roughness, filter_glossy)
     albedos = []
     for value in (roughness, seen):
-        albedo = gloss_albedo(value, METAL_IOR, correlated=bpy.app.version >= (4, 0, 0))
+        albedo = gloss_albedo(value, None, correlated=bpy.app.version >= (4, 0, 0))
         if node.type != 'BSDF_METALLIC':
-            albedo = replace(albedo, edge=0.0, angles=albedo.angles * [[1.0], [0.0]])
+            # Of one colour at all angles.
+            albedo = replace(albedo, edge=0.0, angles=albedo.angles * [[1.0], [0.0], [1.0]])
         albedos.append(albedo)
-    gain = albedos[0].gain(color, node.distribution == 'MULTI_GGX')
-    return albedos[1], gain, albedos[0].several, seen
+    of_socket, of_seen = albedos
+    once = of_seen.of(color, tint=tint)
+    gain = of_socket.gain(color, node.distribution == 'MULTI_GGX', tint)
+    return Glossy(once, of_seen.by_angle(color, tint), once * (gain - 1.0), of_socket.several, seen)
 
 
 def cloth_layer(node: bpy.types.Node, roughness: float) -> Layer:

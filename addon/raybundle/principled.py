@@ -28,8 +28,10 @@ COAT_SOCKETS = ((('Coat Weight', 'Clearcoat'), 0.0),
 SHEEN_SOCKETS = ((('Sheen Weight', 'Sheen'), 0.0), (('Sheen Roughness',), 0.5))
 # Of their colours; sheen's is a number before 4.0.
 COAT_TINT, SHEEN_TINT = (('Coat Tint',), 1.0), (('Sheen Tint',), 1.0)
-METAL_IOR = 1.5  # of the increase towards grazing angles
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# Of the specular layer, and of metals' edges; a number before 4.0.
+SPECULAR_TINT = ('Specular Tint',), 1.0 if bpy.app.version >= (4, 0, 0) else 0.0
+# Before 4.0, by which a tint has the base's hue: of sheen, and of the specular layer.
+_LUMINANCE, _ROUGH_LUMINANCE = np.array([0.2126, 0.7152, 0.0722]), np.array([0.3, 0.6, 0.1])
 _VIEWS = np.sqrt((np.arange(24) + 0.5) / 24)  # cosines, of equal shares of the projected solid angle
 
 
@@ -52,11 +54,10 @@ class PrincipledAlbedo:
     metal: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_edge: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (2, 3): the part of metal and metal_edge that several facets send back. (TERMS, 3): it by the
-    # angle at which light arrives, and over its mean by that at which it leaves.
+    # (2, 3): the part of metal and metal_edge that several facets send back; (TERMS, 3): that by
+    # the angle.
     several: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
     several_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    several_leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
     # (TERMS, 3): how the layers let the diffuse light out (rb_set_material_leaving).
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
     # (3,): what the coat leaves of emission and of light that goes through.
@@ -110,7 +111,7 @@ class PrincipledAlbedo:
             gloss, self.specular_by_angle * under + by_angle[:, None],
             self.metal * under, self.metal_edge * under + mirrored,
             self.metal_by_angle * under + by_angle[:, None], self.several * under,
-            self.several_by_angle * under, self.several_leaving, leaving, under)
+            self.several_by_angle * under, leaving, under)
 
 
 def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray, opaque: float
@@ -118,56 +119,60 @@ def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray
     """The layer on top of a whole surface, and its colour. tint, base: (3,)."""
     if bpy.app.version >= (4, 0, 0):
         return microfibers(roughness), min(max(weight, 0.0), 1.0) * np.maximum(tint, 0.0)
-    # What is not metal and does not let light through has it, in white and the base's hue.
-    luminance = float(_LUMINANCE @ base)
+    # What is not metal and does not let light through has it.
+    return burley_sheen(), max(weight, 0.0) * opaque * _in_hue(base, tint, _LUMINANCE)
+
+
+def _in_hue(base: np.ndarray, share: np.ndarray | float, weights: np.ndarray) -> np.ndarray:
+    """(3,), white and a share of the base's hue. weights: of its luminance."""
+    luminance = float(weights @ base)
     hue = base / luminance if luminance > 0.0 else np.zeros(3)
-    return burley_sheen(), max(weight, 0.0) * opaque * (1.0 + tint * (hue - 1.0))
+    return 1.0 + share * (hue - 1.0)
 
 
 def principled_albedo(roughness: float, specular: float, ior: float, diffuse_roughness: float,
-                      multiple: bool, base: np.ndarray | float, filter_glossy: float | None
-                      ) -> PrincipledAlbedo:
+                      multiple: bool, base: np.ndarray | float, filter_glossy: float | None,
+                      tint: np.ndarray | float = SPECULAR_TINT[1]) -> PrincipledAlbedo:
     """Values of the sockets (specular: Specular or Specular IOR Level); multiple: whether the
     distribution is Multiscatter GGX; base: the base colour, by which light is lost where it meets
-    several facets. filter_glossy: see gloss.filter_glossy_of."""
+    several facets. filter_glossy: see gloss.filter_glossy_of. tint: Specular Tint, (3,) or one."""
     is_layered = bpy.app.version >= (4, 0, 0)
     f0 = 0.08 * specular
     if is_layered:
         f0 = 2.0 * specular * ((ior - 1.0) / (ior + 1.0))**2
     f0 = min(max(f0, 0.0), 0.99)
     base = np.broadcast_to(base, 3)
-    layer, layer_above = (gloss_albedo(roughness, ior_of(f0), from_above, is_layered)
+    specular_ior = ior_of(f0)
+    tint = np.clip(np.broadcast_to(tint, 3), 0.0, 1.0)
+    f0 = f0 * (tint if is_layered else _in_hue(base, tint, _ROUGH_LUMINANCE))
+    layer, layer_above = (gloss_albedo(roughness, specular_ior, from_above, is_layered)
                           for from_above in (False, True))
-    reflected, reflected_above = (float(albedo.of(f0, multiple))
-                                  for albedo in (layer, layer_above))
-    if is_layered:
-        # What it mirrors towards the eye is missing, wherever the light comes from.
-        under, shown = 1.0 - reflected, 1.0 - reflected_above
-        angles = oren_nayar(diffuse_roughness, base)
-    else:
-        under = shown = 1.0
-        angles, diffuse_roughness = burley(roughness), roughness
-    shown, diffuse = np.full(3, shown), under * angles.albedo
     gain = layer.gain(f0, multiple)
     leaving = np.zeros((TERMS, 3))
     if is_layered:
-        leaving = leaving - layer.by_angle(f0)[:, None] * gain / under
+        # What it mirrors towards the eye is missing, of all colours, wherever light comes from.
+        brightest = int(f0.argmax())
+        under = 1.0 - layer.of(f0, multiple)[brightest]
+        shown = np.full(3, 1.0 - layer_above.of(f0, multiple)[brightest])
+        leaving = leaving - (layer.by_angle(f0) * gain)[:, [brightest]] / under
+        angles = oren_nayar(diffuse_roughness, base)
+    else:
+        under, shown = 1.0, np.ones(3)
+        angles, diffuse_roughness = burley(roughness), roughness
+    diffuse = under * angles.albedo
     if filter_glossy is None:
         return PrincipledAlbedo(angles, roughness, diffuse_roughness, shown, diffuse,
                                 leaving=leaving)
     seen = seen_roughness(roughness, filter_glossy)
-    metal_ior = METAL_IOR if is_layered else ior_of(f0)
+    metal_ior, metal_tint = (None, tint) if is_layered else (specular_ior, 1.0)
     # What several facets add has the roughness of the socket.
     rough_metal = gloss_albedo(roughness, metal_ior, False, is_layered)
-    metal_gain = rough_metal.gain(base, multiple)
-    arriving, several_leaving = rough_metal.several
-    layer, metal = (gloss_albedo(seen, of_ior, False, is_layered)
-                    for of_ior in (ior_of(f0), metal_ior))
-    once = np.array([np.full(3, metal.white - metal.edge), np.full(3, metal.edge)])
-    several = once * (metal_gain - 1.0)
+    layer, metal = (gloss_albedo(seen, ior, False, is_layered)
+                    for ior in (specular_ior, metal_ior))
+    black, white = (metal.of(np.full(3, value), tint=metal_tint) for value in (0.0, 1.0))
+    once = np.array([white - black, black])
+    several = once * (rough_metal.gain(base, multiple, metal_tint) - 1.0)
     return PrincipledAlbedo(
-        angles, seen, diffuse_roughness, shown, diffuse, np.full(3, layer.of(f0) * gain),
-        np.tile(layer.by_angle(f0)[:, None] * gain, 3), once[0] * metal_gain,
-        once[1] * metal_gain, metal.by_angle(base), several,
-        arriving[:, None] * (base * several[0] + several[1]), np.tile(several_leaving[:, None], 3),
-        leaving)
+        angles, seen, diffuse_roughness, shown, diffuse, layer.of(f0) * gain,
+        layer.by_angle(f0) * gain, *(once + several), metal.by_angle(base, metal_tint), several,
+        rough_metal.several[:, None] * (base * several[0] + several[1]), leaving)

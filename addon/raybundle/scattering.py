@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where surfaces that are not Lambert's send the light of the sources.
 
-By the direction it comes from: gloss as GGX mirrors it, cloth (layers.py), the diffuse rest as
-Burley's or Oren and Nayar's model has it (native/src/transport/lobe.h). What differs from Cycles: a
-surface has one gloss, one cloth and one diffuse model, with the means of the roughnesses that it is
-mixed of.
+By the direction it comes from: gloss as GGX mirrors it, cloth (layers.py) and several facets of
+gloss by lobes of their own, the diffuse rest as Burley's or Oren and Nayar's model has it
+(native/src/transport/lobe.h). What differs from Cycles: a surface has one gloss, one lobe of each
+kind and one diffuse model, with the means of the roughnesses that it is mixed of.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from .color_expression import ColorExpression
 from .diffuse_angles import TERMS
-from .layers import CLOTHS, Layer
+from .layers import LOBES, SEVERAL_FACETS, Layer
 
 LAMBERT, BURLEY, OREN_NAYAR = range(3)  # rb_diffuse_model
 
@@ -28,10 +28,10 @@ class Scattering:
     # (TERMS, 3): of it, by the terms of diffuse_angles.py.
     by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
     rough_gloss: float = 0.0  # means of gloss times roughness, as diffuse light sees it
-    # (CLOTHS, 2, 3): for each kind of cloth what of the reflectance it sends back, and that times
-    # the roughness. (TERMS, 3): of all of them, by angle.
-    cloth: np.ndarray = field(default_factory=lambda: np.zeros((CLOTHS, 2, 3)))
-    cloth_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
+    # (LOBES, 2, 3): what of the reflectance each lobe sends, and that times the roughness.
+    # (LOBES, TERMS, 3): by angle.
+    lobes: np.ndarray = field(default_factory=lambda: np.zeros((len(LOBES), 2, 3)))
+    lobes_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((len(LOBES), TERMS, 3)))
     # (2, 2, 3): for Burley's model and for Oren and Nayar's, of which Lambert's is one, the mean
     # diffuse colour, and that times the roughness.
     diffuse: np.ndarray = field(default_factory=lambda: np.zeros((2, 2, 3)))
@@ -53,14 +53,26 @@ class Scattering:
     @staticmethod
     def clothed(color: np.ndarray, layer: Layer) -> Scattering:
         """color: (3,), times the layer's albedo."""
-        cloth = np.zeros((CLOTHS, 2, 3))
-        cloth[layer.kind] = [layer.albedo * color, layer.roughness * layer.albedo * color]
-        return Scattering(cloth=cloth, cloth_by_angle=layer.arriving[:, None] * color)
+        return Scattering._of_lobe(layer.lobe, layer.albedo * color,
+                                   layer.arriving[:, None] * color, layer.roughness)
+
+    @staticmethod
+    def several_facets(color: np.ndarray, by_angle: np.ndarray, roughness: float) -> Scattering:
+        """What they add to gloss. color: (3,); by_angle: (TERMS, 3)."""
+        return Scattering._of_lobe(SEVERAL_FACETS, color, by_angle, roughness)
+
+    @staticmethod
+    def _of_lobe(lobe: int, color: np.ndarray, by_angle: np.ndarray, roughness: float
+                 ) -> Scattering:
+        scattering = Scattering()
+        scattering.lobes[lobe] = [color, roughness * color]
+        scattering.lobes_by_angle[lobe] = by_angle
+        return scattering
 
     def scaled(self, factor: float) -> Scattering:
         return Scattering(self.gloss.scaled(factor), factor * self.by_angle,
-                          factor * self.rough_gloss, factor * self.cloth,
-                          factor * self.cloth_by_angle, factor * self.diffuse,
+                          factor * self.rough_gloss, factor * self.lobes,
+                          factor * self.lobes_by_angle, factor * self.diffuse,
                           factor * self.leaving)
 
     def covered(self, share: float, layer: Layer) -> Scattering:
@@ -71,19 +83,17 @@ class Scattering:
 
     def plus(self, other: Scattering) -> Scattering:
         return Scattering(self.gloss.plus(other.gloss).simplified(), self.by_angle + other.by_angle,
-                          self.rough_gloss + other.rough_gloss, self.cloth + other.cloth,
-                          self.cloth_by_angle + other.cloth_by_angle,
+                          self.rough_gloss + other.rough_gloss, self.lobes + other.lobes,
+                          self.lobes_by_angle + other.lobes_by_angle,
                           self.diffuse + other.diffuse, self.leaving + other.leaving)
 
     def gloss_roughness(self) -> float:
         gloss = float(self.gloss.mean().mean())
         return min(self.rough_gloss / gloss, 1.0) if gloss > 0.0 else 0.0
 
-    def cloth_kind(self) -> tuple[int, float]:
-        """The heaviest, and its roughness."""
-        weights, rough = self.cloth.mean(axis=2).T
-        kind = int(weights.argmax())
-        return kind, float(np.clip(rough[kind] / max(weights[kind], 1e-6), 0.0, 1.0))
+    def lobe_roughness(self, lobe: int) -> float:
+        weight, rough = self.lobes[lobe].mean(axis=1)
+        return float(np.clip(rough / max(weight, 1e-6), 0.0, 1.0))
 
     def diffuse_model(self) -> tuple[int, float]:
         """The heavier one, and its roughness."""

@@ -49,11 +49,12 @@ class MaterialData:
     gloss_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
     gloss_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
     gloss_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    cloth_kind: int = 0  # of layers.py
-    # (2, 3): what of the reflectance cloth sends back; (4, 2, 3): that by angle; (2,): how rough.
-    cloth: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    cloth_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
-    cloth_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    separate_masking: bool = False  # rb_masking
+    # What of the reflectance each lobe of layers.py sends (rb_set_material_lobe): (n, 2, 3), that by
+    # angle: (n, 4, 2, 3), and how rough: (n, 2).
+    lobes: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    lobes_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((0, 4, 2, 3)))
+    lobe_roughness: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     diffuse_model: int = 0  # of scattering.py
     diffuse_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))  # likewise by angle

@@ -16,9 +16,9 @@ import numpy as np
 
 from .diffuse_angles import facet_shares, oren_nayar
 from .layers import Layer
-from .node_reader import CLOTH, CLOTH_ROUGHNESS, GLOSSY, cloth_layer, glossy_albedo
+from .node_reader import CLOTH, CLOTH_ROUGHNESS, EDGE_TINT, GLOSSY, cloth_layer, glossy_albedo
 from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, SHEEN_TINT,
-                         PrincipledAlbedo, principled_albedo, sheen_on)
+                         SPECULAR_TINT, PrincipledAlbedo, principled_albedo, sheen_on)
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
     'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
@@ -246,7 +246,8 @@ def _base_color(formula: _Formula, node: bpy.types.Node) -> _Value:
 def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlbedo:
     return principled_albedo(
         *_values(formula, node, GLOSS_SOCKETS), node.distribution == 'MULTI_GGX',
-        float(_mean_base(formula, node).mean()), formula.filter_glossy).coated(
+        float(_mean_base(formula, node).mean()), formula.filter_glossy,
+        _usual_color(formula, node, *SPECULAR_TINT)).coated(
             *_values(formula, node, COAT_SOCKETS), _usual_color(formula, node, *COAT_TINT),
             formula.filter_glossy)
 
@@ -324,9 +325,9 @@ def _glossy(formula: _Formula, node: bpy.types.Node) -> _Value:
         return (0.0, 0.0, 0.0)
     color = formula.raw(node, 'Base Color' if 'Base Color' in node.inputs else 'Color')
     mean = max(float(np.mean(color)) if isinstance(color, tuple) else _USUAL_COLOR, 1e-6)
-    albedo, gain, _, _ = glossy_albedo(node, _usual(formula, node, *GLOSS_SOCKETS[0]), mean,
-                                       formula.filter_glossy)
-    return formula.scaled(color, float(albedo.of(mean) * gain) / mean)
+    gloss = glossy_albedo(node, _usual(formula, node, *GLOSS_SOCKETS[0]), np.full(3, mean),
+                          formula.filter_glossy, _usual_color(formula, node, *EDGE_TINT))
+    return formula.tinted(color, (gloss.once + gloss.again) / mean)
 
 
 def _principled_radiance(formula: _Formula, node: bpy.types.Node) -> _Value:

@@ -183,7 +183,7 @@ void addMaterial(Bytes& in, rb_scene scene) {
             const auto byAngle = in.numbers<24>();
             const auto roughness = in.numbers<2>();
             expectMessage(rb_set_material_gloss(scene, target, a.data(), b.data(), byAngle.data(),
-                                                roughness.data()));
+                                                rb_masking(in.small()), roughness.data()));
             break;
         }
         case 8:
@@ -194,8 +194,8 @@ void addMaterial(Bytes& in, rb_scene scene) {
         case 9: {
             const auto byAngle = in.numbers<24>();
             const auto roughness = in.numbers<2>();
-            expectMessage(rb_set_material_cloth(scene, target, rb_cloth(in.small()), a.data(),
-                                                byAngle.data(), roughness.data()));
+            expectMessage(rb_set_material_lobe(scene, target, rb_lobe(in.small()), a.data(),
+                                               byAngle.data(), roughness.data()));
             break;
         }
         default: {

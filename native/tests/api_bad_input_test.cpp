@@ -82,9 +82,15 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_set_material_angles(scene, 0, nullptr, kAngles), "reflected");
     expectInvalid(rb_set_material_angles(scene, 0, kAngles, nullptr), "shown");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, nullptr), "offset");
-    expectInvalid(rb_set_material_gloss(scene, 0, nullptr, kGrey, kAngles, kGrey), "scale");
-    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, nullptr, kAngles, kGrey), "offset");
-    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, kGrey, nullptr, kGrey), "by_angle");
+    expectInvalid(
+        rb_set_material_gloss(scene, 0, nullptr, kGrey, kAngles, RB_MASKING_SEPARATE, kGrey),
+        "scale");
+    expectInvalid(
+        rb_set_material_gloss(scene, 0, kGrey, nullptr, kAngles, RB_MASKING_SEPARATE, kGrey),
+        "offset");
+    expectInvalid(
+        rb_set_material_gloss(scene, 0, kGrey, kGrey, nullptr, RB_MASKING_SEPARATE, kGrey),
+        "by_angle");
     expectInvalid(rb_set_material_translucence(scene, 0, nullptr, -1, nullptr), "translucence");
     expectInvalid(rb_add_mesh(scene, "", nullptr, 8, kCorners, 24, kFaces, 6, nullptr, &id),
                   "vertices");
@@ -128,9 +134,10 @@ TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_diffuse(scene, bad, kGrey, kBlack),
                       "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_gloss(scene, bad, kGrey, kBlack, kAngles, kBlack),
-                      "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_cloth(scene, bad, RB_CLOTH_VELVET, kGrey, kAngles, kBlack),
+        expectInvalid(
+            rb_set_material_gloss(scene, bad, kGrey, kBlack, kAngles, RB_MASKING_SEPARATE, kBlack),
+            "material " + std::to_string(bad));
+        expectInvalid(rb_set_material_lobe(scene, bad, RB_LOBE_VELVET, kGrey, kAngles, kBlack),
                       "material " + std::to_string(bad));
         expectInvalid(rb_set_material_diffuse_model(scene, bad, RB_DIFFUSE_BURLEY, kBlack),
                       "material " + std::to_string(bad));
@@ -233,31 +240,38 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     badAngles[29] = NAN;
     expectInvalid(rb_set_material_angles(scene, 0, kAngles, badAngles), "shown");
     expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, bad), "offset");
-    expectInvalid(rb_set_material_gloss(scene, 0, bad, kGrey, kAngles, kGrey), "scale");
-    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, bad, kAngles, kGrey), "offset");
+    expectInvalid(rb_set_material_gloss(scene, 0, bad, kGrey, kAngles, RB_MASKING_SEPARATE, kGrey),
+                  "scale");
+    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, bad, kAngles, RB_MASKING_SEPARATE, kGrey),
+                  "offset");
     badAngles[23] = NAN;
-    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, kGrey, badAngles, kGrey), "by_angle");
+    expectInvalid(
+        rb_set_material_gloss(scene, 0, kGrey, kGrey, badAngles, RB_MASKING_SEPARATE, kGrey),
+        "by_angle");
     const int32_t paint = addMaterial();
-    expectInvalid(rb_set_material_cloth(scene, paint, RB_CLOTH_VELVET, bad, kAngles, kGrey),
+    expectInvalid(rb_set_material_lobe(scene, paint, RB_LOBE_VELVET, bad, kAngles, kGrey),
                   "reflectance");
-    expectInvalid(rb_set_material_cloth(scene, paint, RB_CLOTH_VELVET, kGrey, badAngles, kGrey),
+    expectInvalid(rb_set_material_lobe(scene, paint, RB_LOBE_VELVET, kGrey, badAngles, kGrey),
                   "by_angle");
-    expectInvalid(rb_set_material_cloth(scene, paint, rb_cloth(3), kGrey, kAngles, kGrey),
-                  "cloth 3");
+    expectInvalid(rb_set_material_lobe(scene, paint, rb_lobe(4), kGrey, kAngles, kGrey), "lobe 4");
+    expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, rb_masking(2), kGrey),
+                  "masking 2");
     expectInvalid(rb_set_material_leaving(scene, paint, badAngles), "factors");
     expectInvalid(rb_set_material_leaving(scene, paint, nullptr), "factors");
     expectInvalid(rb_set_material_leaving(scene, paint + 1, kAngles), "material");
     for (float rough : {-0.1f, 1.1f, NAN, INFINITY}) {
         const float roughness[2] = {0.5f, rough};
-        expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, roughness),
+        expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles,
+                                            RB_MASKING_SEPARATE, roughness),
                       "roughness");
-        expectInvalid(
-            rb_set_material_cloth(scene, paint, RB_CLOTH_VELVET, kGrey, kAngles, roughness),
-            "roughness");
+        expectInvalid(rb_set_material_lobe(scene, paint, RB_LOBE_VELVET, kGrey, kAngles, roughness),
+                      "roughness");
         expectInvalid(rb_set_material_diffuse_model(scene, paint, RB_DIFFUSE_BURLEY, roughness),
                       "roughness");
     }
-    expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, nullptr), "roughness");
+    expectInvalid(
+        rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, RB_MASKING_SEPARATE, nullptr),
+        "roughness");
     expectInvalid(rb_set_material_diffuse_model(scene, paint, rb_diffuse_model(3), kBlack),
                   "diffuse model 3");
     expectInvalid(rb_set_material_translucence(scene, 0, bad, -1, nullptr), "translucence");

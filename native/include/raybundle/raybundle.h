@@ -137,29 +137,35 @@ RB_API rb_error rb_set_material_angles(rb_scene scene, int32_t material, const f
 /* What of the reflectance is mirrored: scale times it plus offset (six floats each, likewise), for
  * light from everywhere; by_angle: how that depends on the angle of the sources' light, as
  * `reflected` of rb_set_material_angles, of which it is a part. roughness: of the front and of the
- * back, 0 to 1, whose square is alpha of GGX. With first shot GATHER and solver LINE_REUSE
- * light goes where GGX mirrors it to, smoother than a roughness of 0.45 as by that. Without it
- * nothing is mirrored. */
+ * back, 0 to 1, whose square is alpha of GGX; masking: whether the height of a facet decides both
+ * whether light reaches it and whether it is seen, or each by itself. With first shot GATHER and
+ * solver LINE_REUSE light goes where GGX mirrors it to, smoother than a roughness of 0.45 as by
+ * that. Without it nothing is mirrored. */
+typedef enum rb_masking RB_INT { RB_MASKING_CORRELATED = 0, RB_MASKING_SEPARATE = 1 } rb_masking;
+
 RB_API rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float scale[6],
                                       const float offset[6], const float by_angle[24],
-                                      const float roughness[2]);
+                                      rb_masking masking, const float roughness[2]);
 
-/* What of the reflectance cloth sends back (six floats, of the whole surface: RGB of the front
- * side, then of the back side), for light from everywhere, and how that depends on the angle of the
- * light, likewise a part of `reflected` of rb_set_material_angles. Where it goes to: as Cycles'
- * sheen has it from Blender 4.0 on, or its velvet, or its sheen before; roughness: of the front and
- * of the back, 0 to 1 (of velvet sigma; of Burley's sheen unused). Without it nothing. */
-typedef enum rb_cloth RB_INT {
-    RB_CLOTH_MICROFIBERS = 0,
-    RB_CLOTH_VELVET = 1,
-    RB_CLOTH_BURLEY = 2
-} rb_cloth;
+/* What of the reflectance goes where a lobe of its own sends it (six floats, of the whole surface:
+ * RGB of the front side, then of the back side), for light from everywhere, and how that depends on
+ * the angle of the light, likewise a part of `reflected` of rb_set_material_angles. The lobes: sheen
+ * as Cycles has it from Blender 4.0 on, its velvet, its sheen before; and light that gloss sends on
+ * after several facets. roughness: of the front and of the back, 0 to 1 (of velvet sigma; of
+ * Burley's sheen unused; of several facets as gloss). Of each lobe what was set last counts; without
+ * it nothing. */
+typedef enum rb_lobe RB_INT {
+    RB_LOBE_MICROFIBERS = 0,
+    RB_LOBE_VELVET = 1,
+    RB_LOBE_BURLEY_SHEEN = 2,
+    RB_LOBE_SEVERAL_FACETS = 3
+} rb_lobe;
 
-RB_API rb_error rb_set_material_cloth(rb_scene scene, int32_t material, rb_cloth cloth,
-                                      const float reflectance[6], const float by_angle[24],
-                                      const float roughness[2]);
+RB_API rb_error rb_set_material_lobe(rb_scene scene, int32_t material, rb_lobe lobe,
+                                     const float reflectance[6], const float by_angle[24],
+                                     const float roughness[2]);
 
-/* Where what is neither mirrored nor cloth's goes, likewise: as by Lambert's law, or as Burley's or
+/* Where the rest goes, likewise: as by Lambert's law, or as Burley's or
  * Oren and Nayar's model has it, with a roughness (of the front and of the back), 0 to 1. */
 typedef enum rb_diffuse_model RB_INT {
     RB_DIFFUSE_LAMBERT = 0,
@@ -171,7 +177,7 @@ RB_API rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material,
                                               rb_diffuse_model model, const float roughness[2]);
 
 /* How that leaves, by angle, whatever light it is (LINE_REUSE): from under a layer that lets less
- * of it out at some angles, or from facets that do. 1 plus the sum of these factors times the term of
+ * of it out at some angles. 1 plus the sum of these factors times the term of
  * rb_set_material_angles at the angle at which it leaves, less the term's mean (six floats for each
  * term, likewise). Without it 0. */
 RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[24]);

@@ -118,10 +118,17 @@ void needRoughness(const Material& material, const float roughness[2]) {
             throw invalidArgument("material \"" + material.name + "\": roughness must be 0 to 1");
 }
 
+// An enumeration's value, 0 to last.
+void needKind(const Material& material, const char* name, int value, int last) {
+    if (value < 0 || value > last)
+        throw invalidArgument("material \"" + material.name + "\": unknown " + name + " " +
+                              std::to_string(value));
+}
+
 }  // namespace
 
 rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float scale[6],
-                               const float offset[6], const float by_angle[24],
+                               const float offset[6], const float by_angle[24], rb_masking masking,
                                const float roughness[2]) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
@@ -133,20 +140,22 @@ rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float sca
         needFinite(by_angle, 24, "by_angle");
         Material& target = held->material(material);
         needRoughness(target, roughness);
+        needKind(target, "masking", int(masking), RB_MASKING_SEPARATE);
         for (size_t side = 0; side < 2; ++side) {
             Scattering& scattering = target.scattering[side];
             scattering.glossScale = vec3(scale + 3 * side);
             scattering.glossOffset = vec3(offset + 3 * side);
             for (size_t term = 0; term < scattering.glossByAngle.size(); ++term)
                 scattering.glossByAngle[term] = vec3(by_angle + 6 * term + 3 * side);
+            scattering.glossMasking = masking;
             scattering.glossRoughness = roughness[side];
         }
     });
 }
 
-rb_error rb_set_material_cloth(rb_scene scene, int32_t material, rb_cloth cloth,
-                               const float reflectance[6], const float by_angle[24],
-                               const float roughness[2]) {
+rb_error rb_set_material_lobe(rb_scene scene, int32_t material, rb_lobe lobe,
+                              const float reflectance[6], const float by_angle[24],
+                              const float roughness[2]) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
         need(reflectance, "reflectance");
@@ -155,16 +164,17 @@ rb_error rb_set_material_cloth(rb_scene scene, int32_t material, rb_cloth cloth,
         needFinite(by_angle, 24, "by_angle");
         Material& target = held->material(material);
         needRoughness(target, roughness);
-        if (int(cloth) < RB_CLOTH_MICROFIBERS || int(cloth) > RB_CLOTH_BURLEY)
-            throw invalidArgument("material \"" + target.name + "\": unknown cloth " +
-                                  std::to_string(int(cloth)));
+        needKind(target, "lobe", int(lobe), RB_LOBE_SEVERAL_FACETS);
         for (size_t side = 0; side < 2; ++side) {
-            Scattering& scattering = target.scattering[side];
-            scattering.cloth = vec3(reflectance + 3 * side);
-            for (size_t term = 0; term < scattering.clothByAngle.size(); ++term)
-                scattering.clothByAngle[term] = vec3(by_angle + 6 * term + 3 * side);
-            scattering.clothKind = cloth;
-            scattering.clothRoughness = roughness[side];
+            LobeReflectance part{lobe, roughness[side], vec3(reflectance + 3 * side)};
+            for (size_t term = 0; term < part.byAngle.size(); ++term)
+                part.byAngle[term] = vec3(by_angle + 6 * term + 3 * side);
+            std::vector<LobeReflectance>& lobes = target.scattering[side].lobes;
+            lobes.erase(std::remove_if(lobes.begin(), lobes.end(),
+                                       [&](const auto& other) { return other.lobe == lobe; }),
+                        lobes.end());
+            if (part.reflectance != glm::vec3(0.0f) || part.byAngle != AngleFactors{})
+                lobes.push_back(part);
         }
     });
 }
@@ -175,9 +185,7 @@ rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material, rb_diff
         const HeldScene held(scene, "scene");
         Material& target = held->material(material);
         needRoughness(target, roughness);
-        if (int(model) < RB_DIFFUSE_LAMBERT || int(model) > RB_DIFFUSE_OREN_NAYAR)
-            throw invalidArgument("material \"" + target.name + "\": unknown diffuse model " +
-                                  std::to_string(int(model)));
+        needKind(target, "diffuse model", int(model), RB_DIFFUSE_OREN_NAYAR);
         for (size_t side = 0; side < 2; ++side) {
             target.scattering[side].diffuseModel = model;
             target.scattering[side].diffuseRoughness = roughness[side];

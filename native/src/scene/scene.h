@@ -22,17 +22,23 @@ struct Image {
     std::vector<glm::vec3> pixels;
 };
 
+// A part of what a side reflects that has a lobe of its own, see rb_set_material_lobe.
+struct LobeReflectance {
+    rb_lobe lobe = RB_LOBE_MICROFIBERS;
+    float roughness = 0;
+    glm::vec3 reflectance{0.0f};
+    AngleFactors byAngle{};
+};
+
 // Where a side of a surface that is not Lambert's sends light, see
-// rb_set_material_gloss, rb_set_material_cloth, rb_set_material_diffuse_model and
+// rb_set_material_gloss, rb_set_material_lobe, rb_set_material_diffuse_model and
 // rb_set_material_leaving.
 struct Scattering {
     glm::vec3 glossScale{0.0f}, glossOffset{0.0f};
     AngleFactors glossByAngle{};
+    rb_masking glossMasking = RB_MASKING_CORRELATED;
     float glossRoughness = 0;
-    glm::vec3 cloth{0.0f};
-    AngleFactors clothByAngle{};
-    rb_cloth clothKind = RB_CLOTH_MICROFIBERS;
-    float clothRoughness = 0;
+    std::vector<LobeReflectance> lobes;  // of different kinds, none black
     rb_diffuse_model diffuseModel = RB_DIFFUSE_LAMBERT;
     float diffuseRoughness = 0;
     AngleFactors leaving{};  // by the angle at which diffuse light leaves
@@ -41,10 +47,9 @@ struct Scattering {
         return glossScale != glm::vec3(0.0f) || glossOffset != glm::vec3(0.0f) ||
                glossByAngle != AngleFactors{};
     }
-    bool hasCloth() const { return cloth != glm::vec3(0.0f) || clothByAngle != AngleFactors{}; }
     bool isRough() const { return diffuseModel != RB_DIFFUSE_LAMBERT; }
     bool hasLayer() const { return leaving != AngleFactors{}; }
-    bool isLambert() const { return !hasGloss() && !hasCloth() && !isRough() && !hasLayer(); }
+    bool isLambert() const { return !hasGloss() && lobes.empty() && !isRough() && !hasLayer(); }
 };
 
 // Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The

@@ -121,13 +121,15 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
         const glm::vec4 terms = angleTerms(glm::dot(normal, direction));
         const glm::vec3 gloss = surface.mirroredAt(terms);
         if (brightest(gloss) > kLeastShare)
-            parts.push_back(
-                {Lobe::gloss(normal, direction, scattering.glossRoughness, f0), gloss * part});
-        const glm::vec3 cloth = surface.clothAt(terms);
-        if (scattering.hasCloth() && brightest(cloth) > kLeastShare)
-            parts.push_back(
-                {Lobe::cloth(normal, direction, scattering.clothKind, scattering.clothRoughness),
-                 cloth * part});
+            parts.push_back({Lobe::gloss(normal, direction, scattering.glossMasking,
+                                         scattering.glossRoughness, f0),
+                             gloss * part});
+        for (const LobeReflectance& lobe : scattering.lobes) {
+            const glm::vec3 sent = surface.lobeAt(lobe, terms);
+            if (brightest(sent) > kLeastShare)
+                parts.push_back(
+                    {Lobe::of(lobe.lobe, normal, direction, lobe.roughness), sent * part});
+        }
         if (!scattering.isRough()) continue;
         const glm::vec3 diffuse = surface.diffuseAt(terms);
         if (brightest(diffuse) > kLeastShare)

@@ -20,7 +20,7 @@ constexpr float kWeight[kCosines] = {0.05061427f, 0.11119052f, 0.15685332f, 0.18
                                      0.18134189f, 0.15685332f, 0.11119052f, 0.05061427f};
 // Of the table of gloss: steps of the roughness and of the cosine, and for each entry rings of
 // visible normals and normals in them.
-constexpr int kRoughnesses = 11, kTableCosines = 25, kRings = 24, kInRing = 24;
+constexpr int kRoughnesses = 11, kTableCosines = 25, kRings = 48, kInRing = 12;
 // Of Fresnel's edge over Lambert's cosine.
 constexpr float kMeanEdge = 0.0534f;
 // Cosines below this are taken for it: V below stays finite.
@@ -48,19 +48,23 @@ float fresnel(float f0, float cosine) { return f0 + (1 - f0) * fresnelEdge(cosin
 
 }  // namespace
 
+Lobe::Kind Lobe::glossOf(rb_masking masking) {
+    return masking == RB_MASKING_SEPARATE ? Kind::SEPARATE_GLOSS : Kind::GLOSS;
+}
+
 Lobe::Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness, float f0)
     : kind(kind),
       normal(normal),
       incoming(incoming),
       cosine(std::max(glm::dot(normal, incoming), kLeastCosine)),
-      masking(maskingTerm(cosine, roughness)),
+      shadowing(maskingTerm(cosine, roughness)),
       roughness(roughness),
       f0(f0) {}
 
 // Mean and mean square of a gloss lobe that is not scaled: F is linear in f0, so that they are
-// white f0 + edge (1 - f0), and the same squared.
+// white f0 + edge (1 - f0), and the same squared. Those of several facets, which are white.
 struct Lobe::Moments {
-    float white = 0, edge = 0, white2 = 0, both2 = 0, edge2 = 0;
+    float white = 0, edge = 0, white2 = 0, both2 = 0, edge2 = 0, several = 0, several2 = 0;
 
     void add(float factor, const Moments& other) {
         white += factor * other.white;
@@ -68,6 +72,8 @@ struct Lobe::Moments {
         white2 += factor * other.white2;
         both2 += factor * other.both2;
         edge2 += factor * other.edge2;
+        several += factor * other.several;
+        several2 += factor * other.several2;
     }
     float mean(float f0) const { return white * f0 + edge * (1 - f0); }
     float meanSquare(float f0) const {
@@ -79,66 +85,85 @@ struct Lobe::Moments {
 // By roughness and the root of the cosine, made once: towards grazing angles lobes change fast.
 class Lobe::GlossTable {
   public:
-    static const GlossTable& instance() {
-        static const GlossTable table;
-        return table;
+    static const GlossTable& of(Kind kind) {
+        if (kind == Kind::SEPARATE_GLOSS) {
+            static const GlossTable separate(kind);
+            return separate;
+        }
+        static const GlossTable together(Kind::GLOSS);
+        return together;
     }
 
     Moments at(float roughness, float cosine) const {
-        const float r = (roughness - kLeastRoughness) / (1 - kLeastRoughness) * (kRoughnesses - 1);
-        const float c = std::sqrt(cosine) * (kTableCosines - 1);
-        const int i = std::clamp(int(r), 0, kRoughnesses - 2);
-        const int j = std::clamp(int(c), 0, kTableCosines - 2);
         Moments sum;
-        for (int di = 0; di < 2; ++di)
-            for (int dj = 0; dj < 2; ++dj)
-                sum.add(
-                    (di ? r - float(i) : 1 - r + float(i)) * (dj ? c - float(j) : 1 - c + float(j)),
-                    moments[size_t(i + di)][size_t(j + dj)]);
+        around(roughness, cosine,
+               [&](float share, const Moments& entry) { sum.add(share, entry); });
         return sum;
+    }
+    // Moments::white alone, which is the albedo by the angle of view too.
+    float albedo(float roughness, float cosine) const {
+        float sum = 0;
+        around(roughness, cosine,
+               [&](float share, const Moments& entry) { sum += share * entry.white; });
+        return sum;
+    }
+    // What several facets send over what one does, seen at this angle.
+    float lost(float roughness, float cosine) const {
+        return std::max(1 / albedo(roughness, cosine) - 1, 0.0f);
     }
 
     // Of light from everywhere.
     Moments everywhere(float roughness) const {
-        const float r = (roughness - kLeastRoughness) / (1 - kLeastRoughness) * (kRoughnesses - 1);
-        const int i = std::clamp(int(r), 0, kRoughnesses - 2);
         Moments sum;
-        for (int di = 0; di < 2; ++di)
-            sum.add(di ? r - float(i) : 1 - r + float(i), means[size_t(i + di)]);
+        for (int k = 0; k < kCosines; ++k)
+            sum.add(2 * kCosine[k] * kWeight[k], at(roughness, kCosine[k]));
         return sum;
     }
 
   private:
-    GlossTable() {
-        for (int i = 0; i < kRoughnesses; ++i)
-            for (int j = 0; j < kTableCosines; ++j)
-                moments[size_t(i)][size_t(j)] = momentsOfGloss(
-                    kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
-                    std::max(float(j * j) / ((kTableCosines - 1) * (kTableCosines - 1)),
-                             kLeastCosine));
-        for (size_t i = 0; i < means.size(); ++i)
-            for (int k = 0; k < kCosines; ++k)
-                means[i].add(
-                    2 * kCosine[k] * kWeight[k],
-                    at(kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
-                       kCosine[k]));
+    explicit GlossTable(Kind kind) {
+        for (bool isSeveral : {false, true})
+            for (int i = 0; i < kRoughnesses; ++i)
+                for (int j = 0; j < kTableCosines; ++j) {
+                    const float cosine = float(j * j) / ((kTableCosines - 1) * (kTableCosines - 1));
+                    find(kind,
+                         kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
+                         std::max(cosine, kLeastCosine), isSeveral, moments[size_t(i)][size_t(j)]);
+                }
     }
-    std::array<Moments, kRoughnesses> means;
+
+    template <class Visit>
+    void around(float roughness, float cosine, const Visit& visit) const {
+        const float r = (roughness - kLeastRoughness) / (1 - kLeastRoughness) * (kRoughnesses - 1);
+        const float c = std::sqrt(cosine) * (kTableCosines - 1);
+        const int i = std::clamp(int(r), 0, kRoughnesses - 2);
+        const int j = std::clamp(int(c), 0, kTableCosines - 2);
+        for (int di = 0; di < 2; ++di)
+            for (int dj = 0; dj < 2; ++dj)
+                visit(
+                    (di ? r - float(i) : 1 - r + float(i)) * (dj ? c - float(j) : 1 - c + float(j)),
+                    moments[size_t(i + di)][size_t(j + dj)]);
+    }
+
+    // By visible normals, whose weights are F G / G1, on one side of the plane of incidence. Several facets have to be last: they follow
+    // from the rest of the table.
+    void find(Kind kind, float roughness, float cosine, bool isSeveral, Moments& sum) const;
+
     std::array<std::array<Moments, kTableCosines>, kRoughnesses> moments;
 };
 
-// By visible normals, whose weights are F G / G1.
-Lobe::Moments Lobe::momentsOfGloss(float roughness, float cosine) {
+void Lobe::GlossTable::find(Kind kind, float roughness, float cosine, bool isSeveral,
+                            Moments& sum) const {
     const float alpha = roughness * roughness;
     const glm::vec3 in(std::sqrt(1 - cosine * cosine), 0, cosine);
-    const Lobe white(Kind::GLOSS, glm::vec3(0, 0, 1), in, alpha * alpha, 1);
+    const Lobe white(kind, glm::vec3(0, 0, 1), in, alpha * alpha, 1);
     const glm::vec3 stretched = glm::normalize(glm::vec3(alpha * in.x, 0, in.z));
     const glm::vec3 t1(0, 1, 0), t2 = glm::cross(stretched, t1);
-    Moments sum;
     for (int i = 0; i < kRings; ++i)
         for (int j = 0; j < kInRing; ++j) {
-            const float r = (float(i) + 0.5f) / kRings;
-            const float angle = glm::two_pi<float>() * (float(j) + 0.5f) / kInRing;
+            // Closer towards the rim, where what they mirror is near the surface.
+            const float inward = 1 - (float(i) + 0.5f) / kRings, r = 1 - inward * inward;
+            const float angle = glm::pi<float>() * ((float(j) + 0.5f) / kInRing - 0.5f);
             const float p1 = r * std::cos(angle), half = 0.5f * (1 + stretched.z);
             const float p2 = (1 - half) * std::sqrt(1 - p1 * p1) + half * r * std::sin(angle);
             const glm::vec3 n =
@@ -147,26 +172,32 @@ Lobe::Moments Lobe::momentsOfGloss(float roughness, float cosine) {
                 glm::normalize(glm::vec3(alpha * n.x, alpha * n.y, std::max(n.z, 0.0f)));
             const float ih = std::min(glm::dot(in, h), 1.0f), no = 2 * ih * h.z - in.z;
             if (no <= 0) continue;
-            const float visible = no * (cosine + white.masking) /
-                                  (cosine * maskingTerm(no, white.roughness) + no * white.masking);
+            // G / G1: G is 4 ni no times the visibility, G1 = 2 ni / (ni + shadowing).
+            const float visible = 2 * no * (cosine + white.shadowing) * white.visibility(no);
+            const float share = visible * 4 * r * inward / (kRings * kInRing);
             const float value = white.towards(2 * ih * h - in), edge = fresnelEdge(ih);
-            sum.add(visible * 2 * r / (kRings * kInRing),
-                    {1, edge, value, value * edge, value * edge * edge});
+            if (isSeveral) {
+                const float more = lost(roughness, no);
+                sum.several += share * more;
+                sum.several2 += share * value * more * more;
+            } else {
+                sum.add(share, {1, edge, value, value * edge, value * edge * edge});
+            }
         }
-    return sum;
 }
 
-Lobe Lobe::gloss(const glm::vec3& normal, const glm::vec3& incoming, float roughness, float f0) {
+Lobe Lobe::gloss(const glm::vec3& normal, const glm::vec3& incoming, rb_masking masking,
+                 float roughness, float f0) {
     const float rough = std::clamp(roughness, kLeastRoughness, 1.0f), alpha = rough * rough;
-    Lobe lobe(Kind::GLOSS, normal, incoming, alpha * alpha, f0);
-    const Moments moments = GlossTable::instance().at(rough, lobe.cosine);
+    Lobe lobe(glossOf(masking), normal, incoming, alpha * alpha, f0);
+    const Moments moments = GlossTable::of(lobe.kind).at(rough, lobe.cosine);
     lobe.normalise(moments.mean(f0), moments.meanSquare(f0));
     return lobe;
 }
 
-float Lobe::f0Of(float ratio, float roughness) {
+float Lobe::f0Of(float ratio, rb_masking masking, float roughness) {
     const float rough = std::clamp(roughness, kLeastRoughness, 1.0f);
-    const GlossTable& table = GlossTable::instance();
+    const GlossTable& table = GlossTable::of(glossOf(masking));
     // Below the table towards a mirror, about as alpha falls.
     const float share = std::min(roughness * roughness / (kLeastRoughness * kLeastRoughness), 1.0f);
     Moments above, all;
@@ -187,14 +218,20 @@ Lobe Lobe::diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffus
     return lobe;
 }
 
-Lobe Lobe::cloth(const glm::vec3& normal, const glm::vec3& incoming, rb_cloth cloth,
-                 float roughness) {
-    const Kind kind = cloth == RB_CLOTH_MICROFIBERS ? Kind::MICROFIBERS
-                      : cloth == RB_CLOTH_VELVET    ? Kind::VELVET
-                                                    : Kind::BURLEY_SHEEN;
-    Lobe lobe(kind, normal, incoming, std::max(roughness, kLeastClothRoughness), 0);
-    lobe.normalise();
-    return lobe;
+Lobe Lobe::of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming, float roughness) {
+    if (lobe == RB_LOBE_SEVERAL_FACETS) {
+        const float rough = std::clamp(roughness, kLeastRoughness, 1.0f), alpha = rough * rough;
+        Lobe several(Kind::SEVERAL_FACETS, normal, incoming, alpha * alpha, 1);
+        const Moments moments = GlossTable::of(several.kind).at(rough, several.cosine);
+        several.normalise(moments.several, moments.several2);
+        return several;
+    }
+    const Kind kind = lobe == RB_LOBE_MICROFIBERS ? Kind::MICROFIBERS
+                      : lobe == RB_LOBE_VELVET    ? Kind::VELVET
+                                                  : Kind::BURLEY_SHEEN;
+    Lobe cloth(kind, normal, incoming, std::max(roughness, kLeastClothRoughness), 0);
+    cloth.normalise();
+    return cloth;
 }
 
 void Lobe::normalise() {
@@ -218,18 +255,28 @@ void Lobe::normalise(float mean, float meanSquare) {
     rms = std::sqrt(std::max(0.0f, meanSquare * scale * scale - 1));
 }
 
+float Lobe::visibility(float out) const {
+    const float term = maskingTerm(out, roughness);
+    return kind == Kind::SEPARATE_GLOSS ? 1 / ((cosine + shadowing) * (out + term))
+                                        : 0.5f / (cosine * term + out * shadowing);
+}
+
 float Lobe::towards(const glm::vec3& direction) const {
     const float ni = cosine, no = glm::dot(normal, direction);
     if (no <= 0) return 0;
     const float io = std::min(glm::dot(incoming, direction), 1.0f);
     switch (kind) {
-        case Kind::GLOSS: {
+        case Kind::GLOSS:
+        case Kind::SEPARATE_GLOSS:
+        case Kind::SEVERAL_FACETS: {
             // pi D F G / (4 ni no), by the half vector (incoming + direction) / sqrt(2 + 2 io).
             const float nh2 = std::min((ni + no) * (ni + no) / std::max(2 + 2 * io, 1e-6f), 1.0f);
             const float ih = std::sqrt(0.5f * std::max(1 + io, 0.0f));
             const float d = nh2 * (roughness - 1) + 1;
-            const float g = ni * maskingTerm(no, roughness) + no * masking;
-            return 0.5f * scale * roughness * fresnel(f0, ih) / (d * d * g);
+            const float value = scale * roughness * fresnel(f0, ih) * visibility(no) / (d * d);
+            return kind == Kind::SEVERAL_FACETS
+                       ? value * GlossTable::of(kind).lost(std::sqrt(std::sqrt(roughness)), no)
+                       : value;
         }
         case Kind::BURLEY: {
             const float more = roughness * (1 + io) - 0.5f;

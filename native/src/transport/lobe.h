@@ -4,14 +4,16 @@
 // towards a direction, so that the radiance is 1 / pi of it, over its mean by Lambert's cosine.
 //
 // Sources: Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007), GGX
-// with Smith's masking, height-correlated (Heitz 2014), sampled as in Heitz, "Sampling the GGX
-// Distribution of Visible Normals" (2018), with Fresnel's reflectance from f0 to 1 as Cycles has
-// it. Burley, "Physically-Based Shading at Disney" (2012). Fujii, "A tiny
-// improvement of Oren-Nayar reflectance model" (2012). Cloth: transport/microfibers.h; Ashikhmin,
-// Premoze and Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen,
-// Schlick's fifth power of the angle between the light and the half vector.
-// Differs: each is brought to a mean of 1. How much a surface reflects, light that meets several
-// facets included, is known (scene/scene.h); here is only where to.
+// with Smith's masking, height-correlated (Heitz 2014) or not, sampled as in Heitz, "Sampling the
+// GGX Distribution of Visible Normals" (2018), with Fresnel's reflectance from f0 to 1 as Cycles has
+// it. Light that meets several facets: Turquin, "Practical multiple scattering compensation for
+// microfacet models" (2019), what one facet mirrors times 1 / E - 1, E the albedo by the angle of
+// view. Burley, "Physically-Based Shading at Disney" (2012). Fujii, "A tiny improvement of
+// Oren-Nayar reflectance model" (2012). Cloth: transport/microfibers.h; Ashikhmin, Premoze and
+// Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen, Schlick's fifth power
+// of the angle between the light and the half vector.
+// Differs: each is brought to a mean of 1. How much a surface reflects is known (scene/scene.h);
+// here is only where to. Several facets are white here.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -27,16 +29,17 @@ class Lobe {
     // normal, incoming: unit vectors, incoming towards the source and above the surface.
     // roughness: 0 to 1, GGX alpha is its square, but what is smoother than kLeastRoughness is that
     // rough: patches do not tell narrower lobes apart. f0: reflectance at right angles, 0 to 1.
-    static Lobe gloss(const glm::vec3& normal, const glm::vec3& incoming, float roughness,
-                      float f0);
+    static Lobe gloss(const glm::vec3& normal, const glm::vec3& incoming, rb_masking masking,
+                      float roughness, float f0);
     static Lobe diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,
                         float roughness);
-    static Lobe cloth(const glm::vec3& normal, const glm::vec3& incoming, rb_cloth cloth,
-                      float roughness);
+    // Several facets are as rough as gloss.
+    static Lobe of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming,
+                   float roughness);
 
     // f0 of gloss that reflects so many times as much of light at right angles as of light from
     // everywhere.
-    static float f0Of(float ratio, float roughness);
+    static float f0Of(float ratio, rb_masking masking, float roughness);
 
     // Of a unit vector away from the surface: 0 or more, 0 below the surface.
     float towards(const glm::vec3& direction) const;
@@ -47,19 +50,30 @@ class Lobe {
     float contrast() const { return rms; }
 
   private:
-    enum class Kind { GLOSS, BURLEY, OREN_NAYAR, MICROFIBERS, VELVET, BURLEY_SHEEN };
+    enum class Kind {
+        GLOSS,
+        SEPARATE_GLOSS,
+        SEVERAL_FACETS,
+        BURLEY,
+        OREN_NAYAR,
+        MICROFIBERS,
+        VELVET,
+        BURLEY_SHEEN
+    };
     struct Moments;
     class GlossTable;
     Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness, float f0);
-    static Moments momentsOfGloss(float roughness, float cosine);
+    static Kind glossOf(rb_masking masking);
+    // G / (4 times both cosines), of light that leaves at the cosine `out`.
+    float visibility(float out) const;
     void normalise(float mean, float meanSquare);
     void normalise();
 
     Kind kind;
     glm::vec3 normal, incoming;
     float cosine;     // of the two
-    float masking;    // GLOSS: 2 / G1 - 1, times the cosine
-    float roughness;  // of GLOSS: alpha squared
+    float shadowing;  // of facets: 2 / G1 - 1, times the cosine
+    float roughness;  // of facets: alpha squared
     float f0;
     float scale = 1, rms = 0;
 };

@@ -135,24 +135,27 @@ struct Samples {
 // How what arrives is sent on: exitance over irradiance, to a cell (row) from a cell (column).
 struct ScatteredLight::Transfer {
     using Matrix = Eigen::Matrix<float, kCells, kCells>;
-    // Gloss with f0 of 1 and of 0, that mirrors all else that it can; cloth; a white rough surface.
-    Matrix white = Matrix::Zero(), edge = white, cloth = white, rough = white;
+    // Gloss with f0 of 1 and of 0, that mirrors all else that it can; a white rough surface.
+    Matrix white = Matrix::Zero(), edge = white, rough = white;
+    std::vector<Matrix> lobes;  // of the surface
 
     explicit Transfer(const Scattering& surface) {
-        const float roughness = surface.glossRoughness;
         const glm::vec3 z(0, 0, 1);
-        if (surface.hasGloss()) {
-            white = between(
-                [&](const glm::vec3& from) { return Lobe::gloss(z, from, roughness, 1); }, true);
-            edge = between(
-                [&](const glm::vec3& from) { return Lobe::gloss(z, from, roughness, 0); }, true);
-        }
-        if (surface.hasCloth())
-            cloth = between(
+        auto gloss = [&](float f0) {
+            return between(
                 [&](const glm::vec3& from) {
-                    return Lobe::cloth(z, from, surface.clothKind, surface.clothRoughness);
+                    return Lobe::gloss(z, from, surface.glossMasking, surface.glossRoughness, f0);
                 },
                 true);
+        };
+        if (surface.hasGloss()) {
+            white = gloss(1);
+            edge = gloss(0);
+        }
+        for (const LobeReflectance& lobe : surface.lobes)
+            lobes.push_back(between(
+                [&](const glm::vec3& from) { return Lobe::of(lobe.lobe, z, from, lobe.roughness); },
+                true));
         if (surface.isRough())
             rough = between(
                 [&](const glm::vec3& from) {
@@ -183,7 +186,7 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
     for (uint32_t side = 0; side < indices.size(); ++side) {
         const Scattering& surface = SideReflectance(patches, side).scattering();
         if (!patches.parentAt(side).exchanges ||
-            !(surface.hasGloss() || surface.hasCloth() || surface.isRough()))
+            !(surface.hasGloss() || !surface.lobes.empty() || surface.isRough()))
             continue;
         const auto [x, y] = frame(patches.normal(side));
         indices[side] = uint32_t(sent.size());
@@ -210,16 +213,19 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
 void ScatteredLight::findTransfers() {
     // Alike to within a hundredth of the roughness.
     auto rounded = [](float roughness) { return float(std::lround(100 * roughness)) / 100; };
-    // Gloss, cloth and the diffuse rest: whether there is, of which kind, how rough.
-    using Kind = std::tuple<bool, float, bool, rb_cloth, float, rb_diffuse_model, float>;
+    // Gloss, lobes and the diffuse rest: whether there is, of which kind, how rough.
+    using Kind = std::tuple<bool, rb_masking, float, std::vector<std::pair<rb_lobe, float>>,
+                            rb_diffuse_model, float>;
     std::map<Kind, std::vector<size_t>> alike;
     transfers.resize(patches.scattering.size());
     for (size_t k = 0; k < transfers.size(); ++k) {
         const Scattering& surface = patches.scattering[k];
         const float gloss = std::clamp(surface.glossRoughness, Lobe::kLeastRoughness, 1.0f);
-        alike[{surface.hasGloss(), surface.hasGloss() ? rounded(gloss) : 0, surface.hasCloth(),
-               surface.hasCloth() ? surface.clothKind : RB_CLOTH_MICROFIBERS,
-               surface.hasCloth() ? rounded(surface.clothRoughness) : 0, surface.diffuseModel,
+        std::vector<std::pair<rb_lobe, float>> lobes;
+        for (const LobeReflectance& lobe : surface.lobes)
+            lobes.emplace_back(lobe.lobe, rounded(lobe.roughness));
+        alike[{surface.hasGloss(), surface.glossMasking, surface.hasGloss() ? rounded(gloss) : 0,
+               lobes, surface.diffuseModel,
                surface.isRough() ? rounded(surface.diffuseRoughness) : 0}]
             .push_back(k);
     }
@@ -285,10 +291,11 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
         const glm::vec3 scale = surface.mirroredMean() / all;
         leaving.array().rowwise() *= Eigen::Array<float, 1, 3>(scale.x, scale.y, scale.z);
     }
-    if (surface.scattering().hasCloth()) {
-        const glm::vec3 scale = surface.clothMean() / transfer.cloth.mean();
+    for (size_t k = 0; k < transfer.lobes.size(); ++k) {
+        const glm::vec3 scale =
+            surface.lobeMean(surface.scattering().lobes[k]) / transfer.lobes[k].mean();
         leaving +=
-            (transfer.cloth * light) * Eigen::Vector3f(scale.x, scale.y, scale.z).asDiagonal();
+            (transfer.lobes[k] * light) * Eigen::Vector3f(scale.x, scale.y, scale.z).asDiagonal();
     }
     if (surface.scattering().isRough()) {
         Light diffuse = light;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// How much of light from one direction a side that is not Lambert's mirrors, how much its cloth
-// sends back, and how much it reflects diffusely.
+// How much of light from one direction a side that is not Lambert's mirrors, how much its lobes
+// send (scene/scene.h), and how much it reflects diffusely.
 #pragma once
 
 #include <algorithm>
@@ -24,33 +24,42 @@ class SideReflectance {
           // Of its opaque share, what the whole patch has is so many times as much.
           whole(1 / std::max(patches.opacityOf(side / 2), 1e-6f)),
           mirrored(glm::clamp(surface.glossScale * all + whole * surface.glossOffset,
-                              glm::vec3(0.0f), all)),
-          clothed(glm::clamp(whole * surface.cloth, glm::vec3(0.0f), all - mirrored)) {}
+                              glm::vec3(0.0f), all)) {
+        for (const LobeReflectance& lobe : surface.lobes)
+            inLobes += glm::max(whole * lobe.reflectance, 0.0f);
+        const glm::vec3 room = all - mirrored;
+        fits = glm::min(room / glm::max(inLobes, 1e-6f), 1.0f);
+        inLobes = glm::min(inLobes, room);
+    }
 
     const Scattering& scattering() const { return surface; }
 
     // Of light from everywhere.
     const glm::vec3& mirroredMean() const { return mirrored; }
-    const glm::vec3& clothMean() const { return clothed; }
-    glm::vec3 diffuseMean() const { return all - mirrored - clothed; }
+    glm::vec3 lobeMean(const LobeReflectance& lobe) const {
+        return fits * glm::max(whole * lobe.reflectance, 0.0f);
+    }
+    glm::vec3 diffuseMean() const { return all - mirrored - inLobes; }
     // Of light that comes in at an angle (scene/angles.h).
     glm::vec3 mirroredAt(const glm::vec4& terms) const {
         return glm::clamp(mirrored + whole * sumOfTerms(surface.glossByAngle, terms - kEverywhere),
                           0.0f, 1.0f);
     }
-    glm::vec3 clothAt(const glm::vec4& terms) const {
-        return glm::clamp(clothed + whole * sumOfTerms(surface.clothByAngle, terms - kEverywhere),
-                          0.0f, 1.0f);
+    glm::vec3 lobeAt(const LobeReflectance& lobe, const glm::vec4& terms) const {
+        const glm::vec3 byAngle = whole * sumOfTerms(lobe.byAngle, terms - kEverywhere);
+        return glm::clamp(lobeMean(lobe) + fits * byAngle, 0.0f, 1.0f);
     }
     glm::vec3 diffuseAt(const glm::vec4& terms) const {
-        const glm::vec3 sum = byAngle ? all + sumOfTerms(*byAngle, terms - kEverywhere) : all;
-        return glm::clamp(sum - mirroredAt(terms) - clothAt(terms), 0.0f, 1.0f);
+        glm::vec3 sum = byAngle ? all + sumOfTerms(*byAngle, terms - kEverywhere) : all;
+        sum -= mirroredAt(terms);
+        for (const LobeReflectance& lobe : surface.lobes) sum -= lobeAt(lobe, terms);
+        return glm::clamp(sum, 0.0f, 1.0f);
     }
     // Of the gloss alone (transport/lobe.h): what is mixed with it does not count.
     float f0() const {
         const float mean = brightest(mirrored);
         return mean > 0 ? Lobe::f0Of(brightest(mirroredAt(glm::vec4(0.0f))) / mean,
-                                     surface.glossRoughness)
+                                     surface.glossMasking, surface.glossRoughness)
                         : 1;
     }
 
@@ -59,7 +68,8 @@ class SideReflectance {
     const glm::vec3& all;
     const AngleFactors* byAngle;
     float whole;
-    glm::vec3 mirrored, clothed;
+    glm::vec3 mirrored, inLobes{0.0f};
+    glm::vec3 fits;  // of what the lobes send, as much as the rest has room for
 };
 
 }  // namespace raybundle
