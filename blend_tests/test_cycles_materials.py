@@ -497,7 +497,21 @@ def test_room(new_object, new_light, roughness, specular, metallic):
         shader = tree.principled(Base_Color=(0.6, 0.5, 0.3, 1.0), Roughness=roughness,
                                  Metallic=metallic)
         specular_socket(shader).default_value = specular
-    walls = make_room(new_object, new_light, tree.finish(shader))
+    compare_walls(make_room(new_object, new_light, tree.finish(shader)))
+
+
+@pytest.mark.parametrize("caustics", [True, False])
+def test_room_of_one_facet(new_object, new_light, caustics):
+    """Without light that meets several, a rough layer takes more from what lies beneath than it
+    mirrors; without caustics there is no layer to diffuse light at all."""
+    tree = Tree()
+    shader = tree.add('BsdfPrincipled', Base_Color=(0.6, 0.5, 0.3, 1.0), Roughness=0.8)
+    shader.distribution = 'GGX'
+    bpy.context.scene.cycles.caustics_reflective = caustics
+    compare_walls(make_room(new_object, new_light, tree.finish(shader)))
+
+
+def compare_walls(walls):
     references = [SurfaceReference(walls, SAMPLES // 4, seed) for seed in (0, 1)]
     raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=1024)
     found, truth = surface_means(references, {wall.name: read_colors(wall) for wall in walls})

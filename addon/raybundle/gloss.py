@@ -54,6 +54,9 @@ class GlossAlbedo:
     angles: np.ndarray
     # (TERMS,): likewise what several facets add, over its mean, by the angle at which light arrives.
     several: np.ndarray
+    # Of what one facet mirrors, the mean f, and (TERMS,) that by the angle of view.
+    rise: float
+    rise_by_angle: np.ndarray
 
     def by_angle(self, f0: np.ndarray | float, tint: np.ndarray | float = 1.0) -> np.ndarray:
         """(TERMS,) and the shape of f0: of(f0) by the angle, as `angles`."""
@@ -76,6 +79,18 @@ class GlossAlbedo:
         fresnel = f0 + (1.0 - f0) / 21.0 - dip / 126.0 if self.edge > 0.0 else f0
         again = fresnel * self.white_mean / (1.0 - fresnel * (1.0 - self.white_mean))
         return once * (1.0 + again * (1.0 - self.white) / self.white)
+
+
+    def covering(self, f0: np.ndarray | float, multiple: bool) -> np.ndarray:
+        """What is missing beneath such a layer, in Cycles from 4.0 on: what it mirrors, or, where
+        it loses the light that meets several facets, as if it did not."""
+        return self.of(f0, True) if multiple else f0 + (1.0 - f0) * self.rise
+
+    def covering_by_angle(self, f0: np.ndarray | float, multiple: bool) -> np.ndarray:
+        """(TERMS,) and the shape of f0."""
+        if multiple:
+            return self.by_angle(f0) * self.gain(f0, True)
+        return self.rise_by_angle.reshape(TERMS, *[1] * np.ndim(f0)) * (1.0 - f0)
 
 
 def _dip_at(f0: np.ndarray | float, tint: np.ndarray | float) -> np.ndarray:
@@ -110,16 +125,18 @@ def gloss_albedo(roughness: float, ior: float | None, from_above: bool = False,
     """
     roughness = round(min(max(roughness, 0.0), 1.0), 3)
     ior = None if ior is None else round(max(ior, 1.0), 3)
-    means, angles, several = _means(roughness, ior, correlated)
+    means, angles, several, rise, rise_by_angle = _means(roughness, ior, correlated)
     values = means
     if from_above:
         values = _integrals(np.array([_ABOVE]), roughness, ior, correlated)[:, 0]
-    return GlossAlbedo(*map(float, values), float(means[0]), angles, several)
+        rise = values[1] / values[0]
+    return GlossAlbedo(*map(float, values), float(means[0]), angles, several, float(rise),
+                       rise_by_angle)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _means(roughness: float, ior: float | None, correlated: bool
-           ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+           ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray]:
     cosines = np.sqrt((np.arange(_ANGLES) + 0.5) / _ANGLES)
     albedos = _integrals(cosines, roughness, ior, correlated)
     # The BSDF is the same with light and view exchanged.
@@ -132,8 +149,9 @@ def _means(roughness: float, ior: float | None, correlated: bool
     def fit(values: np.ndarray) -> np.ndarray:
         return np.linalg.lstsq(terms, values - values.mean(), rcond=None)[0]
 
+    rise = albedos[1] / albedos[0]
     return (albedos.mean(axis=1), np.array([fit(part) for part in albedos]),
-            fit(several) / max(several.mean(), 1e-6))
+            fit(several) / max(several.mean(), 1e-6), float(rise.mean()), fit(rise))
 
 
 def _integrals(cosines: np.ndarray, roughness: float, ior: float | None, correlated: bool,

@@ -89,8 +89,9 @@ class PrincipledAlbedo:
             # By how far light goes in the coat to each view.
             depths = 1.0 / np.sqrt(1.0 - (1.0 - _VIEWS[:, None]**2) / max(ior, 1.0)**2)
             tint = np.clip(tint, 0.0, 1.0)
-            let_out = ((1.0 - weight * (layer.of(f0) + terms @ layer.by_angle(f0))[:, None])
-                       * (1.0 - weight + weight * tint**depths))
+            let_out = 1.0 - weight + weight * tint**depths
+            if filter_glossy is not None:
+                let_out *= 1.0 - weight * (layer.of(f0) + terms @ layer.by_angle(f0))[:, None]
             under = let_out.mean(axis=0)
             above = (1.0 - weight * from_above.of(f0)) * (1.0 - weight + weight * tint)
             leaving = leaving + np.linalg.lstsq(terms, let_out / under - 1.0, rcond=None)[0]
@@ -147,22 +148,22 @@ def principled_albedo(roughness: float, specular: float, ior: float, diffuse_rou
     f0 = f0 * (tint if is_layered else _in_hue(base, tint, _ROUGH_LUMINANCE))
     layer, layer_above = (gloss_albedo(roughness, specular_ior, from_above, is_layered)
                           for from_above in (False, True))
-    gain = layer.gain(f0, multiple)
-    leaving = np.zeros((TERMS, 3))
+    under, shown, leaving = 1.0, np.ones(3), np.zeros((TERMS, 3))
     if is_layered:
         # What it mirrors towards the eye is missing, of all colours, wherever light comes from.
-        brightest = int(f0.argmax())
-        under = 1.0 - layer.of(f0, multiple)[brightest]
-        shown = np.full(3, 1.0 - layer_above.of(f0, multiple)[brightest])
-        leaving = leaving - (layer.by_angle(f0) * gain)[:, [brightest]] / under
+        shown = shown - layer_above.covering(f0, multiple).max()
         angles = oren_nayar(diffuse_roughness, base)
     else:
-        under, shown = 1.0, np.ones(3)
         angles, diffuse_roughness = burley(roughness), roughness
-    diffuse = under * angles.albedo
     if filter_glossy is None:
-        return PrincipledAlbedo(angles, roughness, diffuse_roughness, shown, diffuse,
-                                leaving=leaving)
+        # To diffuse light there is no such layer.
+        return PrincipledAlbedo(angles, roughness, diffuse_roughness, shown, angles.albedo)
+    if is_layered:
+        brightest = int(f0.argmax())
+        under = 1.0 - layer.covering(f0, multiple)[brightest]
+        leaving = leaving - layer.covering_by_angle(f0, multiple)[:, [brightest]] / under
+    diffuse = under * angles.albedo
+    gain = layer.gain(f0, multiple)
     seen = seen_roughness(roughness, filter_glossy)
     metal_ior, metal_tint = (None, tint) if is_layered else (specular_ior, 1.0)
     # What several facets add has the roughness of the socket.

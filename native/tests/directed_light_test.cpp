@@ -164,7 +164,7 @@ void expectModel(const Lobe& lobe, const Bsdf& bsdf, const glm::dvec3& in, doubl
     const glm::dvec2 mean = moments(bsdf, in);
     forCosine(32, [&](const glm::dvec3& out, double) {
         const double expected = kPi * bsdf(in, out) / mean.x;
-        EXPECT_NEAR(double(lobe.towards(out)), expected, tolerance * expected + 1e-3);
+        EXPECT_NEAR(double(lobe.towards(out).x), expected, tolerance * expected + 1e-3);
     });
     // What the mean square has beyond 1, after the table's means of up to 1 % off.
     const double square = std::max(0.0, mean.y / (mean.x * mean.x) - 1);
@@ -182,7 +182,7 @@ TEST(Lobe, IsTheModelOverItsMean) {
             const glm::dvec3 in = inclined(cosine);
             const float rough = float(roughness);
             for (rb_masking masking : {RB_MASKING_CORRELATED, RB_MASKING_SEPARATE})
-                expectModel(Lobe::gloss(normal, in, masking, rough, 0.04f),
+                expectModel(Lobe::gloss(normal, in, masking, rough, glm::vec3(0.04f)),
                             ggx(roughness, 0.04, masking), in, kTolerance);
             expectModel(Lobe::of(RB_LOBE_SEVERAL_FACETS, normal, in, rough), several, in,
                         kTolerance);
@@ -231,16 +231,17 @@ TEST(Lobe, HasNothingBelowTheSurfaceAndIsFiniteAtItsEdge) {
     for (const glm::vec3& in : {glm::vec3(0, 0, 1), glm::vec3(1, 0, 1e-6f), glm::vec3(1, 0, -0.1f)})
         for (float roughness : {0.0f, 0.45f, 1.0f}) {
             const glm::vec3 to = glm::normalize(in);
-            for (const Lobe& lobe : {Lobe::gloss(normal, to, RB_MASKING_CORRELATED, roughness, 0),
-                                     Lobe::gloss(normal, to, RB_MASKING_SEPARATE, roughness, 1),
-                                     Lobe::of(RB_LOBE_MICROFIBERS, normal, to, roughness),
-                                     Lobe::of(RB_LOBE_VELVET, normal, to, roughness),
-                                     Lobe::of(RB_LOBE_BURLEY_SHEEN, normal, to, roughness),
-                                     Lobe::of(RB_LOBE_SEVERAL_FACETS, normal, to, roughness)}) {
-                EXPECT_EQ(lobe.towards({0.6f, 0, -0.8f}), 0);
+            for (const Lobe& lobe :
+                 {Lobe::gloss(normal, to, RB_MASKING_CORRELATED, roughness, glm::vec3(0)),
+                  Lobe::gloss(normal, to, RB_MASKING_SEPARATE, roughness, glm::vec3(1)),
+                  Lobe::of(RB_LOBE_MICROFIBERS, normal, to, roughness),
+                  Lobe::of(RB_LOBE_VELVET, normal, to, roughness),
+                  Lobe::of(RB_LOBE_BURLEY_SHEEN, normal, to, roughness),
+                  Lobe::of(RB_LOBE_SEVERAL_FACETS, normal, to, roughness)}) {
+                EXPECT_EQ(lobe.towards({0.6f, 0, -0.8f}), glm::vec3(0));
                 for (const glm::vec3& out : {glm::vec3(0, 0, 1), glm::vec3(-1, 0, 1e-6f),
                                              glm::vec3(1, 0, 1e-6f), glm::vec3(0, 1, 1)}) {
-                    const float value = lobe.towards(glm::normalize(out));
+                    const float value = lobe.towards(glm::normalize(out)).x;
                     EXPECT_TRUE(std::isfinite(value) && value >= 0) << roughness;
                 }
             }

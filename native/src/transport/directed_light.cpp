@@ -103,7 +103,7 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
     const SideReflectance surface(patches, side);
     const Scattering& scattering = surface.scattering();
     if (scattering.isLambert()) return;
-    const float f0 = surface.f0();
+    const glm::vec3 f0 = surface.f0();
     const glm::vec3 normal = patches.normal(side);
     const Incoming& incoming = shot.incoming[side];
     std::array<glm::vec3, Incoming::kCount> directions;
@@ -142,7 +142,7 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
 glm::vec3 DirectedLight::towards(uint32_t side, const glm::vec3& direction) const {
     glm::vec3 sum(0.0f);
     for (uint32_t k = first[side]; k < first[side + 1]; ++k)
-        sum += (all[k].lobe.towards(direction) - 1) * all[k].exitance;
+        sum += (all[k].lobe.towards(direction) - 1.0f) * all[k].exitance;
     return sum;
 }
 

@@ -44,7 +44,9 @@ float fresnelEdge(float cosine) {
     return 0.3429f * x3 + 0.2440f * x5 + 0.4131f * x5 * x2 * x2;
 }
 
-float fresnel(float f0, float cosine) { return f0 + (1 - f0) * fresnelEdge(cosine); }
+float rmsOf(float mean, float meanSquare) {
+    return mean > 0 ? std::sqrt(std::max(0.0f, meanSquare / (mean * mean) - 1)) : 0;
+}
 
 }  // namespace
 
@@ -52,14 +54,13 @@ Lobe::Kind Lobe::glossOf(rb_masking masking) {
     return masking == RB_MASKING_SEPARATE ? Kind::SEPARATE_GLOSS : Kind::GLOSS;
 }
 
-Lobe::Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness, float f0)
+Lobe::Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness)
     : kind(kind),
       normal(normal),
       incoming(incoming),
       cosine(std::max(glm::dot(normal, incoming), kLeastCosine)),
       shadowing(maskingTerm(cosine, roughness)),
-      roughness(roughness),
-      f0(f0) {}
+      roughness(roughness) {}
 
 // Mean and mean square of a gloss lobe that is not scaled: F is linear in f0, so that they are
 // white f0 + edge (1 - f0), and the same squared. Those of several facets, which are white.
@@ -156,7 +157,7 @@ void Lobe::GlossTable::find(Kind kind, float roughness, float cosine, bool isSev
                             Moments& sum) const {
     const float alpha = roughness * roughness;
     const glm::vec3 in(std::sqrt(1 - cosine * cosine), 0, cosine);
-    const Lobe white(kind, glm::vec3(0, 0, 1), in, alpha * alpha, 1);
+    const Lobe white(kind, glm::vec3(0, 0, 1), in, alpha * alpha);
     const glm::vec3 stretched = glm::normalize(glm::vec3(alpha * in.x, 0, in.z));
     const glm::vec3 t1(0, 1, 0), t2 = glm::cross(stretched, t1);
     for (int i = 0; i < kRings; ++i)
@@ -175,7 +176,7 @@ void Lobe::GlossTable::find(Kind kind, float roughness, float cosine, bool isSev
             // G / G1: G is 4 ni no times the visibility, G1 = 2 ni / (ni + shadowing).
             const float visible = 2 * no * (cosine + white.shadowing) * white.visibility(no);
             const float share = visible * 4 * r * inward / (kRings * kInRing);
-            const float value = white.towards(2 * ih * h - in), edge = fresnelEdge(ih);
+            const auto [value, edge] = white.shape(2 * ih * h - in);
             if (isSeveral) {
                 const float more = lost(roughness, no);
                 sum.several += share * more;
@@ -187,11 +188,16 @@ void Lobe::GlossTable::find(Kind kind, float roughness, float cosine, bool isSev
 }
 
 Lobe Lobe::gloss(const glm::vec3& normal, const glm::vec3& incoming, rb_masking masking,
-                 float roughness, float f0) {
+                 float roughness, const glm::vec3& f0) {
     const float rough = std::clamp(roughness, kLeastRoughness, 1.0f), alpha = rough * rough;
-    Lobe lobe(glossOf(masking), normal, incoming, alpha * alpha, f0);
+    Lobe lobe(glossOf(masking), normal, incoming, alpha * alpha);
     const Moments moments = GlossTable::of(lobe.kind).at(rough, lobe.cosine);
-    lobe.normalise(moments.mean(f0), moments.meanSquare(f0));
+    for (int c = 0; c < 3; ++c) {
+        const float mean = moments.mean(f0[c]);
+        lobe.facing[c] = f0[c] / mean;
+        lobe.rising[c] = (1 - f0[c]) / mean;
+        lobe.rms = std::max(lobe.rms, rmsOf(mean, moments.meanSquare(f0[c])));
+    }
     return lobe;
 }
 
@@ -213,7 +219,7 @@ float Lobe::f0Of(float ratio, rb_masking masking, float roughness) {
 Lobe Lobe::diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,
                    float roughness) {
     Lobe lobe(model == RB_DIFFUSE_BURLEY ? Kind::BURLEY : Kind::OREN_NAYAR, normal, incoming,
-              roughness, 0);
+              roughness);
     lobe.normalise();
     return lobe;
 }
@@ -221,7 +227,7 @@ Lobe Lobe::diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffus
 Lobe Lobe::of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming, float roughness) {
     if (lobe == RB_LOBE_SEVERAL_FACETS) {
         const float rough = std::clamp(roughness, kLeastRoughness, 1.0f), alpha = rough * rough;
-        Lobe several(Kind::SEVERAL_FACETS, normal, incoming, alpha * alpha, 1);
+        Lobe several(Kind::SEVERAL_FACETS, normal, incoming, alpha * alpha);
         const Moments moments = GlossTable::of(several.kind).at(rough, several.cosine);
         several.normalise(moments.several, moments.several2);
         return several;
@@ -229,7 +235,7 @@ Lobe Lobe::of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming, 
     const Kind kind = lobe == RB_LOBE_MICROFIBERS ? Kind::MICROFIBERS
                       : lobe == RB_LOBE_VELVET    ? Kind::VELVET
                                                   : Kind::BURLEY_SHEEN;
-    Lobe cloth(kind, normal, incoming, std::max(roughness, kLeastClothRoughness), 0);
+    Lobe cloth(kind, normal, incoming, std::max(roughness, kLeastClothRoughness));
     cloth.normalise();
     return cloth;
 }
@@ -242,7 +248,7 @@ void Lobe::normalise() {
         for (int j = 0; j < kAngles; ++j) {
             const float angle = glm::two_pi<float>() * float(j) / kAngles;
             const float value =
-                towards(sine * (std::cos(angle) * x + std::sin(angle) * y) + no * normal);
+                shape(sine * (std::cos(angle) * x + std::sin(angle) * y) + no * normal).first;
             mean += 2 * no * kWeight[i] / kAngles * value;
             meanSquare += 2 * no * kWeight[i] / kAngles * value * value;
         }
@@ -251,8 +257,8 @@ void Lobe::normalise() {
 }
 
 void Lobe::normalise(float mean, float meanSquare) {
-    scale = mean > 0 ? 1 / mean : 0;
-    rms = std::sqrt(std::max(0.0f, meanSquare * scale * scale - 1));
+    facing = glm::vec3(mean > 0 ? 1 / mean : 0);
+    rms = rmsOf(mean, meanSquare);
 }
 
 float Lobe::visibility(float out) const {
@@ -261,9 +267,17 @@ float Lobe::visibility(float out) const {
                                         : 0.5f / (cosine * term + out * shadowing);
 }
 
-float Lobe::towards(const glm::vec3& direction) const {
+glm::vec3 Lobe::towards(const glm::vec3& direction) const {
+    const auto [value, rise] = shape(direction);
+    return value * (facing + rise * rising);
+}
+
+// facing and rising are f0 and 1 - f0 over it.
+glm::vec3 Lobe::mean() const { return 1.0f / glm::max(facing + rising, 1e-30f); }
+
+std::pair<float, float> Lobe::shape(const glm::vec3& direction) const {
     const float ni = cosine, no = glm::dot(normal, direction);
-    if (no <= 0) return 0;
+    if (no <= 0) return {0, 0};
     const float io = std::min(glm::dot(incoming, direction), 1.0f);
     switch (kind) {
         case Kind::GLOSS:
@@ -273,22 +287,22 @@ float Lobe::towards(const glm::vec3& direction) const {
             const float nh2 = std::min((ni + no) * (ni + no) / std::max(2 + 2 * io, 1e-6f), 1.0f);
             const float ih = std::sqrt(0.5f * std::max(1 + io, 0.0f));
             const float d = nh2 * (roughness - 1) + 1;
-            const float value = scale * roughness * fresnel(f0, ih) * visibility(no) / (d * d);
-            return kind == Kind::SEVERAL_FACETS
-                       ? value * GlossTable::of(kind).lost(std::sqrt(std::sqrt(roughness)), no)
-                       : value;
+            const float value = roughness * visibility(no) / (d * d);
+            if (kind == Kind::SEVERAL_FACETS)
+                return {value * GlossTable::of(kind).lost(std::sqrt(std::sqrt(roughness)), no), 0};
+            return {value, fresnelEdge(ih)};
         }
         case Kind::BURLEY: {
             const float more = roughness * (1 + io) - 0.5f;
-            return scale * (1 + more * fifthPower(1 - ni)) * (1 + more * fifthPower(1 - no));
+            return {(1 + more * fifthPower(1 - ni)) * (1 + more * fifthPower(1 - no)), 0};
         }
         case Kind::OREN_NAYAR: {
             const float s = io - ni * no;
-            return scale * std::max(0.0f, 1 + roughness * (s > 0 ? s / std::max(ni, no) : s));
+            return {std::max(0.0f, 1 + roughness * (s > 0 ? s / std::max(ni, no) : s)), 0};
         }
         case Kind::MICROFIBERS: {
             const float sine = std::sqrt(std::max(1 - no * no, 1e-6f));
-            return scale * Microfibers::at(roughness, no).towards((io - ni * no) / sine, ni);
+            return {Microfibers::at(roughness, no).towards((io - ni * no) / sine, ni), 0};
         }
         case Kind::VELVET: {
             // pi D G / (4 ni no), D by the cotangent of the half vector's angle.
@@ -296,13 +310,14 @@ float Lobe::towards(const glm::vec3& direction) const {
             const float rest = std::max(1 - nh2, 1e-6f), square = roughness * roughness;
             const float ih = std::sqrt(std::max(0.5f * (1 + io), 1e-6f));
             const float g = std::min(1.0f, 2 * std::sqrt(nh2) * std::min(ni, no) / ih);
-            return 0.25f * scale * std::exp(-nh2 / (rest * square)) * g /
-                   (square * rest * rest * ni * std::max(no, kLeastCosine));
+            return {0.25f * std::exp(-nh2 / (rest * square)) * g /
+                        (square * rest * rest * ni * std::max(no, kLeastCosine)),
+                    0};
         }
         case Kind::BURLEY_SHEEN:
-            return scale * fifthPower(1 - std::sqrt(0.5f * std::max(1 + io, 0.0f)));
+            return {fifthPower(1 - std::sqrt(0.5f * std::max(1 + io, 0.0f))), 0};
     }
-    return 0;
+    return {0, 0};
 }
 
 }  // namespace raybundle

@@ -12,11 +12,12 @@
 // Oren-Nayar reflectance model" (2012). Cloth: transport/microfibers.h; Ashikhmin, Premoze and
 // Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen, Schlick's fifth power
 // of the angle between the light and the half vector.
-// Differs: each is brought to a mean of 1. How much a surface reflects is known (scene/scene.h);
+// Differs: each is brought to a mean of 1, by channel. How much a surface reflects is known (scene/scene.h);
 // here is only where to. Several facets are white here.
 #pragma once
 
 #include <glm/glm.hpp>
+#include <utility>
 
 #include "raybundle/raybundle.h"
 
@@ -28,9 +29,10 @@ class Lobe {
 
     // normal, incoming: unit vectors, incoming towards the source and above the surface.
     // roughness: 0 to 1, GGX alpha is its square, but what is smoother than kLeastRoughness is that
-    // rough: patches do not tell narrower lobes apart. f0: reflectance at right angles, 0 to 1.
+    // rough: patches do not tell narrower lobes apart. f0: reflectance at right angles, 0 to 1, by
+    // channel.
     static Lobe gloss(const glm::vec3& normal, const glm::vec3& incoming, rb_masking masking,
-                      float roughness, float f0);
+                      float roughness, const glm::vec3& f0);
     static Lobe diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,
                         float roughness);
     // Several facets are as rough as gloss.
@@ -42,11 +44,11 @@ class Lobe {
     static float f0Of(float ratio, rb_masking masking, float roughness);
 
     // Of a unit vector away from the surface: 0 or more, 0 below the surface.
-    float towards(const glm::vec3& direction) const;
+    glm::vec3 towards(const glm::vec3& direction) const;
 
     // Its mean before it was brought to 1: lobes of gloss times theirs are linear in f0.
-    float mean() const { return scale > 0 ? 1 / scale : 0; }
-    // RMS of what it is off its mean, by Lambert's cosine.
+    glm::vec3 mean() const;
+    // RMS of what it is off its mean, by Lambert's cosine, of the channel with most.
     float contrast() const { return rms; }
 
   private:
@@ -62,10 +64,13 @@ class Lobe {
     };
     struct Moments;
     class GlossTable;
-    Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness, float f0);
+    Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float roughness);
     static Kind glossOf(rb_masking masking);
     // G / (4 times both cosines), of light that leaves at the cosine `out`.
     float visibility(float out) const;
+    // Before it is brought to a mean of 1, without Fresnel's reflectance, and the latter's rise,
+    // which only gloss has.
+    std::pair<float, float> shape(const glm::vec3& direction) const;
     void normalise(float mean, float meanSquare);
     void normalise();
 
@@ -74,8 +79,9 @@ class Lobe {
     float cosine;     // of the two
     float shadowing;  // of facets: 2 / G1 - 1, times the cosine
     float roughness;  // of facets: alpha squared
-    float f0;
-    float scale = 1, rms = 0;
+    // What of the shape is sent, and what of it times the rise.
+    glm::vec3 facing{1.0f}, rising{0.0f};
+    float rms = 0;
 };
 
 }  // namespace raybundle

@@ -30,6 +30,8 @@ int8_t rounded(float steps) {
     return int8_t(std::lround(std::clamp(steps, -kMostSteps, kMostSteps)));
 }
 
+Eigen::DiagonalMatrix<float, 3> diagonal(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+
 // The inverse of onDisk, times kEdge.
 glm::vec2 cellsAt(glm::vec2 disk) {
     const float r = glm::length(disk), perAngle = 4 * glm::one_over_pi<float>();
@@ -144,7 +146,8 @@ struct ScatteredLight::Transfer {
         auto gloss = [&](float f0) {
             return between(
                 [&](const glm::vec3& from) {
-                    return Lobe::gloss(z, from, surface.glossMasking, surface.glossRoughness, f0);
+                    return Lobe::gloss(z, from, surface.glossMasking, surface.glossRoughness,
+                                       glm::vec3(f0));
                 },
                 true);
         };
@@ -172,8 +175,8 @@ struct ScatteredLight::Transfer {
         for (uint32_t in = 0; in < kDirections; ++in) {
             const Lobe lobe = lobeOf(samples.directions[in]);
             for (uint32_t out = 0; out < kDirections; ++out)
-                values(out, in) = lobe.towards(samples.directions[out]);
-            values.col(in) *= (timesMean ? lobe.mean() : 1) / values.col(in).mean();
+                values(out, in) = lobe.towards(samples.directions[out]).x;
+            values.col(in) *= (timesMean ? lobe.mean().x : 1) / values.col(in).mean();
         }
         return samples.fit * values * samples.fit.transpose();
     }
@@ -285,17 +288,15 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
     const Light light = Eigen::Map<const Light>(arriving.front().data());
     Light leaving = Light::Zero();
     if (surface.scattering().hasGloss()) {
-        const float f0 = surface.f0();
-        const float all = f0 * transfer.white.mean() + (1 - f0) * transfer.edge.mean();
-        leaving = f0 * (transfer.white * light) + (1 - f0) * (transfer.edge * light);
-        const glm::vec3 scale = surface.mirroredMean() / all;
-        leaving.array().rowwise() *= Eigen::Array<float, 1, 3>(scale.x, scale.y, scale.z);
+        const glm::vec3 f0 = surface.f0(), rest = 1.0f - f0;
+        const glm::vec3 scale =
+            surface.mirroredMean() / (f0 * transfer.white.mean() + rest * transfer.edge.mean());
+        leaving = (transfer.white * light) * diagonal(f0 * scale) +
+                  (transfer.edge * light) * diagonal(rest * scale);
     }
     for (size_t k = 0; k < transfer.lobes.size(); ++k) {
-        const glm::vec3 scale =
-            surface.lobeMean(surface.scattering().lobes[k]) / transfer.lobes[k].mean();
-        leaving +=
-            (transfer.lobes[k] * light) * Eigen::Vector3f(scale.x, scale.y, scale.z).asDiagonal();
+        const glm::vec3 mean = surface.lobeMean(surface.scattering().lobes[k]);
+        leaving += (transfer.lobes[k] * light) * diagonal(mean / transfer.lobes[k].mean());
     }
     if (surface.scattering().isRough()) {
         Light diffuse = light;

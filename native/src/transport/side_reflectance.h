@@ -56,11 +56,14 @@ class SideReflectance {
         return glm::clamp(sum, 0.0f, 1.0f);
     }
     // Of the gloss alone (transport/lobe.h): what is mixed with it does not count.
-    float f0() const {
-        const float mean = brightest(mirrored);
-        return mean > 0 ? Lobe::f0Of(brightest(mirroredAt(glm::vec4(0.0f))) / mean,
-                                     surface.glossMasking, surface.glossRoughness)
-                        : 1;
+    glm::vec3 f0() const {
+        const glm::vec3 above = mirroredAt(glm::vec4(0.0f));
+        glm::vec3 result(1.0f);
+        for (int c = 0; c < 3; ++c)
+            if (mirrored[c] > 0)
+                result[c] = Lobe::f0Of(above[c] / mirrored[c], surface.glossMasking,
+                                       surface.glossRoughness);
+        return result;
     }
 
   private:
