@@ -6,10 +6,10 @@ By the angle of the light, as a sum of the terms of diffuse_angles.py.
 Source: Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007), GGX with
 Smith's masking; sampled by its visible normals, Heitz, "Sampling the GGX Distribution of Visible
 Normals" (2018). Fresnel's reflectance runs from F0, seen from straight above, to 1 as that of a
-dielectric does: F = F0 + (1 - F0) f. That of metals from Blender 4.0 on by Schlick's fifth power, less
-a dip around 82 degrees, where a tint multiplies it: Kutz, Hasan and Edmondson, "Novel aspects of the
-Adobe Standard Material" (2023). The albedo is linear in F0 then: A = (a - b) F0 + b, where a is the
-albedo for F = 1 and b that for F = f.
+dielectric does: F = F0 + (1 - F0) f; that of metals from Blender 4.0 on by Schlick's fifth power,
+less a dip around 82 degrees, where a tint multiplies it (Kutz, Hasan and Edmondson, "Novel aspects of
+the Adobe Standard Material", 2023). The albedo is linear in F0 then: A = (a - b) F0 + b, where a is
+the albedo for F = 1 and b that for F = f.
 
 What differs: integrals by midpoints, good to 1e-3 (blend_tests/test_gloss.py), and the terms fitted
 to them, to 2 % up to 80 degrees; light that meets several facets is given back as Cycles'
@@ -34,8 +34,6 @@ _RINGS, _IN_RING = 32, 8  # visible normals, on one side of the plane of view
 # Of the rays that meet gloss after a diffuse bounce: mean of the cosine over pi, their density.
 _DENSITY = 2.0 / (3.0 * math.pi)
 _ABOVE = 0.9999  # cosine of the view from straight above
-
-
 # The fifth power at the angle where the tint of a metal's edge counts, and c (1 - c)^6 there.
 _DIP_EDGE, _DIP = (6.0 / 7.0)**5, (6.0 / 7.0)**6 / 7.0
 
@@ -79,7 +77,6 @@ class GlossAlbedo:
         fresnel = f0 + (1.0 - f0) / 21.0 - dip / 126.0 if self.edge > 0.0 else f0
         again = fresnel * self.white_mean / (1.0 - fresnel * (1.0 - self.white_mean))
         return once * (1.0 + again * (1.0 - self.white) / self.white)
-
 
     def covering(self, f0: np.ndarray | float, multiple: bool) -> np.ndarray:
         """What is missing beneath such a layer, in Cycles from 4.0 on: what it mirrors, or, where

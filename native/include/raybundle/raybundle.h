@@ -165,8 +165,8 @@ RB_API rb_error rb_set_material_lobe(rb_scene scene, int32_t material, rb_lobe l
                                      const float reflectance[6], const float by_angle[24],
                                      const float roughness[2]);
 
-/* Where the rest goes, likewise: as by Lambert's law, or as Burley's or
- * Oren and Nayar's model has it, with a roughness (of the front and of the back), 0 to 1. */
+/* Where the rest goes, likewise: as by Lambert's law, or as Burley's or Oren and Nayar's model has
+ * it, with a roughness (of the front and of the back), 0 to 1. */
 typedef enum rb_diffuse_model RB_INT {
     RB_DIFFUSE_LAMBERT = 0,
     RB_DIFFUSE_BURLEY = 1,
@@ -177,9 +177,9 @@ RB_API rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material,
                                               rb_diffuse_model model, const float roughness[2]);
 
 /* How that leaves, by angle, whatever light it is (LINE_REUSE): from under a layer that lets less
- * of it out at some angles. 1 plus the sum of these factors times the term of
- * rb_set_material_angles at the angle at which it leaves, less the term's mean (six floats for each
- * term, likewise). Without it 0. */
+ * of it out at some angles. 1 plus the sum of these factors times the term of rb_set_material_angles
+ * at the angle at which it leaves, less the term's mean (six floats for each term, likewise).
+ * Without it 0. */
 RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[24]);
 
 /* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.

@@ -146,8 +146,8 @@ class Lobe::GlossTable {
                     moments[size_t(i + di)][size_t(j + dj)]);
     }
 
-    // By visible normals, whose weights are F G / G1, on one side of the plane of incidence. Several facets have to be last: they follow
-    // from the rest of the table.
+    // By visible normals, whose weights are F G / G1, on one side of the plane of incidence. Several
+    // facets have to be last: they follow from the rest of the table.
     void find(Kind kind, float roughness, float cosine, bool isSeveral, Moments& sum) const;
 
     std::array<std::array<Moments, kTableCosines>, kRoughnesses> moments;

@@ -5,15 +5,16 @@
 //
 // Sources: Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007), GGX
 // with Smith's masking, height-correlated (Heitz 2014) or not, sampled as in Heitz, "Sampling the
-// GGX Distribution of Visible Normals" (2018), with Fresnel's reflectance from f0 to 1 as Cycles has
-// it. Light that meets several facets: Turquin, "Practical multiple scattering compensation for
+// GGX Distribution of Visible Normals" (2018), with Fresnel's reflectance from f0 to 1 as Cycles
+// has it. Light that meets several facets: Turquin, "Practical multiple scattering compensation for
 // microfacet models" (2019), what one facet mirrors times 1 / E - 1, E the albedo by the angle of
 // view. Burley, "Physically-Based Shading at Disney" (2012). Fujii, "A tiny improvement of
 // Oren-Nayar reflectance model" (2012). Cloth: transport/microfibers.h; Ashikhmin, Premoze and
-// Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen, Schlick's fifth power
-// of the angle between the light and the half vector.
-// Differs: each is brought to a mean of 1, by channel. How much a surface reflects is known (scene/scene.h);
-// here is only where to. Several facets are white here.
+// Shirley, "A Microfacet-Based BRDF Generator" (2000), velvet; Burley's sheen, Schlick's fifth
+// power of the angle between the light and the half vector.
+// Differs: each is brought to a mean of 1, by channel. How much a surface reflects is known
+// (scene/scene.h); here is only where to. Fresnel's reflectance always rises as that of an index of
+// 1.5, and several facets are white.
 #pragma once
 
 #include <glm/glm.hpp>
