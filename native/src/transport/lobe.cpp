@@ -20,7 +20,7 @@ constexpr float kWeight[kCosines] = {0.05061427f, 0.11119052f, 0.15685332f, 0.18
                                      0.18134189f, 0.15685332f, 0.11119052f, 0.05061427f};
 // Of the table of gloss: steps of the roughness and of the cosine, and for each entry rings of
 // visible normals and normals in them.
-constexpr int kRoughnesses = 11, kTableCosines = 25, kRings = 48, kInRing = 12;
+constexpr int kRoughnesses = 21, kTableCosines = 25, kRings = 48, kInRing = 12;
 // Of Fresnel's edge over Lambert's cosine.
 constexpr float kMeanEdge = 0.0534f;
 // Cosines below this are taken for it: V below stays finite.
@@ -123,7 +123,8 @@ class Lobe::GlossTable {
 
   private:
     explicit GlossTable(Kind kind) {
-        for (bool isSeveral : {false, true})
+        for (bool isSeveral : {false, true}) {
+            if (isSeveral && kind != Kind::GLOSS) break;
             for (int i = 0; i < kRoughnesses; ++i)
                 for (int j = 0; j < kTableCosines; ++j) {
                     const float cosine = float(j * j) / ((kTableCosines - 1) * (kTableCosines - 1));
@@ -131,6 +132,7 @@ class Lobe::GlossTable {
                          kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
                          std::max(cosine, kLeastCosine), isSeveral, moments[size_t(i)][size_t(j)]);
                 }
+        }
     }
 
     template <class Visit>
