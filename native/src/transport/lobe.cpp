@@ -63,9 +63,9 @@ Lobe::Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float 
       roughness(roughness) {}
 
 // Mean and mean square of a gloss lobe that is not scaled: F is linear in f0, so that they are
-// white f0 + edge (1 - f0), and the same squared. Those of several facets, which are white.
+// white f0 + edge (1 - f0), and the same squared. Several facets are white alone.
 struct Lobe::Moments {
-    float white = 0, edge = 0, white2 = 0, both2 = 0, edge2 = 0, several = 0, several2 = 0;
+    float white = 0, edge = 0, white2 = 0, both2 = 0, edge2 = 0;
 
     void add(float factor, const Moments& other) {
         white += factor * other.white;
@@ -73,8 +73,6 @@ struct Lobe::Moments {
         white2 += factor * other.white2;
         both2 += factor * other.both2;
         edge2 += factor * other.edge2;
-        several += factor * other.several;
-        several2 += factor * other.several2;
     }
     float mean(float f0) const { return white * f0 + edge * (1 - f0); }
     float meanSquare(float f0) const {
@@ -83,13 +81,18 @@ struct Lobe::Moments {
     }
 };
 
-// By roughness and the root of the cosine, made once: towards grazing angles lobes change fast.
+// By roughness and the root of the cosine, made once, where first asked for: towards grazing angles
+// lobes change fast.
 class Lobe::GlossTable {
   public:
     static const GlossTable& of(Kind kind) {
         if (kind == Kind::SEPARATE_GLOSS) {
             static const GlossTable separate(kind);
             return separate;
+        }
+        if (kind == Kind::SEVERAL_FACETS) {
+            static const GlossTable several(kind);
+            return several;
         }
         static const GlossTable together(Kind::GLOSS);
         return together;
@@ -123,16 +126,13 @@ class Lobe::GlossTable {
 
   private:
     explicit GlossTable(Kind kind) {
-        for (bool isSeveral : {false, true}) {
-            if (isSeveral && kind != Kind::GLOSS) break;
-            for (int i = 0; i < kRoughnesses; ++i)
-                for (int j = 0; j < kTableCosines; ++j) {
-                    const float cosine = float(j * j) / ((kTableCosines - 1) * (kTableCosines - 1));
-                    find(kind,
-                         kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
-                         std::max(cosine, kLeastCosine), isSeveral, moments[size_t(i)][size_t(j)]);
-                }
-        }
+        for (int i = 0; i < kRoughnesses; ++i)
+            for (int j = 0; j < kTableCosines; ++j) {
+                const float cosine = float(j * j) / ((kTableCosines - 1) * (kTableCosines - 1));
+                moments[size_t(i)][size_t(j)] = find(
+                    kind, kLeastRoughness + (1 - kLeastRoughness) * float(i) / (kRoughnesses - 1),
+                    std::max(cosine, kLeastCosine));
+            }
     }
 
     template <class Visit>
@@ -148,15 +148,14 @@ class Lobe::GlossTable {
                     moments[size_t(i + di)][size_t(j + dj)]);
     }
 
-    // By visible normals, whose weights are F G / G1, on one side of the plane of incidence. Several
-    // facets have to be last: they follow from the rest of the table.
-    void find(Kind kind, float roughness, float cosine, bool isSeveral, Moments& sum) const;
+    // By visible normals, whose weights are F G / G1, on one side of the plane of incidence.
+    static Moments find(Kind kind, float roughness, float cosine);
 
     std::array<std::array<Moments, kTableCosines>, kRoughnesses> moments;
 };
 
-void Lobe::GlossTable::find(Kind kind, float roughness, float cosine, bool isSeveral,
-                            Moments& sum) const {
+Lobe::Moments Lobe::GlossTable::find(Kind kind, float roughness, float cosine) {
+    Moments sum;
     const float alpha = roughness * roughness;
     const glm::vec3 in(std::sqrt(1 - cosine * cosine), 0, cosine);
     const Lobe white(kind, glm::vec3(0, 0, 1), in, alpha * alpha);
@@ -177,16 +176,13 @@ void Lobe::GlossTable::find(Kind kind, float roughness, float cosine, bool isSev
             if (no <= 0) continue;
             // G / G1: G is 4 ni no times the visibility, G1 = 2 ni / (ni + shadowing).
             const float visible = 2 * no * (cosine + white.shadowing) * white.visibility(no);
-            const float share = visible * 4 * r * inward / (kRings * kInRing);
+            const float more =
+                kind == Kind::SEVERAL_FACETS ? of(Kind::GLOSS).lost(roughness, no) : 1;
+            const float share = more * visible * 4 * r * inward / (kRings * kInRing);
             const auto [value, edge] = white.shape(2 * ih * h - in);
-            if (isSeveral) {
-                const float more = lost(roughness, no);
-                sum.several += share * more;
-                sum.several2 += share * value * more * more;
-            } else {
-                sum.add(share, {1, edge, value, value * edge, value * edge * edge});
-            }
+            sum.add(share, {1, edge, value, value * edge, value * edge * edge});
         }
+    return sum;
 }
 
 Lobe Lobe::gloss(const glm::vec3& normal, const glm::vec3& incoming, rb_masking masking,
@@ -231,7 +227,7 @@ Lobe Lobe::of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming, 
         const float rough = std::clamp(roughness, kLeastRoughness, 1.0f), alpha = rough * rough;
         Lobe several(Kind::SEVERAL_FACETS, normal, incoming, alpha * alpha);
         const Moments moments = GlossTable::of(several.kind).at(rough, several.cosine);
-        several.normalise(moments.several, moments.several2);
+        several.normalise(moments.white, moments.white2);
         return several;
     }
     const Kind kind = lobe == RB_LOBE_MICROFIBERS ? Kind::MICROFIBERS
@@ -290,8 +286,10 @@ std::pair<float, float> Lobe::shape(const glm::vec3& direction) const {
             const float ih = std::sqrt(0.5f * std::max(1 + io, 0.0f));
             const float d = nh2 * (roughness - 1) + 1;
             const float value = roughness * visibility(no) / (d * d);
-            if (kind == Kind::SEVERAL_FACETS)
-                return {value * GlossTable::of(kind).lost(std::sqrt(std::sqrt(roughness)), no), 0};
+            if (kind == Kind::SEVERAL_FACETS) {
+                const float rough = std::sqrt(std::sqrt(roughness));
+                return {value * GlossTable::of(Kind::GLOSS).lost(rough, no), 0};
+            }
             return {value, fresnelEdge(ih)};
         }
         case Kind::BURLEY: {
