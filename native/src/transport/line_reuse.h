@@ -87,9 +87,9 @@ class LineReuse {
     std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
 
   private:
-    // The lines of a half to a side, or a share of them that stands for all (kLeastEntries of its
-    // row at least): add(share, from, entry), where of what leaves side `from` that share arrives,
-    // and entry is one of the row.
+    // The lines of a half to a side, or a share of them that stands for all (of its row as many
+    // entries at least as the target error asks for): add(share, from, entry), where of what leaves
+    // side `from` that share arrives, and entry is one of the row.
     template <class Add>
     void alongLines(Half half, const LineWeights& weights, double share, uint32_t side,
                     const Add& add) const;

@@ -23,8 +23,11 @@
 namespace raybundle {
 namespace {
 
-// Entries of a row, if it has as many, that are looked at in any case.
-constexpr size_t kLeastEntries = 64;
+// Entries of a row, if it has as many, that are looked at in any case, times the target error: what
+// fewer leave out is to be little beside it. In an office and a box of which all is painted, or of
+// metal, 64 are off by 0.04 to 0.3 % (RMS) from all of a row, 32 by 0.1 to 0.4, 16 by 0.3 to 0.7.
+constexpr float kLeastEntriesTimesError = 0.4f;
+constexpr float kFewestEntries = 16, kMostEntries = 256;
 constexpr float kMostReflectance = 0.999f;
 constexpr size_t kGrain = 256;  // sides per task
 
@@ -43,12 +46,13 @@ void LineReuse::alongLines(Half half, const LineWeights& weights, double share, 
     const LineRows::LinesOf<float>& lines = LineRows::linesOf<float>();
     if (weights.m[side] == 0) return;
     const float perLine = weights.x[side] / weights.m[side];
+    const auto least =
+        size_t(std::clamp(kLeastEntriesTimesError / targetError, kFewestEntries, kMostEntries));
     for (size_t h = 0; h < 2; ++h) {
         if (half != Half::BOTH && half != Half(h)) continue;
         const uint32_t* const begin = counts.rows(h).first(side);
         const size_t count = size_t(counts.rows(h).last(side) - begin);
-        const size_t enough =
-            std::min(count, std::max(kLeastEntries, size_t(share * double(count))));
+        const size_t enough = std::min(count, std::max(least, size_t(share * double(count))));
         // From the whole row: it may be in the order of the bundles, or of the sides.
         const float start = float(hash(side, uint32_t(h)) >> 8) * 0x1p-24f;
         const double step = double(count) / double(enough);

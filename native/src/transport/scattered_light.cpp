@@ -48,14 +48,15 @@ glm::vec2 cellsAt(glm::vec2 disk) {
 
 // The first of the four cells around a direction, and where in the square of their middles it is.
 struct Around {
-    uint8_t first = 0, s = 0, t = 0;  // s, t: of 255
+    static constexpr int kWhole = 255;
+    uint8_t first = 0, s = 0, t = 0;  // s, t: of kWhole
 
     Around() = default;
     // At a point of the square, in cells.
     explicit Around(const glm::vec2& point) {
         const glm::vec2 p = glm::clamp(point - 0.5f, 0.0f, float(kEdge - 1));
         const glm::uvec2 low = glm::min(glm::uvec2(p), glm::uvec2(kEdge - 2));
-        const glm::vec2 within = 255.0f * (p - glm::vec2(low)) + 0.5f;
+        const glm::vec2 within = float(kWhole) * (p - glm::vec2(low)) + 0.5f;
         first = uint8_t(low.y * kEdge + low.x);
         s = uint8_t(within.x);
         t = uint8_t(within.y);
@@ -64,8 +65,13 @@ struct Around {
         return {first, first + 1u, first + kEdge, first + kEdge + 1};
     }
     std::array<float, 4> shares() const {
-        const float x = float(s) / 255, y = float(t) / 255;
+        const float x = float(s) / kWhole, y = float(t) / kWhole;
         return {(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y};
+    }
+    // Of kWhole squared.
+    std::array<int, 4> wholeShares() const {
+        const int x = s, y = t;
+        return {(kWhole - x) * (kWhole - y), x * (kWhole - y), (kWhole - x) * y, x * y};
     }
 };
 
@@ -309,22 +315,25 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
     leaving.rowwise() -= leaving.colwise().mean().eval();
     Sent& target = sent[indices[side]];
     target.unit = leaving.cwiseAbs().maxCoeff() / kMostSteps;
-    for (uint32_t out = 0; out < kCells && target.unit > 0; ++out)
-        for (int c = 0; c < 3; ++c)
-            target.cells[out][size_t(c)] = rounded(leaving(out, c) / target.unit);
+    if (!(target.unit > 0)) return;
+    const Eigen::Array<float, kCells, 3> steps =
+        (leaving.array() / target.unit).rint().min(kMostSteps).max(-kMostSteps);
+    for (uint32_t out = 0; out < kCells; ++out)
+        for (int c = 0; c < 3; ++c) target.cells[out][size_t(c)] = int8_t(steps(out, c));
 }
 
 glm::vec3 ScatteredLight::towards(uint32_t side, const glm::vec3& direction) const {
     const Sent& source = sent[indices[side]];
     const Around& around = AroundTable::instance().at(source.x, source.y, direction);
-    glm::vec3 sum(0.0f);
+    // In whole numbers, of which there are fewer to convert.
+    glm::ivec3 sum(0);
     const std::array<uint32_t, 4> at = around.cells();
-    const std::array<float, 4> shares = around.shares();
+    const std::array<int, 4> shares = around.wholeShares();
     for (size_t k = 0; k < 4; ++k) {
         const auto& cell = source.cells[at[k]];
-        sum += shares[k] * glm::vec3(cell[0], cell[1], cell[2]);
+        sum += shares[k] * glm::ivec3(cell[0], cell[1], cell[2]);
     }
-    return source.unit * sum;
+    return source.unit / (Around::kWhole * Around::kWhole) * glm::vec3(sum);
 }
 
 float ScatteredLight::contrast(uint32_t side) const {
