@@ -45,6 +45,16 @@ Mesh turned(Mesh mesh) {
     return mesh;
 }
 
+// Both as parts of one mesh.
+Mesh joined(Mesh a, const Mesh& b) {
+    const auto firstVertex = int32_t(a.vertices.size()), firstCorner = a.faceOffsets.back();
+    a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
+    for (const int32_t v : b.cornerVertices) a.cornerVertices.push_back(firstVertex + v);
+    for (size_t f = 1; f < b.faceOffsets.size(); ++f)
+        a.faceOffsets.push_back(firstCorner + b.faceOffsets[f]);
+    return a;
+}
+
 Mesh floorOf(float size) {
     return rectangle("floor", {-size / 2, -size / 2, -0.3f}, {size, 0, 0}, {0, size, 0});
 }
@@ -152,6 +162,7 @@ std::vector<Case> geometryCases(bool isQuick) {
     cases.push_back(furnaceOf("each face twice", {unitBox(), unitBox()}));
     cases.push_back(
         furnaceOf("each face twice, the other way round", {unitBox(), turned(unitBox())}));
+    cases.push_back(furnaceOf("a shell of two sides", {joined(unitBox(), turned(unitBox()))}));
     cases.push_back(
         furnaceOf("each face twice, 1e-7 m apart", {unitBox(), unitBox(glm::vec3(1e-7f))}));
     cases.push_back(furnaceOf("boxes through each other",

@@ -2,16 +2,62 @@
 #include "patches/coincidence.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <numeric>
 
 namespace raybundle {
+namespace {
 
-std::vector<bool> closedFaces(const Mesh& mesh) {
+// Of two parts in the same place, relative.
+constexpr double kSameVolume = 1e-4;
+
+// Faces that hang together: where they lie and what they enclose.
+struct Part {
+    glm::vec3 low{INFINITY}, high{-INFINITY};
+    double volume = 0;  // negative: turned inwards
+    double area = 0;
+    bool isSolid = true;
+
+    auto place() const { return std::make_tuple(low.x, low.y, low.z, high.x, high.y, high.z); }
+    // Double: both sides of a slab.
+    double thickness() const { return area > 0 ? 2 * std::abs(volume) / area : 0; }
+};
+
+// Of the parts of a mesh, by their roots among its vertices.
+using Parts = std::map<int32_t, Part>;
+
+void measure(const Mesh& mesh, const glm::vec3* places, const std::vector<int32_t>& rootOfFace,
+             Parts& parts) {
+    for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        const auto found = parts.find(rootOfFace[f]);
+        if (found == parts.end()) continue;
+        Part& part = found->second;
+        const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
+        auto place = [&](int32_t c) { return places[mesh.cornerVertices[size_t(c)]]; };
+        // From a place of the part: far from the origin digits would be lost.
+        const glm::dvec3 origin(places[found->first]), first(place(begin));
+        glm::dvec3 doubled(0.0);
+        for (int32_t c = begin; c < end; ++c) {
+            part.low = glm::min(part.low, place(c));
+            part.high = glm::max(part.high, place(c));
+            if (c + 1 < end)
+                doubled +=
+                    glm::cross(glm::dvec3(place(c)) - first, glm::dvec3(place(c + 1)) - first);
+        }
+        part.area += glm::length(doubled) / 2;
+        part.volume += glm::dot(first - origin, doubled) / 6;
+    }
+}
+
+}  // namespace
+
+std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest) {
     // Parts are sets of vertices joined by faces.
-    std::vector<int32_t> part(mesh.vertices.size());
-    std::iota(part.begin(), part.end(), 0);
+    std::vector<int32_t> above(mesh.vertices.size());
+    std::iota(above.begin(), above.end(), 0);
     auto root = [&](int32_t v) {
-        while (part[size_t(v)] != v) v = part[size_t(v)] = part[size_t(part[size_t(v)])];
+        while (above[size_t(v)] != v) v = above[size_t(v)] = above[size_t(above[size_t(v)])];
         return v;
     };
     struct Edge {
@@ -27,7 +73,7 @@ std::vector<bool> closedFaces(const Mesh& mesh) {
             const int32_t a = mesh.cornerVertices[size_t(c)];
             const int32_t b = mesh.cornerVertices[size_t(c + 1 < end ? c + 1 : begin)];
             edges.push_back({edgeKey(a, b), a, a < b ? 1 : -1});
-            part[size_t(root(a))] = root(b);
+            above[size_t(root(a))] = root(b);
         }
     }
     std::sort(edges.begin(), edges.end(),
@@ -41,9 +87,28 @@ std::vector<bool> closedFaces(const Mesh& mesh) {
         if (end - i != 2 || turns != 0) closed[size_t(root(edges[i].vertex))] = false;
         i = end;
     }
+    std::vector<int32_t> rootOfFace(mesh.faceCount());
+    Parts parts;
+    for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        rootOfFace[f] = root(mesh.cornerVertices[size_t(mesh.faceOffsets[f])]);
+        if (closed[size_t(rootOfFace[f])]) parts[rootOfFace[f]];
+    }
+    measure(mesh, places, rootOfFace, parts);
+    std::map<decltype(Part().place()), std::vector<Part*>> byPlace;
+    for (auto& [vertex, part] : parts) {
+        part.isSolid = part.thickness() > thinnest;
+        byPlace[part.place()].push_back(&part);
+    }
+    for (auto& [place, there] : byPlace)
+        for (size_t k = 1; k < there.size(); ++k)
+            if (const double sum = there[0]->volume + there[k]->volume;
+                std::abs(sum) < kSameVolume * std::abs(there[0]->volume))
+                there[0]->isSolid = there[k]->isSolid = false;
     std::vector<bool> result(mesh.faceCount());
-    for (size_t f = 0; f < mesh.faceCount(); ++f)
-        result[f] = closed[size_t(root(mesh.cornerVertices[size_t(mesh.faceOffsets[f])]))];
+    for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        const auto found = parts.find(rootOfFace[f]);
+        result[f] = found != parts.end() && found->second.isSolid;
+    }
     return result;
 }
 

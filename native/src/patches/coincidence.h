@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <tuple>
 #include <vector>
 
@@ -9,9 +10,11 @@
 
 namespace raybundle {
 
-// Per face of a mesh: whether it belongs to a part that encloses a volume, that is, whether each
-// edge of the part has exactly two faces, which turn alike.
-std::vector<bool> closedFaces(const Mesh& mesh);
+// Per face of a mesh, whose vertices lie at `places`: whether it belongs to a part that encloses a
+// volume, that is, whether each edge of the part has exactly two faces, which turn alike. Parts that
+// are no thicker than `thinnest` do not, and neither do two that lie in the same place and are
+// turned each to another side: such a shell has light on both sides.
+std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest);
 
 // Which of two parallel surfaces that lie in the same place comes first along a direction. Depth
 // cannot tell, but solids can: the surface by which the direction leaves a solid comes before any

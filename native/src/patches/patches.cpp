@@ -120,6 +120,8 @@ constexpr double kNeedle = 16.0;
 // Share of the edge by which the fourth corner of a parallelogram may be off.
 constexpr double kParallelogramTolerance = 1e-4;
 constexpr int kMaxGrid = 4096;
+// Solids of less thickness are sheets, of the scene's radius: about what depth tells apart.
+constexpr double kThinnest = 2e-6;
 // From the origin, metres: areas, and the squares of distances, stay far from the ends of float.
 constexpr double kFarthest = 1e12;
 
@@ -158,14 +160,15 @@ class Subdivision {
     void cutFaces(const std::vector<double>& sizes) {
         for (size_t i = 0; i < scene.instances.size(); ++i) {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
-            const std::vector<bool> closed = closedFaces(mesh);
+            const std::vector<bool> solid = solidFaces(
+                mesh, patches.vertices.data() + firstVertex[i], kThinnest * double(patches.radius));
             const size_t firstParent = patches.parents.size();
             size_t degenerate = 0;
             for (size_t f = 0; f < mesh.faceCount(); ++f)
                 if (!cutFace(uint32_t(i), int32_t(f), sizes[i])) ++degenerate;
             for (size_t p = firstParent; p < patches.parents.size(); ++p)
                 patches.parents[p].isSolid =
-                    closed[size_t(patches.parents[p].face)] &&
+                    solid[size_t(patches.parents[p].face)] &&
                     !scene.materialOf(mesh, size_t(patches.parents[p].face)).isTranslucent();
             for (size_t p = firstParent; p < patches.parents.size(); ++p) {
                 patches.parents[p].stopsDirect = scene.instances[i].stopsDirect;
