@@ -23,7 +23,10 @@ def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: I
     """None if the light gives no light."""
     light = light_object.data
     name = light_object.name
-    strength = _strength(light, name, images, warnings)
+    given = _strength(light, name, images, warnings)
+    strength = np.where(np.isfinite(given), np.maximum(given, 0.0), 0.0)
+    if not np.array_equal(strength, given):
+        warnings.add(f'light "{name}": light that is negative, or no number, is left out')
     if not np.any(strength > 0.0):
         return None
     _warn_of_unread_options(light_object, warnings)

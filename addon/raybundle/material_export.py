@@ -170,6 +170,10 @@ class MaterialExporter:
                               f'different ways: the translucence has its mean')
             passed = [ColorExpression(color.mean()) for color in passed]
             passed_texture = None
+        if any(np.any(color.mean() < -1e-6) for side in sides
+               for color in (side.reflectance, side.radiance)):
+            self.warnings.add(f'material "{name}": reflectance or emission that is negative counts '
+                              f'as 0')
         transmittance = np.clip([side.transmittance for side in sides], 0.0, 1.0)
         if np.ptp(transmittance) > 1e-3:
             self.warnings.add(f'material "{name}": what it lets through differs between colours '

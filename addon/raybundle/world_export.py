@@ -44,7 +44,10 @@ def export_world(scene: bpy.types.Scene, images: ImagePixels, warnings: Warnings
         return WorldData()
     unread = Warnings()
     reader = NodeReader(f'world "{world.name}"', images, unread)
-    radiance = np.maximum(reader.surface(output.inputs['Surface']).emission, 0.0)
+    given = reader.surface(output.inputs['Surface']).emission
+    radiance = np.maximum(given, 0.0)
+    if np.any(given < 0.0):
+        warnings.add(f'world "{world.name}": light that is negative is left out')
     # What is read without a word is constant.
     if not unread:
         return WorldData(radiance)
