@@ -46,49 +46,49 @@ def empty_file():
     yield
 
 
+def create_material(name: str, reflectance=(0.8, 0.8, 0.8), emission=(0.0, 0.0, 0.0)):
+    """Of a Diffuse and an Emission shader; emission: radiance."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new('ShaderNodeOutputMaterial')
+    diffuse = tree.nodes.new('ShaderNodeBsdfDiffuse')
+    diffuse.inputs['Color'].default_value = (*reflectance, 1.0)
+    shader = diffuse.outputs[0]
+    if any(emission):
+        emit = tree.nodes.new('ShaderNodeEmission')
+        emit.inputs['Color'].default_value = (*emission, 1.0)
+        emit.inputs['Strength'].default_value = 1.0
+        add = tree.nodes.new('ShaderNodeAddShader')
+        tree.links.new(shader, add.inputs[0])
+        tree.links.new(emit.outputs[0], add.inputs[1])
+        shader = add.outputs[0]
+    tree.links.new(shader, output.inputs['Surface'])
+    return material
+
+
 @pytest.fixture
 def new_material():
-    """(name, reflectance, emission radiance) -> material of a Diffuse and an Emission shader."""
+    return create_material
 
-    def create(name: str, reflectance=(0.8, 0.8, 0.8), emission=(0.0, 0.0, 0.0)):
-        material = bpy.data.materials.new(name)
-        material.use_nodes = True
-        tree = material.node_tree
-        tree.nodes.clear()
-        output = tree.nodes.new('ShaderNodeOutputMaterial')
-        diffuse = tree.nodes.new('ShaderNodeBsdfDiffuse')
-        diffuse.inputs['Color'].default_value = (*reflectance, 1.0)
-        shader = diffuse.outputs[0]
-        if any(emission):
-            emit = tree.nodes.new('ShaderNodeEmission')
-            emit.inputs['Color'].default_value = (*emission, 1.0)
-            emit.inputs['Strength'].default_value = 1.0
-            add = tree.nodes.new('ShaderNodeAddShader')
-            tree.links.new(shader, add.inputs[0])
-            tree.links.new(emit.outputs[0], add.inputs[1])
-            shader = add.outputs[0]
-        tree.links.new(shader, output.inputs['Surface'])
-        return material
 
-    return create
+def create_object(name: str, vertices, faces, material=None, location=(0.0, 0.0, 0.0)):
+    """A mesh object in the scene."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    if material is not None:
+        mesh.materials.append(material)
+    item = bpy.data.objects.new(name, mesh)
+    item.location = location
+    bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.update()
+    return item
 
 
 @pytest.fixture
 def new_object():
-    """(name, vertices, faces, ...) -> mesh object in the scene."""
-
-    def create(name: str, vertices, faces, material=None, location=(0.0, 0.0, 0.0)):
-        mesh = bpy.data.meshes.new(name)
-        mesh.from_pydata(vertices, [], faces)
-        if material is not None:
-            mesh.materials.append(material)
-        item = bpy.data.objects.new(name, mesh)
-        item.location = location
-        bpy.context.scene.collection.objects.link(item)
-        bpy.context.view_layer.update()
-        return item
-
-    return create
+    return create_object
 
 
 @pytest.fixture
@@ -107,21 +107,21 @@ def new_light():
     return create
 
 
+def create_world(radiance=(0.05, 0.05, 0.05)):
+    """The Background node of the scene's new world, of strength 1."""
+    world = bpy.data.worlds.new("World")
+    if bpy.app.version < (5, 0, 0):
+        world.use_nodes = True
+    bpy.context.scene.world = world
+    node = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
+    node.inputs['Color'].default_value = (*radiance, 1.0)
+    node.inputs['Strength'].default_value = 1.0
+    return node
+
+
 @pytest.fixture
 def new_world():
-    """(radiance) -> the Background node of the scene's new world, of strength 1."""
-
-    def create(radiance=(0.05, 0.05, 0.05)):
-        world = bpy.data.worlds.new("World")
-        if bpy.app.version < (5, 0, 0):
-            world.use_nodes = True
-        bpy.context.scene.world = world
-        node = next(node for node in world.node_tree.nodes if node.type == 'BACKGROUND')
-        node.inputs['Color'].default_value = (*radiance, 1.0)
-        node.inputs['Strength'].default_value = 1.0
-        return node
-
-    return create
+    return create_world
 
 
 CUBE_VERTICES = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
