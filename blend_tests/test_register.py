@@ -84,6 +84,14 @@ def test_every_native_function_is_declared():
     assert int(re.search(r"#define RB_ABI_VERSION (\d+)", text)[1]) == native.ABI_VERSION
 
 
+def test_every_skip_is_a_choice():
+    header = Path(__file__).parent.parent / "native/include/raybundle/raybundle.h"
+    names = re.search(r"skip\.NAME .*?NAME: ([^(]*)", header.read_text(), re.DOTALL)[1]
+    names = re.findall(r"[a-z_]+", names)
+    assert sorted(names) == sorted(native.SKIPS)
+    assert [item[0] for item in properties.enum_skip] == list(native.SKIPS)
+
+
 def test_only_one_module_knows_ctypes():
     folder = Path(inspect.getfile(raybundle)).parent
     users = [path.name for path in folder.glob("*.py") if "ctypes" in path.read_text()]

@@ -52,7 +52,8 @@ enum_shared_meshes = (
     ('AVERAGE', "Average", "Objects that share a mesh keep sharing it and show their mean light"),
 )
 
-# What each skip leaves out; the names are those of the native library's settings "skip.NAME".
+# What each skip leaves out; the names are those of the native library's settings "skip.NAME". New
+# ones at the end: files keep their places.
 enum_skip = (
     ('darkness', "Darkness", "Bundles and solve, if no light reaches any surface"),
     ('reflection', "Reflection", "The same, if no surface reflects light"),
@@ -66,6 +67,7 @@ enum_skip = (
     ('gather', "Gather", "Final gather where interpolation follows the light"),
     ('bundles', "Bundles", "Bundles once the noise is at its target"),
     ('warm_start', "Warm Start", "Iterations that a solve from zero takes more"),
+    ('sheets', "Sheets", "Projection of faces that lie in a plane with others of their kind"),
 )
 
 enum_solver = (
