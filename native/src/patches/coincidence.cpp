@@ -11,48 +11,11 @@ namespace {
 
 // Of two parts in the same place, relative.
 constexpr double kSameVolume = 1e-4;
+constexpr int32_t kOpen = -1;
 
-// Faces that hang together: where they lie and what they enclose.
-struct Part {
-    glm::vec3 low{INFINITY}, high{-INFINITY};
-    double volume = 0;  // negative: turned inwards
-    double area = 0;
-    bool isSolid = true;
-
-    auto place() const { return std::make_tuple(low.x, low.y, low.z, high.x, high.y, high.z); }
-    // Double: both sides of a slab.
-    double thickness() const { return area > 0 ? 2 * std::abs(volume) / area : 0; }
-};
-
-// Of the parts of a mesh, by their roots among its vertices.
-using Parts = std::map<int32_t, Part>;
-
-void measure(const Mesh& mesh, const glm::vec3* places, const std::vector<int32_t>& rootOfFace,
-             Parts& parts) {
-    for (size_t f = 0; f < mesh.faceCount(); ++f) {
-        const auto found = parts.find(rootOfFace[f]);
-        if (found == parts.end()) continue;
-        Part& part = found->second;
-        const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
-        auto place = [&](int32_t c) { return places[mesh.cornerVertices[size_t(c)]]; };
-        // From a place of the part: far from the origin digits would be lost.
-        const glm::dvec3 origin(places[found->first]), first(place(begin));
-        glm::dvec3 doubled(0.0);
-        for (int32_t c = begin; c < end; ++c) {
-            part.low = glm::min(part.low, place(c));
-            part.high = glm::max(part.high, place(c));
-            if (c + 1 < end)
-                doubled +=
-                    glm::cross(glm::dvec3(place(c)) - first, glm::dvec3(place(c + 1)) - first);
-        }
-        part.area += glm::length(doubled) / 2;
-        part.volume += glm::dot(first - origin, doubled) / 6;
-    }
-}
-
-}  // namespace
-
-std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest) {
+// Per face: one vertex of the part that it hangs together with, the same for all faces of the part;
+// kOpen where not each edge of the part has exactly two faces, which turn alike.
+std::vector<int32_t> closedParts(const Mesh& mesh) {
     // Parts are sets of vertices joined by faces.
     std::vector<int32_t> above(mesh.vertices.size());
     std::iota(above.begin(), above.end(), 0);
@@ -87,13 +50,56 @@ std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double t
         if (end - i != 2 || turns != 0) closed[size_t(root(edges[i].vertex))] = false;
         i = end;
     }
-    std::vector<int32_t> rootOfFace(mesh.faceCount());
-    Parts parts;
+    std::vector<int32_t> result(mesh.faceCount());
     for (size_t f = 0; f < mesh.faceCount(); ++f) {
-        rootOfFace[f] = root(mesh.cornerVertices[size_t(mesh.faceOffsets[f])]);
-        if (closed[size_t(rootOfFace[f])]) parts[rootOfFace[f]];
+        const int32_t vertex = root(mesh.cornerVertices[size_t(mesh.faceOffsets[f])]);
+        result[f] = closed[size_t(vertex)] ? vertex : kOpen;
     }
-    measure(mesh, places, rootOfFace, parts);
+    return result;
+}
+
+// Where a part lies and what it encloses.
+struct Part {
+    glm::vec3 low{INFINITY}, high{-INFINITY};
+    double volume = 0;  // negative: turned inwards
+    double area = 0;
+    bool isSolid = true;
+
+    auto place() const { return std::make_tuple(low.x, low.y, low.z, high.x, high.y, high.z); }
+    // Double: both sides of a slab.
+    double thickness() const { return area > 0 ? 2 * std::abs(volume) / area : 0; }
+};
+
+// By the vertex that stands for the part.
+std::map<int32_t, Part> measured(const Mesh& mesh, const glm::vec3* places,
+                                 const std::vector<int32_t>& partOfFace) {
+    std::map<int32_t, Part> parts;
+    for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        if (partOfFace[f] == kOpen) continue;
+        Part& part = parts[partOfFace[f]];
+        const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
+        auto place = [&](int32_t c) { return places[mesh.cornerVertices[size_t(c)]]; };
+        // From a place of the part: far from the origin digits would be lost.
+        const glm::dvec3 origin(places[partOfFace[f]]), first(place(begin));
+        glm::dvec3 doubled(0.0);
+        for (int32_t c = begin; c < end; ++c) {
+            part.low = glm::min(part.low, place(c));
+            part.high = glm::max(part.high, place(c));
+            if (c + 1 < end)
+                doubled +=
+                    glm::cross(glm::dvec3(place(c)) - first, glm::dvec3(place(c + 1)) - first);
+        }
+        part.area += glm::length(doubled) / 2;
+        part.volume += glm::dot(first - origin, doubled) / 6;
+    }
+    return parts;
+}
+
+}  // namespace
+
+std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest) {
+    const std::vector<int32_t> partOfFace = closedParts(mesh);
+    std::map<int32_t, Part> parts = measured(mesh, places, partOfFace);
     std::map<decltype(Part().place()), std::vector<Part*>> byPlace;
     for (auto& [vertex, part] : parts) {
         part.isSolid = part.thickness() > thinnest;
@@ -105,10 +111,8 @@ std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double t
                 std::abs(sum) < kSameVolume * std::abs(there[0]->volume))
                 there[0]->isSolid = there[k]->isSolid = false;
     std::vector<bool> result(mesh.faceCount());
-    for (size_t f = 0; f < mesh.faceCount(); ++f) {
-        const auto found = parts.find(rootOfFace[f]);
-        result[f] = found != parts.end() && found->second.isSolid;
-    }
+    for (size_t f = 0; f < mesh.faceCount(); ++f)
+        result[f] = partOfFace[f] != kOpen && parts.at(partOfFace[f]).isSolid;
     return result;
 }
 
