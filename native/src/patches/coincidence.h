@@ -10,9 +10,9 @@
 
 namespace raybundle {
 
-// Per face of a mesh, whose vertices lie at `places`: whether it belongs to a part that encloses a
-// volume, that is, whether each edge of the part has exactly two faces, which turn alike. Parts that
-// are no thicker than `thinnest` do not, and neither do two that lie in the same place and are
+// Per face of a mesh, whose vertices lie at `places` (metres): whether it belongs to a part that
+// encloses a volume, that is, whether each edge of the part has exactly two faces, which turn alike.
+// Parts that are no thicker than `thinnest` (metres) do not, and neither do two that lie in the same place and are
 // turned each to another side: such a shell has light on both sides.
 std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest);
 
