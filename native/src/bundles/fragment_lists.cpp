@@ -2,33 +2,47 @@
 #include "bundles/fragment_lists.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 namespace raybundle {
 namespace {
 
-// Depth 1 in the integer steps of a key.
-constexpr double kDepthSteps = 4294967040.0;
-constexpr size_t kFirstFragments = 1024;
+// Steps of a key from the nearest to the farthest depth, and those before, which rounding may need.
+constexpr double kDepthSteps = 4294967040.0, kFirstStep = 64;
+// A double of about this size has steps of 1, and its digits in its low half.
+constexpr double kIntegers = 0x1p52;
 
 uint32_t sideOf(uint64_t key) { return uint32_t(key); }
 uint32_t depthOf(uint64_t key) { return uint32_t(key >> 32); }
 
-// Lists are short.
 void sort(uint64_t* first, uint64_t* last) {
-    if (last - first == 2) {
-        const uint64_t a = first[0], b = first[1];
-        first[0] = std::min(a, b);
-        first[1] = std::max(a, b);
-        return;
-    }
-    if (last - first > 32) return std::sort(first, last);
+    if (last - first > 16) return std::sort(first, last);
     for (uint64_t* a = first + 1; a < last; ++a) {
         const uint64_t key = *a;
         uint64_t* b = a;
         for (; b > first && b[-1] > key; --b) *b = b[-1];
         *b = key;
     }
+}
+
+// Four keys in a row, without branches, whose way would be hard to foretell.
+void sortFour(uint64_t* key) {
+    auto order = [](uint64_t& a, uint64_t& b) {
+        const uint64_t low = std::min(a, b), high = std::max(a, b);
+        a = low;
+        b = high;
+    };
+    uint64_t a = key[0], b = key[1], c = key[2], d = key[3];
+    order(a, b);
+    order(c, d);
+    order(a, c);
+    order(b, d);
+    order(b, c);
+    key[0] = a;
+    key[1] = b;
+    key[2] = c;
+    key[3] = d;
 }
 
 }  // namespace
@@ -53,42 +67,61 @@ void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
 }
 
 void FragmentLists::projectView(BundleLines& out) {
-    begin.assign(rasteriser.pixelCount() + 1, 0);
+    const size_t pixels = rasteriser.pixelCount();
+    counts.assign(pixels, 0);
+    if (pixels > pixelRoom) {
+        pixelRoom = 0;
+        layers.reset();
+        layers.reset(new uint64_t[kLayers * pixels]);
+        pixelRoom = pixels;
+    }
+    links.clear();
     const double depthLow = rasteriser.depthLow();
     depthSteps = kDepthSteps /
                  std::max(rasteriser.depthHigh() - depthLow, std::numeric_limits<double>::min());
+    depthOffset = kIntegers + kFirstStep - depthLow * depthSteps;
     nearSteps = uint32_t(std::min(contacts.zone() * depthSteps, kDepthSteps)) + 1;
-    Fragment* next = fragments.data();
-    const Fragment* end = next + fragments.size();
-    rasteriser.forEachFragment(
-        [&, steps = depthSteps](uint32_t pixel, double depth, uint32_t side) {
-            if (next == end) {
-                const size_t count = fragments.size();
-                fragments.resize(std::max(kFirstFragments, 2 * count));
-                next = fragments.data() + count;
-                end = fragments.data() + fragments.size();
-            }
-            // Part by part: the copy of a temporary waits for its parts to be stored.
-            next->pixel = pixel;
-            next->depth = uint32_t((depth - depthLow) * steps);
-            next->side = side;
-            ++next;
-            ++begin[pixel + 1];
-        });
-    fragmentCount = size_t(next - fragments.data());
-    scatter();
+    rasteriser.forEachRun([&](uint32_t pixel, int count, const double* depth,
+                              const uint32_t* side) { keepRun(pixel, count, depth, side); });
     pairLists(out);
     if (rasteriser.windowCount() > 0)
         out.densities.push_back(
             {rasteriser.lineWeight(), out.exchanges.size(), out.sky.size(), out.touching.size()});
 }
 
-void FragmentLists::scatter() {
-    for (size_t p = 1; p < begin.size(); ++p) begin[p] += begin[p - 1];
-    keys.resize(fragmentCount);
-    // Fill the lists back to front: begin[p + 1] counts down to where list p starts.
-    for (const Fragment *f = fragments.data(), *end = f + fragmentCount; f < end; ++f)
-        keys[--begin[f->pixel + 1]] = uint64_t(f->depth) << 32 | f->side;
+inline void FragmentLists::keepRun(uint32_t pixel, int count, const double* depth,
+                                   const uint32_t* side) {
+    uint64_t key[Rasteriser::kRun];
+    for (int k = 0; k < count; ++k) {
+        const double d = depth[k] * depthSteps + depthOffset;
+        uint64_t bits;
+        std::memcpy(&bits, &d, sizeof bits);
+        key[k] = bits << 32 | side[k];
+    }
+    uint32_t* const ofPixel = counts.data() + pixel;
+    uint64_t* const place = layers.get() + pixel;
+    for (int k = 0; k < count; ++k) {
+        const uint32_t layer = ofPixel[k]++;
+        if (layer < kLayers) {
+            place[layer * pixelRoom + size_t(k)] = key[k];
+        } else {
+            chain.resize(counts.size());
+            uint32_t& last = chain[pixel + uint32_t(k)];
+            links.push_back({key[k], last});
+            last = uint32_t(links.size() - 1);
+        }
+    }
+}
+
+void FragmentLists::collect(uint32_t pixel, uint32_t count) {
+    keys.resize(std::max<size_t>(count, 4));
+    std::fill(keys.begin(), keys.begin() + 4, std::numeric_limits<uint64_t>::max());
+    for (uint32_t layer = 0; layer < std::min(count, kLayers); ++layer)
+        keys[layer] = layers[layer * pixelRoom + pixel];
+    for (uint32_t k = kLayers, link = count > kLayers ? chain[pixel] : 0; k < count; ++k) {
+        keys[k] = links[link].key;
+        link = links[link].next;
+    }
 }
 
 double FragmentLists::along(uint64_t a, uint64_t b) const {
@@ -109,14 +142,28 @@ void FragmentLists::orderCoinciding(uint64_t* first, uint64_t* last) const {
 }
 
 void FragmentLists::pairLists(BundleLines& out) {
-    const size_t pixels = begin.size() - 1;
+    const size_t pixels = counts.size();
     sky.resize(2 * pixels);
     uint32_t* nextSky = sky.data();
-    uint64_t* first = keys.data();
-    for (size_t p = 0; p < pixels; ++p) {
-        uint64_t* const last = keys.data() + (p + 1 < pixels ? begin[p + 2] : keys.size());
-        if (first == last) continue;
-        sort(first, last);
+    for (uint32_t p = 0; p < pixels; ++p) {
+        const uint32_t count = counts[p];
+        if (count == 0) continue;
+        if (count == 2) {  // nearly all where surfaces are closed
+            const uint64_t a = layers[p], b = layers[pixelRoom + p];
+            const uint64_t nearer = std::min(a, b), farther = std::max(a, b);
+            if (!hasLeaks && !areNear(nearer, farther)) {
+                *nextSky++ = sideOf(nearer);
+                *nextSky++ = sideOf(farther) ^ 1;
+                runs.add(0, sideOf(nearer) ^ 1, sideOf(farther));
+                continue;
+            }
+        }
+        collect(p, count);
+        uint64_t *const first = keys.data(), *const last = first + count;
+        if (count <= 4)
+            sortFour(first);
+        else
+            sort(first, last);
         bool anyNear = false;
         for (const uint64_t* k = first; k + 1 < last; ++k) anyNear |= areNear(k[0], k[1]);
         if (anyNear) orderCoinciding(first, last);
@@ -127,7 +174,6 @@ void FragmentLists::pairLists(BundleLines& out) {
         else  // the far side of the nearer surface sees the near side of the farther one
             for (const uint64_t* k = first; k + 1 < last; ++k)
                 runs.add(size_t(k - first), sideOf(k[0]) ^ 1, sideOf(k[1]));
-        first = last;
     }
     out.lines += size_t(nextSky - sky.data()) / 2;
     out.sky.insert(out.sky.end(), sky.data(), nextSky);

@@ -16,6 +16,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
 
 #include "bundles/contacts.h"
@@ -37,16 +38,12 @@ class FragmentLists : public Projector {
     void project(const Bundle& bundle, BundleLines& out) override;
 
   private:
-    struct Fragment {
-        uint32_t pixel;
-        uint32_t depth;  // quantised over the depth range of the scene
-        uint32_t side;   // the side that faces against the direction
-    };
-
     // The view that the rasteriser has turned to.
     void projectView(BundleLines& out);
-    // Puts the fragments into the lists of their pixels.
-    void scatter();
+    // Fragments of neighbouring pixels, as Rasteriser::forEachRun has them.
+    void keepRun(uint32_t pixel, int count, const double* depth, const uint32_t* side);
+    // The fragments of a pixel, unordered.
+    void collect(uint32_t pixel, uint32_t count);
     // How much deeper b lies than a, metres; and whether that is so little that they may touch.
     double along(uint64_t a, uint64_t b) const;
     bool areNear(uint64_t a, uint64_t b) const;
@@ -59,12 +56,23 @@ class FragmentLists : public Projector {
     const bool hasLeaks;  // lines may pass through the surface of a solid: ROULETTE
     Rasteriser rasteriser;
 
-    double depthSteps = 1;            // depth in metres -> quantised depth
-    uint32_t nearSteps = 0;           // Contacts::zone in quantised depth
-    std::vector<Fragment> fragments;  // fragmentCount of them
-    size_t fragmentCount = 0;
-    std::vector<uint32_t> begin;  // per pixel, into keys; one more at the end
-    std::vector<uint64_t> keys;   // depth << 32 | side, per pixel
+    static constexpr uint32_t kLayers = 8;  // fragments of a pixel that need no chain
+    struct Link {
+        uint64_t key;
+        uint32_t next;  // into links; of the first of a pixel: anything
+    };
+
+    // A fragment's key is depth << 32 | side, its depth quantised over the range of the scene.
+    double depthSteps = 1;   // depth in metres -> quantised depth
+    double depthOffset = 0;  // which added to it leaves its digits in the low half of a double
+    uint32_t nearSteps = 0;  // Contacts::zone in quantised depth
+    // Fragment k of a pixel lies in layer k, what layers have no place for in a chain.
+    std::vector<uint32_t> counts;        // per pixel: its fragments
+    std::unique_ptr<uint64_t[]> layers;  // keys, kLayers times pixelRoom; unwritten until used
+    size_t pixelRoom = 0;
+    std::vector<Link> links;
+    std::vector<uint32_t> chain;  // per pixel of more than kLayers: the last of its links
+    std::vector<uint64_t> keys;   // of the pixel in hand
     RunLengths runs;
     std::vector<uint32_t> sky;  // of the view in hand
 };

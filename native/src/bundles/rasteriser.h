@@ -32,6 +32,8 @@ namespace raybundle {
 
 class Rasteriser {
   public:
+    static constexpr int kRun = 64;  // pixels of a row that are looked at together, at most
+
     // pixelSize: edge of a pixel in metres, outside of the windows. `patches` must outlive it.
     // Keeps its memory from bundle to bundle. ROULETTE has no windows.
     Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches,
@@ -46,13 +48,26 @@ class Rasteriser {
     // How many lines of the finest window a line of the view in hand stands for.
     uint32_t lineWeight() const { return 1u << (2 * (finestLevel - level)); }
 
-    // Calls visit(pixel, depth in metres, side that faces against the direction) for all fragments
-    // in the view, parent after parent. Where a patch lets a line through, there is none.
+    // Calls visit(pixel, count, depths in metres, sides that face against the direction) for all
+    // fragments in the view, parent after parent, neighbouring pixels of a row at a time. Where a
+    // patch lets a line through, there is none.
+    template <class Visit>
+    void forEachRun(const Visit& visit) {
+        if (patches.opacity.empty() && taken.empty()) return forEachCovered(visit);
+        forEachCovered([&](uint32_t pixel, int count, const double* z, const uint32_t* side) {
+            for (int first = 0, k = 0; k <= count; ++k) {
+                if (k < count && isMet(pixel + uint32_t(k), side[k])) continue;
+                if (first < k) visit(pixel + uint32_t(first), k - first, z + first, side + first);
+                first = k + 1;
+            }
+        });
+    }
+
+    // The same, one by one: visit(pixel, depth, side).
     template <class Visit>
     void forEachFragment(const Visit& visit) {
-        if (patches.opacity.empty()) return forEachCovered(visit);
-        forEachCovered([&](uint32_t pixel, double z, uint32_t side) {
-            if (stops(patches, side / 2, line + pixel)) visit(pixel, z, side);
+        forEachRun([&](uint32_t pixel, int count, const double* z, const uint32_t* side) {
+            for (int k = 0; k < count; ++k) visit(pixel + uint32_t(k), z[k], side[k]);
         });
     }
 
@@ -64,7 +79,12 @@ class Rasteriser {
     double depthHigh() const { return highest; }
 
   private:
-    // As if all patches were opaque.
+    // Whether the line of a pixel belongs to the view and meets the patch of a side.
+    bool isMet(uint32_t pixel, uint32_t side) const {
+        return (taken.empty() || !taken[pixel]) &&
+               (patches.opacity.empty() || stops(patches, side / 2, line + pixel));
+    }
+    // As if all patches were opaque and all pixels belonged to the view.
     template <class Visit>
     void forEachCovered(const Visit& visit) {
         if (smallPatches == SmallPatches::ROULETTE) {
@@ -118,8 +138,6 @@ class Rasteriser {
     }
     // Marks the pixels that belong to finer windows; of windows as fine, to the first.
     void findTaken(size_t window);
-
-    static constexpr int kRun = 64;  // pixels of a row that are looked at together
 
     const Patches& patches;
     const float pixelSize;
@@ -224,18 +242,15 @@ void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& o
         // Apart from what is visited, so that the compiler makes these loops SIMD.
         for (int first = x0; first < x1; first += kRun) {
             const int count = std::min(kRun, x1 - first);
-            uint32_t patch[kRun];
+            uint32_t side[kRun];
             double z[kRun];
             for (int k = 0; k < count; ++k) {
                 const float dx = float(first - x0 + k);
-                patch[k] = patchAt(s0 + dx * dsdx, t0 + dx * dtdx);
+                side[k] = 2 * patchAt(s0 + dx * dsdx, t0 + dx * dtdx) + plane.facing;
             }
             for (int k = 0; k < count; ++k)
                 z[k] = std::min(std::max(zRow + (first + k) * plane.dzdx, zMin), zMax);
-            for (int k = 0; k < count; ++k) {
-                const uint32_t pixel = rowStart + uint32_t(first + k);
-                if (taken.empty() || !taken[pixel]) visit(pixel, z[k], 2 * patch[k] + plane.facing);
-            }
+            visit(rowStart + uint32_t(first), count, z, side);
         }
     }
 }
@@ -251,7 +266,8 @@ void Rasteriser::fillPatches(const Parent& parent, const Visit& visit) {
     if (det == 0 || !findPlane(parent.origin, parent.a, parent.b, plane)) return;
     auto visitPixel = [&](int x, int y, double z, uint32_t patch) {
         if (x < 0 || y < 0 || x >= width || y >= height) return;
-        visit(uint32_t(y) * uint32_t(width) + uint32_t(x), z, 2 * patch + plane.facing);
+        const uint32_t side = 2 * patch + plane.facing;
+        visit(uint32_t(y) * uint32_t(width) + uint32_t(x), 1, &z, &side);
     };
     const double tileArea = std::abs(det) / (parent.isTriangle ? 2 : 1) / parent.tileCount();
     const glm::vec2 middle(parent.isTriangle ? 1.0f / 3 : 0.5f);
