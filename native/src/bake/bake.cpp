@@ -35,6 +35,8 @@ namespace {
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
 // Bundles whose noise is less than this share of the target have done their part.
 constexpr double kFewNoise = 0.3;
+// So many times the bundles are too many to be foretold.
+constexpr double kFarAway = 2.5;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 
 class Stopwatch {
@@ -450,9 +452,10 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                 " and not below " + std::to_string(100 * settings.targetError) + " %");
             break;
         }
-        // Double at most; less where the error's slope says that less will do.
-        const double factor = settings.skipBundles ? std::pow(excess, 1 / kNoiseSlope) : INFINITY;
-        wanted = std::min(most, (uint32_t(bundles * std::min(2.0, 1.05 * factor)) + 2) & ~1u);
+        // As many as the error's slope says; if that is far away, double only, and look again.
+        const double factor =
+            settings.skipBundles ? 1.05 * std::pow(excess, 1 / kNoiseSlope) : INFINITY;
+        wanted = std::min(most, (uint32_t(bundles * (factor < kFarAway ? factor : 2.0)) + 2) & ~1u);
     }
 
     Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);

@@ -150,7 +150,8 @@ LineWeights LineReuse::lineWeights(Half half) const {
         const float power = kBalancePowers[step];
         std::vector<float>& next = m;
         forEachSide(n, [&](size_t i) {
-            const float row = weightedLines(counts, half, i, x);
+            const float row = step == 0 ? float(linesOf(counts.total[i], half))  // all x are 1
+                                        : weightedLines(counts, half, i, x);
             const float wanted = float(patches.area[i / 2] * exposed[i] * lines / area);
             next[i] = row > 0 ? std::clamp(x[i] * std::pow(wanted / (x[i] * row), power),
                                            1 / kMaxLineWeight, kMaxLineWeight)
@@ -260,6 +261,8 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         // Lines' product with the guess, to the last bit as at the end of the solve that found it.
         scaled[i] = padded(x[i] * reflected[i]);
     });
+    // What the lines bring to a half follows from its last residual, where a channel reflects.
+    const Field rightSide = half == Half::BOTH ? Field() : product;
     const glm::dvec3 given = dot(product, product);
     // A sunny yard around a room says nothing of what matters in the room.
     auto enough = [&] {
@@ -313,7 +316,12 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         scaled[i] = padded(x[i] * reflected[i]);
     });
     forEachSide(n, [&](size_t i) {
-        brought[i] = isSolved ? share * brought[i] : rowTimes(counts, half, i, scaled);
+        if (isSolved)
+            brought[i] *= share;
+        else if (half != Half::BOTH && glm::all(glm::greaterThan(lineScale[i], glm::vec3(0.0f))))
+            brought[i] = (z[i] - rightSide[i] + r[i]) / lineScale[i];
+        else
+            brought[i] = rowTimes(counts, half, i, scaled);
         result.indirect[i] = first.indirect[i];
         if (m[i] > 0) result.indirect[i] += x[i] * brought[i] / m[i];
         if (!known.empty()) result.indirect[i] += known[i];
