@@ -8,7 +8,8 @@
 //
 // The C library's malloc and its kin, and mmap, are replaced for all libraries, so that what oneTBB,
 // its allocator and Embree take fails too. Each allocation has a process of its own: whatever it
-// breaks is seen, and the first bake of a process, which starts oneTBB, is tried like any other.
+// breaks is seen. Where STEP is 1 the first bake of a process, which starts oneTBB, is tried too; of
+// that one Embree does not survive a few allocations (docs/stability.md).
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -215,6 +216,7 @@ int main(int count, char** arguments) {
     bool isWell = true;
     for (const char* reconstruction : {"LEAST_SQUARES", "POINT"})
         for (bool isFirst : {true, false})
-            isWell = failEach(reconstruction, isFirst, step, from) && isWell;
+            if (!isFirst || step == 1)
+                isWell = failEach(reconstruction, isFirst, step, from) && isWell;
     return isWell ? 0 : 1;
 }
