@@ -143,11 +143,21 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
 Bake::Bake() = default;
 Bake::~Bake() = default;
 
+// Where memory runs out, patches, lines and solutions may be left half-made, and none of them goes
+// to the next bake. A cancel comes between two steps, after which Trace::isWhole tells.
 void Bake::run(const Scene& scene) {
     checkCombination(settings, scene.lightSets.size());
     const Threads threads(settings.threads);
     tbb::task_arena arena(threads.count);
-    arena.execute([&] { runStages(scene, threads); });
+    try {
+        arena.execute([&] { runStages(scene, threads); });
+    } catch (const Error& error) {
+        if (error.code != RB_ERROR_CANCELLED) trace.reset();
+        throw;
+    } catch (...) {
+        trace.reset();
+        throw;
+    }
 }
 
 void Bake::runStages(const Scene& scene, const Threads& threads) {

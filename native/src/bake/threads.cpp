@@ -5,11 +5,24 @@
 #include <exception>
 #include <future>
 #include <mutex>
+#include <new>
 #include <thread>
 #include <vector>
 
 namespace raybundle {
 namespace {
+
+// oneTBB counts the processors at its first use, and where memory runs out in that, every later use
+// waits forever (2021.8: atomic_do_once stays pending when what it runs throws). So they are counted
+// when the library is loaded, before there is a scene that could take the memory.
+bool countProcessors() noexcept {
+    try {
+        return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) > 0;
+    } catch (const std::bad_alloc&) {
+        return false;
+    }
+}
+const bool isCounted = countProcessors();
 
 // Starts threads until there are as many at once, with the caller's, or no more can be. oneTBB keeps
 // those that it has, so that what went once is not tried again.
@@ -36,6 +49,7 @@ int startable(int wanted) {
 }  // namespace
 
 Threads::Threads(int asked) {
+    if (!isCounted) throw std::bad_alloc();
     const int most =
         int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
     wanted = asked > 0 ? std::min(asked, most) : most;

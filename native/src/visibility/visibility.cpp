@@ -20,6 +20,10 @@ namespace {
 // Share of the scene's radius: some tens of float rounding errors.
 constexpr float kRelativeOffset = 2e-6f;
 
+// Embree 3 else maps 128 MB for surfaces that it subdivides, of which there are none here; and where
+// that fails it waits forever when the device is released (3.13.5, SharedLazyTessellationCache).
+constexpr const char* kConfiguration = "tessellation_cache_size=0";
+
 [[noreturn]] void fail(RTCError code, const char* what) {
     // A tree that is built in several threads knows of an allocation that failed in one of them only
     // that it was cancelled, which is RTC_ERROR_UNKNOWN; nothing else can fail in it.
@@ -48,7 +52,7 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     : patches(patches),
       surfaceOffset(kRelativeOffset * patches.radius),
       embree(std::make_unique<Embree>()) {
-    embree->device = rtcNewDevice(nullptr);
+    embree->device = rtcNewDevice(kConfiguration);
     if (!embree->device) fail(rtcGetDeviceError(nullptr), "no device");
     embree->scene = rtcNewScene(embree->device);
     if (!embree->scene) fail(rtcGetDeviceError(embree->device), "no scene");
