@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <glm/gtc/constants.hpp>
@@ -163,28 +164,39 @@ LineWeights LineReuse::lineWeights(Half half) const {
     return weights;
 }
 
-Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected, Field& passed,
+Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const {
+    LineSolution guess;
+    guess.reflected.swap(reflected);
+    Irradiance light = solve(half, tolerance, guess, lineWeights(half));
+    reflected.swap(guess.reflected);
+    return light;
+}
+
+Irradiance LineReuse::solve(Half half, float tolerance, LineSolution& guess,
                             const LineWeights& weights) const {
     ByAngle byAngle;
     byAngle.brought = byAngle.ofSources = directed(half, weights);
-    Irradiance light = solvePassed(half, tolerance, reflected, passed, weights, byAngle);
+    Irradiance light = solvePassed(half, tolerance, guess, weights, byAngle);
     // Halves tell of noise alone.
     if (half != Half::BOTH || !directedLight.hasAngles()) return light;
     // Each turn leaves out what was sent by direction once more often.
     double missing = 1;
     for (int turn = 0; turn < kMostTurns && missing > kSettledTurns * double(targetError); ++turn) {
-        const double bent = findAngles(weights, reflected, light, byAngle);
-        light = solvePassed(half, tolerance, reflected, passed, weights, byAngle);
+        const double bent = findAngles(weights, guess.reflected, light, byAngle);
+        light = solvePassed(half, tolerance, guess, weights, byAngle);
         missing = bent * (turn == 0 ? bent : missing);
     }
     light.scattered = byAngle.scattered;
     return light;
 }
 
-Irradiance LineReuse::solvePassed(Half half, float tolerance, Field& reflected, Field& passed,
+Irradiance LineReuse::solvePassed(Half half, float tolerance, LineSolution& guess,
                                   const LineWeights& weights, const ByAngle& byAngle) const {
-    if (patches.translucence.empty())
-        return solveReflected(half, tolerance, reflected, weights, {}, byAngle);
+    Field& passed = guess.passed;
+    if (patches.translucence.empty()) {
+        passed.clear();
+        return solveReflected(half, tolerance, guess, weights, byAngle);
+    }
     const std::vector<float> exposed = exposedShare();
     const size_t n = counts.sideCount();
     Field next(n), change(n);
@@ -199,21 +211,23 @@ Irradiance LineReuse::solvePassed(Half half, float tolerance, Field& reflected, 
         passed = next;
     }
     for (int pass = 1;; ++pass) {
-        Irradiance light = solveReflected(half, tolerance, reflected, weights, passed, byAngle);
+        Irradiance light = solveReflected(half, tolerance, guess, weights, byAngle);
         passOn(light.direct, light.indirect);
         forEachSide(n, [&](size_t i) { change[i] = next[i] - passed[i]; });
         passed.swap(next);
-        const glm::dvec3 sent = dot(reflected, reflected, isShown) + dot(passed, passed, isShown);
+        const glm::dvec3 sent =
+            dot(guess.reflected, guess.reflected, isShown) + dot(passed, passed, isShown);
         const glm::dvec3 enough = sent * double(tolerance) * double(tolerance);
         if (pass == kMaxPasses || !glm::any(glm::greaterThan(dot(change, change), enough)))
             return light;
     }
 }
 
-Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflected,
-                                     const LineWeights& weights, const Field& passed,
-                                     const ByAngle& byAngle) const {
+Irradiance LineReuse::solveReflected(Half half, float tolerance, LineSolution& guess,
+                                     const LineWeights& weights, const ByAngle& byAngle) const {
     const size_t n = counts.sideCount();
+    Field &reflected = guess.reflected, &brought = guess.brought;
+    const Field& passed = guess.passed;
     Irradiance result(n);
     const std::vector<float> exposed = exposedShare();
     const HandOver first = handOver(patches, shot, exposed);
@@ -244,11 +258,15 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
 
     // The scaling, the right-hand side and the first residual.
     Field scale(n), lineScale(n), z(n), r(n), p(n), product(n);
+    std::atomic<bool> isBroughtKnown{!brought.empty()};
     forEachSide(n, [&](size_t i) {
         scale[i] = m[i] > 0 ? glm::sqrt(patches.reflectance[i] / m[i]) : glm::vec3(0.0f);
         lineScale[i] = x[i] * scale[i];
         for (int c = 0; c < 3; ++c) {
-            if (!(scale[i][c] > 0)) reflected[i][c] = 0;
+            if (!(scale[i][c] > 0) && reflected[i][c] != 0) {
+                reflected[i][c] = 0;
+                isBroughtKnown = false;
+            }
             z[i][c] = scale[i][c] > 0 ? reflected[i][c] / scale[i][c] : 0;
         }
         // The right-hand side, until the loop: unshot and what the lines brought, over the scale.
@@ -269,8 +287,8 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, Field& reflecte
         const glm::dvec3 shown = isShown ? glm::min(given, dot(z, z, isShown)) : given;
         return glm::max(shown, kLeastShown * given) * double(tolerance) * double(tolerance);
     };
-    Field brought(n, glm::vec3(0.0f));  // by the lines, over x_i
-    if (dot(z, z) != glm::dvec3(0.0))
+    if (!isBroughtKnown) brought.assign(n, glm::vec3(0.0f));
+    if (!isBroughtKnown && dot(z, z) != glm::dvec3(0.0))
         forEachSide(n, [&](size_t i) { brought[i] = rowTimes(counts, half, i, scaled); });
     forEachSide(n, [&](size_t i) {
         p[i] = z[i] - lineScale[i] * brought[i];

@@ -52,17 +52,14 @@ class LineReuse {
               const std::vector<bool>* isShown = nullptr, float targetError = 0.01f);
 
     // Solves until the residual is below `tolerance` of the right-hand side in every channel, and
-    // of the solution on the sides that are shown. `reflected` (R, per side, W/m^2) holds the first
-    // guess, which any multiple of is as good as itself, and takes the solution. weights: of the
-    // same half. Where patches are translucent, it is solved again with what they passed on until
-    // that has settled: R is without it. `passed` (likewise; may be empty) holds the first guess of
-    // it, and takes the solution.
-    Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected,
-                     std::vector<glm::vec3>& passed, const LineWeights& weights) const;
-    Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const {
-        std::vector<glm::vec3> passed;
-        return solve(half, tolerance, reflected, passed, lineWeights(half));
-    }
+    // of the solution on the sides that are shown. `guess` is where it starts: any multiple of its
+    // `reflected` (R) is as good as itself; it takes the solution. weights: of the same half.
+    // Where patches are translucent, it is solved again with what they passed on until that has
+    // settled: R is without it.
+    Irradiance solve(Half half, float tolerance, LineSolution& guess,
+                     const LineWeights& weights) const;
+    // With the weights of the half; nothing but R is kept.
+    Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const;
 
     // The share of each side that nothing covers.
     std::vector<float> exposedShare() const {
@@ -112,13 +109,11 @@ class LineReuse {
     double findAngles(const LineWeights& weights, const std::vector<glm::vec3>& reflected,
                       const Irradiance& light, ByAngle& byAngle) const;
     // With what passes through translucent patches.
-    Irradiance solvePassed(Half half, float tolerance, std::vector<glm::vec3>& reflected,
-                           std::vector<glm::vec3>& passed, const LineWeights& weights,
-                           const ByAngle& byAngle) const;
-    // passed: per side, exitance that is known besides; empty: none.
-    Irradiance solveReflected(Half half, float tolerance, std::vector<glm::vec3>& reflected,
-                              const LineWeights& weights, const std::vector<glm::vec3>& passed,
-                              const ByAngle& byAngle) const;
+    Irradiance solvePassed(Half half, float tolerance, LineSolution& guess,
+                           const LineWeights& weights, const ByAngle& byAngle) const;
+    // What is passed on (empty: nothing) is known.
+    Irradiance solveReflected(Half half, float tolerance, LineSolution& guess,
+                              const LineWeights& weights, const ByAngle& byAngle) const;
 
     const Patches& patches;
     const LineCounts& counts;

@@ -87,21 +87,23 @@ class LineReuseTransport : public Transport {
     Irradiance irradiance(Half half, float tolerance) override {
         if (streaming[0]) return streamed(half);
         const uint32_t bundles = input.counts.bundles;
-        std::vector<glm::vec3>& guess = last.reflected[size_t(half)];
-        std::vector<glm::vec3>& passed = last.passed[size_t(half)];
+        LineSolution& guess = last.of[size_t(half)];
+        const bool isOfOthers = guess.bundles != bundles;
+        if (isOfOthers) guess.brought.clear();
         if (!input.settings.skipWarmStart) {
-            std::fill(guess.begin(), guess.end(), glm::vec3(0.0f));
-            passed.clear();
-        } else if (half == Half::BOTH && last.bundles != bundles) {
-            guess = meanOf(last.reflected[0], last.reflected[1]);
-            passed = meanOf(last.passed[0], last.passed[1]);
+            std::fill(guess.reflected.begin(), guess.reflected.end(), glm::vec3(0.0f));
+            guess.passed.clear();
+            guess.brought.clear();
+        } else if (half == Half::BOTH && isOfOthers) {
+            guess.reflected = meanOf(last.of[0].reflected, last.of[1].reflected);
+            guess.passed = meanOf(last.of[0].passed, last.of[1].passed);
         }
+        guess.bundles = bundles;
         ++solves;
         if (half != Half::BOTH)
-            return solver.solve(half, tolerance, guess, passed, solver.lineWeights(half));
-        if (last.bundles != bundles) last.weights = solver.lineWeights(half);
-        last.bundles = bundles;
-        return solver.solve(half, tolerance, guess, passed, last.weights);
+            return solver.solve(half, tolerance, guess, solver.lineWeights(half));
+        if (isOfOthers) last.weights = solver.lineWeights(half);
+        return solver.solve(half, tolerance, guess, last.weights);
     }
 
     Irradiance finish(float tolerance, const std::vector<bool>& wanted, Report& report) override {
@@ -112,7 +114,7 @@ class LineReuseTransport : public Transport {
                 {"iterations of a solve", "it starts from the last solution", solves - 2});
         const size_t starved = solver.gatherStarvedSides(
             input.visibility, input.touchDistance, kStarvedLines, uint32_t(input.settings.seed),
-            wanted, last.reflected[size_t(Half::BOTH)], result);
+            wanted, last.of[size_t(Half::BOTH)].reflected, result);
         if (starved)
             report.skipped.push_back({"bundles on small patches",
                                       "too few lines met them: they gathered with local rays",
@@ -152,7 +154,7 @@ class LineReuseTransport : public Transport {
                 passedOn(input.patches, exposed, i, first.gathered[i ^ 1] + first.indirect[i ^ 1]);
         for (uint32_t half = 0; half < 2; ++half) {
             const Irradiance start =
-                solver.solve(Half(half), kStartTolerance, last.reflected[half]);
+                solver.solve(Half(half), kStartTolerance, last.of[half].reflected);
             const size_t n = input.patches.sideCount();
             std::vector<float> lines(n);
             std::vector<glm::vec3> direct(n), indirect(n);
@@ -179,7 +181,7 @@ class LineReuseTransport : public Transport {
         Irradiance result(input.patches.sideCount());
         result.gathered = result.direct = first.gathered;
         result.indirect = first.indirect;
-        std::vector<glm::vec3>& exitance = last.reflected[size_t(half)];
+        std::vector<glm::vec3>& exitance = last.of[size_t(half)].reflected;
         std::fill(exitance.begin(), exitance.end(), glm::vec3(0.0f));
         for (int h = 0; h < 2; ++h) {
             if (half != Half::BOTH && h != int(half)) continue;

@@ -60,18 +60,25 @@ struct LineWeights {
     std::vector<float> x, m;
 };
 
-// What LINE_REUSE found by the lines of a trace, for solves to start from: of other light too, for
-// the first solve of a bake.
+// What LINE_REUSE found by the lines of a half or of both, for solves to start from: of other light
+// too, for the first solve of a bake.
+struct LineSolution {
+    std::vector<glm::vec3> reflected;  // per side: exitance, W/m^2
+    // Likewise, besides: what passed through translucent patches; empty: not known.
+    std::vector<glm::vec3> passed;
+    // Per side: the sum of `reflected` at the other ends of its lines, each times its factor x_j;
+    // empty: not known.
+    std::vector<glm::vec3> brought;
+    uint32_t bundles = 0;  // that it is of; 0: of none
+};
+
 struct LineSolutions {
     explicit LineSolutions(size_t sides = 0) {
-        for (auto& field : reflected) field.resize(sides);
+        for (LineSolution& solution : of) solution.reflected.resize(sides);
     }
 
-    std::vector<glm::vec3> reflected[3];  // per half and for both, per side: exitance, W/m^2
-    // Likewise, besides: what passed through translucent patches; empty: not known.
-    std::vector<glm::vec3> passed[3];
-    LineWeights weights;   // for both
-    uint32_t bundles = 0;  // that those for both are of; 0: there are none
+    LineSolution of[3];   // by Half
+    LineWeights weights;  // for both
 };
 
 // What transports are made of. References must outlive them.
