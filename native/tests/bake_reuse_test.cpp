@@ -206,6 +206,74 @@ TEST(Cancel, AnyStageCanBeCancelledAndRunAgain) {
         }
 }
 
+// Cancels at one call of the callback.
+struct CancelAtCall {
+    int call = 0, calls = 0;  // from 0; the calls so far
+};
+
+bool cancelAtCall(void* user, rb_stage, double) {
+    CancelAtCall& at = *static_cast<CancelAtCall*>(user);
+    return at.calls++ != at.call;
+}
+
+// At each call in turn: the results of the bake before stay, and the next bake, which goes on with
+// what is left, is right. Solved from elsewhere, to 1e-5 (kMostTolerance in bake.cpp).
+void cancelAtEachCall(const Scene& before, const Scene& scene, const Settings& settings) {
+    Bake fresh, bake;
+    fresh.settings = bake.settings = settings;
+    fresh.run(scene);
+    const std::vector<glm::vec3> wanted = everything(fresh);
+    for (CancelAtCall at;; ++at.call) {
+        bake.progress = Progress();
+        bake.run(before);
+        const std::vector<glm::vec3> light = everything(bake);
+        const std::string json = bake.reportJson();
+        bake.progress = Progress(cancelAtCall, &at);
+        bake.settings.skipGeometry = 0;  // all of it, not a relighting
+        at.calls = 0;
+        bool isCancelled = false;
+        try {
+            bake.run(scene);
+        } catch (const Error& error) {
+            isCancelled = error.code == RB_ERROR_CANCELLED;
+        }
+        bake.settings.skipGeometry = 1;
+        if (at.calls <= at.call) {
+            EXPECT_FALSE(isCancelled);
+            EXPECT_GT(at.call, 10);
+            break;
+        }
+        ASSERT_TRUE(isCancelled) << "call " << at.call;
+        EXPECT_EQ(everything(bake), light) << "call " << at.call;
+        EXPECT_EQ(bake.reportJson(), json) << "call " << at.call;
+        bake.progress = Progress();
+        bake.run(scene);
+        EXPECT_LT(difference(everything(bake), wanted), 1e-5) << "call " << at.call;
+    }
+}
+
+TEST(Cancel, EachCallCanCancel) {
+    Bake quick;
+    setQuick(quick, 32);
+    cancelAtEachCall(litRoom(0.3f), litRoom(), quick.settings);
+}
+
+TEST(Cancel, EachCallCanCancelLightSetsGatheredAtCorners) {
+    auto room = [](float reflectance) {
+        Scene scene = litRoom(reflectance);
+        const int32_t set = scene.addLightSet("lamps");
+        Light lamp = pointLight({1, 1, 2}, {1, 5, 2});
+        lamp.lightSet = set;
+        scene.addLight(std::move(lamp));
+        return scene;
+    };
+    Bake quick;
+    setQuick(quick, 32);
+    quick.settings.reconstruction = "POINT";
+    quick.settings.finalGather = 1;
+    cancelAtEachCall(room(0.3f), room(0.6f), quick.settings);
+}
+
 TEST(Cancel, TheLastResultIsKept) {
     const Scene scene = litRoom();
     Bake bake;
