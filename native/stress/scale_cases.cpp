@@ -51,11 +51,13 @@ std::vector<Case> scaleCases() {
     cases.push_back(
         room("offset", "0.01 times as large, 1e+06 m from the origin", 0.01, glm::dvec3(1e6)));
 
-    // Patches of 0.25 m: about 1000 of them, over which a bundle's lines are spread.
-    constexpr double kPatches = 1000;
+    // Patches of 0.25 m: about 1000 of them, over which a bundle's lines are spread; or of 0.5 m,
+    // of which each gets the same with a quarter of the lines.
     for (double pixels : {0.02, 0.2, 5.0, 50.0, 1000.0}) {
+        const bool isWide = pixels >= 1000;
         Case made = room("pixels", printed("%g pixels a patch", pixels), 1, glm::dvec3(0));
-        made.settings.linesPerBundle = int(kPatches * pixels / 4);
+        if (isWide) made.settings.patchSize = made.likeSettings.patchSize = 2 * kPatchSize;
+        made.settings.linesPerBundle = int((isWide ? 250 : 1000) * pixels / 4);
         // With fewer lines than patches these gather with local rays until they have some lines,
         // which are noisier: the noise need not fall from the first.
         made.hasNoise = pixels > 1;

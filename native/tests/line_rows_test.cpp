@@ -61,5 +61,17 @@ TEST(LineRows, RepeatedPairsAreJoined) {
     EXPECT_LE(rows.byteCount(), 4 * 380u * 4 + 21 * sizeof(size_t));
 }
 
+TEST(LineRows, RepeatedPairsAreJoinedWhereOneSideOfAllPatchesSeesNothing) {
+    // Of 256 sides those of one parity exchange 20 lines each with others of it, again and again.
+    for (const uint32_t parity : {0u, 1u}) {
+        LineRows rows(256);
+        BundleLines bundle;
+        for (const Exchange& e : everyPair(128, 128 * 10).exchanges)
+            bundle.exchanges.push_back({2 * e.i + parity, 2 * e.j + parity, 1});
+        for (int k = 0; k < 100; ++k) rows.append({&bundle});
+        EXPECT_LE(rows.entryCount(), 4 * 128 * 20u) << parity;
+    }
+}
+
 }  // namespace
 }  // namespace raybundle

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <random>
 
 namespace raybundle {
 namespace {
@@ -130,8 +131,11 @@ double LineRows::repetition() const {
     size_t all = 0, different = 0;
     const size_t rows = std::min(sideCount(), kSampledRows);
     std::vector<uint32_t> sides;
+    // One of each step, for at equal steps they could all be fronts, of closed boxes say.
+    std::mt19937_64 random;
     for (size_t s = 0; s < rows; ++s) {
-        const size_t i = s * sideCount() / rows;
+        const size_t first = s * sideCount() / rows, last = (s + 1) * sideCount() / rows;
+        const size_t i = first + random() % (last - first);
         sides.clear();
         for (size_t k = begin[i]; k < begin[i + 1]; ++k) sides.push_back(sideOf(entries[k]));
         std::sort(sides.begin(), sides.end());

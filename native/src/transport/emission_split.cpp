@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <glm/gtc/constants.hpp>
+#include <random>
 
+#include "bundles/directions.h"
+#include "transport/local_lines.h"
 #include "transport/receiver.h"
-#include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
 
 namespace raybundle {
@@ -13,7 +15,7 @@ namespace {
 
 // Emission up to this many times the mean exitance that lines meet is left to the bundles.
 constexpr double kBundledEmission = 1.5;
-// Paths by which the light that leaves the scene is estimated, to 2 %.
+// Paths by which the light that leaves the scene is estimated: a share of one half to 2 % of all.
 constexpr uint32_t kPaths = 512;
 
 // The light of a set, as a mean over the scene's surfaces, W/m^2. Only orders of magnitude matter.
@@ -74,13 +76,15 @@ double metShare(const Patches& patches, const Visibility& visibility,
         return visibility.firstHit(side, patches.point(side / 2, glm::vec2(1 / 3.0f)),
                                    cosineDirection(patches.normal(side), u));
     };
-    const SobolPoints points(seed);
+    // Sides are in an order, fronts and backs in turns, and so are the points of Sobol's sequence:
+    // equal steps through either could meet fronts alone. A path starts anywhere in its step.
+    std::mt19937_64 random(seed);
     uint32_t lit = 0, met = 0, path = 0;
-    double sum = 0;
+    double sum = 0, start = uniform(random);  // of all, and of the next path: power / kPaths
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
-        sum += patches.area[side / 2] * brightest(emission[side]);
-        for (; path < kPaths && (path + 0.5) * power < sum * kPaths; ++path) {
-            const glm::vec4 u = points[path];
+        sum += patches.area[side / 2] * brightest(emission[side]) / power * kPaths;
+        for (; path < kPaths && start < sum; start = ++path + uniform(random)) {
+            const glm::vec4 u = uniformPoint(random);
             const auto receiver = nextHit(side, {u.x, u.y});
             if (!receiver) continue;
             ++lit;
