@@ -14,12 +14,12 @@
 namespace raybundle {
 namespace {
 
-// Sobol sets, each with its own shift: of all receivers that share in a mean, and of each of them at
-// least. Rays of a set: at first and at most.
-constexpr uint32_t kSets = 8, kFewestSets = 2, kFirstRays = 16, kMostRays = 1024;
-// The first rays of all sets times the target: what so few miss is a share of the light around of
+// Parts of the Sobol points of all receivers that share in a mean, and of those of each of them at
+// least. Rays of a part: at first and at most.
+constexpr uint32_t kParts = 8, kFewestParts = 2, kFirstRays = 4, kMostRays = 1024;
+// The fewest rays of all parts times the target: what so few miss is a share of the light around of
 // about one over their number.
-constexpr float kFirstTimesTarget = 2.5f;
+constexpr float kFewestTimesTarget = 2.5f;
 // So many patches on a face tell whether interpolation follows them.
 constexpr uint32_t kTellingPatches = 4;
 // Rays that look for surfaces nearer than patches are wide.
@@ -29,6 +29,10 @@ constexpr float kNearLengths = 2;
 // The standard error of what is gathered, and how far interpolation may be off the light around,
 // as shares of the error.
 constexpr float kNoiseShare = 0.6f, kInterpolationShare = 1;
+// The spread of parts that are stratified together over the standard error of their mean, which it
+// overstates: against gathers by many more rays it keeps the error that parts with shifts of their
+// own have at 1 (open_court, instances).
+constexpr float kSpreadOverError = 2;
 
 double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 
@@ -60,33 +64,37 @@ FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
                                        float brightness) const {
-    const double tolerance =
-        std::pow(double(kNoiseShare * std::max(error, targetError * brightness)), 2);
-    const uint32_t sets = std::max(kFewestSets, kSets / uint32_t(receivers.size()));
-    std::vector<Light> sums(receivers.size() * sets);
+    const double tolerance = std::pow(
+        double(kSpreadOverError * kNoiseShare * std::max(error, targetError * brightness)), 2);
+    const uint32_t parts = std::max(kFewestParts, kParts / uint32_t(receivers.size()));
+    std::vector<Light> sums(receivers.size() * parts);
+    const uint32_t count = uint32_t(sums.size());
     uint32_t wanted = kFirstRays;
-    while (wanted < kMostRays / 2 && float(wanted * sums.size()) * targetError < kFirstTimesTarget)
+    // Twice as many are taken before the first look at how they differ.
+    while (wanted < kMostRays / 2 && 2 * float(wanted * count) * targetError < kFewestTimesTarget)
         wanted *= 2;
+    const SobolPoints points(hash(receivers[0].receiver->seed, 0));
     Light mean;
     for (uint32_t done = 0; done < kMostRays; wanted *= 2) {
         const Light before = mean;
         mean = {};
-        for (size_t r = 0; r < receivers.size(); ++r)
-            for (uint32_t set = 0; set < sets; ++set) {
-                Light& sum = sums[r * sets + set];
-                addRays(*receivers[r].receiver, set, done, wanted, sum);
-                const float share = receivers[r].share / float(sets * wanted);
-                mean.carried += share * sum.carried;
-                mean.reflected += share * sum.reflected;
-            }
-        // From the mean of all: sets of one receiver are so few that they are alike by chance.
+        // Those that are done are the first of the sequence, and these come next.
+        const uint32_t each = wanted - done;
+        for (uint32_t k = 0; k < count; ++k) {
+            const Share& one = receivers[k / parts];
+            addRays(*one.receiver, points, done * count + k * each, each, sums[k]);
+            const float share = one.share / float(parts * wanted);
+            mean.carried += share * sums[k].carried;
+            mean.reflected += share * sums[k].reflected;
+        }
+        // From the mean of all: parts of one receiver are so few that they are alike by chance.
         double variance = 0;
-        for (size_t k = 0; k < sums.size(); ++k) {
-            const double share = double(receivers[k / sets].share) / sets;
+        for (uint32_t k = 0; k < count; ++k) {
+            const double share = double(receivers[k / parts].share) / parts;
             variance += share * share * square(sums[k].total() / float(wanted) - mean.total());
         }
-        variance *= double(sums.size()) / double(sums.size() - 1);
-        // What few rays meet can be missed by all sets alike: the step from half as many counts
+        variance *= double(count) / double(count - 1);
+        // What few rays meet can be missed by all parts alike: the step from half as many counts
         // too.
         const double step = done > 0 ? square(mean.total() - before.total()) : INFINITY;
         if (std::max(variance, step) <= tolerance) break;
@@ -95,12 +103,11 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
     return mean;
 }
 
-// Adds what rays [first, last) of a set bring to a receiver.
-void FinalGather::addRays(const Receiver& receiver, uint32_t set, uint32_t first, uint32_t last,
-                          Light& sum) const {
+// Adds what the rays by `count` points from the `first` one on bring to a receiver.
+void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
+                          uint32_t count, Light& sum) const {
     const glm::vec3 side = patches.normal(receiver.side);
-    const SobolPoints points(hash(receiver.seed, set));
-    for (uint32_t i = first; i < last; ++i) {
+    for (uint32_t i = first; i < first + count; ++i) {
         const glm::vec4 u = points[i];
         const glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
         // Below a face that is shaded as if it were bent.
@@ -118,7 +125,7 @@ void FinalGather::addRays(const Receiver& receiver, uint32_t set, uint32_t first
             sum.reflected += light.irradiance.scattered->towards(*hit, -direction);
         if (distance >= width(*hit)) continue;
         const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
-                           hash(receiver.seed, kSets + set)};
+                           hash(receiver.seed, kParts)};
         sum.reflected += shotReflectance(patches, light.shot, *hit) *
                          (light.direct.sample(met, i) - light.irradiance.gathered[*hit]);
     }

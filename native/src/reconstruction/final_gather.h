@@ -14,7 +14,8 @@
 //   truth than rays are, whose noise differs from point to point.
 // - Where a ray ends nearer than the patch there is wide, the light of the sources is sampled at
 //   its end: the mean of the patch is not what shines into a narrow gap.
-// - As many rays as the error needs: the spread of several independently shifted Sobol sets tells.
+// - As many rays as the error needs. The receivers of a vertex share one sequence of Sobol points,
+//   which are stratified together where they look the same way; the spread of its parts tells.
 #pragma once
 
 #include <vector>
@@ -25,6 +26,7 @@
 #include "transport/direct_light.h"
 #include "transport/directed_light.h"
 #include "transport/set_light.h"
+#include "transport/sobol.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
@@ -65,8 +67,8 @@ class FinalGather {
                                const std::vector<glm::vec3>& reflected) const;
 
   private:
-    void addRays(const Receiver& receiver, uint32_t set, uint32_t first, uint32_t last,
-                 Light& sum) const;
+    void addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
+                 uint32_t count, Light& sum) const;
     float width(uint32_t side) const;  // of a patch, metres
 
     const Patches& patches;

@@ -125,13 +125,16 @@ class PointSource : public LightSource {
 class SunSource : public LightSource {
   public:
     explicit SunSource(const Light& light)
-        : direction(light.direction), strength(light.strength), half(float(0.5 * light.angle)) {}
+        : direction(light.direction),
+          strength(light.strength),
+          half(float(0.5 * light.angle)),
+          cosHalf(std::cos(half)),
+          sinHalf(std::sin(half)) {}
 
     LightSample sample(const glm::vec3&, const glm::vec3& normal, glm::vec2 uv) const override {
         LightSample sample;
         sample.distance = kInfinity;
-        const float cosMax = std::cos(half);
-        sample.direction = half > 0 ? inCone(direction, cosMax, uv) : direction;
+        sample.direction = half > 0 ? inCone(direction, cosHalf, uv) : direction;
         // Radiance E / (pi sin^2 half) over the solid angle 2 pi (1 - cos half).
         sample.irradiance =
             strength * perCosine() * std::max(0.0f, glm::dot(normal, sample.direction));
@@ -141,13 +144,13 @@ class SunSource : public LightSource {
     std::optional<glm::vec3> irradiance(const glm::vec3&, const glm::vec3& normal) const override {
         const float c = glm::dot(normal, direction);
         // Wholly above or wholly below the horizon; in between it is sampled.
-        if (c >= std::sin(half)) return strength * c;
-        if (c <= -std::sin(half)) return glm::vec3(0.0f);
+        if (c >= sinHalf) return strength * c;
+        if (c <= -sinHalf) return glm::vec3(0.0f);
         return std::nullopt;
     }
 
     bool isOutOfSight(const glm::vec3&, const glm::vec3& normal, float) const override {
-        return glm::dot(normal, direction) <= -std::sin(half);
+        return glm::dot(normal, direction) <= -sinHalf;
     }
 
     float distance(const glm::vec3&) const override { return kInfinity; }
@@ -162,8 +165,7 @@ class SunSource : public LightSource {
 
     EmittedRay emit(const glm::vec4& u, float sceneRadius) const override {
         EmittedRay ray;
-        const glm::vec3 towards =
-            half > 0 ? inCone(direction, std::cos(half), {u.x, u.y}) : direction;
+        const glm::vec3 towards = half > 0 ? inCone(direction, cosHalf, {u.x, u.y}) : direction;
         const auto [x, y] = frame(towards);
         const glm::vec2 d = onDisk({u.z, u.w});
         ray.origin = kCover * sceneRadius * (towards + d.x * x + d.y * y);
@@ -175,10 +177,11 @@ class SunSource : public LightSource {
     static constexpr float kCover = 1.001f;  // radius of the disk over the scene's
 
     // Irradiance across a ray of the sun, whose disk it covers, over that across its middle.
-    float perCosine() const { return half > 0 ? 2 / (1 + std::cos(half)) : 1; }
+    float perCosine() const { return half > 0 ? 2 / (1 + cosHalf) : 1; }
 
     const glm::vec3 direction, strength;
     const float half;  // angular radius
+    const float cosHalf, sinHalf;
 };
 
 class AreaSource : public LightSource {
