@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/error.h"
 #include "test_scenes.h"
 #include "test_shots.h"
 #include "transport/local_lines.h"
@@ -34,6 +35,17 @@ TEST(Allotment, FollowsThePowerAndLosesNoLine) {
         EXPECT_EQ(all, 10u);
     }
     for (size_t i = 0; i < mean.size(); ++i) EXPECT_NEAR(mean[i], expected[i], 1e-9);
+}
+
+TEST(Allotment, RefusesPowerThatIsNotFinite) {
+    for (double power : {double(INFINITY), double(NAN)}) {
+        try {
+            allotLines({1, power}, 0.5);
+            ADD_FAILURE() << power;
+        } catch (const Error& error) {
+            EXPECT_EQ(error.code, RB_ERROR_INVALID_ARGUMENT);
+        }
+    }
 }
 
 TEST(ShootPower, IsConservedInEachChannel) {

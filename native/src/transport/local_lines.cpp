@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/error.h"
+
 namespace raybundle {
 namespace {
 
@@ -52,6 +54,8 @@ std::vector<uint64_t> allotLines(const std::vector<double>& expected, double xi)
     uint64_t sent = 0;
     for (size_t k = 0; k < expected.size(); ++k) {
         sum += expected[k];
+        if (!std::isfinite(sum))
+            throw invalidArgument("the lights are too bright: their power is not a finite number");
         const uint64_t upTo = uint64_t(std::floor(sum + xi));
         counts[k] = upTo - sent;
         sent = upTo;

@@ -24,6 +24,7 @@
 namespace raybundle {
 
 // Whole numbers of lines whose partial sums follow those of the expected numbers; xi in [0, 1).
+// Throws Error(INVALID_ARGUMENT) where one is no finite number.
 std::vector<uint64_t> allotLines(const std::vector<double>& expected, double xi);
 
 // Where one line ended.
