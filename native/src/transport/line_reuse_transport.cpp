@@ -182,6 +182,7 @@ class LineReuseTransport : public Transport {
         result.gathered = result.direct = first.gathered;
         result.indirect = first.indirect;
         std::vector<glm::vec3>& exitance = last.of[size_t(half)].reflected;
+        last.of[size_t(half)].brought.clear();
         std::fill(exitance.begin(), exitance.end(), glm::vec3(0.0f));
         for (int h = 0; h < 2; ++h) {
             if (half != Half::BOTH && h != int(half)) continue;
