@@ -150,11 +150,11 @@ def scaled(*scale: float) -> None:
     ground()
 
 
-def slivers() -> None:
+def slivers(count: int) -> None:
     """A metre long and a micrometre wide, side by side."""
-    rows = np.arange(1001) * 1e-6
+    rows = np.arange(count + 1) * 1e-6
     vertices = [(x, y, 0.0) for y in rows for x in (0.0, 1.0)]
-    polygons(vertices, *[(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(1000)])
+    polygons(vertices, *[(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(count)])
     cube("Cube", (0.0, 0.0, 0.2))
 
 
@@ -279,7 +279,8 @@ def cases() -> Iterator[Case]:
     yield Case("sheared by a parent, tenfold", lambda: sheared(10))
     yield Case("sheared by a parent, a thousandfold", lambda: sheared(1000))
 
-    yield Case("slivers of 1 m by 1e-6 m", slivers)
+    yield Case("slivers of 1 m by 1e-6 m", lambda: slivers(1000), is_quick=False)
+    yield Case("50 slivers of 1 m by 1e-6 m", lambda: slivers(50))
     yield Case("ten thousand triangles of a millimetre", lambda: dust(10000))
     yield Case("a cube twice", lambda: cubes((0, 0, 0), (0, 0, 0)), hides_faces=True)
     yield Case("a cube twice, 1e-7 m apart", lambda: cubes((0, 0, 0), (1e-7, 1e-7, 1e-7)),

@@ -271,9 +271,10 @@ def test_emission_of_one_side(floor, new_object, new_material, flipped, size):
                          (0.0, 0.0, 2.6))
     ceiling.data.flip_normals()
     # One of them gets the lamp's light, the other what that one reflects past the lamp.
-    # Dark beside the other, it needs less noise than most.
+    # Dark beside the other, it needs less noise than most: the mean of two seeds has 0.10 %
+    # (standard deviation) under the small lamp, and 0.11 % under the large one.
     items = [floor, ceiling]
-    expected = cycles_light(items, samples=3600)
+    expected = cycles_light(items, samples=900 if size < 1 else 3600)
     means = {name: light.mean() for name, light in expected.items()}
     assert (means["Floor"] > 3 * means["Ceiling"]) != flipped
     assert (means["Ceiling"] > 3 * means["Floor"]) == flipped

