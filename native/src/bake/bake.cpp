@@ -382,7 +382,7 @@ SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLi
     return noise.perSide();
 }
 
-// Adds bundles by doubling until the difference of the two halves' estimates meets the target, in
+// Adds bundles until the difference of the two halves' estimates meets the target, in
 // the light of all and in that of each light set.
 SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
                               SetLights& lights, const Transports& transports, Report& report) {
