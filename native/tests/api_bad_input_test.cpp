@@ -116,6 +116,17 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     EXPECT_EQ(id, 0);
 }
 
+TEST_F(Api, ALongMessageEndsWithAWholeCharacter) {
+    std::string name;
+    for (int i = 0; i < 5000; ++i) name += "\u00e4";  // two bytes
+    for (const std::string shift : {"", "x"}) {
+        expectInvalid(rb_set_bake_int(bake, (shift + name).c_str(), 1), shift + "\u00e4");
+        EXPECT_GT(message().size(), 2045u);
+        EXPECT_LT(message().size(), 2048u);
+        EXPECT_EQ(message().substr(message().size() - 2), "\u00e4");
+    }
+}
+
 TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
     const int32_t material = addMaterial(), mesh = addCube(material);
     int32_t id = 77;

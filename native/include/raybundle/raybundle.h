@@ -66,8 +66,8 @@ typedef enum rb_error RB_INT {
     RB_ERROR_CANCELLED = 6 /* the progress function returned false */
 } rb_error;
 
-/* What the last failing call of this thread said, or "" if none failed yet. Valid until the next
- * failing call of this thread. */
+/* What the last failing call of this thread said (UTF-8, at most 2047 bytes of it), or "" if none
+ * failed yet. Valid until the next failing call of this thread. */
 RB_API const char* rb_get_error_message(void);
 
 /* ------------------------------------------------------------------------------------------------

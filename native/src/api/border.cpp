@@ -1,24 +1,33 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "api/border.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cstring>
 
 namespace {
 
-thread_local std::string lastMessage;
+// An array, since there may be no memory for more when it is needed: glibc ends the process where it
+// cannot note the destructor of a thread_local string.
+thread_local char lastMessage[2048];
 
 }  // namespace
 
 namespace raybundle {
 
-// Keeping the message may itself run out of memory; the code still arrives.
 rb_error fail(rb_error code, const char* message) noexcept {
-    try {
-        lastMessage = message;
-    } catch (...) {
-        lastMessage.clear();
-    }
+    size_t length = std::min(std::strlen(message), sizeof(lastMessage) - 1);
+    // Not in the middle of a character of UTF-8.
+    while (length > 0 && (message[length] & 0xC0) == 0x80) --length;
+    std::memcpy(lastMessage, message, length);
+    lastMessage[length] = 0;
     return code;
+}
+
+void makeRoomForMessage() noexcept {
+    // Of a library that is loaded later glibc allocates a thread's variables at their first use.
+    volatile char& last = lastMessage[sizeof(lastMessage) - 1];
+    last = 0;
 }
 
 void needProcessor() {
@@ -81,4 +90,4 @@ int32_t rb_get_abi_version(void) { return RB_ABI_VERSION; }
 
 const char* rb_get_version(void) { return RAYBUNDLE_VERSION; }
 
-const char* rb_get_error_message(void) { return lastMessage.c_str(); }
+const char* rb_get_error_message(void) { return lastMessage; }

@@ -18,8 +18,10 @@
 
 namespace raybundle {
 
-// Keeps the message for rb_get_error_message of this thread and returns the code.
+// Keeps the message for rb_get_error_message of this thread, its first 2047 bytes, and returns the
+// code. Takes no memory, if makeRoomForMessage() was called in this thread.
 rb_error fail(rb_error code, const char* message) noexcept;
+void makeRoomForMessage() noexcept;
 
 // Throws Error(UNSUPPORTED_HARDWARE) on a processor that lacks what the library was compiled for,
 // where all else would end the process.
@@ -28,6 +30,7 @@ void needProcessor();
 // Runs the body of an API function; whatever it throws becomes a code and a message.
 template <class Body>
 rb_error guarded(const Body& body) noexcept {
+    makeRoomForMessage();
     try {
         needProcessor();
         body();
