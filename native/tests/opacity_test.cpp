@@ -203,6 +203,35 @@ TEST(VaryingEmission, ACheckerShinesAsItsMean) {
     EXPECT_NEAR(light.emitted.z, 50, 0.05);
 }
 
+TEST(VaryingEmission, OfARegularCheckerHalfEscapesFromTwoSides) {
+    // As many rays as pairs of a bright and a dark patch. What goes down meets the ground.
+    constexpr int kAlong = 256, kAcross = 128;
+    Scene scene;
+    place(scene, rectangle("ground", {-100, -100, -0.01f}, {200, 0, 0}, {0, 200, 0}), grey("", 0),
+          glm::dmat4(1), RB_ROLE_OCCLUDE);
+    Mesh mesh = grid("lamp", {0, 0, 0}, {2, 0, 0}, {0, 1, 0}, kAlong, kAcross);
+    for (int32_t v : mesh.cornerVertices) {
+        const glm::vec3& at = mesh.vertices[size_t(v)];
+        mesh.uvs.push_back({at.x / 2, at.y});
+    }
+    std::vector<glm::vec3> checker;
+    for (int y = 0; y < kAcross; ++y)
+        for (int x = 0; x < kAlong; ++x) checker.push_back(glm::vec3((x + y) % 2 ? 0.0f : 1.0f));
+    Material lamp = grey("lamp", 0);
+    lamp.emissionImage =
+        scene.addImage({"checker", kAlong, kAcross, RB_IMAGE_REPEAT, std::move(checker)});
+    lamp.emissionImageWeight = {glm::vec3(1.0f), glm::vec3(1.0f)};
+    place(scene, mesh, lamp);
+    const Patches patches = subdivide(scene, 20, kMany);
+    ASSERT_GE(patches.count(), size_t(kAlong * kAcross));
+    const Visibility visibility(patches);
+    for (uint32_t seed = 0; seed < 8; ++seed) {
+        const DirectLight light(scene, patches, visibility, seed);
+        // Of 2^14 rays the side is a matter of chance: five times the standard deviation of 0.004.
+        EXPECT_NEAR(light.escapedShares().at(0).x, 0.5, 0.02) << seed;
+    }
+}
+
 TEST(VaryingEmission, EachPatchShinesByItself) {
     // Two patches, one bright and one black, with an image that is constant over each.
     Scene scene = floorUnderChecker(2, {600, 600, 600});

@@ -230,11 +230,16 @@ std::vector<glm::dvec3> DirectLight::escapedShares() const {
     const uint32_t rays = std::max(kLeastEscapeRays, kEscapeRays / uint32_t(sources.size()));
     for (size_t k = 0; k < sources.size(); ++k) {
         if (brightest(sources[k]->power()) <= 0 || !sources[k]->castsShadows) continue;
+        const uint32_t own = hash(seed, uint32_t(k));
         tbb::enumerable_thread_specific<glm::dvec3> missed(glm::dvec3(0.0));
         tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
-                const EmittedRay ray =
-                    sources[k]->emit(sobolPoint(i, hash(seed, uint32_t(k))), patches.radius);
+                glm::vec4 u = sobolPoint(i, own);
+                // Of a mesh of 2^n faces all points could lie alike in their faces' shares, as on
+                // their fronts alone.
+                u.x = std::min(glm::fract(u.x + float(hash(own, i)) * 0x1p-32f / float(rays)),
+                               0.9999999f);
+                const EmittedRay ray = sources[k]->emit(u, patches.radius);
                 const float share =
                     ray.side
                         ? visibility.visibleShare(*ray.side, ray.origin, ray.direction, INFINITY)
