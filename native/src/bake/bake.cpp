@@ -26,6 +26,7 @@
 #include "reconstruction/shown_light.h"
 #include "reconstruction/stated_error.h"
 #include "transport/set_light.h"
+#include "visibility/embree_device.h"
 
 namespace raybundle {
 namespace {
@@ -148,6 +149,7 @@ Bake::~Bake() = default;
 void Bake::run(const Scene& scene) {
     checkCombination(settings, scene.lightSets.size());
     const Threads threads(settings.threads);
+    makeRoomForTreeBuilders();
     tbb::task_arena arena(threads.count);
     try {
         arena.execute([&] { runStages(scene, threads); });

@@ -13,16 +13,13 @@
 #include "bake/error.h"
 #include "patches/coincidence.h"
 #include "patches/opacity.h"
+#include "visibility/embree_device.h"
 
 namespace raybundle {
 namespace {
 
 // Share of the scene's radius: some tens of float rounding errors.
 constexpr float kRelativeOffset = 2e-6f;
-
-// Embree 3 else maps 128 MB for surfaces that it subdivides, of which there are none here; and where
-// that fails it waits forever when the device is released (3.13.5, SharedLazyTessellationCache).
-constexpr const char* kConfiguration = "tessellation_cache_size=0";
 
 [[noreturn]] void fail(RTCError code, const char* what) {
     // A tree that is built in several threads knows of an allocation that failed in one of them only
@@ -52,7 +49,7 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     : patches(patches),
       surfaceOffset(kRelativeOffset * patches.radius),
       embree(std::make_unique<Embree>()) {
-    embree->device = rtcNewDevice(kConfiguration);
+    embree->device = newEmbreeDevice();
     if (!embree->device) fail(rtcGetDeviceError(nullptr), "no device");
     embree->scene = rtcNewScene(embree->device);
     if (!embree->scene) fail(rtcGetDeviceError(embree->device), "no scene");

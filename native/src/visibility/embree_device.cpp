@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "visibility/embree_device.h"
+
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <system_error>
+#include <thread>
+
+namespace raybundle {
+namespace {
+
+// Builds a tree of one box, which Embree does in the thread that asks. Returns whether it is built.
+// Throws std::bad_alloc too, where Embree has no memory for its error.
+bool buildLeastTree(RTCDevice device) {
+    const std::unique_ptr<RTCBVHTy, decltype(&rtcReleaseBVH)> tree(rtcNewBVH(device),
+                                                                   &rtcReleaseBVH);
+    if (!tree) return false;
+    RTCBuildPrimitive box = {};
+    box.upper_x = box.upper_y = box.upper_z = 1;
+    RTCBuildArguments arguments = rtcDefaultBuildArguments();
+    arguments.bvh = tree.get();
+    arguments.primitives = &box;
+    arguments.primitiveCount = arguments.primitiveArrayCapacity = 1;
+    arguments.createNode = [](RTCThreadLocalAllocator memory, unsigned, void*) {
+        return rtcThreadLocalAlloc(memory, 16, 16);
+    };
+    arguments.setNodeChildren = [](void*, void**, unsigned, void*) {};
+    arguments.setNodeBounds = [](void*, const RTCBounds**, unsigned, void*) {};
+    arguments.createLeaf = [](RTCThreadLocalAllocator memory, const RTCBuildPrimitive*, size_t,
+                              void*) { return rtcThreadLocalAlloc(memory, 16, 16); };
+    return rtcBuildBVH(&arguments) != nullptr;
+}
+
+}  // namespace
+
+RTCDevice newEmbreeDevice() { return rtcNewDevice("tessellation_cache_size=0"); }
+
+void makeRoomForTreeBuilders() {
+    static std::mutex mutex;
+    static size_t callers = 0;  // threads that called this
+    static size_t ended = 0;    // threads in the list that ended at once
+    thread_local bool isKnown = false;
+    const std::lock_guard lock(mutex);
+    if (!isKnown) ++callers;
+    isKnown = true;
+
+    // oneTBB's workers build too. The list doubles whenever it is full: with `room` + 1 threads in it,
+    // it has places for as many again but one.
+    const size_t builders = callers + 2 * std::thread::hardware_concurrency();
+    size_t room = 1;
+    while (room <= builders) room *= 2;
+    if (ended > room) return;
+    const std::unique_ptr<RTCDeviceTy, decltype(&rtcReleaseDevice)> device(newEmbreeDevice(),
+                                                                           &rtcReleaseDevice);
+    for (; ended <= room; ++ended) {
+        bool isBuilt = false;
+        try {
+            std::thread([&] {
+                try {
+                    isBuilt = device && buildLeastTree(device.get());
+                } catch (const std::bad_alloc&) {
+                    // Not built.
+                }
+            }).join();
+        } catch (const std::system_error&) {
+            return;  // no more threads: without room, as long as there is memory
+        }
+        if (!isBuilt) throw std::bad_alloc();
+    }
+}
+
+}  // namespace raybundle
