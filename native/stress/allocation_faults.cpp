@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // A bake that runs out of memory at its first allocation, at its second, and so on to its last, on
-// whichever thread: each time it must say so, keep the results of the run before, and be as good as
-// new afterwards. Or it gives the light that it should, where whoever asked does without.
+// whichever thread, for that allocation alone or until it ends: each time it must say so, keep the
+// results of the run before, and be as good as new afterwards. Or it gives the light that it should,
+// where whoever asked does without.
 //
 //   allocation_faults [STEP [FIRST]]     fails every STEP-th allocation (1) from the FIRST-th on (0)
 //
 // The C library's malloc and its kin, and mmap, are replaced for all libraries, so that what oneTBB,
 // its allocator and Embree take fails too. Each allocation has a process of its own: whatever it
-// breaks is seen. Where STEP is 1 the first bake of a process, which starts oneTBB, is tried too; of
-// that one Embree does not survive a few allocations (docs/stability.md).
+// breaks is seen. Where STEP is 1 the first bake of a process, which starts oneTBB, is tried too.
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -33,8 +33,9 @@ namespace {
 enum Way { MALLOC, CALLOC, REALLOC, ALIGNED, MMAP, WAYS };
 constexpr std::array<const char*, WAYS> kWays{"malloc", "calloc", "realloc", "aligned", "mmap"};
 
-// Counts down while a bake runs; the allocation that reaches 0 fails. Negative: none does.
-std::atomic<int64_t> untilFault{-1};
+std::atomic<bool> isBaking{false};  // allocations are counted, and fail, only then
+std::atomic<int64_t> untilFault{0};
+bool stays = false;  // all after that at 0 fail too
 
 // What a process tells the one that started it.
 struct Told {
@@ -51,7 +52,9 @@ Told* told = nullptr;
 }
 
 bool isFault(Way way) {
-    return untilFault.load() >= 0 && untilFault.fetch_sub(1) == 0 && fail(way);
+    if (!isBaking.load()) return false;
+    const int64_t left = untilFault.fetch_sub(1);
+    return (left == 0 || (stays && left < 0)) && fail(way);
 }
 
 }  // namespace
@@ -131,8 +134,10 @@ Outcome bakeWithFault(const char* reconstruction, bool isFirst, int64_t at) {
         rb_set_bake_int(bake, "skip.geometry", 0);  // all of it, not a relighting
     }
     untilFault = at;
+    isBaking = true;
     const rb_error error = rb_execute_bake(bake, second);
-    const bool wasReached = untilFault.exchange(-1) < 0;
+    isBaking = false;
+    const bool wasReached = untilFault < 0;
     bool isRight = true;
     if (!wasReached || error == RB_ERROR_NONE) {
         isRight = holds(error == RB_ERROR_NONE, "a bake with memory failed", at) &&
@@ -193,11 +198,11 @@ bool failEach(const char* reconstruction, bool isFirst, int64_t step, int64_t fr
         ++ended[inProcess([&] { return bakeWithFault(reconstruction, isFirst, at); }, at)];
         ++ways[told->failed];
     }
-    std::printf(
-        "%s, %s: %lld allocations failed with an error, %lld were done without, %lld went "
-        "wrong (",
-        reconstruction, isFirst ? "the first bake" : "a later bake", (long long)ended[FAILED_WELL],
-        (long long)ended[DID_WITHOUT], (long long)ended[WRONG]);
+    std::printf("%s, %s, %s: %lld failed with an error, %lld were done without, %lld went wrong (",
+                reconstruction, isFirst ? "the first bake" : "a later bake",
+                stays ? "an allocation and all after it" : "one allocation",
+                (long long)ended[FAILED_WELL], (long long)ended[DID_WITHOUT],
+                (long long)ended[WRONG]);
     for (size_t way = 0; way < WAYS; ++way)
         std::printf("%s%s %lld", way ? ", " : "", kWays[way], (long long)ways[way]);
     std::printf(")\n");
@@ -214,9 +219,12 @@ int main(int count, char** arguments) {
     const int64_t step = count > 1 ? std::max(1, std::atoi(arguments[1])) : 1;
     const int64_t from = count > 2 ? std::max(0, std::atoi(arguments[2])) : 0;
     bool isWell = true;
-    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"})
-        for (bool isFirst : {true, false})
-            if (!isFirst || step == 1)
-                isWell = failEach(reconstruction, isFirst, step, from) && isWell;
+    for (bool all : {false, true}) {
+        stays = all;
+        for (const char* reconstruction : {"LEAST_SQUARES", "POINT"})
+            for (bool isFirst : {true, false})
+                if (!isFirst || step == 1)
+                    isWell = failEach(reconstruction, isFirst, step, from) && isWell;
+    }
     return isWell ? 0 : 1;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bake/threads.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <exception>
 #include <future>
@@ -13,16 +15,19 @@ namespace raybundle {
 namespace {
 
 // oneTBB counts the processors at its first use, and where memory runs out in that, every later use
-// waits forever (2021.8: atomic_do_once stays pending when what it runs throws). So they are counted
-// when the library is loaded, before there is a scene that could take the memory.
-bool countProcessors() noexcept {
+// waits forever (2021.8: atomic_do_once stays pending when what it runs throws); and it looks for
+// libraries of its own, in which glibc ends the process where there is no memory to say that there
+// is none. So both are done when the library is loaded, before there is a scene that could take the
+// memory.
+bool useOnce() noexcept {
     try {
+        tbb::task_arena().initialize();
         return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) > 0;
     } catch (const std::bad_alloc&) {
         return false;
     }
 }
-const bool isCounted = countProcessors();
+const bool isUsed = useOnce();
 
 // Starts threads until there are as many at once, with the caller's, or no more can be. oneTBB keeps
 // those that it has, so that what went once is not tried again.
@@ -49,7 +54,7 @@ int startable(int wanted) {
 }  // namespace
 
 Threads::Threads(int asked) {
-    if (!isCounted) throw std::bad_alloc();
+    if (!isUsed) throw std::bad_alloc();
     const int most =
         int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
     wanted = asked > 0 ? std::min(asked, most) : most;
