@@ -140,6 +140,84 @@ def test_undo_after_a_bake(closed_box):
     assert is_furnace(read_colors(bpy.data.objects[name]))
 
 
+def open_another_file(item):
+    bpy.ops.wm.read_homefile(use_empty=True)
+
+
+def undo(item):
+    bpy.ops.ed.undo()
+
+
+def remove_object(item):
+    bpy.data.objects.remove(item)
+
+
+def remove_mesh(item):
+    bpy.data.meshes.remove(item.data)
+
+
+def add_faces(item):
+    mesh = item.data
+    vertices = [vertex.co[:] for vertex in mesh.vertices]
+    faces = [polygon.vertices[:] for polygon in mesh.polygons]
+    mesh.clear_geometry()
+    mesh.from_pydata(vertices, [], faces + faces)
+
+
+def enter_edit_mode(item):
+    bpy.context.view_layer.objects.active = item
+    bpy.ops.object.mode_set(mode='EDIT')
+
+
+def clear_bake(item):
+    bpy.ops.raybundle.clear()
+
+
+@pytest.mark.parametrize("stage", ['bundles', 'write_back'])
+@pytest.mark.parametrize("change", [open_another_file, undo, remove_object, remove_mesh, add_faces,
+                                    enter_edit_mode, clear_bake])
+def test_a_change_of_the_file_during_a_bake(closed_box, new_object, stage, change):
+    # The other one would be written first.
+    other = new_object("A", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES],
+                       closed_box.data.materials[0])
+    other.location.x = 5.0
+    bpy.ops.ed.undo_push(message="before")
+    bake()
+    bpy.ops.ed.undo_push(message="baked")
+    for item in bpy.data.objects:
+        item.data.color_attributes["Radiosity"].data.foreach_set('color', np.full(24 * 4, 0.25))
+    bpy.ops.ed.undo_push(message="painted")
+    bpy.data.objects["Box"].location.z = 1.0
+    bpy.ops.ed.undo_push(message="moved")
+    done = []
+
+    def change_once(current, fraction):
+        if current == stage and not done:
+            done.append(change)
+            change(bpy.data.objects["Box"])
+
+    with pytest.raises(raybundle.BakeError, match="nothing is written"):
+        bake(seed=1, progress=change_once)
+    assert done
+    if bpy.context.mode != 'OBJECT':
+        bpy.ops.object.mode_set(mode='OBJECT')
+    if change in (remove_object, remove_mesh, add_faces, enter_edit_mode):
+        assert np.all(read_colors(bpy.data.objects["A"]) == 0.25)
+    if change is not open_another_file:
+        bake(seed=2)
+        assert is_furnace(read_colors(bpy.data.objects["A"]))
+
+
+def test_a_bake_within_a_bake_is_refused(closed_box):
+    def bake_again(stage, fraction):
+        if stage == 'bundles':
+            bake()
+
+    with pytest.raises(raybundle.RaybundleError, match="not done"):
+        bake(progress=bake_again)
+    assert len(closed_box.data.color_attributes) == 0
+
+
 # --------------------------------------------------------------------------------------------------
 # Files
 # --------------------------------------------------------------------------------------------------

@@ -47,18 +47,19 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
     right, RaybundleError for what the native library refuses, with code CANCELLED after a cancel.
     """
     started = time.perf_counter()
+    report_progress = _checked_progress(progress)
+    native.load()
+    # Before anything is read: whoever gets the progress may change the file.
+    report_progress('export', 0.0)
     scene = context.scene
     try:
         settings = read_settings(scene, overrides)
     except ValueError as error:
         raise BakeError(str(error)) from error
-    report_progress = _checked_progress(progress)
-    native.load()
 
     with _object_mode(context):
         light_sets = read_light_sets(scene, settings.attribute)
         _check(scene, settings, light_sets)
-        report_progress('export', 0.0)
         export, subdivided = _export(context, settings, light_sets)
         with build_native_scene(export.scene) as native_scene:
             export_seconds = time.perf_counter() - started
@@ -68,6 +69,7 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
 
         report_progress('write_back', 0.0)
         write_started = time.perf_counter()
+        _check_unchanged(scene, export, native_bake)
         lights = _read_results(native_bake, export, subdivided, settings, light_sets)
         native_report = native_bake.report()
         objects = _write(context, lights, settings, export, native_report)
@@ -193,6 +195,23 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
             native_bake.set(name, getattr(settings, name))
     for name in native.SKIPS:
         native_bake.set(f'skip.{name}', name not in settings.skips_off)
+
+
+def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: native.Bake) -> None:
+    """Whoever got the progress may have undone a step, opened a file, edited a mesh."""
+    for target in export.targets:
+        try:
+            mesh = target.object.data
+            size = (len(mesh.vertices), len(mesh.loops))
+            is_same = (size == (target.vertex_count, target.corner_map.original_count)
+                       and not mesh.is_editmode and scene.name)
+        except ReferenceError:
+            is_same = False
+        if not is_same:
+            raise BakeError(f'"{target.name}" was removed or changed while it was baked: nothing '
+                            'is written')
+    if native_bake.is_closed:
+        raise BakeError("The bake was cleared while it ran: nothing is written")
 
 
 # --------------------------------------------------------------------------------------------------

@@ -289,6 +289,10 @@ class _Handle:
             getattr(self._library, self._release)(self._pointer)
             self._pointer = _handle()
 
+    @property
+    def is_closed(self) -> bool:
+        return not self._pointer
+
     def __enter__(self):
         return self
 
@@ -600,7 +604,8 @@ class Bake(_Handle):
 
     def execute(self, scene: Scene, progress: Progress | None = None) -> None:
         """Bake the scene. Raises RaybundleError, with code CANCELLED if progress returned False;
-        an exception inside progress cancels and is raised again here."""
+        an exception inside progress cancels and is raised again here. After a close() inside
+        progress there are no results."""
         raised: list[BaseException] = []
 
         def report(_user: object, stage: int, fraction: float) -> bool:
@@ -621,7 +626,8 @@ class Bake(_Handle):
                 raise raised[0]
             raise
         finally:
-            self._library.rb_set_bake_progress(self._pointer, _ProgressFunction(), None)
+            if not self.is_closed:  # by progress
+                self._library.rb_set_bake_progress(self._pointer, _ProgressFunction(), None)
         if raised:
             raise raised[0]
 

@@ -36,6 +36,8 @@ class BakeTarget:
     object: bpy.types.Object  # original
     instance: int  # position in SceneData.instances
     corner_map: CornerMap
+    name: str  # and vertices, of the object when it was exported
+    vertex_count: int
 
 
 @dataclass
@@ -262,7 +264,8 @@ class _Exporter:
         if role == 'BAKE':
             index = len(self.result.scene.instances) - 1
             self.result.targets.append(
-                BakeTarget(original, index, self._corner_maps[original]))
+                BakeTarget(original, index, self._corner_maps[original], original.name,
+                           len(original.data.vertices)))
 
     def _refuse(self, name: str, reason: str) -> None:
         self.result.statuses[name] = reason
