@@ -162,8 +162,10 @@ class _Exporter:
                 continue
             seen.add(group)
             reasons = {}
-            for index, slot in enumerate(item.material_slots):
-                if slot.material is None:
+            # Cycles bakes the original's, which a script may have changed after the evaluation.
+            for index, (slot, original) in enumerate(zip(item.material_slots,
+                                                         item.original.material_slots)):
+                if slot.material is None or original.material is None:
                     continue
                 unread = self.materials.unread(slot.material)
                 if unread is not None:
