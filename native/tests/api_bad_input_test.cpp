@@ -116,6 +116,38 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     EXPECT_EQ(id, 0);
 }
 
+TEST_F(Api, LightThatIsTooBrightIsRefusedByName) {
+    const float bright[6] = {0, 2e15f, 0, 0, 0, 0};
+    const float x[3] = {1, 0, 0}, y[3] = {0, 1, 0}, small[3] = {1e-4f, 0, 0};
+    int32_t id = 77;
+    expectInvalid(rb_add_material(scene, "glow", kGrey, bright, &id), "glow");
+    expectInvalid(rb_add_point_light(scene, "bulb", kOne, bright, 0, RB_POINT_DISK, &id), "bulb");
+    expectInvalid(rb_add_sun_light(scene, "sun", kOne, bright, 0, &id), "sun");
+    expectInvalid(rb_add_area_light(scene, "panel", kOne, x, y, bright, RB_AREA_RECTANGLE, &id),
+                  "panel");
+    expectInvalid(rb_set_world(scene, bright), "world");
+    expectInvalid(rb_set_world_image(scene, 1, 1, bright), "world");
+    EXPECT_EQ(id, 77);
+    // What counts of a panel is its power.
+    EXPECT_EQ(rb_add_area_light(scene, "panel", kOne, small, y, bright, RB_AREA_RECTANGLE, &id),
+              RB_ERROR_NONE);
+}
+
+TEST_F(Api, LightThatMultipliesToTooMuchIsAnErrorWithoutAResult) {
+    const float pixel[3] = {1e25f, 1e25f, 1e25f}, weight[6] = {1e25f, 1e25f, 1e25f, 0, 0, 0};
+    int32_t image = -1;
+    ASSERT_EQ(rb_add_image(scene, "sun", 1, 1, pixel, RB_IMAGE_REPEAT, &image), RB_ERROR_NONE);
+    const int32_t material = addMaterial(kGrey, kBlack);
+    ASSERT_EQ(rb_set_material_emission_image(scene, material, image, weight), RB_ERROR_NONE);
+    const int32_t mesh = addCube(material);
+    const std::vector<float> uvs(48, 0.5f);
+    ASSERT_EQ(rb_set_mesh_uvs(scene, mesh, uvs.data(), 24), RB_ERROR_NONE);
+    addInstance(mesh);
+    expectInvalid(rb_execute_bake(bake, scene), "box");
+    const char* report = nullptr;
+    EXPECT_EQ(rb_get_report(bake, &report), RB_ERROR_INVALID_OPERATION);
+}
+
 TEST_F(Api, ALongMessageEndsWithAWholeCharacter) {
     std::string name;
     for (int i = 0; i < 5000; ++i) name += "\u00e4";  // two bytes
@@ -363,6 +395,17 @@ TEST_F(Api, ObjectsTooFarAwayAreRefusedByName) {
     ASSERT_EQ(rb_add_instance(scene, 0, "comet", far, RB_ROLE_BAKE, RB_SIDE_FRONT, &id),
               RB_ERROR_NONE);
     expectInvalid(rb_execute_bake(bake, scene), "comet");
+}
+
+TEST_F(Api, LightsTooFarAwayAreRefusedByName) {
+    const float far[3] = {0, 2e12f, 0}, x[3] = {1, 0, 0}, y[3] = {0, 1, 0};
+    int32_t id = 77;
+    for (rb_error error : {rb_add_point_light(scene, "it", far, kOne, 0, RB_POINT_DISK, &id),
+                           rb_add_point_light(scene, "it", x, kOne, 2e12f, RB_POINT_SPHERE, &id),
+                           rb_add_area_light(scene, "it", far, x, y, kOne, RB_AREA_ELLIPSE, &id),
+                           rb_add_area_light(scene, "it", x, y, far, kOne, RB_AREA_ELLIPSE, &id)})
+        expectInvalid(error, "light \"it\" reaches further than 1e12 m");
+    EXPECT_EQ(id, 77);
 }
 
 TEST(ApiSubdivision, RefusesWhatCannotBeCut) {

@@ -466,8 +466,7 @@ rb_error rb_set_world(rb_scene scene, const float radiance[3]) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
         need(radiance, "radiance");
-        needFinite(radiance, 3, "world radiance");
-        held->worldRadiance = glm::max(vec3(radiance), glm::vec3(0.0f));
+        held->setWorld(vec3(radiance));
     });
 }
 

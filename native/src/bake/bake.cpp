@@ -139,6 +139,18 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
     return isEmpty || isDark;
 }
 
+// What is bright by itself is refused by Scene; what adds up to too much, or shines from nearly no
+// distance, is seen only in the end.
+void checkFinite(const std::vector<InstanceLight>& instances) {
+    for (const InstanceLight& instance : instances)
+        for (size_t c = 0; c < instance.direct.size(); ++c) {
+            const glm::vec3 all = instance.direct[c] + instance.indirect[c] + instance.exitance[c];
+            if (!std::isfinite(all.x + all.y + all.z))
+                throw invalidArgument("object \"" + instance.name +
+                                      "\": its light is too bright to compute with");
+        }
+}
+
 }  // namespace
 
 Bake::Bake() = default;
@@ -223,6 +235,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                     meanOver(tiles, shown.of(lights, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
                     settings.targetError, made, report);
+        checkFinite(made);
     }
     report.patches = trace->patches.count();
     report.cuts = trace->cuts;

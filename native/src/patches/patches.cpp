@@ -122,8 +122,6 @@ constexpr double kParallelogramTolerance = 1e-4;
 constexpr int kMaxGrid = 4096;
 // Solids of less thickness are sheets, of the scene's radius: about what depth tells apart.
 constexpr double kThinnest = 2e-6;
-// From the origin, metres: areas, and the squares of distances, stay far from the ends of float.
-constexpr double kFarthest = 1e12;
 
 // Walks over the faces of all instances and appends vertices, cells and parents.
 class Subdivision {

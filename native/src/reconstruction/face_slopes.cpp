@@ -47,7 +47,8 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
         for (int c = 0; c < 3; ++c)
             if (mean[c] > 0) share[c] = std::min(1.0f, gathered[c] / mean[c]);
         for (size_t k = 0; k < count; ++k) {
-            const glm::vec3 slope = factor * glm::max(share * (values[k] - mean), -gathered);
+            const glm::vec3 slope =
+                glm::max(factor * share * (values[k] - mean), -direct[nodes[k]]);
             direct[nodes[k]] += slope;
             exitance[nodes[k]] += shown.color()[at] * slope;
         }

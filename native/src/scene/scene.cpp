@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "bake/error.h"
+#include "scene/channels.h"
 
 namespace raybundle {
 namespace {
@@ -30,6 +31,11 @@ bool isFiniteAndPositive(const V& v) {
         if (!std::isfinite(v[i]) || v[i] < 0) return false;
     return true;
 }
+
+// Squares of brighter light, times areas, leave the range of floats: the result would be no number.
+// W/m^2, W/sr, W/(m^2 sr); sunlight is 1e3.
+constexpr float kMostLight = 1e15f;
+constexpr const char* kTooBright = " is too bright to compute with: more than 1e15";
 
 std::string quoted(const char* kind, const std::string& name) {
     return std::string(kind) + " \"" + name + "\"";
@@ -80,6 +86,8 @@ int32_t Scene::addMaterial(Material material) {
             !isFiniteAndPositive(material.emission[side]))
             throw invalidArgument(object +
                                   ": reflectance and emission must be finite and not negative");
+        if (brightest(material.emission[side]) > kMostLight)
+            throw invalidArgument(object + ": its emission" + kTooBright);
         const glm::vec3 limited = glm::min(material.reflectance[side], glm::vec3(kMaxReflectance));
         clamped = clamped || limited != material.reflectance[side];
         material.reflectance[side] = limited;
@@ -129,6 +137,13 @@ int32_t Scene::addLight(Light light) {
         !isFinite(light.axisV) || !std::isfinite(light.radius) || light.radius < 0 ||
         !std::isfinite(light.angle) || light.angle < 0)
         throw invalidArgument(object + ": its position and size must be finite");
+    const float reach = light.radius + glm::length(light.axisU) + glm::length(light.axisV);
+    if (!(glm::length(light.position) + reach <= kFarthest))
+        throw invalidArgument(object + " reaches further than 1e12 m from the origin");
+    // A small panel may be as bright as it likes.
+    const float area =
+        light.kind == Light::Kind::AREA ? glm::length(glm::cross(light.axisU, light.axisV)) : 1.0f;
+    if (brightest(light.strength) * area > kMostLight) throw invalidArgument(object + kTooBright);
     if (light.kind == Light::Kind::SUN) {
         if (glm::length(light.direction) == 0)
             throw invalidArgument(object + ": its direction must not be zero");
@@ -150,11 +165,20 @@ glm::vec3 WorldImage::meanRadiance() const {
     return width > 0 ? glm::vec3(sum / double(width)) : glm::vec3(0.0f);
 }
 
+void Scene::setWorld(const glm::vec3& radiance) {
+    if (!isFinite(radiance)) throw invalidArgument("world radiance: it must be finite");
+    if (brightest(radiance) > kMostLight)
+        throw invalidArgument(std::string("world radiance") + kTooBright);
+    worldRadiance = glm::max(radiance, glm::vec3(0.0f));
+}
+
 void Scene::setWorldImage(WorldImage image) {
     if (image.width <= 0 || image.height <= 0) throw invalidArgument("world image has no pixels");
     for (const glm::vec3& pixel : image.pixels)
         if (!isFiniteAndPositive(pixel))
             throw invalidArgument("world image: its pixels must be finite and not negative");
+        else if (brightest(pixel) > kMostLight)
+            throw invalidArgument(std::string("world image: a pixel") + kTooBright);
     worldImage = std::move(image);
 }
 

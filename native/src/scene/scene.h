@@ -52,6 +52,9 @@ struct Scattering {
     bool isLambert() const { return !hasGloss() && lobes.empty() && !isRough() && !hasLayer(); }
 };
 
+// From the origin, metres: areas, and the squares of distances, stay far from the ends of float.
+constexpr double kFarthest = 1e12;
+
 // Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The
 // optional image and corner colours, each times its weight, are added to both reflectances.
 struct Material {
@@ -179,6 +182,7 @@ class Scene {
     int32_t addMesh(Mesh mesh);
     int32_t addInstance(Instance instance);
     int32_t addLight(Light light);
+    void setWorld(const glm::vec3& radiance);  // negative parts count as 0
     void setWorldImage(WorldImage image);
     int32_t addLightSet(std::string name);
 

@@ -176,7 +176,19 @@ void passStart(const RTCFilterFunctionNArguments* args) {
     }
 }
 
-void setRay(RTCRay& ray, const glm::vec3& origin, const glm::vec3& direction, float distance) {
+// Embree's assertions end the process for rays from or to where squares leave the range of floats.
+// Such a ray, of points that are no numbers too, meets nothing and is blocked.
+bool isValid(const glm::vec3& v) {
+    constexpr float kMost = 1e18f;
+    return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
+}
+
+void setRay(RTCRay& ray, glm::vec3 origin, glm::vec3 direction, float distance) {
+    if (!isValid(origin) || !isValid(direction)) {
+        origin = glm::vec3(0.0f);
+        direction = glm::vec3(0, 0, 1);
+        distance = -1;
+    }
     ray.org_x = origin.x;
     ray.org_y = origin.y;
     ray.org_z = origin.z;
