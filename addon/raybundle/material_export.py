@@ -113,7 +113,7 @@ class MaterialExporter:
         """A material as Cycles baked it for the faces of one object (surface_bake.py)."""
         # What both ways only approximate is still named.
         approximated = Warnings()
-        surface = self._surface(material, False, approximated, [], baked.diffuse_color)
+        surface = self._surface(material, False, approximated, [], baked.diffuse_color).limited()
         for text in (*approximated, baked.message):
             self.warnings.add(text)
         index = {}
@@ -138,7 +138,7 @@ class MaterialExporter:
 
     def _export(self, material: bpy.types.Material | None) -> MaterialExport:
         name = material.name if material else "(none)"
-        sides = [self._surface(material, backfacing, self.warnings)
+        sides = [self._surface(material, backfacing, self.warnings).limited()
                  for backfacing in (False, True)]
         if not sides[0].reflectance.same_variation(sides[1].reflectance):
             # The native library lays an image on both sides alike.

@@ -102,6 +102,16 @@ class Surface:
             self.translucence.scaled(under),
             self.scattering.covered(share, layer).plus(Scattering.clothed(color, layer)))
 
+    def limited(self) -> Surface:
+        """With parts that fit a reflectance of 1, where the whole, which the native library clamps,
+        is more."""
+        whole = self.reflectance.mean()
+        if not np.any(whole > 1.0):
+            return self
+        share = 1.0 / np.maximum(whole, 1.0)
+        return replace(self, reflected_by_angle=self.reflected_by_angle * share,
+                       scattering=self.scattering.limited(share))
+
     def scaled(self, factor: float) -> Surface:
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
                        self.transmittance * factor, self.diffuse.scaled(factor),
@@ -229,7 +239,8 @@ class NodeReader:
             mirrored.plus(base.scaled(opaque * albedo.diffuse + several[0])).plus(
                 ColorExpression(several[1])), radiance.scaled(albedo.uncoated),
             through * mean * albedo.uncoated, base.scaled(shown),
-            albedo.reflected_by_angle(mean, opaque, metallic), shown * mean * albedo.angles.shown,
+            albedo.reflected_by_angle(mean, opaque, metallic),
+            np.maximum(base.mean(), 0.0) * shown * albedo.angles.shown,
             scattering=scattering)
         surface = surface.covered(*sheen_on(*self._values(node, SHEEN_SOCKETS, path),
                                             self._usual_color(node, *SHEEN_TINT, path), mean,

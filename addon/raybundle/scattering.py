@@ -75,6 +75,11 @@ class Scattering:
                           factor * self.lobes_by_angle, factor * self.diffuse,
                           factor * self.leaving)
 
+    def limited(self, share: np.ndarray) -> Scattering:
+        """share: (3,), of what is sent by angle and by lobes; the rest is taken relatively."""
+        return replace(self, by_angle=self.by_angle * share, lobes=self.lobes * share,
+                       lobes_by_angle=self.lobes_by_angle * share)
+
     def covered(self, share: float, layer: Layer) -> Scattering:
         """Without what a layer, of so much weight, sends back."""
         under = self.scaled(1.0 - share * layer.albedo)
