@@ -47,10 +47,10 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
         for (int c = 0; c < 3; ++c)
             if (mean[c] > 0) share[c] = std::min(1.0f, gathered[c] / mean[c]);
         for (size_t k = 0; k < count; ++k) {
-            const glm::vec3 slope =
-                glm::max(factor * share * (values[k] - mean), -direct[nodes[k]]);
-            direct[nodes[k]] += slope;
-            exitance[nodes[k]] += shown.color()[at] * slope;
+            const glm::vec3 flat = direct[nodes[k]];
+            direct[nodes[k]] = glm::max(flat + factor * share * (values[k] - mean), 0.0f);
+            glm::vec3& sent = exitance[nodes[k]];
+            sent = glm::max(sent + shown.color()[at] * (direct[nodes[k]] - flat), 0.0f);
         }
     }
 }

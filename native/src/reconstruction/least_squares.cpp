@@ -264,8 +264,8 @@ std::vector<std::vector<glm::vec3>> leastSquares(
         Eigen::VectorXd high = Eigen::VectorXd::Constant(nodes, INFINITY);
         for (Eigen::Index v = 0; v < nodes; ++v)
             if (atContact[size_t(v)] && least(v, Eigen::Index(c)) <= most(v, Eigen::Index(c))) {
-                low[v] = least(v, Eigen::Index(c));
-                high[v] = most(v, Eigen::Index(c));
+                low[v] = std::max(least(v, Eigen::Index(c)), 0.0);
+                high[v] = std::max(most(v, Eigen::Index(c)), 0.0);
             }
         keepWithin(matrix, rhs.col(Eigen::Index(c)), low, high, highest[c], solution);
         for (Eigen::Index v = 0; v < nodes; ++v)
