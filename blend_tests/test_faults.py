@@ -31,6 +31,68 @@ def is_furnace(values):
 
 
 # --------------------------------------------------------------------------------------------------
+# Numbers
+# --------------------------------------------------------------------------------------------------
+
+
+def add_light(kind, **properties):
+    light = bpy.data.lights.new("Lamp", kind)
+    for name, value in properties.items():
+        setattr(light, name, value)
+    item = bpy.data.objects.new("Lamp", light)
+    bpy.context.scene.collection.objects.link(item)
+    return item
+
+
+@pytest.mark.parametrize("kind, properties", [
+    ('POINT', {"color": (1.0, 1.0, 3e38)}), ('SUN', {"energy": 1e20}),
+    ('AREA', {"energy": 1e30}), ('AREA', {"size": 1e20}), ('POINT', {"shadow_soft_size": 1e20})])
+def test_lights_beyond_the_range_of_numbers_are_refused(closed_box, kind, properties):
+    add_light(kind, **properties)
+    with pytest.raises(raybundle.RaybundleError, match='"Lamp"'):
+        bake()
+    assert len(closed_box.data.color_attributes) == 0
+
+
+@pytest.mark.parametrize("name", ["exposure", "target_error", "patch_size"])
+def test_a_setting_that_is_no_number_is_refused(closed_box, name):
+    # The limits of a property let it pass.
+    setattr(bpy.context.scene.raybundle, name, float("nan"))
+    if not np.isfinite(getattr(bpy.context.scene.raybundle, name)):
+        with pytest.raises(raybundle.BakeError, match=name):
+            raybundle.bake(bpy.context)
+        assert len(closed_box.data.color_attributes) == 0
+
+
+@pytest.mark.parametrize("roughness", [1e-30, 0.5, 1.0])
+@pytest.mark.parametrize("red", [0.9, 2.0, 1e20])
+def test_colours_above_1_send_no_negative_light(new_object, new_material, red, roughness):
+    material = new_material("Red", (red, 0.0, 0.0))
+    diffuse = next(node for node in material.node_tree.nodes if node.type == 'BSDF_DIFFUSE')
+    diffuse.inputs['Roughness'].default_value = roughness
+    floor = new_object("Floor", [(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)], [(0, 1, 2, 3)],
+                       material)
+    box = new_object("Box", CUBE_VERTICES, CUBE_FACES, material)
+    box.location.z = 1.5
+    add_light('SUN', energy=10.0)
+    bake()
+    for item in (floor, box):
+        assert (read_colors(item) >= 0.0).all()
+    assert read_colors(floor).max() > 1.0
+
+
+def test_a_slot_that_a_script_emptied_after_the_evaluation(closed_box):
+    tree = closed_box.data.materials[0].node_tree
+    noise = tree.nodes.new('ShaderNodeTexNoise')
+    tree.links.new(noise.outputs['Color'], next(node for node in tree.nodes
+                                                if node.type == 'BSDF_DIFFUSE').inputs['Color'])
+    bpy.context.view_layer.update()
+    closed_box.material_slots[0].link = 'OBJECT'
+    bake()
+    assert np.isfinite(read_colors(closed_box)).all()
+
+
+# --------------------------------------------------------------------------------------------------
 # Names and transforms
 # --------------------------------------------------------------------------------------------------
 

@@ -69,7 +69,8 @@ def facet_shares(roughness: float) -> tuple[float, float]:
 def oren_nayar(roughness: float, color: np.ndarray) -> DiffuseAngles:
     """color: (3,), on which light that meets several facets depends."""
     roughness = min(max(roughness, 0.0), 1.0)
-    if roughness == 0.0:
+    # Less makes no difference, but divides by nothing.
+    if roughness < 1e-6:
         return lambert()
     color = np.clip(color, 0.0, 1.0)
     above = _from_above(roughness)
