@@ -10,6 +10,8 @@
  * Conventions
  * - Units: metres, W/m^2 (emission, irradiance), W/(m^2 sr) (radiance), W/sr (intensity). All
  * colours are linear RGB, three floats.
+ * - Light of more than 1e15 in these units (of an area light: times its area) and what reaches further
+ *   than 1e12 m from the origin are refused.
  * - Every fallible function returns an rb_error; rb_get_error_message() explains the last failure
  * of the calling thread and names the object concerned. Output parameters are untouched on failure.
  * - Arrays are pointer + count, are read or written only during the call, and stay the caller's. No

@@ -9,6 +9,7 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Core/Utils/PropertyManager.hh>
 #include <algorithm>
+#include <cmath>
 #include <queue>
 
 #include "bake/error.h"
@@ -41,12 +42,13 @@ std::array<float, 3> barycentric(const OpenMesh::Vec3d& p,
                                  const std::array<OpenMesh::Vec3d, 3>& t) {
     const OpenMesh::Vec3d normal = (t[1] - t[0]) % (t[2] - t[0]);
     const double scale = normal | normal;
-    std::array<float, 3> weights{1, 0, 0};
-    if (scale <= 0) return weights;
-    weights[1] = float((normal | ((t[2] - p) % (t[0] - p))) / scale);
-    weights[2] = float((normal | ((t[0] - p) % (t[1] - p))) / scale);
-    weights[0] = 1 - weights[1] - weights[2];
-    return weights;
+    const double b = (normal | ((t[2] - p) % (t[0] - p))) / scale;
+    const double c = (normal | ((t[0] - p) % (t[1] - p))) / scale;
+    if (!std::isfinite(b) || !std::isfinite(c)) return {1, 0, 0};
+    // The point is in the triangle: what is not is rounding, without bound where edges are long.
+    const double second = std::clamp(b, 0.0, 1.0), third = std::clamp(c, 0.0, 1.0);
+    const double first = std::max(1 - second - third, 0.0), sum = first + second + third;
+    return {float(first / sum), float(second / sum), float(third / sum)};
 }
 
 }  // namespace
