@@ -35,7 +35,7 @@ FLOATS = (0.0, -0.0, -1.0, 1e-30, 1e-7, 0.5, 1.0, 2.0, 100.0, 1e6, 1e20, 3e38, -
           math.nan)
 INTEGERS = (-1, 0, 1, 2, 3, 7)
 # They would only take long, or are no part of what is baked.
-LEFT_ALONE = {'use_nodes', 'levels', 'render_levels', 'count', 'frame_current', 'max_bundles', 'max_patches'}
+LEFT_ALONE = {'paint_active_slot', 'paint_clone_slot', 'use_nodes', 'levels', 'render_levels', 'count', 'frame_current', 'max_bundles', 'max_patches'}
 # Blender ends itself at those that it does not register.
 NODES = [name for name in dir(bpy.types) if name.startswith("ShaderNode")
          and name not in ("ShaderNode", "ShaderNodeTree", "ShaderNodeCustomGroup", "ShaderNodeScript")
