@@ -2,6 +2,7 @@
 #include "patches/patches.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <map>
 
@@ -367,10 +368,11 @@ class Subdivision {
         patches.parents.push_back(parent);
     }
 
-    // Not between numbers that follow each other, far from the centre.
+    // Whether the halves of an edge are shorter than it however their end is rounded, which is by
+    // half an epsilon of its coordinates: pieces of pieces else need not get smaller.
     static bool hasMiddle(const glm::vec3& a, const glm::vec3& b) {
-        const glm::vec3 middle = 0.5f * (a + b);
-        return middle != a && middle != b;
+        const glm::vec3 most = glm::max(glm::abs(a), glm::abs(b));
+        return glm::distance(a, b) > 16 * FLT_EPSILON * std::max({most.x, most.y, most.z});
     }
 
     // Neighbouring faces that bisect the same edge share the new vertex.
