@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <random>
 
 #include "bake/error.h"
 #include "patches/patch_size.h"
@@ -307,6 +308,30 @@ TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnTriangles) {
     ASSERT_EQ(patches.count(), 1u);
     EXPECT_LT(glm::distance(patches.reflectance[0], glm::vec3(0.3f)), 1e-5f)
         << "the mean of a linear colour is that at the centroid";
+}
+
+TEST(Subdivide, PiecesThatRoundingKeepsAsLongAreNotCutForEver) {
+    // Two heaps of triangles some tens of roundings long, 1 km apart: floats there are 6e-5 m apart.
+    std::mt19937 random(1);
+    std::uniform_real_distribution<float> at(0, 4e-3f), thin(0, 2e-4f);
+    std::vector<glm::vec3> vertices;
+    std::vector<std::vector<int32_t>> faces;
+    for (int32_t k = 0; k < 2000; ++k) {
+        const glm::vec3 far(k % 2 ? 500 : -500, 500, 500);
+        const glm::vec3 from(at(random), at(random), at(random)),
+            to(at(random), at(random), at(random));
+        const glm::vec3 aside(thin(random), thin(random), thin(random));
+        for (const glm::vec3& v : {from, to, 0.5f * (from + to) + aside})
+            vertices.push_back(far + v);
+        faces.push_back({3 * k, 3 * k + 1, 3 * k + 2});
+    }
+    Scene scene;
+    place(scene, polygons("heaps", vertices, faces), grey("", 0.5f));
+    const Patches patches = subdivide(scene, 3e-5f, 8000000);
+    EXPECT_GT(patches.parents.size(), 1000u);
+    // A triangle of 100 roundings has some hundred pieces at most.
+    EXPECT_LT(patches.parents.size(), 200'000u);
+    EXPECT_LT(patches.vertices.size(), 200'000u);
 }
 
 TEST(Subdivide, CutsNoFurtherThanNumbersReach) {
