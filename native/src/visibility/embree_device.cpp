@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "visibility/embree_device.h"
 
+#include <embree3/rtcore.h>
+
 #include <cstddef>
 #include <memory>
 #include <mutex>
@@ -35,7 +37,7 @@ bool buildLeastTree(RTCDevice device) {
 
 }  // namespace
 
-RTCDevice newEmbreeDevice() { return rtcNewDevice("tessellation_cache_size=0"); }
+RTCDeviceTy* newEmbreeDevice() { return rtcNewDevice("tessellation_cache_size=0"); }
 
 void makeRoomForTreeBuilders() {
     static std::mutex mutex;

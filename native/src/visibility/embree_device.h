@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <embree3/rtcore.h>
+struct RTCDeviceTy;  // Embree's, of which nothing else needs to know
 
 namespace raybundle {
 
 // A device for triangles and quads, which the caller releases; null if it fails. Embree 3 else maps
 // 128 MB for surfaces that it subdivides, of which there are none here; and where that fails it waits
 // forever when the device is released (3.13.5, SharedLazyTessellationCache).
-RTCDevice newEmbreeDevice();
+RTCDeviceTy* newEmbreeDevice();
 
 // Embree keeps a list of the threads that ever built a tree. Where it cannot grow for one of them,
 // that thread keeps a pointer to what is freed, and the next tree that it builds waits forever for
