@@ -6,7 +6,6 @@ The defaults of what the native library knows are its own; a test compares them.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 
 import bpy
@@ -344,17 +343,14 @@ class BakeSettings:
 
 
 def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
-    """Raises ValueError for an override that is unknown or not one of the property's values, and
-    for a setting that is no number."""
+    """Raises ValueError for an override that is unknown, and for a value, of an override or stored,
+    that is none of the property's: its limits let one pass that is no number."""
     names = [item.name for item in fields(BakeSettings)]
-    values = {name: getattr(scene.raybundle, name) for name in names}
-    for name, value in overrides.items():
-        if name not in values:
+    for name in overrides:
+        if name not in names:
             raise ValueError(f'there is no setting "{name}"; there are: {", ".join(names)}')
-        values[name] = checked_value(name, value)
-    for name, value in values.items():
-        if isinstance(value, float) and not math.isfinite(value):
-            raise ValueError(f"{name} is not a number")
+    values = {name: checked_value(name, overrides.get(name, getattr(scene.raybundle, name)))
+              for name in names}
     return BakeSettings(**values)
 
 

@@ -19,7 +19,7 @@ namespace {
 // libraries of its own, in which glibc ends the process where there is no memory to say that there
 // is none. So both are done when the library is loaded, before there is a scene that could take the
 // memory.
-bool useOnce() noexcept {
+bool prepare() noexcept {
     try {
         tbb::task_arena().initialize();
         return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) > 0;
@@ -27,7 +27,7 @@ bool useOnce() noexcept {
         return false;
     }
 }
-const bool isUsed = useOnce();
+const bool isPrepared = prepare();
 
 // Starts threads until there are as many at once, with the caller's, or no more can be. oneTBB keeps
 // those that it has, so that what went once is not tried again.
@@ -54,7 +54,7 @@ int startable(int wanted) {
 }  // namespace
 
 Threads::Threads(int asked) {
-    if (!isUsed) throw std::bad_alloc();
+    if (!isPrepared) throw std::bad_alloc();
     const int most =
         int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
     wanted = asked > 0 ? std::min(asked, most) : most;

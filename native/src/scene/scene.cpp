@@ -174,11 +174,12 @@ void Scene::setWorld(const glm::vec3& radiance) {
 
 void Scene::setWorldImage(WorldImage image) {
     if (image.width <= 0 || image.height <= 0) throw invalidArgument("world image has no pixels");
-    for (const glm::vec3& pixel : image.pixels)
+    for (const glm::vec3& pixel : image.pixels) {
         if (!isFiniteAndPositive(pixel))
             throw invalidArgument("world image: its pixels must be finite and not negative");
-        else if (brightest(pixel) > kMostLight)
+        if (brightest(pixel) > kMostLight)
             throw invalidArgument(std::string("world image: a pixel") + kTooBright);
+    }
     worldImage = std::move(image);
 }
 
