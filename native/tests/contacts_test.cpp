@@ -9,7 +9,7 @@
 
 #include "test_bakes.h"
 #include "test_scenes.h"
-#include "transport/light_source.h"
+#include "transport/mesh_outline.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {

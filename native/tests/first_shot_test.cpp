@@ -10,6 +10,7 @@
 #include "test_scenes.h"
 #include "test_shots.h"
 #include "transport/light_source.h"
+#include "transport/mesh_outline.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {

@@ -7,7 +7,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "test_scenes.h"
-#include "transport/light_source.h"
+#include "transport/mesh_outline.h"
 
 namespace raybundle {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/light_source.h"
+#include "transport/mesh_outline.h"
 #include "transport/outlook.h"
 #include "transport/world_source.h"
 

@@ -11,7 +11,7 @@
 #include "reconstruction/surplus.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
-#include "transport/light_source.h"
+#include "transport/mesh_outline.h"
 
 namespace raybundle {
 namespace {

@@ -11,6 +11,7 @@
 #include "test_bakes.h"
 #include "test_scenes.h"
 #include "test_shots.h"
+#include "transport/mesh_outline.h"
 #include "transport/sphere_sampling.h"
 #include "transport/world_source.h"
 

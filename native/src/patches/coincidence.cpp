@@ -97,7 +97,7 @@ std::map<int32_t, Part> measured(const Mesh& mesh, const glm::vec3* places,
 
 }  // namespace
 
-std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest) {
+std::vector<Shell> shellsOfFaces(const Mesh& mesh, const glm::vec3* places, double thinnest) {
     const std::vector<int32_t> partOfFace = closedParts(mesh);
     std::map<int32_t, Part> parts = measured(mesh, places, partOfFace);
     std::map<decltype(Part().place()), std::vector<Part*>> byPlace;
@@ -110,9 +110,11 @@ std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double t
             if (const double sum = there[0]->volume + there[k]->volume;
                 std::abs(sum) < kSameVolume * std::abs(there[0]->volume))
                 there[0]->isSolid = there[k]->isSolid = false;
-    std::vector<bool> result(mesh.faceCount());
+    std::vector<Shell> result(mesh.faceCount(), Shell::OPEN);
     for (size_t f = 0; f < mesh.faceCount(); ++f)
-        result[f] = partOfFace[f] != kOpen && parts.at(partOfFace[f]).isSolid;
+        if (partOfFace[f] != kOpen)
+            if (const Part& part = parts.at(partOfFace[f]); part.isSolid)
+                result[f] = part.volume > 0 ? Shell::OUTWARD : Shell::INWARD;
     return result;
 }
 

@@ -10,11 +10,14 @@
 
 namespace raybundle {
 
+// Whether a part of a mesh encloses a volume, and whether its faces wind about that outwards.
+enum class Shell : uint8_t { OPEN, OUTWARD, INWARD };
+
 // Per face of a mesh, whose vertices lie at `places` (metres): whether it belongs to a part that
 // encloses a volume, that is, whether each edge of the part has exactly two faces, which turn alike.
-// Parts that are no thicker than `thinnest` (metres) do not, and neither do two that lie in the same place and are
-// turned each to another side: such a shell has light on both sides.
-std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest);
+// Parts that are no thicker than `thinnest` (metres) do not, and neither do two that lie in the same
+// place and are turned each to another side: such a shell has light on both sides.
+std::vector<Shell> shellsOfFaces(const Mesh& mesh, const glm::vec3* places, double thinnest);
 
 // Which of two parallel surfaces that lie in the same place comes first along a direction. Depth
 // cannot tell, but solids can: the surface by which the direction leaves a solid comes before any

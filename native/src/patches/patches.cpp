@@ -159,19 +159,21 @@ class Subdivision {
     void cutFaces(const std::vector<double>& sizes) {
         for (size_t i = 0; i < scene.instances.size(); ++i) {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
-            const std::vector<bool> solid = solidFaces(
+            const std::vector<Shell> shells = shellsOfFaces(
                 mesh, patches.vertices.data() + firstVertex[i], kThinnest * double(patches.radius));
+            const Shell inward = isMirrored(uint32_t(i)) ? Shell::OUTWARD : Shell::INWARD;
             const size_t firstParent = patches.parents.size();
             size_t degenerate = 0;
             for (size_t f = 0; f < mesh.faceCount(); ++f)
                 if (!cutFace(uint32_t(i), int32_t(f), sizes[i])) ++degenerate;
-            for (size_t p = firstParent; p < patches.parents.size(); ++p)
-                patches.parents[p].isSolid =
-                    solid[size_t(patches.parents[p].face)] &&
-                    !scene.materialOf(mesh, size_t(patches.parents[p].face)).isTranslucent();
             for (size_t p = firstParent; p < patches.parents.size(); ++p) {
-                patches.parents[p].stopsDirect = scene.instances[i].stopsDirect;
-                patches.parents[p].exchanges = scene.instances[i].exchanges;
+                Parent& parent = patches.parents[p];
+                const Shell shell = shells[size_t(parent.face)];
+                parent.isSolid = shell != Shell::OPEN &&
+                                 !scene.materialOf(mesh, size_t(parent.face)).isTranslucent();
+                parent.isInward = shell == inward;
+                parent.stopsDirect = scene.instances[i].stopsDirect;
+                parent.exchanges = scene.instances[i].exchanges;
             }
             patches.degenerateFaces += degenerate;
             if (degenerate)
@@ -186,14 +188,17 @@ class Subdivision {
   private:
     using Triangle = std::array<uint32_t, 3>;  // into Patches::vertices
 
+    // A mirroring transform turns the winding, but the front stays outside as in Blender.
+    bool isMirrored(uint32_t instance) const {
+        return glm::determinant(glm::dmat3(scene.instances[instance].transform)) < 0;
+    }
+
     bool cutFace(uint32_t instance, int32_t face, double size) {
         const Mesh& mesh = scene.meshes[scene.instances[instance].mesh];
         const int32_t begin = mesh.faceOffsets[face], end = mesh.faceOffsets[face + 1];
-        // A mirroring transform turns the winding, but the front stays outside as in Blender.
-        const bool mirrored = glm::determinant(glm::dmat3(scene.instances[instance].transform)) < 0;
         std::vector<int32_t> corners;
         for (int32_t c = begin; c < end; ++c) corners.push_back(c);
-        if (mirrored) std::reverse(corners.begin(), corners.end());
+        if (isMirrored(instance)) std::reverse(corners.begin(), corners.end());
         std::vector<glm::dvec3> points;
         for (int32_t c : corners) points.push_back(patches.vertices[worldVertex(instance, c)]);
 

@@ -45,7 +45,8 @@ struct Parent {
     uint32_t firstTile = 0;           // its number before any tile was cut
     uint16_t countA = 1, countB = 1;  // grid along a and b; equal for triangles
     bool isTriangle = true;
-    bool isSolid = false;  // part of a surface that encloses a volume
+    bool isSolid = false;   // part of a surface that encloses a volume
+    bool isInward = false;  // its front looks into that volume
     // As the instance has it.
     bool stopsDirect = true, exchanges = true;
     uint32_t instance = 0;    // into Scene::instances

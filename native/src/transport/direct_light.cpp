@@ -9,6 +9,7 @@
 #include <glm/gtc/constants.hpp>
 #include <numeric>
 
+#include "transport/local_lines.h"
 #include "transport/receiver_place.h"
 
 namespace raybundle {
@@ -24,7 +25,7 @@ constexpr size_t kMostLookingAround = 1 << 19;
 // Points of a source by which its light at the corners of a face is compared: the same for all.
 constexpr uint32_t kSlopeSamples = 32;
 // For the power balance: rays of all sources together, and of each at least.
-constexpr uint32_t kEscapeRays = 16384, kLeastEscapeRays = 1024;
+constexpr uint32_t kPowerRays = 16384, kLeastPowerRays = 1024;
 
 }  // namespace
 
@@ -224,14 +225,14 @@ bool DirectLight::isOutOfSight(const LightSource& source, const Place& place) co
     return skips.skipFacing && source.isOutOfSight(place.middle, place.normal, place.radius);
 }
 
-std::vector<glm::dvec3> DirectLight::escapedShares() const {
-    std::vector<glm::dvec3> shares(sources.size(), glm::dvec3(0.0));
+std::vector<PowerShares> DirectLight::powerShares(float touchDistance) const {
+    std::vector<PowerShares> shares(sources.size());
     if (sources.empty()) return shares;
-    const uint32_t rays = std::max(kLeastEscapeRays, kEscapeRays / uint32_t(sources.size()));
+    const uint32_t rays = std::max(kLeastPowerRays, kPowerRays / uint32_t(sources.size()));
     for (size_t k = 0; k < sources.size(); ++k) {
         if (brightest(sources[k]->power()) <= 0 || !sources[k]->castsShadows) continue;
         const uint32_t own = hash(seed, uint32_t(k));
-        tbb::enumerable_thread_specific<glm::dvec3> missed(glm::dvec3(0.0));
+        tbb::enumerable_thread_specific<PowerShares> sums;
         tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
                 glm::vec4 u = sobolPoint(i, own);
@@ -240,14 +241,22 @@ std::vector<glm::dvec3> DirectLight::escapedShares() const {
                 u.x = std::min(glm::fract(u.x + float(hash(own, i)) * 0x1p-32f / float(rays)),
                                0.9999999f);
                 const EmittedRay ray = sources[k]->emit(u, patches.radius);
-                const float share =
-                    ray.side
-                        ? visibility.visibleShare(*ray.side, ray.origin, ray.direction, INFINITY)
-                        : visibility.escapingShare(ray.start(visibility.offset()), ray.direction);
-                missed.local() += double(share) * glm::dvec3(ray.weight);
+                const glm::dvec3 weight = glm::dvec3(ray.weight) / double(rays);
+                float distance = 0;
+                const auto met =
+                    ray.side ? visibility.firstHit(*ray.side, ray.origin, ray.direction, &distance)
+                             : visibility.firstHit(ray.start(visibility.offset()), ray.direction);
+                if (!met)
+                    sums.local().escaped += weight;
+                else if (ray.side && isCovered(patches, *ray.side, *met, ray.direction, distance,
+                                               touchDistance))
+                    sums.local().covered += weight;
             }
         });
-        for (const glm::dvec3& part : missed) shares[k] += part / double(rays);
+        for (const PowerShares& part : sums) {
+            shares[k].escaped += part.escaped;
+            shares[k].covered += part.covered;
+        }
     }
     return shares;
 }

@@ -97,8 +97,8 @@ class DirectLight {
     // Whether lines that end at the first surface leave out some of the light of a side's sources.
     bool hasPassingLight(uint32_t side) const;
 
-    // Of each source: the power that meets no surface over its power. 0 where it has none.
-    std::vector<glm::dvec3> escapedShares() const;
+    // Of each source; 0 where it has no power. touchDistance: surfaces not further apart touch, metres.
+    std::vector<PowerShares> powerShares(float touchDistance) const;
 
   private:
     struct Block;

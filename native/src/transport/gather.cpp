@@ -92,21 +92,21 @@ FirstShot gather(const FirstShotInput& input) {
     };
     const float target = input.settings.targetError;
     const auto& sources = light.lightSources();
-    std::vector<glm::dvec3> escapedShares(sources.size(), glm::dvec3(0.0));
+    std::vector<PowerShares> shares(sources.size());
     std::vector<Gathered> results;
     if (const auto matches = input.before ? input.before->match(sources) : std::nullopt) {
         results = light.scale(*input.before, *matches, receiverAt, target, report);
         shot.bySource = input.before;
         for (size_t k = 0; k < matches->size(); ++k)
             if (const auto source = (*matches)[k].source)
-                escapedShares[*source] = input.before->escapedShares[k];
+                shares[*source] = input.before->powerShares[k];
     } else {
         auto bySource = std::make_shared<LightBySource>(sources, n);
         bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
         results =
             light.gather(n, receiverAt, target, report, coarseOfPatches(input, receiverAt, report),
                          neighbouringSides(patches), bySource->isWhole ? bySource.get() : nullptr);
-        escapedShares = bySource->escapedShares = light.escapedShares();
+        shares = bySource->powerShares = light.powerShares(input.touchDistance);
         shot.bySource = std::move(bySource);
     }
     for (size_t side = 0; side < n; ++side) {
@@ -124,8 +124,8 @@ FirstShot gather(const FirstShotInput& input) {
     }
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::dvec3 power(sources[k]->power());
-        if (sources[k]->castsShadows) shot.emitted += power;
-        shot.escaped += power * escapedShares[k];
+        if (sources[k]->castsShadows) shot.emitted += power * (1.0 - shares[k].covered);
+        shot.escaped += power * shares[k].escaped;
     }
     input.progress.report(RB_STAGE_FIRST_SHOT, 1);
     return shot;

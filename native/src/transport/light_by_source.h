@@ -30,7 +30,7 @@ class LightBySource {
     LightPart* of(size_t receiver) { return parts.data() + receiver * magnitudes.size(); }
 
     // See DirectLight; in the order of the sources that it was made of.
-    std::vector<glm::dvec3> escapedShares;
+    std::vector<PowerShares> powerShares;
     // Whether all of it was filled in.
     bool isWhole = false;
 

@@ -9,8 +9,10 @@
 #include <map>
 
 #include "bake/hasher.h"
+#include "patches/plane.h"
 #include "transport/area_spread.h"
 #include "transport/mesh_source.h"
+#include "transport/receiver_place.h"
 #include "transport/sphere_sampling.h"
 #include "transport/spot_cone.h"
 #include "transport/world_source.h"
@@ -20,6 +22,16 @@ namespace raybundle {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Of a triangle seen from the origin, sr: van Oosterom and Strackee, "The Solid Angle of a Plane
+// Triangle" (1983).
+double triangleSolidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+    const double x = glm::length(a), y = glm::length(b), z = glm::length(c);
+    return 2 * std::abs(std::atan2(
+                   glm::dot(a, glm::cross(b, c)),
+                   x * y * z + glm::dot(a, b) * z + glm::dot(b, c) * x + glm::dot(c, a) * y));
+}
+
 class PointSource : public LightSource {
   public:
     PointSource(const Light& light, const glm::dvec3& centre)
@@ -66,8 +78,30 @@ class PointSource : public LightSource {
         return sample;
     }
 
-    std::optional<glm::vec3> irradiance(const glm::vec3&, const glm::vec3&) const override {
-        return std::nullopt;  // a sample is as good
+    // A sphere that is wholly above the horizon gives what its centre would.
+    std::optional<glm::vec3> irradiance(const glm::vec3& point,
+                                        const glm::vec3& normal) const override {
+        const glm::vec3 towards = position - point;
+        const float height = glm::dot(towards, normal), distance2 = glm::dot(towards, towards);
+        if (height <= -float(light.radius)) return glm::vec3(0.0f);
+        if (!isPoint() && (cone || isDisk() || height < float(light.radius))) return std::nullopt;
+        if (!(height > 0)) return glm::vec3(0.0f);
+        const float distance = std::sqrt(distance2);
+        const float share = cone ? cone->share(-towards / distance) : 1.0f;
+        return intensity * (share * height / (distance * distance2));
+    }
+
+    // What leaves towards the patch: its solid angle times the intensity, however near it is.
+    std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& patch) const override {
+        if (cone || isDisk()) return std::nullopt;
+        const Plane plane(patch.origin, patch.normal, double(patch.radius));
+        const double height = plane.height(position);
+        if (height < std::max(double(light.radius), plane.thickness)) return std::nullopt;
+        const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
+        double angle = triangleSolidAngle(o, o + a, o + b);
+        if (!patch.isTriangle) angle += triangleSolidAngle(o + a, o + b, o + a + b);
+        const double area = glm::length(glm::cross(a, b)) * (patch.isTriangle ? 0.5 : 1.0);
+        return intensity * float(angle / area);
     }
 
     bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal,
@@ -113,6 +147,7 @@ class PointSource : public LightSource {
     }
 
   private:
+    bool isPoint() const { return light.radius == 0; }
     bool isDisk() const { return light.radius > 0 && light.pointShape == RB_POINT_DISK; }
 
     const Light& light;
@@ -198,10 +233,12 @@ class AreaSource : public LightSource {
         normal = area > 0 ? glm::normalize(n) : glm::vec3(0.0f);
         if (isEllipse) area *= glm::quarter_pi<float>();
         isNarrow = !spread.isWhole();
+        plane = Plane(position, normal, double(glm::length(u) + glm::length(v)));
     }
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override {
+        if (plane.side(point) != PlaneSide::FRONT) return {};
         if (spread.isWhole())
             return surfaceSample(point, receiver, onSurface(uv), normal, radiance, area);
         const Part part = partSeenFrom(point);
@@ -230,7 +267,7 @@ class AreaSource : public LightSource {
 
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& receiver) const override {
-        if (glm::dot(point - position, normal) <= 0) return glm::vec3(0.0f);
+        if (plane.side(point) != PlaneSide::FRONT) return glm::vec3(0.0f);
         if (isEllipse || !spread.isWhole()) return std::nullopt;
         const glm::dvec3 p(position), du(u), dv(v);
         const glm::dvec3 corners[4] = {p - du - dv, p + du - dv, p + du + dv, p - du + dv};
@@ -301,6 +338,7 @@ class AreaSource : public LightSource {
     const AreaSpread spread;
     glm::vec3 normal;
     float area;
+    Plane plane;
 };
 
 // LightSource::shape of a lamp.
@@ -312,20 +350,49 @@ uint64_t shapeOf(const Light& l) {
     return hasher.value();
 }
 
-// The same of emissive faces.
-uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents,
+// The same of the fronts (back = 0) or backs of emissive faces.
+uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                  const std::vector<glm::vec3>& emission, const glm::vec3& strength) {
     Hasher hasher;
     hasher.add(parents);
+    hasher.add(back);
     for (uint32_t p : parents) {
         const Parent& parent = patches.parents[p];
-        for (uint32_t k = 0; k < 2 * parent.patchCount(); ++k)
+        for (uint32_t k = 0; k < parent.patchCount(); ++k)
             for (int c = 0; c < 3; ++c) {
-                const float e = emission[2 * parent.firstPatch + k][c];
+                const float e = emission[2 * (parent.firstPatch + k) + back][c];
                 hasher.add(e > 0 ? e / strength[c] : 0.0f);
             }
     }
     return hasher.value();
+}
+
+// What light of one side of an object's faces does not get out of.
+struct Enclosed {
+    std::optional<Enclosure> box;  // none: it may get anywhere
+    uint32_t side = 0;             // 0: of the fronts
+};
+
+// Faces that enclose volumes and all look outwards hide their backs from all that is outside: a line
+// from there meets a front first.
+Enclosed enclosedBy(const Patches& patches, uint32_t instance) {
+    Enclosure box;
+    std::optional<bool> isInward;
+    // Parents are in the order of their instances.
+    const auto first =
+        std::partition_point(patches.parents.begin(), patches.parents.end(),
+                             [&](const Parent& parent) { return parent.instance < instance; });
+    for (auto p = first; p != patches.parents.end() && p->instance == instance; ++p) {
+        const Parent& parent = *p;
+        if (!parent.isSolid || !parent.stopsDirect ||
+            isInward.value_or(parent.isInward) != parent.isInward)
+            return {};
+        isInward = parent.isInward;
+        for (size_t k = 0; k < (parent.isTriangle ? 3 : 4); ++k)
+            box.add(patches.vertices[parent.vertex[k]]);
+    }
+    if (!isInward) return {};
+    return {box, *isInward ? 0u : 1u};
 }
 
 }  // namespace
@@ -376,7 +443,7 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
         groups[{parent.instance, mesh.faceMaterials[parent.face]}].push_back(uint32_t(p));
     }
-    for (auto& [key, parents] : groups) {
+    for (const auto& [key, parents] : groups) {
         std::array<glm::vec3, 2> most{glm::vec3(0.0f), glm::vec3(0.0f)};
         const uint32_t first = 2 * patches.parents[parents.front()].firstPatch;
         bool varies = false;
@@ -388,12 +455,18 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
                 varies = varies || emission[side] != emission[first + k % 2];
             }
         }
-        const glm::vec3 strength = glm::max(most[0], most[1]);
-        const uint64_t shape = shapeOf(patches, parents, emission, strength);
-        sources.push_back(std::make_unique<MeshSource>(patches, std::move(parents), most,
-                                                       varies ? &emission : nullptr));
-        sources.back()->magnitude = strength;
-        sources.back()->shape = shape;
+        // Fronts and backs apart: of a lamp that encloses a volume one of them is never seen.
+        const Enclosed enclosed = enclosedBy(patches, key.first);
+        for (uint32_t back = 0; back < 2; ++back) {
+            if (most[back] == glm::vec3(0.0f)) continue;
+            std::array<glm::vec3, 2> own{glm::vec3(0.0f), glm::vec3(0.0f)};
+            own[back] = most[back];
+            sources.push_back(
+                std::make_unique<MeshSource>(patches, parents, own, varies ? &emission : nullptr,
+                                             enclosed.side == back ? enclosed.box : std::nullopt));
+            sources.back()->magnitude = most[back];
+            sources.back()->shape = shapeOf(patches, parents, back, emission, most[back]);
+        }
     }
     return sources;
 }

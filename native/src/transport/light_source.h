@@ -16,6 +16,8 @@
 
 namespace raybundle {
 
+struct ReceiverPlace;
+
 // What one sampled point of a source gives to a receiver if nothing is in between.
 struct LightSample {
     glm::vec3 direction{0.0f};   // unit vector towards the sampled point
@@ -34,6 +36,12 @@ struct EmittedRay {
 
     // The origin, moved off the lamp's surface.
     glm::vec3 start(float offset) const { return origin + offset * (direction + normal); }
+};
+
+// What becomes of the power of a source, as shares of it by channel.
+struct PowerShares {
+    glm::dvec3 escaped{0.0};  // meets no surface
+    glm::dvec3 covered{0.0};  // stays between the source's surface and one that it touches
 };
 
 // Sample of a surface point `on` with normal onNormal and radiance towards the receiver; area: m^2
@@ -89,6 +97,11 @@ class LightSource {
     virtual std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                                 const glm::vec3& normal) const = 0;
 
+    // The same, as the mean over a patch, where the source knows that better than by points of it.
+    virtual std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& /*patch*/) const {
+        return std::nullopt;
+    }
+
     // Whether no point within `radius` of a point with a unit normal can get any of its light,
     // occluders aside. False where that is not certain.
     virtual bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal,
@@ -134,11 +147,5 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
                                                        const std::vector<bool>& gatheredSides,
                                                        const std::vector<glm::vec3>& emission,
                                                        int32_t lightSet = kNoLightSet);
-
-// Irradiance at a point with a unit normal from a planar polygon of radiance 1 around it, by
-// Lambert's formula after clipping at the horizon; the polygon's side does not matter. m^2 and sr
-// cancel.
-double polygonIrradiance(const glm::dvec3& point, const glm::dvec3& normal,
-                         const glm::dvec3* polygon, int count);
 
 }  // namespace raybundle

@@ -1,25 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The emissive faces of one object and material as a source of light. What a receiver gets without
+// occluders has a closed form (transport/mesh_outline.h); which of it is seen, samples tell, whose
+// faces are chosen by a tree (transport/light_tree.h).
 #pragma once
 
 #include <array>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "transport/light_source.h"
+#include "transport/light_tree.h"
+#include "transport/mesh_outline.h"
 
 namespace raybundle {
 
-// The emissive faces of one object and material. Where emission or opacity varies between patches,
-// points are chosen by the power of patches and there is no closed form.
+// A box, metres, relative to Patches::centre.
+struct Enclosure {
+    glm::vec3 low{INFINITY}, high{-INFINITY};
+
+    void add(const glm::vec3& point) {
+        low = glm::min(low, point);
+        high = glm::max(high, point);
+    }
+    float distance(const glm::vec3& point) const {
+        return glm::length(glm::max(glm::max(low - point, point - high), glm::vec3(0.0f)));
+    }
+};
+
 class MeshSource : public LightSource {
   public:
-    // parents: into Patches::parents; emission: of their front and back, W/m^2. `patches` must
-    // outlive it. Where they vary, sideEmission holds the emission per side of all patches, W/m^2
-    // of the whole patch, and must outlive it too.
+    // parents: into Patches::parents; emission: of their front and back, W/m^2; black where that
+    // side does not belong to the source. `patches` must outlive it. Where the emission varies,
+    // sideEmission holds it per side of all patches, W/m^2 of the whole patch, must outlive the
+    // source too, and there is no closed form; emission is then the most of each side. enclosure:
+    // what the light does not get out of, if that is known.
     MeshSource(const Patches& patches, std::vector<uint32_t> parents,
                const std::array<glm::vec3, 2>& emission,
-               const std::vector<glm::vec3>* sideEmission = nullptr);
+               const std::vector<glm::vec3>* sideEmission = nullptr,
+               const std::optional<Enclosure>& enclosure = std::nullopt);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override;
@@ -34,34 +53,23 @@ class MeshSource : public LightSource {
     EmittedRay emit(const glm::vec4& u, float sceneRadius) const override;
 
   private:
-    glm::vec3 outlineIrradiance(const glm::vec3& point, const glm::vec3& receiver) const;
     void boundSource();
-    void findOutline();
-    struct SurfacePoint {
-        glm::vec3 position, normal;
-        uint32_t parent;
-        std::optional<uint32_t> side;  // where it is chosen by power
-        float area;                    // over the probability of the point: m^2 that it stands for
-    };
-    SurfacePoint onSurface(glm::vec2 uv) const;
-    SurfacePoint onParents(glm::vec2 uv) const;
-    glm::vec3 emissionOf(uint32_t patch, int k) const;
-    glm::vec3 emissionAt(const SurfacePoint& on, int k) const;
-    void chooseByPower();
+    void collectFaces();
+    glm::vec3 emissionOf(uint32_t side) const;
 
     const Patches& patches;
     const std::vector<uint32_t> parents;
-    const std::array<glm::vec3, 2> emission;  // W/m^2, front and back; most where it varies
+    const std::array<glm::vec3, 2> emission;           // W/m^2, front and back
     const std::vector<glm::vec3>* const sideEmission;  // where it varies
-    std::vector<uint32_t> shining;                     // sides, where it varies
-    std::vector<double> powerUpTo;                     // of them, cumulative, W
-    glm::vec3 totalPower{0.0f};                        // W
-    std::vector<double> areaUpTo;                      // per parent, cumulative, m^2
-    double total = 0;                                  // m^2
-    glm::vec3 centre{0.0f}, planeNormal{0.0f};
+    const std::optional<Enclosure> enclosure;
+    glm::vec3 totalPower{0.0f};  // W
+    glm::vec3 centre{0.0f};
     float extent = 0;  // radius of a sphere around centre, metres
-    bool isPlanar = false;
-    std::vector<std::pair<glm::dvec3, glm::dvec3>> outline;  // of a planar source, if short
+    // Parents, or patches where the emission varies: their sides that emit.
+    std::vector<LightFace> faces;
+    std::vector<double> powerUpTo;  // of them, sum of the channels, cumulative, W
+    LightTree tree;
+    MeshOutline outline;
 };
 
 }  // namespace raybundle

@@ -153,7 +153,7 @@ std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, cons
     return sum / float(grid.patchCount() * points);
 }
 
-// Mean of the closed form over a patch by Gauss quadrature (degree 3 on a parallelogram, 2 on a
+// Mean of the closed form over a patch, if the source does not know it, by Gauss quadrature (degree 3 on a parallelogram, 2 on a
 // triangle), on more parts where it varies much: beside a source it falls from a finite value
 // at the common edge with an infinite slope.
 std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, const Place& place,
@@ -162,6 +162,7 @@ std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, cons
     error = 0;
     if (place.radius == 0 || place.radius < kFar * source.distance(place.centroid()))
         return source.irradiance(place.centroid(), place.normal);
+    if (const auto mean = source.meanIrradiance(place)) return mean;
     const auto coarse = quadrature(source, place, 1, low, high);
     if (!coarse) return coarse;
     // The points of the quadrature alone may be alike by symmetry.

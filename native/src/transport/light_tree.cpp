@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/light_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace raybundle {
+namespace {
+
+glm::vec3 middleOf(const LightFace& face) {
+    return face.origin + (face.isTriangle ? 1 / 3.0f : 0.5f) * (face.a + face.b);
+}
+
+float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
+
+// Cosine of max(x - y, 0) of two angles up to half a turn, by their sines and cosines.
+float cosineOfRest(float cosX, float sinX, float cosY, float sinY) {
+    return cosX >= cosY ? 1.0f : cosX * cosY + sinX * sinY;
+}
+
+}  // namespace
+
+LightTree::LightTree(const std::vector<LightFace>& faces) : order(faces.size()) {
+    std::iota(order.begin(), order.end(), 0u);
+    nodes.reserve(2 * faces.size());
+    if (!faces.empty()) build(faces, 0, uint32_t(faces.size()));
+}
+
+uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, uint32_t count) {
+    glm::vec3 low(INFINITY), high(-INFINITY), middleLow(INFINITY), middleHigh(-INFINITY), sum(0.0f);
+    double power = 0;
+    for (uint32_t k = first; k < first + count; ++k) {
+        const LightFace& face = faces[order[k]];
+        const glm::vec3 across = face.origin + face.a + face.b;
+        for (const glm::vec3& corner : {face.origin, face.origin + face.a, face.origin + face.b,
+                                        face.isTriangle ? face.origin : across}) {
+            low = glm::min(low, corner);
+            high = glm::max(high, corner);
+        }
+        middleLow = glm::min(middleLow, middleOf(face));
+        middleHigh = glm::max(middleHigh, middleOf(face));
+        sum += face.normal;
+        power += double(face.strength * face.area());
+    }
+    Node node{};
+    node.centre = 0.5f * (low + high);
+    node.radius = 0.5f * glm::length(high - low);
+    node.axis = glm::length(sum) > 1e-3f * float(count) ? glm::normalize(sum) : glm::vec3(0, 0, 1);
+    node.cosine = 1;
+    for (uint32_t k = first; k < first + count; ++k)
+        node.cosine = std::min(node.cosine, glm::dot(node.axis, faces[order[k]].normal));
+    node.sine = sineOf(node.cosine);
+    node.power = float(power);
+    node.first = first;
+    node.count = count;
+    const uint32_t index = uint32_t(nodes.size());
+    nodes.push_back(node);
+    if (count == 1) return index;
+
+    const glm::vec3 size = middleHigh - middleLow;
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    // By place, then by normal, so that the order of the faces in the mesh does not matter.
+    auto key = [&](uint32_t f) {
+        const glm::vec3 at = middleOf(faces[f]), n = faces[f].normal;
+        return std::array<float, 6>{at[axis], at.x, at.y, n.x, n.y, n.z};
+    };
+    const auto begin = order.begin() + first;
+    std::nth_element(begin, begin + count / 2, begin + count,
+                     [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+    build(faces, first, count / 2);
+    nodes[index].second = build(faces, first + count / 2, count - count / 2);
+    return index;
+}
+
+// About what the cluster gives to a plane with that normal at a point, an upper bound of it in angle:
+// 0 only where it gives nothing.
+float LightTree::importance(const Node& node, const glm::vec3& point, const glm::vec3& normal) {
+    const glm::vec3 d = node.centre - point;
+    const float r2 = node.radius * node.radius, distance2 = glm::dot(d, d);
+    if (distance2 <= r2) return node.power / std::max(r2, 1e-30f);
+    const float distance = std::sqrt(distance2);
+    const glm::vec3 towards = d / distance;
+    // Half the angle under which the sphere is seen.
+    const float sinSphere = node.radius / distance, cosSphere = sineOf(sinSphere);
+    const float c = glm::dot(normal, towards);
+    const float received = cosineOfRest(c, sineOf(c), cosSphere, sinSphere);
+    if (received <= 0) return 0;
+    // From the cone's axis to the receiver, less the cone, less the sphere.
+    const float e = -glm::dot(node.axis, towards);
+    float emitted = cosineOfRest(e, sineOf(e), node.cosine, node.sine);
+    emitted = cosineOfRest(emitted, sineOf(emitted), cosSphere, sinSphere);
+    return emitted <= 0 ? 0 : node.power * emitted * received / distance2;
+}
+
+std::optional<LightTree::Choice> LightTree::choose(const glm::vec3& point, const glm::vec3& normal,
+                                                   float u) const {
+    if (nodes.empty()) return std::nullopt;
+    uint32_t index = 0;
+    double rest = double(u), probability = 1;
+    while (nodes[index].count > 1) {
+        const uint32_t first = index + 1, second = nodes[index].second;
+        const double a = double(importance(nodes[first], point, normal));
+        const double b = double(importance(nodes[second], point, normal));
+        if (!(a + b > 0)) return std::nullopt;
+        const double share = a / (a + b);
+        if (rest < share) {
+            index = first;
+            probability *= share;
+            rest /= share;
+        } else {
+            index = second;
+            probability *= 1 - share;
+            rest = (rest - share) / (1 - share);
+        }
+    }
+    return Choice{order[nodes[index].first], float(probability),
+                  std::clamp(float(rest), 0.0f, 0.9999999f)};
+}
+
+}  // namespace raybundle

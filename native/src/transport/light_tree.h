@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A tree over the emitting faces of a mesh, by which a receiver chooses one about in proportion to
+// the light that it gets from it: whatever their order is in the mesh, and without looking at all.
+//
+// Source: Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting"
+// (2018): the bounds of a cluster's light by its sphere and by the cone of its normals.
+// Differs:
+// - One sample goes to one face: clusters are not split for a receiver.
+// - Clusters are halved at the middle of their longer side instead of where the surface area
+//   orientation heuristic has its least: the faces of one mesh are of a kind.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <vector>
+
+namespace raybundle {
+
+// One side of a face that emits.
+struct LightFace {
+    glm::vec3 origin, a, b;  // as in Parent
+    glm::vec3 normal;        // of the side that emits
+    bool isTriangle;
+    float strength;  // emission, sum of the channels, W/m^2; above 0
+    uint32_t side;   // patch side; where the emission is even on its parent, of its first patch
+
+    float area() const { return glm::length(glm::cross(a, b)) * (isTriangle ? 0.5f : 1.0f); }
+};
+
+class LightTree {
+  public:
+    LightTree() = default;
+    explicit LightTree(const std::vector<LightFace>& faces);
+
+    struct Choice {
+        uint32_t face;      // into the faces
+        float probability;  // above 0
+        float u;            // what is left of the random number, uniform in [0, 1)
+    };
+    // By the bounds of what a plane with that normal at a point gets from each cluster; u uniform in
+    // [0, 1). None: it gets nothing.
+    std::optional<Choice> choose(const glm::vec3& point, const glm::vec3& normal, float u) const;
+
+  private:
+    struct Node {
+        glm::vec3 centre;       // of a sphere around it, metres
+        float radius;           // metres
+        glm::vec3 axis;         // of the cone of normals
+        float cosine, sine;     // of half its opening
+        float power;            // sum of the channels, W
+        uint32_t first, count;  // of the faces in `order`; a leaf has one
+        uint32_t second;        // the second child; the first one follows
+    };
+    uint32_t build(const std::vector<LightFace>& faces, uint32_t first, uint32_t count);
+    static float importance(const Node& node, const glm::vec3& point, const glm::vec3& normal);
+
+    std::vector<uint32_t> order;
+    std::vector<Node> nodes;
+};
+
+}  // namespace raybundle
