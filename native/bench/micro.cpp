@@ -167,7 +167,7 @@ void ShadowRays(benchmark::State& state) {
     shootRays(state, [](uint32_t side, const glm::vec3& point, const glm::vec4&) {
         const glm::vec3 to = -point;  // the middle
         const float distance = std::max(glm::length(to), 1e-6f);
-        return subject->visibility.visibleShare(side, point, to / distance, distance);
+        return subject->visibility.visibleShare(side, {point, to / distance, distance});
     });
 }
 BENCHMARK(ShadowRays);

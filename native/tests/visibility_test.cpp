@@ -25,10 +25,8 @@ TEST(Visibility, RaysOutOfTheRangeOfNumbersMeetNothingAndAreBlocked) {
             glm::vec3 from = inside, way = up;
             from[axis] = bad;
             way[axis] = bad;
-            EXPECT_EQ(visibility.escapingShare(from, up), 0) << bad;
-            EXPECT_EQ(visibility.escapingShare(inside, way), 0) << bad;
-            EXPECT_EQ(visibility.visibleShare(0, from, up, INFINITY), 0) << bad;
-            EXPECT_EQ(visibility.visibleShare(0, from, way, INFINITY), 0) << bad;
+            EXPECT_EQ(visibility.visibleShare(0, {from, up, INFINITY}), 0) << bad;
+            EXPECT_EQ(visibility.visibleShare(0, {from, way, INFINITY}), 0) << bad;
             EXPECT_FALSE(visibility.firstHit(0, from, up)) << bad;
             const ShadowRay rays[2] = {{from, up, INFINITY}, {from, way, INFINITY}};
             float shares[2] = {-1, -1};

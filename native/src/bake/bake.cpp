@@ -10,7 +10,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iomanip>
+#include <map>
 #include <numeric>
+#include <sstream>
 
 #include "bake/combination.h"
 #include "bake/energy_balance.h"
@@ -25,6 +28,7 @@
 #include "reconstruction/reconstruction.h"
 #include "reconstruction/shown_light.h"
 #include "reconstruction/stated_error.h"
+#include "transport/bright_spots.h"
 #include "transport/set_light.h"
 #include "visibility/embree_device.h"
 
@@ -34,11 +38,12 @@ namespace {
 // Relative residual of the last solve: a share of the noise, within these bounds. The upper one
 // keeps a relit bake, whose solves start elsewhere, within 1e-5 of a new one.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
-// Bundles whose noise is less than this share of the target have done their part.
-constexpr double kFewNoise = 0.3;
 // So many times the bundles are too many to be foretold.
 constexpr double kFarAway = 2.5;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
+
+// Relative; above it the energy balance is worth a warning.
+constexpr double kMostImbalance = 0.01;
 
 class Stopwatch {
   public:
@@ -139,6 +144,50 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
     return isEmpty || isDark;
 }
 
+std::string percent(double share) {
+    std::ostringstream text;
+    text << std::setprecision(3) << 100 * share << " %";
+    return text.str();
+}
+
+// Names the source and the object that most of the first shot's noise comes from and is on. area:
+// per side, of what is wanted.
+void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
+                       const std::vector<float>& area, double noise, double target,
+                       Report& report) {
+    std::map<std::pair<std::string, uint32_t>, double> variances;  // by source and instance
+    for (const SetLight& light : lights) {
+        const auto& sources = light.direct.lightSources();
+        for (size_t side = 0; side < light.shot.error.size(); ++side) {
+            const double error = double(light.shot.error[side]);
+            const bool isKnown = !light.shot.noisiest.empty() && !sources.empty();
+            variances[{isKnown ? sources[light.shot.noisiest[side]]->name : "the sources",
+                       patches.parentAt(uint32_t(side)).instance}] +=
+                double(area[side]) * error * error;
+        }
+    }
+    if (variances.empty()) return;
+    const auto most =
+        std::max_element(variances.begin(), variances.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    report.warnings.push_back(
+        "the noise is " + percent(noise) + " and not below " + percent(target) +
+        ": most of it is in the light of " + most->first.first + " on object \"" +
+        scene.instances[most->first.second].name +
+        "\", which more bundles do not help; smaller patches there or a larger distance do");
+}
+
+// First of all that is said: light that is lost or made is worse than noise.
+void warnOfImbalance(Report& report) {
+    if (!(report.balanceError() > kMostImbalance)) return;
+    report.warnings.insert(
+        report.warnings.begin(),
+        "the energy balance is off by " + percent(report.balanceError()) +
+            ": so much of the light that is emitted is neither absorbed nor leaves the scene, or "
+            "comes from nowhere; look for lamps inside of other surfaces, and compare with a bake "
+            "of smaller patches (patch_size)");
+}
+
 // What is bright by itself is refused by Scene; what adds up to too much, or shines from nearly no
 // distance, is seen only in the end.
 void checkFinite(const std::vector<InstanceLight>& instances) {
@@ -223,6 +272,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
             exposed = trace->exposedShare();
             for (const SetLight& light : lights)
                 balanceEnergy(patches, light, exposed, transports.front()->openShare(), report);
+            warnOfImbalance(report);
             report.bundles = transports.front()->bundleCount();
         }
         irradiance = sumOf(lights);
@@ -333,25 +383,37 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
         Trace::Shot& last = trace->shots[set];
         const uint64_t hash = lightHash(direct, aims);
         FirstShot shot;
-        const bool mayKeep = settings.skipLights && settings.firstShot == "GATHER";
+        const bool isGather = settings.firstShot == "GATHER";
+        const bool mayKeep = settings.skipLights && isGather;
+        const FirstShotInput input{direct,
+                                   patches,
+                                   visibility,
+                                   settings,
+                                   share,
+                                   trace->touchDistance,
+                                   trace->linesPerBundle(),
+                                   &trace->visibility,
+                                   coarse.empty() ? nullptr : &coarse[lights.size()],
+                                   mayKeep && last.aims == aims ? last.shot.bySource : nullptr,
+                                   &shown.sides()};
         if (mayKeep && last.hash == hash) {
             report.skipped.push_back({"first shot", "lights unchanged since the last bake", 1});
             shot = last.shot;
         } else {
-            shot = firstShot(
-                settings.firstShot,
-                {direct, patches, visibility, settings, share, trace->touchDistance,
-                 trace->linesPerBundle(), &trace->visibility,
-                 coarse.empty() ? nullptr : &coarse[lights.size()],
-                 mayKeep && last.aims == aims ? last.shot.bySource : nullptr, &shown.sides()});
+            shot = firstShot(settings.firstShot, input);
             report.shadowRays += shot.rays;
             if (shot.bySource && shot.bySource == last.shot.bySource)
                 report.skipped.push_back({"first shot",
                                           "only strengths of lights changed since the last bake: "
                                           "what each brought is scaled",
                                           1});
-            if (settings.firstShot == "GATHER") last = {hash, aims, shot};
+            if (isGather) last = {hash, aims, shot};
         }
+        if (isGather && settings.solver == "LINE_REUSE")
+            if (const size_t spots =
+                    gatherBrightSpots(scene, input, trace->visibility, trace->density, shot))
+                report.skipped.push_back(
+                    {"bundles", "few bright sides: their reflected light is gathered", spots});
         report.skipped.push_back(
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
         report.skipped.push_back(
@@ -444,26 +506,22 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         const auto worst = std::max_element(errors.begin(), errors.end());
         const double onSmall =
             windowNoise(tiles.patches(), trace->density.windowOf, halves, tileWeight);
-        const double excess = std::max(*worst, onSmall) / settings.targetError;
+        const double target = settings.targetError;
+        const double excess = std::max(noise.excess(target), onSmall / target);
         if (excess <= 1 && settings.skipBundles) {
-            report.skipped.push_back(
-                {"bundles", "the noise is at its target", most - std::min(most, bundles)});
+            if (*worst <= target)
+                report.skipped.push_back(
+                    {"bundles", "the noise is at its target", most - std::min(most, bundles)});
+            else
+                warnOfDirectNoise(scene, patches, lights, area, *worst, target, report);
             break;
         }
-        const double needed = bundles * std::pow(onSmall / settings.targetError, 1 / kNoiseSlope);
-        if (*worst <= settings.targetError && needed > kMostWindowBundles && settings.skipBundles) {
+        const double needed = bundles * std::pow(onSmall / target, 1 / kNoiseSlope);
+        if (noise.excess(target) <= 1 && needed > kMostWindowBundles && settings.skipBundles) {
             report.warnings.push_back(
-                "on small patches the noise is " + std::to_string(100 * onSmall) +
-                " %: they are too many and too small for lines; those that few lines met gather "
+                "on small patches the noise is " + percent(onSmall) +
+                ": they are too many and too small for lines; those that few lines met gather "
                 "with local rays");
-            break;
-        }
-        if (onSmall <= settings.targetError &&
-            noise.ofBundles() < kFewNoise * settings.targetError) {
-            report.warnings.push_back(
-                "the noise is " + std::to_string(100 * *worst) + " % and not below " +
-                std::to_string(100 * settings.targetError) +
-                " %: what is left is that of direct light, which more bundles do not help");
             break;
         }
         if (bundles >= most) {
@@ -471,10 +529,9 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
             report.warnings.push_back(
                 "max_bundles was reached at " + std::to_string(bundles) + " bundles: the noise " +
                 (set == kNoLightSet ? "" : "of light set \"" + scene.lightSets[set] + "\" ") +
-                "is " + std::to_string(100 * *worst) + " %" +
-                (onSmall > *worst ? ", on small patches " + std::to_string(100 * onSmall) + " %,"
-                                  : "") +
-                " and not below " + std::to_string(100 * settings.targetError) + " %");
+                "is " + percent(*worst) +
+                (onSmall > *worst ? ", on small patches " + percent(onSmall) + "," : "") +
+                " and not below " + percent(target));
             break;
         }
         // As many as the error's slope says; if that is far away, double only, and look again.

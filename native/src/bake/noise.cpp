@@ -9,6 +9,9 @@ namespace {
 
 // At the first look the noise is stated so much above what the halves say; less with each look.
 constexpr double kSmallSample = 0.15;
+// Where the first shot has nearly all the noise of the target, or more, bundles may have this share
+// of it: less of theirs would cost many and hardly be seen in the sum.
+constexpr double kLeastOfBundles = 0.6;
 // Weight of the looks before.
 constexpr double kMemory = 0.5;
 
@@ -58,6 +61,12 @@ double Noise::ofBundles() const {
     return signal > 0 ? std::hypot(factor() * std::sqrt(pooled), bias) : 0;
 }
 
+double Noise::excess(double target) const {
+    const double left = std::max(target * target - directNoise,
+                                 kLeastOfBundles * kLeastOfBundles * target * target);
+    return ofBundles() / std::sqrt(left);
+}
+
 Looks Noise::looks() const { return {looked, bundles, bundleNoise > 0 ? pooled / bundleNoise : 1}; }
 
 std::vector<glm::vec3> Noise::perSide() const {
@@ -101,9 +110,9 @@ std::vector<double> SetNoise::relative() const {
     return result;
 }
 
-double SetNoise::ofBundles() const {
+double SetNoise::excess(double target) const {
     double most = 0;
-    for (const Noise& noise : noises) most = std::max(most, noise.ofBundles());
+    for (const Noise& noise : noises) most = std::max(most, noise.excess(target));
     return most;
 }
 

@@ -44,6 +44,9 @@ class Noise {
     // As of the last look, relative to the RMS of the light.
     double relative() const;
     double ofBundles() const;  // without that of the first shot
+    // So many times too large is the noise of bundles for a relative target: beside that of the
+    // first shot, which they do not help.
+    double excess(double target) const;
     Looks looks() const;
     // Per side: half the difference of the halves, brought to the stated size, W/m^2.
     std::vector<glm::vec3> perSide() const;
@@ -83,8 +86,8 @@ class SetNoise {
 
     // As of the last look, relative: of the light of all, then of each light set.
     std::vector<double> relative() const;
-    // The largest of them without that of the first shot.
-    double ofBundles() const;
+    // The largest of theirs, see Noise::excess.
+    double excess(double target) const;
     // Of the light of all.
     Looks looks() const { return noises.front().looks(); }
     SideNoise perSide() const;

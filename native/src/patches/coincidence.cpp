@@ -6,6 +6,8 @@
 #include <map>
 #include <numeric>
 
+#include "patches/plane.h"
+
 namespace raybundle {
 namespace {
 
@@ -13,19 +15,36 @@ namespace {
 constexpr double kSameVolume = 1e-4;
 constexpr int32_t kOpen = -1;
 
-// Per face: one vertex of the part that it hangs together with, the same for all faces of the part;
-// kOpen where not each edge of the part has exactly two faces, which turn alike.
-std::vector<int32_t> closedParts(const Mesh& mesh) {
-    // Parts are sets of vertices joined by faces.
+}  // namespace
+
+// By one of its vertices.
+std::vector<int32_t> partsOfFaces(const Mesh& mesh) {
     std::vector<int32_t> above(mesh.vertices.size());
     std::iota(above.begin(), above.end(), 0);
     auto root = [&](int32_t v) {
         while (above[size_t(v)] != v) v = above[size_t(v)] = above[size_t(above[size_t(v)])];
         return v;
     };
+    for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
+        for (int32_t c = begin; c < end; ++c)
+            above[size_t(root(mesh.cornerVertices[size_t(c)]))] =
+                root(mesh.cornerVertices[size_t(begin)]);
+    }
+    std::vector<int32_t> parts(mesh.faceCount());
+    for (size_t f = 0; f < mesh.faceCount(); ++f)
+        parts[f] = root(mesh.cornerVertices[size_t(mesh.faceOffsets[f])]);
+    return parts;
+}
+
+namespace {
+
+// Per face: its part; kOpen where not each edge of the part has exactly two faces, which turn alike.
+std::vector<int32_t> closedParts(const Mesh& mesh) {
+    std::vector<int32_t> parts = partsOfFaces(mesh);
     struct Edge {
         uint64_t key;
-        int32_t vertex;
+        int32_t part;
         int turn;  // +1 from the smaller vertex to the larger, else -1
     };
     std::vector<Edge> edges;
@@ -35,27 +54,23 @@ std::vector<int32_t> closedParts(const Mesh& mesh) {
         for (int32_t c = begin; c < end; ++c) {
             const int32_t a = mesh.cornerVertices[size_t(c)];
             const int32_t b = mesh.cornerVertices[size_t(c + 1 < end ? c + 1 : begin)];
-            edges.push_back({edgeKey(a, b), a, a < b ? 1 : -1});
-            above[size_t(root(a))] = root(b);
+            edges.push_back({edgeKey(a, b), parts[f], a < b ? 1 : -1});
         }
     }
     std::sort(edges.begin(), edges.end(),
               [](const Edge& a, const Edge& b) { return a.key < b.key; });
-    std::vector<bool> closed(mesh.vertices.size(), true);  // at the root of a part
+    std::vector<bool> closed(mesh.vertices.size(), true);  // at the vertex that names a part
     for (size_t i = 0; i < edges.size();) {
         size_t end = i;
         int turns = 0;
         for (; end < edges.size() && edges[end].key == edges[i].key; ++end)
             turns += edges[end].turn;
-        if (end - i != 2 || turns != 0) closed[size_t(root(edges[i].vertex))] = false;
+        if (end - i != 2 || turns != 0) closed[size_t(edges[i].part)] = false;
         i = end;
     }
-    std::vector<int32_t> result(mesh.faceCount());
-    for (size_t f = 0; f < mesh.faceCount(); ++f) {
-        const int32_t vertex = root(mesh.cornerVertices[size_t(mesh.faceOffsets[f])]);
-        result[f] = closed[size_t(vertex)] ? vertex : kOpen;
-    }
-    return result;
+    for (int32_t& part : parts)
+        if (!closed[size_t(part)]) part = kOpen;
+    return parts;
 }
 
 // Where a part lies and what it encloses.
@@ -65,7 +80,11 @@ struct Part {
     double area = 0;
     bool isSolid = true;
 
-    auto place() const { return std::make_tuple(low.x, low.y, low.z, high.x, high.y, high.z); }
+    // Whether another part lies in the same place, within what rounding does to it.
+    bool isWhere(const Part& other, double rounding) const {
+        const glm::vec3 off = glm::max(glm::abs(other.low - low), glm::abs(other.high - high));
+        return double(std::max({off.x, off.y, off.z})) <= rounding;
+    }
     // Double: both sides of a slab.
     double thickness() const { return area > 0 ? 2 * std::abs(volume) / area : 0; }
 };
@@ -100,16 +119,25 @@ std::map<int32_t, Part> measured(const Mesh& mesh, const glm::vec3* places,
 std::vector<Shell> shellsOfFaces(const Mesh& mesh, const glm::vec3* places, double thinnest) {
     const std::vector<int32_t> partOfFace = closedParts(mesh);
     std::map<int32_t, Part> parts = measured(mesh, places, partOfFace);
-    std::map<decltype(Part().place()), std::vector<Part*>> byPlace;
+    std::vector<Part*> byPlace;
     for (auto& [vertex, part] : parts) {
         part.isSolid = part.thickness() > thinnest;
-        byPlace[part.place()].push_back(&part);
+        byPlace.push_back(&part);
     }
-    for (auto& [place, there] : byPlace)
-        for (size_t k = 1; k < there.size(); ++k)
-            if (const double sum = there[0]->volume + there[k]->volume;
-                std::abs(sum) < kSameVolume * std::abs(there[0]->volume))
-                there[0]->isSolid = there[k]->isSolid = false;
+    std::sort(byPlace.begin(), byPlace.end(),
+              [](const Part* a, const Part* b) { return a->low.x < b->low.x; });
+    for (size_t i = 0; i < byPlace.size(); ++i) {
+        Part& a = *byPlace[i];
+        const double rounding =
+            std::max(thinnest, Plane::kOfExtent * double(glm::length(a.high - a.low)));
+        for (size_t k = i + 1; k < byPlace.size(); ++k) {
+            Part& b = *byPlace[k];
+            if (double(b.low.x - a.low.x) > rounding) break;
+            if (a.isWhere(b, rounding) &&
+                std::abs(a.volume + b.volume) < kSameVolume * std::abs(a.volume))
+                a.isSolid = b.isSolid = false;
+        }
+    }
     std::vector<Shell> result(mesh.faceCount(), Shell::OPEN);
     for (size_t f = 0; f < mesh.faceCount(); ++f)
         if (partOfFace[f] != kOpen)

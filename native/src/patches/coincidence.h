@@ -22,17 +22,25 @@ std::vector<Shell> shellsOfFaces(const Mesh& mesh, const glm::vec3* places, doub
 // Which of two parallel surfaces that lie in the same place comes first along a direction. Depth
 // cannot tell, but solids can: the surface by which the direction leaves a solid comes before any
 // sheet between, and that before the surface by which it enters the next solid; so nothing shines
-// between a cupboard and the wall it stands against. Two of a kind are ordered by their index, the
-// same from both directions. (Of surfaces that meet at an angle, depth knows the order.) aEnters:
-// the direction looks at the front of parent a.
+// between a cupboard and the wall it stands against. Of sheets, those whose fronts the direction
+// looks at come before those that it sees from behind. Of two of a kind the smaller one lies on the
+// front of the larger one, as a lamp or a picture on a wall does, whatever their order in the scene;
+// only where they are as large their indices decide, the same from both directions. (Of surfaces that
+// meet at an angle, depth knows the order.) aEnters: the direction looks at the front of parent a.
 inline bool comesBefore(const Patches& patches, uint32_t a, bool aEnters, uint32_t b,
                         bool bEnters) {
-    auto rank = [&](uint32_t parent, bool enters) {
-        const int kind = !patches.parents[parent].isSolid ? 1 : enters ? 2 : 0;
-        return std::make_tuple(kind, enters ? -int64_t(parent) : int64_t(parent));
+    auto rank = [&](uint32_t index, bool enters) {
+        const Parent& parent = patches.parents[index];
+        const int kind = !parent.isSolid ? 1 : enters ? 2 : 0;
+        const int64_t size = parent.surfaceSize;
+        return std::make_tuple(kind, !enters, enters ? size : -size,
+                               enters ? -int64_t(index) : int64_t(index));
     };
     return rank(a, aEnters) < rank(b, bEnters);
 }
+
+// Per face: a number of the part of the mesh that it hangs together with by its vertices.
+std::vector<int32_t> partsOfFaces(const Mesh& mesh);
 
 // Whether two parents are parallel, within what rounding does to coinciding faces.
 inline bool areParallel(const Parent& a, const Parent& b) {

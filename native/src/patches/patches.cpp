@@ -121,6 +121,8 @@ constexpr double kNeedle = 16.0;
 // Share of the edge by which the fourth corner of a parallelogram may be off.
 constexpr double kParallelogramTolerance = 1e-4;
 constexpr int kMaxGrid = 4096;
+// Determinant of a transform that flattens, over the product of the lengths of its columns.
+constexpr double kFlat = 1e-9;
 // Solids of less thickness are sheets, of the scene's radius: about what depth tells apart.
 constexpr double kThinnest = 2e-6;
 
@@ -175,6 +177,7 @@ class Subdivision {
                 parent.stopsDirect = scene.instances[i].stopsDirect;
                 parent.exchanges = scene.instances[i].exchanges;
             }
+            measureSurfaces(mesh, firstParent);
             patches.degenerateFaces += degenerate;
             if (degenerate)
                 patches.warnings.push_back("object \"" + scene.instances[i].name +
@@ -188,9 +191,34 @@ class Subdivision {
   private:
     using Triangle = std::array<uint32_t, 3>;  // into Patches::vertices
 
-    // A mirroring transform turns the winding, but the front stays outside as in Blender.
+    // Of an instance's parents, from the first on.
+    void measureSurfaces(const Mesh& mesh, size_t firstParent) {
+        const std::vector<int32_t> parts = partsOfFaces(mesh);
+        std::vector<double> areaOf(mesh.vertices.size(), 0.0);  // of parts
+        double all = 0;
+        for (size_t p = firstParent; p < patches.parents.size(); ++p) {
+            const double area = double(patches.parents[p].area());
+            areaOf[size_t(parts[size_t(patches.parents[p].face)])] += area;
+            all += area;
+        }
+        // In steps of 0.7 %, so that rounding does not order what is as large.
+        auto steps = [](double area) {
+            return uint32_t(
+                std::clamp(100 * std::log2(std::max(area, 1e-80)) + 32768, 0.0, 65535.0));
+        };
+        for (size_t p = firstParent; p < patches.parents.size(); ++p) {
+            Parent& parent = patches.parents[p];
+            parent.surfaceSize =
+                steps(all) << 16 | steps(areaOf[size_t(parts[size_t(parent.face)])]);
+        }
+    }
+
+    // A mirroring transform turns the winding, but the front stays outside as in Blender. One that
+    // flattens has a determinant of rounding alone, and does not mirror.
     bool isMirrored(uint32_t instance) const {
-        return glm::determinant(glm::dmat3(scene.instances[instance].transform)) < 0;
+        const glm::dmat3 turn(scene.instances[instance].transform);
+        return glm::determinant(turn) <
+               -kFlat * glm::length(turn[0]) * glm::length(turn[1]) * glm::length(turn[2]);
     }
 
     bool cutFace(uint32_t instance, int32_t face, double size) {

@@ -30,6 +30,8 @@ namespace raybundle {
 // The number of a side takes 24 bits (bundles/line_rows.h).
 constexpr size_t kMostPatches = size_t(1) << 23;
 
+constexpr uint32_t kNoParent = UINT32_MAX;
+
 // The tiles of a parent of which some are cut once more.
 struct CutTiles {
     std::vector<uint8_t> level;   // per tile: it has 4^level patches
@@ -47,6 +49,8 @@ struct Parent {
     bool isTriangle = true;
     bool isSolid = false;   // part of a surface that encloses a volume
     bool isInward = false;  // its front looks into that volume
+    // Orders surfaces by the area of their object, and then of the part of it that hangs together.
+    uint32_t surfaceSize = 0;
     // As the instance has it.
     bool stopsDirect = true, exchanges = true;
     uint32_t instance = 0;    // into Scene::instances

@@ -11,6 +11,9 @@ namespace {
 
 // How far inside a face a corner's receiver lies, as a share of the way to the centre.
 constexpr float kInside = 0.01f;
+// Shading normals up to this cosine to a face are as good as at right angles to it, where which side
+// they look at is a matter of rounding: the face's own normal counts then.
+constexpr float kUpright = 1e-3f;
 // Gaps of so many times that width are narrow; there a receiver lies inside by a share of the gap.
 // At the edges of two plates as long as wide it then gets 3 % less of the light around them.
 constexpr float kNarrowGap = 8, kInsideGap = 1.0f / 32;
@@ -64,7 +67,7 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
             if (mesh.cornerNormals.empty()) continue;
             const glm::dvec3 shading = normalToWorld * glm::dvec3(mesh.cornerNormals[corner]);
             const glm::vec3 normal = turn * glm::vec3(glm::normalize(shading));
-            if (glm::dot(normal, receiver.normal) > 0) receiver.normal = normal;
+            if (glm::dot(normal, receiver.normal) > kUpright) receiver.normal = normal;
         }
     }
     std::vector<CornerReceiver> result;

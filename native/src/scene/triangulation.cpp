@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "scene/triangulation.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace raybundle {
 
 glm::dvec3 vectorArea(const std::vector<glm::dvec3>& points) {
@@ -10,11 +14,31 @@ glm::dvec3 vectorArea(const std::vector<glm::dvec3>& points) {
     return 0.5 * sum;
 }
 
+namespace {
+
+// A corner is straight where it is lower over the line between its neighbours than this share of
+// their distance, or than so much of its coordinates: a rounding error.
+constexpr double kStraight = 1e-5;
+constexpr double kRounding = 4 * double(std::numeric_limits<float>::epsilon());
+
+}  // namespace
+
 std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& points) {
     const glm::dvec3 normal = vectorArea(points);
+    const double area = glm::length(normal);
+    double rounding = 0;  // metres
+    for (const glm::dvec3& p : points)
+        rounding =
+            std::max(rounding, kRounding * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}));
     // Positive where the corner a, b, c turns as the polygon does.
     auto turn = [&](int a, int b, int c) {
         return glm::dot(glm::cross(points[b] - points[a], points[c] - points[b]), normal);
+    };
+    // Whether the corner turns as the polygon does, by more than rounding does to a straight one: its
+    // triangle would have a normal of rounding alone, or be left out as one without area.
+    auto isConvex = [&](int a, int b, int c) {
+        const double diagonal = glm::length(points[c] - points[a]);
+        return turn(a, b, c) > area * diagonal * std::max(kStraight * diagonal, rounding);
     };
     auto contains = [&](int a, int b, int c, int p) {
         return turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
@@ -25,7 +49,7 @@ std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& point
     // Only a corner that turns the other way can lie inside an ear.
     std::vector<int> reflex;
     for (size_t i = 0, n = points.size(); i < n; ++i)
-        if (turn(int((i + n - 1) % n), int(i), int((i + 1) % n)) <= 0) reflex.push_back(int(i));
+        if (!isConvex(int((i + n - 1) % n), int(i), int((i + 1) % n))) reflex.push_back(int(i));
 
     std::vector<std::array<int, 3>> triangles;
     triangles.reserve(points.size() - 2);
@@ -36,7 +60,7 @@ std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& point
         double bestDiagonal = 0;
         for (size_t i = 0; i < n; ++i) {
             const int a = ring[(i + n - 1) % n], b = ring[i], c = ring[(i + 1) % n];
-            if (turn(a, b, c) <= 0) continue;
+            if (!isConvex(a, b, c)) continue;
             bool ear = true;
             for (int p : reflex)
                 if (p != a && p != b && p != c && points[p] != points[a] &&

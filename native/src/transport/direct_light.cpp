@@ -35,8 +35,19 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
       visibility(visibility),
       seed(seed),
       skips(skips),
-      split(splitEmission(scene, patches, visibility, lightSet, seed)),
-      sources(raybundle::lightSources(scene, patches, split.isSource, split.gathered, lightSet)) {}
+      split(std::make_unique<const EmissionSplit>(
+          splitEmission(scene, patches, visibility, lightSet, seed))),
+      sources(raybundle::lightSources(scene, patches, split->isSource, split->gathered, lightSet)) {
+}
+
+DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                         uint32_t seed, const Skips& skips, EmissionSplit reflected)
+    : patches(patches),
+      visibility(visibility),
+      seed(seed),
+      skips(skips),
+      split(std::make_unique<const EmissionSplit>(std::move(reflected))),
+      sources(meshSources(scene, patches, split->isSource, split->gathered)) {}
 
 void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
                               const std::function<Receiver(size_t)>& receiverAt,
@@ -63,9 +74,9 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
                                 LightBySource* bySource, std::vector<Sightings>* sightings) const {
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
-    for (size_t side = 0; side < split.bundled.size(); ++side)
+    for (size_t side = 0; side < split->bundled.size(); ++side)
         coarse.bundled +=
-            double(patches.area[side / 2] * brightest(split.bundled[side])) / patches.totalArea;
+            double(patches.area[side / 2] * brightest(split->bundled[side])) / patches.totalArea;
     if (sources.empty()) return;
     Seen seen(sources.size());
     const Aim aim{INFINITY, hasNeighbours ? kNeighbourSamples : kFirstSamples, false};
@@ -181,10 +192,9 @@ glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
         const glm::vec3 point = place.at({u.x, u.y});
         const LightSample sample = sources[k]->sample(point, place.normal, {u.z, u.w});
         if (brightest(sample.irradiance) <= 0) continue;
-        const float share =
-            sources[k]->castsShadows
-                ? visibility.visibleShare(receiver.side, point, sample.direction, sample.distance)
-                : 1;
+        const float share = sources[k]->castsShadows
+                                ? visibility.visibleShare(receiver.side, sample.ray(point))
+                                : 1;
         sum += share * sample.irradiance;
     }
     return sum;

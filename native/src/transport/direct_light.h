@@ -50,11 +50,16 @@ class DirectLight {
     DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                 uint32_t seed, int32_t lightSet = kNoLightSet, const Skips& skips = {});
 
+    // The light of surfaces that shine by what they reflect: of the sides that are sources in
+    // `reflected`.
+    DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                uint32_t seed, const Skips& skips, EmissionSplit reflected);
+
     // Per side: all emission of the set, W/m^2.
-    const std::vector<glm::vec3>& emission() const { return split.emitted; }
+    const std::vector<glm::vec3>& emission() const { return split->emitted; }
 
     // Per side: emission that is no source here, for the bundles to carry, W/m^2.
-    const std::vector<glm::vec3>& bundledEmission() const { return split.bundled; }
+    const std::vector<glm::vec3>& bundledEmission() const { return split->bundled; }
     const std::vector<std::unique_ptr<LightSource>>& lightSources() const { return sources; }
 
     // Gathers at `count` receivers to about `targetError` relative standard error each: all
@@ -146,7 +151,7 @@ class DirectLight {
     const Visibility& visibility;
     const uint32_t seed;
     const Skips skips;
-    EmissionSplit split;
+    std::unique_ptr<const EmissionSplit> split;  // sources refer to it
     std::vector<std::unique_ptr<LightSource>> sources;
 };
 

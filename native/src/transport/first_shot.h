@@ -24,9 +24,11 @@ struct FirstShot {
     // Where the first shot went on with reflected light: irradiance from it, and the reflected
     // exitance that is left to the transport, per side, W/m^2; else both are empty.
     std::vector<glm::vec3> indirect, unshot;
-    std::vector<glm::vec4> angles;    // per side, of GATHER: means of angleTerms; else empty
-    std::vector<Incoming> incoming;   // per side, of GATHER, if any surface is not Lambert's
-    std::vector<float> error;         // per side, standard error of all irradiance, W/m^2
+    std::vector<glm::vec4> angles;   // per side, of GATHER: means of angleTerms; else empty
+    std::vector<Incoming> incoming;  // per side, of GATHER, if any surface is not Lambert's
+    std::vector<float> error;        // per side, standard error of all irradiance, W/m^2
+    std::vector<uint32_t>
+        noisiest;  // per side, of GATHER: the source with most of that; else empty
     std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2
     std::shared_ptr<const LightBySource> bySource;  // of GATHER: what came from each source
     glm::dvec3 emitted{0.0};  // power of the gathered sources, W; without a power: what arrives
@@ -72,6 +74,10 @@ double localToGlobalRatio(double intersections, double meanReflectance, double s
 
 // What a side reflects of the first shot's light.
 glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t side);
+
+// Receivers of all sides that are beside each other: the sides of neighbouring tiles; the patches of
+// a cut one stand beside each other.
+std::vector<ReceiverPair> neighbouringSides(const Patches& patches);
 
 // A first shot by the name of its row.
 FirstShot firstShot(const std::string& kind, const FirstShotInput& input);

@@ -21,7 +21,8 @@ namespace {
 // from many of them.
 constexpr float kOthersError = 2;
 
-// The sides of neighbouring tiles; the patches of a cut one stand beside each other.
+}  // namespace
+
 std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
     std::vector<uint32_t> firstOf;  // per tile; one more at the end
     for (const Parent& parent : patches.parents)
@@ -42,6 +43,8 @@ std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
         for (uint32_t p = firstOf[tile] + 1; p < firstOf[tile + 1]; ++p) add(p, p - 1);
     return pairs;
 }
+
+namespace {
 
 // By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
 CoarseShot coarseOfPatches(const FirstShotInput& input,
@@ -76,6 +79,7 @@ FirstShot gather(const FirstShotInput& input) {
     shot.angles.resize(n);
     if (!patches.scattering.empty()) shot.incoming.resize(n);
     shot.error.resize(n);
+    shot.noisiest.resize(n);
     auto report = [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); };
     auto receiverAt = [&](size_t side) {
         Receiver receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
@@ -116,6 +120,7 @@ FirstShot gather(const FirstShotInput& input) {
         shot.angles[side] = result.meanAngles();
         if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
         shot.error[side] = std::sqrt(result.variance);
+        shot.noisiest[side] = result.noisiest;
         shot.rays += result.rays;
         shot.unblockedSides += result.unblocked;
         shot.hiddenSides += result.hidden;

@@ -55,6 +55,7 @@ class LightBySource {
             for (size_t k = 0; k < matches.size(); ++k)
                 if (const auto source = matches[k].source)
                     results[receiver].add(
+                        uint32_t(*source),
                         parts[receiver * matches.size() + k].scaled(matches[k].factor),
                         isUnpowered(*source, receiver),
                         hash(uint32_t(receiver), uint32_t(*source)));

@@ -14,6 +14,7 @@
 #include "transport/mesh_source.h"
 #include "transport/receiver_place.h"
 #include "transport/sphere_sampling.h"
+#include "transport/spherical_triangle.h"
 #include "transport/spot_cone.h"
 #include "transport/world_source.h"
 
@@ -22,15 +23,6 @@ namespace raybundle {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-// Of a triangle seen from the origin, sr: van Oosterom and Strackee, "The Solid Angle of a Plane
-// Triangle" (1983).
-double triangleSolidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
-    const double x = glm::length(a), y = glm::length(b), z = glm::length(c);
-    return 2 * std::abs(std::atan2(
-                   glm::dot(a, glm::cross(b, c)),
-                   x * y * z + glm::dot(a, b) * z + glm::dot(b, c) * x + glm::dot(c, a) * y));
-}
 
 class PointSource : public LightSource {
   public:
@@ -98,8 +90,8 @@ class PointSource : public LightSource {
         const double height = plane.height(position);
         if (height < std::max(double(light.radius), plane.thickness)) return std::nullopt;
         const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
-        double angle = triangleSolidAngle(o, o + a, o + b);
-        if (!patch.isTriangle) angle += triangleSolidAngle(o + a, o + b, o + a + b);
+        double angle = SphericalTriangle(o, o + a, o + b).area();
+        if (!patch.isTriangle) angle += SphericalTriangle(o + a, o + b, o + a + b).area();
         const double area = glm::length(glm::cross(a, b)) * (patch.isTriangle ? 0.5 : 1.0);
         return intensity * float(angle / area);
     }
@@ -239,29 +231,8 @@ class AreaSource : public LightSource {
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override {
         if (plane.side(point) != PlaneSide::FRONT) return {};
-        if (spread.isWhole())
-            return surfaceSample(point, receiver, onSurface(uv), normal, radiance, area);
-        const Part part = partSeenFrom(point);
-        if (!(part.area > 0)) return {};
-        if (part.isCone) {
-            // The light fills the cone of directions (but for the rim of an ellipse).
-            LightSample sample;
-            sample.direction = -spread.emit(normal, uv);
-            const float cosine = -glm::dot(normal, sample.direction);
-            sample.distance = glm::dot(point - position, normal) / cosine;
-            const glm::vec2 d = inPlane(point + sample.distance * sample.direction);
-            if (isEllipse && glm::dot(d, d) > 1) return {};
-            sample.irradiance = radiance * (glm::pi<float>() / cosine *
-                                            std::max(0.0f, glm::dot(receiver, sample.direction)));
-            return sample;
-        }
-        // Else the part of the surface whose light reaches the point, or rather its bounds.
-        const glm::vec2 d =
-            part.isAll && isEllipse ? onDisk(uv) : part.low + uv * (part.high - part.low);
-        if (isEllipse && glm::dot(d, d) > 1) return {};
-        LightSample sample = surfaceSample(point, receiver, position + d.x * u + d.y * v, normal,
-                                           radiance, part.area);
-        sample.irradiance *= spread.factor(-glm::dot(normal, sample.direction));
+        LightSample sample = sampleBefore(point, receiver, uv);
+        sample.setMargin(plane);
         return sample;
     }
 
@@ -299,6 +270,35 @@ class AreaSource : public LightSource {
     }
 
   private:
+    // In front of the light.
+    LightSample sampleBefore(const glm::vec3& point, const glm::vec3& receiver,
+                             glm::vec2 uv) const {
+        if (spread.isWhole())
+            return surfaceSample(point, receiver, onSurface(uv), normal, radiance, area);
+        const Part part = partSeenFrom(point);
+        if (!(part.area > 0)) return {};
+        if (part.isCone) {
+            // The light fills the cone of directions (but for the rim of an ellipse).
+            LightSample sample;
+            sample.direction = -spread.emit(normal, uv);
+            const float cosine = -glm::dot(normal, sample.direction);
+            sample.distance = glm::dot(point - position, normal) / cosine;
+            const glm::vec2 d = inPlane(point + sample.distance * sample.direction);
+            if (isEllipse && glm::dot(d, d) > 1) return {};
+            sample.irradiance = radiance * (glm::pi<float>() / cosine *
+                                            std::max(0.0f, glm::dot(receiver, sample.direction)));
+            return sample;
+        }
+        // Else the part of the surface whose light reaches the point, or rather its bounds.
+        const glm::vec2 d =
+            part.isAll && isEllipse ? onDisk(uv) : part.low + uv * (part.high - part.low);
+        if (isEllipse && glm::dot(d, d) > 1) return {};
+        LightSample sample = surfaceSample(point, receiver, position + d.x * u + d.y * v, normal,
+                                           radiance, part.area);
+        sample.irradiance *= spread.factor(-glm::dot(normal, sample.direction));
+        return sample;
+    }
+
     glm::vec3 onSurface(glm::vec2 uv) const {
         const glm::vec2 d = isEllipse ? onDisk(uv) : 2.0f * uv - 1.0f;
         return position + d.x * u + d.y * v;
@@ -397,41 +397,10 @@ Enclosed enclosedBy(const Patches& patches, uint32_t instance) {
 
 }  // namespace
 
-std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
-                                                       const std::vector<bool>& gatheredSides,
-                                                       const std::vector<glm::vec3>& emission,
-                                                       int32_t lightSet) {
+std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
+                                                      const std::vector<bool>& gatheredSides,
+                                                      const std::vector<glm::vec3>& emission) {
     std::vector<std::unique_ptr<LightSource>> sources;
-    for (const Light& light : scene.lights) {
-        const size_t before = sources.size();
-        if (light.strength == glm::dvec3(0.0) || light.lightSet != lightSet) continue;
-        switch (light.kind) {
-            case Light::Kind::POINT:
-                sources.push_back(std::make_unique<PointSource>(light, patches.centre));
-                break;
-            case Light::Kind::SUN:
-                sources.push_back(std::make_unique<SunSource>(light));
-                break;
-            case Light::Kind::AREA:
-                if (glm::length(glm::cross(light.axisU, light.axisV)) > 0)
-                    sources.push_back(std::make_unique<AreaSource>(light, patches.centre));
-                break;
-        }
-        if (sources.size() == before) continue;
-        sources.back()->castsShadows = light.castsShadows;
-        sources.back()->magnitude = light.strength;
-        sources.back()->shape = shapeOf(light);
-    }
-
-    if (scene.worldLightSet == lightSet && !scene.worldImage.pixels.empty() &&
-        scene.worldImage.meanRadiance() != glm::vec3(0.0f)) {
-        Hasher hasher;
-        hasher.add(scene.worldImage.width, scene.worldImage.height);
-        hasher.add(scene.worldImage.pixels);
-        sources.push_back(std::make_unique<WorldSource>(scene.worldImage));
-        sources.back()->shape = hasher.value();
-    }
-
     std::map<std::pair<uint32_t, int32_t>, std::vector<uint32_t>>
         groups;  // by instance and material
     for (size_t p = 0; p < patches.parents.size(); ++p) {
@@ -459,15 +428,56 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
         const Enclosed enclosed = enclosedBy(patches, key.first);
         for (uint32_t back = 0; back < 2; ++back) {
             if (most[back] == glm::vec3(0.0f)) continue;
-            std::array<glm::vec3, 2> own{glm::vec3(0.0f), glm::vec3(0.0f)};
-            own[back] = most[back];
-            sources.push_back(
-                std::make_unique<MeshSource>(patches, parents, own, varies ? &emission : nullptr,
-                                             enclosed.side == back ? enclosed.box : std::nullopt));
+            sources.push_back(std::make_unique<MeshSource>(
+                patches, parents, back, most[back], varies ? &emission : nullptr,
+                enclosed.side == back ? enclosed.box : std::nullopt));
+            sources.back()->name = "object \"" + scene.instances[key.first].name + "\"";
             sources.back()->magnitude = most[back];
             sources.back()->shape = shapeOf(patches, parents, back, emission, most[back]);
         }
     }
+    return sources;
+}
+
+std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
+                                                       const std::vector<bool>& gatheredSides,
+                                                       const std::vector<glm::vec3>& emission,
+                                                       int32_t lightSet) {
+    std::vector<std::unique_ptr<LightSource>> sources;
+    for (const Light& light : scene.lights) {
+        const size_t before = sources.size();
+        if (light.strength == glm::dvec3(0.0) || light.lightSet != lightSet) continue;
+        switch (light.kind) {
+            case Light::Kind::POINT:
+                sources.push_back(std::make_unique<PointSource>(light, patches.centre));
+                break;
+            case Light::Kind::SUN:
+                sources.push_back(std::make_unique<SunSource>(light));
+                break;
+            case Light::Kind::AREA:
+                if (glm::length(glm::cross(light.axisU, light.axisV)) > 0)
+                    sources.push_back(std::make_unique<AreaSource>(light, patches.centre));
+                break;
+        }
+        if (sources.size() == before) continue;
+        sources.back()->castsShadows = light.castsShadows;
+        sources.back()->name = "lamp \"" + light.name + "\"";
+        sources.back()->magnitude = light.strength;
+        sources.back()->shape = shapeOf(light);
+    }
+
+    if (scene.worldLightSet == lightSet && !scene.worldImage.pixels.empty() &&
+        scene.worldImage.meanRadiance() != glm::vec3(0.0f)) {
+        Hasher hasher;
+        hasher.add(scene.worldImage.width, scene.worldImage.height);
+        hasher.add(scene.worldImage.pixels);
+        sources.push_back(std::make_unique<WorldSource>(scene.worldImage));
+        sources.back()->name = "the world";
+        sources.back()->shape = hasher.value();
+    }
+
+    for (auto& source : meshSources(scene, patches, gatheredSides, emission))
+        sources.push_back(std::move(source));
     return sources;
 }
 

@@ -5,14 +5,18 @@
 // Blender's light units (addon/raybundle/light_export.py).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "patches/patches.h"
+#include "patches/plane.h"
 #include "scene/scene.h"
+#include "visibility/visibility.h"
 
 namespace raybundle {
 
@@ -20,10 +24,24 @@ struct ReceiverPlace;
 
 // What one sampled point of a source gives to a receiver if nothing is in between.
 struct LightSample {
-    glm::vec3 direction{0.0f};   // unit vector towards the sampled point
-    float distance = 0;          // metres; infinite for suns
-    glm::vec3 irradiance{0.0f};  // W/m^2, divided by the sample's probability; 0: receives nothing
-    uint32_t part = 0;           // of the source, if it has any
+    glm::vec3 direction{0.0f};    // unit vector towards the sampled point
+    float distance = 0;           // metres; infinite for suns
+    glm::vec3 irradiance{0.0f};   // W/m^2, divided by the sample's probability; 0: receives nothing
+    uint32_t part = 0;            // of the source, if it has any
+    uint32_t parent = kNoParent;  // that the sampled point lies on, if the source is a mesh
+    // This much before the point, along the ray, nothing blocks it any more, metres: what lies in the
+    // plane of the source may stand before it by a rounding error.
+    float margin = 0;
+
+    // From the receiver's point.
+    ShadowRay ray(const glm::vec3& point) const {
+        return {point, direction, std::max(0.0f, distance - margin), parent};
+    }
+    // For a plane source of that normal, as thick as `plane` has it.
+    void setMargin(const Plane& plane) {
+        margin = float(2 * plane.thickness /
+                       std::max(0.01, -glm::dot(glm::dvec3(direction), plane.normal)));
+    }
 };
 
 // A ray that leaves a source with an equal share of its power.
@@ -125,6 +143,8 @@ class LightSource {
     // Patches::centre.
     virtual glm::vec3 shootingPower(float /*sceneRadius*/) const { return power(); }
 
+    // As messages have it: its kind and the name of the lamp or object.
+    std::string name;
     // Whether surfaces stop its light. If not, it brings more than power() in all.
     bool castsShadows = true;
     // Whether many samples may miss it although it is seen.
@@ -139,10 +159,14 @@ class LightSource {
     virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;
 };
 
+// The emissive faces of sides that are marked, whose emission per side of all patches (W/m^2 of the
+// whole patch, 0 where not marked) is given. All that is passed must outlive them.
+std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
+                                                      const std::vector<bool>& gatheredSides,
+                                                      const std::vector<glm::vec3>& emission);
+
 // All sources of a light set whose light the first shot gathers: its lights, the image of the world
-// if that is in it, and the emissive faces of sides that are marked, whose emission per side of all
-// patches (W/m^2 of the whole patch, 0 where not marked) is given. All that is passed must outlive
-// them.
+// if that is in it, and its emissive faces as above.
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
                                                        const std::vector<bool>& gatheredSides,
                                                        const std::vector<glm::vec3>& emission,

@@ -31,8 +31,13 @@ double edgeTerm(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& norm
 // The facets of a mesh and the edges between them.
 class Facets {
   public:
-    Facets(const Patches& patches, const std::vector<uint32_t>& parents, double extent)
-        : patches(patches), parents(parents), extent(extent), facetOf(parents.size(), kNone) {
+    Facets(const Patches& patches, const std::vector<uint32_t>& parents, bool ofBacks,
+           double extent)
+        : patches(patches),
+          parents(parents),
+          turn(ofBacks ? -1 : 1),
+          extent(extent),
+          facetOf(parents.size(), kNone) {
         weld();
         for (uint32_t k = 0; k < parents.size(); ++k)
             if (facetOf[k] == kNone) grow(k);
@@ -86,7 +91,7 @@ class Facets {
             }
             for (size_t c = 0; c < count; ++c) {
                 const uint32_t a = cornersOf[k][c], b = cornersOf[k][(c + 1) % count];
-                if (a != b) usersOf[std::minmax(a, b)].push_back({k, a < b});
+                if (a != b) usersOf[std::minmax(a, b)].push_back({k, (a < b) == (turn > 0)});
             }
         }
     }
@@ -94,7 +99,7 @@ class Facets {
     // A facet from a parent on, over edges, as far as its plane reaches.
     void grow(uint32_t seed) {
         const Parent& first = patches.parents[parents[seed]];
-        const Plane plane(first.origin, glm::normalize(glm::dvec3(first.normal)), extent);
+        const Plane plane(first.origin, turn * glm::normalize(glm::dvec3(first.normal)), extent);
         const uint32_t facet = uint32_t(planes.size());
         planes.push_back(plane);
         std::vector<uint32_t> open{seed};
@@ -118,7 +123,7 @@ class Facets {
 
     bool liesIn(const Plane& plane, uint32_t k) const {
         const Parent& parent = patches.parents[parents[k]];
-        return glm::dot(glm::dvec3(parent.normal), plane.normal) > 0 &&
+        return turn * glm::dot(glm::dvec3(parent.normal), plane.normal) > 0 &&
                std::all_of(cornersOf[k].begin(), cornersOf[k].end(), [&](uint32_t vertex) {
                    return plane.side(places[vertex]) == PlaneSide::WITHIN;
                });
@@ -185,8 +190,9 @@ class Facets {
 
     const Patches& patches;
     const std::vector<uint32_t>& parents;
-    const double extent;
-    std::vector<uint32_t> facetOf;                 // per parent
+    const double turn;              // -1: backs are looked at, which are passed the other way round
+    const double extent;            // metres
+    std::vector<uint32_t> facetOf;  // per parent
     std::vector<std::vector<uint32_t>> cornersOf;  // per parent, into places
     std::map<Ends, std::vector<User>> usersOf;
 };
@@ -212,11 +218,11 @@ double polygonIrradiance(const glm::dvec3& point, const glm::dvec3& normal,
     return 0.5 * std::abs(sum);
 }
 
-MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& parents,
+MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& parents, bool ofBacks,
                          double extent)
     : extent(extent) {
     if (parents.empty() || parents.size() > kMostParents) return;
-    const Facets made(patches, parents, extent);
+    const Facets made(patches, parents, ofBacks, extent);
     if (made.planes.size() > kMostFacets) return;
     facets = made.planes;
     glm::dvec3 low(INFINITY), high(-INFINITY);
@@ -232,70 +238,66 @@ MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& pa
     if (edges.size() > kMostEdges) edges.clear();
 }
 
-// Per facet: 1 if its front looks at a point, -1 if its back does, 0 if neither. One more for `none`.
+// Per facet: whether it looks at a point. One more for `none`.
 struct MeshOutline::Facing {
-    std::array<int8_t, kMostFacets + 1> side;
+    std::array<bool, kMostFacets + 1> looks;
 
-    // How often the sums over fronts (x) and backs (y) have an edge, one way less the other: seen
-    // from behind, a facet runs round the other way.
-    glm::dvec2 countOf(const Edge& edge) const {
-        const int a = side[edge.along], b = side[edge.against];
-        return {(a > 0) - (b > 0), (b < 0) - (a < 0)};
-    }
+    // How often the sum over all that do passes an edge, one way less the other.
+    int countOf(const Edge& edge) const { return looks[edge.along] - looks[edge.against]; }
 };
 
-glm::dvec2 MeshOutline::irradiance(const glm::dvec3& point, const glm::dvec3& normal) const {
+double MeshOutline::irradiance(const glm::dvec3& point, const glm::dvec3& normal) const {
     const double middle = glm::dot(centre - point, normal);
-    if (middle < -extent) return glm::dvec2(0.0);
+    if (middle < -extent) return 0;
     Facing facing;
-    for (size_t f = 0; f < facets.size(); ++f) facing.side[f] = int8_t(facets[f].side(point));
-    facing.side[facets.size()] = 0;
-    const bool isClipped = middle < extent;
-    glm::dvec2 sum(0.0);
-    for (const Edge& edge : edges) {
-        if (isClipped) {
-            addClipped(edge, facing, point, normal, sum);
-        } else if (const glm::dvec2 count = facing.countOf(edge); count != glm::dvec2(0.0)) {
-            sum += count * edgeTerm(edge.from - point, edge.to - point, normal);
-        }
+    bool any = false;
+    for (size_t f = 0; f < facets.size(); ++f) {
+        facing.looks[f] = facets[f].side(point) == PlaneSide::FRONT;
+        any |= facing.looks[f];
     }
-    // A front that is passed counter-clockwise as its own normal sees it is passed clockwise about
-    // that of the receiver.
-    return glm::max(-0.5 * sum, 0.0);
+    if (!any) return 0;
+    facing.looks[facets.size()] = false;
+    const bool isClipped = middle < extent;
+    double sum = 0;
+    for (const Edge& edge : edges) {
+        if (isClipped)
+            sum += clippedTerm(edge, facing, point, normal);
+        else if (const int count = facing.countOf(edge))
+            sum += count * edgeTerm(edge.from - point, edge.to - point, normal);
+    }
+    // What is passed counter-clockwise as its own normal sees it is passed clockwise about that of
+    // the receiver.
+    return std::max(0.0, -0.5 * sum);
 }
 
 // Where the receiver's horizon cuts facets, the cuts close their outlines: of each along the line in
 // which the two planes meet, from where edges go down to where they come up, whichever belong
 // together.
-void MeshOutline::addClipped(const Edge& edge, const Facing& facing, const glm::dvec3& point,
-                             const glm::dvec3& normal, glm::dvec2& sum) const {
+double MeshOutline::clippedTerm(const Edge& edge, const Facing& facing, const glm::dvec3& point,
+                                const glm::dvec3& normal) const {
+    if (!facing.looks[edge.along] && !facing.looks[edge.against]) return 0;
     const glm::dvec3 a = edge.from - point, b = edge.to - point;
     const double ha = glm::dot(a, normal), hb = glm::dot(b, normal);
-    if (ha <= 0 && hb <= 0) return;
-    const glm::dvec2 count = facing.countOf(edge);
-    if (ha > 0 && hb > 0) {
-        if (count != glm::dvec2(0.0)) sum += count * edgeTerm(a, b, normal);
-        return;
-    }
+    if (ha <= 0 && hb <= 0) return 0;
+    const int count = facing.countOf(edge);
+    if (ha > 0 && hb > 0) return count == 0 ? 0 : count * edgeTerm(a, b, normal);
     const glm::dvec3 cut = a + (ha / (ha - hb)) * (b - a);
-    if (count != glm::dvec2(0.0))
-        sum += count * (ha > 0 ? edgeTerm(a, cut, normal) : edgeTerm(cut, b, normal));
+    double sum =
+        count == 0 ? 0 : count * (ha > 0 ? edgeTerm(a, cut, normal) : edgeTerm(cut, b, normal));
     const double up = ha > 0 ? -1 : 1;
     for (const auto& [facet, way] : {std::pair(edge.along, 1.0), std::pair(edge.against, -1.0)}) {
-        const int side = facing.side[facet];
-        if (side == 0) continue;
+        if (!facing.looks[facet]) continue;
         // Towards the line, along the horizon; and the angle there of the cut. Where the planes are
         // parallel but for a rounding error, the line is far off, and so is the facet.
         const Plane& plane = facets[facet];
         const glm::dvec3 across = plane.normal - glm::dot(plane.normal, normal) * normal;
-        const glm::dvec3 ahead = glm::dot(across, across) > kParallel * kParallel
-                                     ? -double(side) * across
-                                     : plane.origin - point;
+        const glm::dvec3 ahead =
+            glm::dot(across, across) > kParallel * kParallel ? -across : plane.origin - point;
         const glm::dvec3 aside = glm::cross(normal, ahead);
-        const double angle =
-            double(std::atan2(float(glm::dot(cut, aside)), float(glm::dot(cut, ahead))));
-        (side > 0 ? sum.x : sum.y) += double(side) * way * up * angle;
+        sum +=
+            way * up * double(std::atan2(float(glm::dot(cut, aside)), float(glm::dot(cut, ahead))));
     }
+    return sum;
 }
 
 }  // namespace raybundle

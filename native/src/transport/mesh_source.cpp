@@ -6,11 +6,16 @@
 #include <glm/gtc/constants.hpp>
 
 #include "transport/sphere_sampling.h"
+#include "transport/spherical_triangle.h"
 
 namespace raybundle {
 namespace {
 
 float strength(const glm::vec3& emission) { return emission.x + emission.y + emission.z; }
+
+// A face that is nearer than so many times its radius is sampled by solid angle: by area, the light of
+// what touches the receiver would have no finite variance.
+constexpr float kNear = 3;
 
 // Uniform by area: the unit square is folded onto a triangle.
 glm::vec3 pointOn(const LightFace& face, glm::vec2 uv) {
@@ -18,25 +23,57 @@ glm::vec3 pointOn(const LightFace& face, glm::vec2 uv) {
     return face.origin + uv.x * face.a + uv.y * face.b;
 }
 
+// A direction to a face, uniform in the solid angle of it.
+struct FaceDirection {
+    glm::vec3 direction;
+    float distance;    // metres
+    float solidAngle;  // sr
+};
+
+// Of faces that are near; none: it is sampled by area.
+std::optional<FaceDirection> directionTo(const LightFace& face, const glm::vec3& point,
+                                         glm::vec2 uv) {
+    const glm::vec3 middle = face.origin + (face.isTriangle ? 1 / 3.0f : 0.5f) * (face.a + face.b);
+    const glm::vec3 d = middle - point;
+    const float radius = 0.5f * (glm::length(face.a) + glm::length(face.b));
+    if (glm::dot(d, d) > kNear * kNear * radius * radius) return std::nullopt;
+    const glm::dvec3 o = glm::dvec3(face.origin) - glm::dvec3(point), a(face.a), b(face.b);
+    const SphericalTriangle first(o, o + a, o + b);
+    double solidAngle = first.area();
+    glm::dvec3 direction;
+    if (face.isTriangle) {
+        if (!first.isSampled()) return std::nullopt;
+        direction = first.sample(uv);
+    } else {
+        const SphericalTriangle second(o + a + b, o + b, o + a);
+        if (!first.isSampled() || !second.isSampled()) return std::nullopt;
+        solidAngle += second.area();
+        const float share = float(first.area() / solidAngle);
+        direction = uv.x < share
+                        ? first.sample({uv.x / share, uv.y})
+                        : second.sample({std::min((uv.x - share) / (1 - share), 0.9999999f), uv.y});
+    }
+    const glm::dvec3 normal(face.normal);
+    const double slant = glm::dot(direction, normal);
+    if (!(slant < 0)) return std::nullopt;
+    return FaceDirection{glm::vec3(direction), float(glm::dot(o, normal) / slant),
+                         float(solidAngle)};
+}
+
 }  // namespace
 
-MeshSource::MeshSource(const Patches& patches, std::vector<uint32_t> parents,
-                       const std::array<glm::vec3, 2>& emission,
-                       const std::vector<glm::vec3>* sideEmission,
+MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
+                       const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission,
                        const std::optional<Enclosure>& enclosure)
-    : patches(patches),
-      parents(std::move(parents)),
-      emission(emission),
-      sideEmission(sideEmission),
-      enclosure(enclosure) {
-    boundSource();
-    collectFaces();
+    : patches(patches), emission(emission), sideEmission(sideEmission), enclosure(enclosure) {
+    boundSource(parents);
+    collectFaces(parents, back);
     tree = LightTree(faces);
-    outline = MeshOutline(patches, this->parents, double(extent));
+    if (!sideEmission) outline = MeshOutline(patches, parents, back == 1, double(extent));
 }
 
 // Sphere around the source.
-void MeshSource::boundSource() {
+void MeshSource::boundSource(const std::vector<uint32_t>& parents) {
     Enclosure box;
     for (uint32_t index : parents) {
         const Parent& parent = patches.parents[index];
@@ -47,46 +84,37 @@ void MeshSource::boundSource() {
     extent = 0.5f * glm::length(box.high - box.low);
 }
 
-void MeshSource::collectFaces() {
+void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t back) {
     double sum = 0;
-    auto add = [&](const LightFace& face, const glm::vec3& emitted) {
+    auto add = [&](const LightFace& face) {
         const double power = double(face.strength * face.area());
         if (!(power > 0)) return;
         faces.push_back(face);
-        totalPower += face.area() * emitted;
+        totalPower += face.area() * emissionOf(face.side);
         powerUpTo.push_back(sum += power);
     };
     for (uint32_t index : parents) {
         const Parent& parent = patches.parents[index];
-        for (uint32_t k = 0; k < 2; ++k) {
-            if (emission[k] == glm::vec3(0.0f)) continue;
-            const glm::vec3 normal = k ? -parent.normal : parent.normal;
-            LightFace face{parent.origin,
-                           parent.a,
-                           parent.b,
-                           normal,
-                           parent.isTriangle,
-                           strength(emission[k]),
-                           2 * parent.firstPatch + k};
-            if (!sideEmission) {
-                add(face, emission[k]);
-                continue;
-            }
-            for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
-                face.origin = patches.point(p, {0, 0});
-                face.a = patches.point(p, {1, 0}) - face.origin;
-                face.b = patches.point(p, {0, 1}) - face.origin;
-                face.side = 2 * p + k;
-                face.strength = strength(emissionOf(face.side));
-                add(face, emissionOf(face.side));
-            }
+        LightFace face{parent.origin,
+                       parent.a,
+                       parent.b,
+                       back ? -parent.normal : parent.normal,
+                       parent.isTriangle,
+                       strength(emission),
+                       2 * parent.firstPatch + back};
+        if (!sideEmission) {
+            add(face);
+            continue;
+        }
+        for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
+            face.origin = patches.point(p, {0, 0});
+            face.a = patches.point(p, {1, 0}) - face.origin;
+            face.b = patches.point(p, {0, 1}) - face.origin;
+            face.side = 2 * p + back;
+            face.strength = strength(emissionOf(face.side));
+            add(face);
         }
     }
-}
-
-// Of a side, W/m^2.
-glm::vec3 MeshSource::emissionOf(uint32_t side) const {
-    return sideEmission ? (*sideEmission)[side] : emission[side % 2];
 }
 
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
@@ -94,26 +122,35 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     const auto choice = tree.choose(point, receiver, uv.x);
     if (!choice) return {};
     const LightFace& face = faces[choice->face];
-    if (Plane(face.origin, face.normal, double(extent)).side(point) != PlaneSide::FRONT) return {};
-    return surfaceSample(point, receiver, pointOn(face, {choice->u, uv.y}), face.normal,
-                         emissionOf(face.side) / glm::pi<float>(),
-                         face.area() / choice->probability);
+    const Plane plane(face.origin, face.normal, double(extent));
+    if (plane.side(point) != PlaneSide::FRONT) return {};
+    const glm::vec3 radiance = emissionOf(face.side) / glm::pi<float>();
+    LightSample sample;
+    if (const auto seen = directionTo(face, point, {choice->u, uv.y})) {
+        sample.direction = seen->direction;
+        sample.distance = seen->distance;
+        sample.irradiance = radiance * (seen->solidAngle / choice->probability *
+                                        std::max(0.0f, glm::dot(receiver, sample.direction)));
+    } else {
+        sample = surfaceSample(point, receiver, pointOn(face, {choice->u, uv.y}), face.normal,
+                               radiance, face.area() / choice->probability);
+    }
+    sample.parent = patches.parentOf[face.side / 2];
+    sample.setMargin(plane);
+    return sample;
 }
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
                                                 const glm::vec3& receiver) const {
-    if (sideEmission || outline.isEmpty()) return std::nullopt;
-    const glm::vec2 seen(outline.irradiance(point, receiver));
-    return (seen.x * emission[0] + seen.y * emission[1]) / glm::pi<float>();
+    if (outline.isEmpty()) return std::nullopt;
+    return emission * float(outline.irradiance(point, receiver) / glm::pi<double>());
 }
 
 bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
                               float radius) const {
     if (glm::dot(receiver, centre - point) < -(radius + extent)) return true;
     if (enclosure && enclosure->distance(point) > radius) return true;
-    if (!outline.isPlanar()) return false;
-    const float height = float(outline.plane(0).height(point));
-    return emission[height > 0 ? 0 : 1] == glm::vec3(0.0f) && std::abs(height) > radius;
+    return outline.plane() && outline.plane()->height(point) < -double(radius);
 }
 
 EmittedRay MeshSource::emit(const glm::vec4& r, float) const {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The emissive faces of one object and material as a source of light. What a receiver gets without
+// The fronts or the backs of the emissive faces of one object and material as a source of light. What a receiver gets without
 // occluders has a closed form (transport/mesh_outline.h); which of it is seen, samples tell, whose
 // faces are chosen by a tree (transport/light_tree.h).
 #pragma once
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -30,14 +29,12 @@ struct Enclosure {
 
 class MeshSource : public LightSource {
   public:
-    // parents: into Patches::parents; emission: of their front and back, W/m^2; black where that
-    // side does not belong to the source. `patches` must outlive it. Where the emission varies,
-    // sideEmission holds it per side of all patches, W/m^2 of the whole patch, must outlive the
-    // source too, and there is no closed form; emission is then the most of each side. enclosure:
-    // what the light does not get out of, if that is known.
-    MeshSource(const Patches& patches, std::vector<uint32_t> parents,
-               const std::array<glm::vec3, 2>& emission,
-               const std::vector<glm::vec3>* sideEmission = nullptr,
+    // parents: into Patches::parents; back: 0 for their fronts, 1 for their backs; emission: of
+    // those, W/m^2. `patches` must outlive it. Where the emission varies, sideEmission holds it per
+    // side of all patches, W/m^2 of the whole patch, must outlive the source too, and there is no
+    // closed form. enclosure: what the light does not get out of, if that is known.
+    MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
+               const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission = nullptr,
                const std::optional<Enclosure>& enclosure = std::nullopt);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
@@ -53,19 +50,21 @@ class MeshSource : public LightSource {
     EmittedRay emit(const glm::vec4& u, float sceneRadius) const override;
 
   private:
-    void boundSource();
-    void collectFaces();
-    glm::vec3 emissionOf(uint32_t side) const;
+    void boundSource(const std::vector<uint32_t>& parents);
+    void collectFaces(const std::vector<uint32_t>& parents, uint32_t back);
+    // Of a side of the source, W/m^2.
+    glm::vec3 emissionOf(uint32_t side) const {
+        return sideEmission ? (*sideEmission)[side] : emission;
+    }
 
     const Patches& patches;
-    const std::vector<uint32_t> parents;
-    const std::array<glm::vec3, 2> emission;           // W/m^2, front and back
+    const glm::vec3 emission;                          // W/m^2
     const std::vector<glm::vec3>* const sideEmission;  // where it varies
     const std::optional<Enclosure> enclosure;
     glm::vec3 totalPower{0.0f};  // W
     glm::vec3 centre{0.0f};
     float extent = 0;  // radius of a sphere around centre, metres
-    // Parents, or patches where the emission varies: their sides that emit.
+    // Sides of parents, or of patches where the emission varies.
     std::vector<LightFace> faces;
     std::vector<double> powerUpTo;  // of them, sum of the channels, cumulative, W
     LightTree tree;

@@ -63,6 +63,8 @@ struct Gathered {
     glm::vec4 angles{0.0f};      // of theirs
     float brightness = 0;        // of their brightest channels
     Incoming incoming;           // of theirs, by brightness
+    uint32_t noisiest = 0;       // of them: the one with the most variance
+    float mostVariance = 0;      // of that one
     uint64_t rays = 0;
     uint64_t unblocked = 0;  // sources without noise: wholly visible
     uint64_t hidden = 0;     // sources that it cannot face, without a sample
@@ -70,7 +72,11 @@ struct Gathered {
     uint64_t inside = 0;     // sources that took fewer rays since it is the inside of a solid
 
     // random: see Incoming::add.
-    void add(const LightPart& part, bool isUnpowered, uint32_t random) {
+    void add(uint32_t source, const LightPart& part, bool isUnpowered, uint32_t random) {
+        if (part.variance > mostVariance) {
+            mostVariance = part.variance;
+            noisiest = source;
+        }
         irradiance += part.irradiance;
         if (isUnpowered) unpowered += part.irradiance;
         variance += part.variance;

@@ -119,7 +119,7 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
             own.samples = std::max(kFewSamples, aim.samples / 2);
         if (own.samples < aim.samples) ++sum.weak;
         const LightPart part = gatherFrom(k, receiver, place, own, seen, sightings, sum);
-        sum.add(part, isUnpowered(k, receiver.side), hash(receiver.seed, uint32_t(k)));
+        sum.add(uint32_t(k), part, isUnpowered(k, receiver.side), hash(receiver.seed, uint32_t(k)));
         if (parts) parts[k] = part;
     }
     return sum;
@@ -220,7 +220,7 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
             continue;
         }
         held[size_t(count)] = {sample.irradiance, &block, sample.part};
-        rays[size_t(count++)] = {point, sample.direction, sample.distance};
+        rays[size_t(count++)] = sample.ray(point);
         if (count == Visibility::kPacket) trace();
     }
     if (count > 0) trace();

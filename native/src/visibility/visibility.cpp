@@ -125,8 +125,11 @@ struct Start {
     bool isFront;      // the ray leaves the front of the parent
     glm::vec3 normal;  // of the side
     float zone;        // height over the side within which a hit coincides with it, metres
-    // How far behind the surface each ray starts, by its id in the packet, metres along it.
+    // Of each ray, by its id in the packet: how far behind the surface it starts, metres along it,
+    // and the parent that it ends on. A parent whose corners lie in a plane but for a rounding error
+    // may stand before a point of its plane.
     std::array<float, Visibility::kPacket> behind;
+    std::array<uint32_t, Visibility::kPacket> target;
 };
 
 // Lets a ray pass the surface that it starts on, what coincides with it on its other side, and what
@@ -169,8 +172,9 @@ void passStart(const RTCFilterFunctionNArguments* args) {
         if (args->valid[k] == 0) continue;
         const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, k)];
         const Hit hit(args, k);
-        const float behind = start.behind[RTCRayN_id(args->ray, args->N, k)];
-        if (passesStart(start, other, hit.direction, hit.distance, behind) ||
+        const uint32_t id = RTCRayN_id(args->ray, args->N, k);
+        if (other == start.target[id] ||
+            passesStart(start, other, hit.direction, hit.distance, start.behind[id]) ||
             start.passage.goesOn(other, hit.point))
             args->valid[k] = 0;
     }
@@ -235,6 +239,7 @@ struct Visibility::FromSide : Start {
         isFront = side % 2 == 0;
         normal = patches.normal(side);
         zone = 2 * visibility.surfaceOffset;
+        target.fill(kNoParent);
     }
     // Rays start this much behind the surface, so that they meet what coincides with it.
     // Behind along the ray and not along the normal: the ray still passes through the point.
@@ -255,15 +260,15 @@ struct Visibility::FromSide : Start {
             setRay(ray, from, shadow.direction, shadow.distance);
         }
         ray.id = uint32_t(id);
+        target[id] = shadow.target;
         return true;
     }
 };
 
-float Visibility::visibleShare(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
-                               float distance) const {
+float Visibility::visibleShare(uint32_t side, const ShadowRay& shadow) const {
     FromSide start(*this, side);
     RTCRay ray{};
-    if (!start.setShadowRay(ray, {point, direction, distance})) return 1;
+    if (!start.setShadowRay(ray, shadow)) return 1;
     rtcOccluded1(embree->scene, &start.context, &ray);
     return ray.tfar < 0 ? 0.0f : start.passage.share;
 }
@@ -272,8 +277,7 @@ void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
                                float* shares) const {
     // What a ray has passed is noted for one ray alone.
     if (!patches.opacity.empty() || count == 1) {
-        for (int k = 0; k < count; ++k)
-            shares[k] = visibleShare(side, rays[k].point, rays[k].direction, rays[k].distance);
+        for (int k = 0; k < count; ++k) shares[k] = visibleShare(side, rays[k]);
         return;
     }
     FromSide start(*this, side);
@@ -394,14 +398,6 @@ std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm:
     const uint32_t parent =
         firstCoinciding(embree->parentOf[query.hit.primID], origin, direction, query.ray.tfar);
     return sideOf(parent, origin + query.ray.tfar * direction, direction);
-}
-
-float Visibility::escapingShare(const glm::vec3& origin, const glm::vec3& direction) const {
-    Passing passing(*this);
-    RTCRay ray{};
-    setRay(ray, origin, direction, std::numeric_limits<float>::infinity());
-    rtcOccluded1(embree->scene, &passing.context, &ray);
-    return ray.tfar < 0 ? 0.0f : passing.passage.share;
 }
 
 namespace {

@@ -28,8 +28,9 @@ enum class Blockers { EXCHANGING, STOPPING_DIRECT };
 // From a point on a side of a patch, relative to Patches::centre.
 struct ShadowRay {
     glm::vec3 point;
-    glm::vec3 direction;  // unit
-    float distance;       // metres; may be infinite
+    glm::vec3 direction;          // unit
+    float distance;               // metres; may be infinite
+    uint32_t target = kNoParent;  // the parent that it ends on, which does not block it
 };
 
 class Visibility {
@@ -38,12 +39,9 @@ class Visibility {
     explicit Visibility(const Patches& patches, Blockers blockers = Blockers::EXCHANGING);
     ~Visibility();
 
-    // Share of the light that comes through between a point on a side of a patch (relative to
-    // Patches::centre) and point + distance * direction (unit vector); distance may be infinite.
-    // The far end is kept a little off, since it usually lies on a surface. Of surfaces that
+    // Share of the light that comes through along a ray from a side. The far end is kept a little off, since it usually lies on a surface. Of surfaces that
     // coincide with the patch, those on its other side do not block (see comesBefore).
-    float visibleShare(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
-                       float distance) const;
+    float visibleShare(uint32_t side, const ShadowRay& ray) const;
 
     // The same for up to kPacket rays from one side, which is quicker the nearer they lie together.
     static constexpr int kPacket = 8;
@@ -52,7 +50,7 @@ class Visibility {
     // Whether nothing comes through.
     bool isBlocked(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
                    float distance) const {
-        return visibleShare(side, point, direction, distance) <= 0;
+        return visibleShare(side, {point, direction, distance}) <= 0;
     }
 
     // The patch side that a ray from a side meets first, if any, and how far from the point. Of
@@ -65,10 +63,6 @@ class Visibility {
     // The same for origins that lie on no surface, or at least `offset` off it.
     std::optional<uint32_t> firstHit(const glm::vec3& origin, const glm::vec3& direction,
                                      float* distance = nullptr) const;
-
-    // Share of a ray's light that leaves the scene; for origins that lie on no surface, or at least
-    // `offset` off it.
-    float escapingShare(const glm::vec3& origin, const glm::vec3& direction) const;
 
     // All hits along the endless line through a point (relative to Patches::centre, not outside the
     // scene's sphere), in order of depth. A line through an edge or a vertex between faces that

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/bright_spots.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bake/noise.h"
+#include "scene/channels.h"
+
+namespace raybundle {
+namespace {
+
+// Sides whose exitance is at least so many times the mean of what lines meet may be bright spots.
+constexpr double kBright = 10;
+// Gathering the light of bright spots takes about as long as so many bundles (both in proportion to
+// the patches): they are worth it where they spare more.
+constexpr double kWorthwhileBundles = 2000;
+
+// Points of a side at which is looked whether another surface lies on it.
+constexpr uint32_t kLooks = 16;
+
+// Whether nothing lies on a side: what it reflects would come from what is left of it alone.
+bool isUncovered(const FirstShotInput& input, const Visibility& exchange, uint32_t side) {
+    const glm::vec3 normal = input.patches.normal(side);
+    for (uint32_t k = 0; k < kLooks; ++k) {
+        const glm::vec4 u = sobolPoint(k, side);
+        if (exchange.isBlocked(side, input.patches.point(side / 2, {u.x, u.y}), normal,
+                               input.touchDistance))
+            return false;
+    }
+    return true;
+}
+
+// The area that a line stands for at a parent, over that outside of all windows.
+double lineShare(const LineDensity& density, uint32_t parent) {
+    const int32_t window = density.windowOf.empty() ? -1 : density.windowOf[parent];
+    return window < 0 ? 1.0 : std::ldexp(1.0, -2 * density.windows[size_t(window)].level);
+}
+
+// Of the first shot's light, W/m^2.
+glm::vec3 reflected(const Patches& patches, const FirstShot& shot, size_t side) {
+    return shotReflectance(patches, shot, side) * shot.irradiance[side];
+}
+
+// Per side: its reflected light if it is a bright spot, else 0.
+EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchange,
+                          const LineDensity& density, const FirstShot& shot) {
+    const Patches& patches = input.patches;
+    const size_t n = patches.sideCount();
+    EmissionSplit spots;
+    std::vector<double> exitance(n, 0.0);  // of the brightest channel, W/m^2
+    double power = 0, reflectance = 0;
+    for (size_t side = 0; side < n; ++side) {
+        if (!patches.parentAt(uint32_t(side)).exchanges) continue;
+        const double area = double(patches.area[side / 2]);
+        exitance[side] = double(brightest(reflected(patches, shot, side)));
+        power += area * (exitance[side] + double(brightest(shot.emission[side])));
+        if (side % 2 == 0) reflectance += area * double(brightest(patches.reflectance[side]));
+    }
+    if (!(patches.totalArea > 0)) return spots;
+    // All bounces included, as far as they stay in the scene.
+    const double mean =
+        power / patches.totalArea / std::max(0.05, 1 - reflectance / patches.totalArea);
+    if (!(mean > 0)) return spots;
+    // What sides of any exitance do to the noise of others is in proportion to the square of their
+    // contrast, to their area, and to the area that a line stands for.
+    double inSpots = 0, inRest = 0;
+    for (size_t side = 0; side < n; ++side) {
+        const double area = double(patches.area[side / 2]);
+        (exitance[side] > kBright * mean ? inSpots : inRest) +=
+            area * std::pow(exitance[side] / mean - 1, 2) *
+            lineShare(density, patches.parentOf[side / 2]);
+    }
+    auto bundlesFor = [&](double squares) {
+        return std::min(
+            double(input.settings.maxBundles),
+            std::pow(std::sqrt(squares / patches.totalArea) / double(input.settings.targetError),
+                     1 / kNoiseSlope));
+    };
+    if (!(bundlesFor(inSpots + inRest) - bundlesFor(inRest) > kWorthwhileBundles)) return spots;
+    spots.gathered.resize(n);
+    spots.isSource.resize(n);
+    for (size_t side = 0; side < n; ++side)
+        if (exitance[side] > kBright * mean && isUncovered(input, exchange, uint32_t(side))) {
+            spots.isSource[side] = true;
+            spots.gathered[side] = reflected(patches, shot, side);
+        }
+    return spots;
+}
+
+glm::dvec3 sumOver(const Patches& patches, const std::vector<glm::vec3>& light) {
+    glm::dvec3 sum(0.0);
+    for (size_t side = 0; side < light.size(); ++side)
+        sum += double(patches.area[side / 2]) * glm::dvec3(light[side]);
+    return sum;
+}
+
+}  // namespace
+
+size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
+                         const Visibility& exchange, const LineDensity& density, FirstShot& shot) {
+    const Patches& patches = input.patches;
+    if (!patches.translucence.empty() || !patches.opacity.empty()) return 0;
+    EmissionSplit spots = brightSpots(input, exchange, density, shot);
+    const size_t n = patches.sideCount();
+    const size_t count = size_t(std::count(spots.isSource.begin(), spots.isSource.end(), true));
+    if (count == 0) return 0;
+    // Its error counts beside all light.
+    const double all = double(brightest(glm::vec3(sumOver(patches, shot.irradiance))));
+    const double inSpots = double(brightest(glm::vec3(sumOver(patches, spots.gathered))));
+    std::vector<glm::vec3> unshot(n);
+    for (size_t side = 0; side < n; ++side)
+        if (patches.parentAt(uint32_t(side)).exchanges && !spots.isSource[side])
+            unshot[side] = reflected(patches, shot, side);
+    const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707);
+    const DirectLight light(scene, patches, exchange, seed, input.settings, std::move(spots));
+    const std::vector<Gathered> results = light.gather(
+        n,
+        [&](size_t side) {
+            Receiver receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
+                              uint32_t(side)};
+            receiver.isShown = !input.isShown || (*input.isShown)[side];
+            return receiver;
+        },
+        float(double(input.settings.targetError) * (all + inSpots) / inSpots),
+        [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); }, {},
+        neighbouringSides(patches));
+    shot.indirect.resize(n);
+    for (size_t side = 0; side < n; ++side) {
+        shot.indirect[side] = results[side].irradiance;
+        unshot[side] += patches.reflectance[side] * results[side].irradiance;
+        shot.error[side] = std::hypot(shot.error[side], std::sqrt(results[side].variance));
+        shot.rays += results[side].rays;
+    }
+    for (size_t side = 0; side < n; ++side)
+        if (!patches.parentAt(uint32_t(side)).exchanges) unshot[side] = glm::vec3(0.0f);
+    shot.unshot = std::move(unshot);
+    return count;
+}
+
+}  // namespace raybundle
