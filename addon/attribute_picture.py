@@ -18,7 +18,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from mathutils import Vector
-from raybundle.material_export import MaterialExporter
+from raybundle.material_export import MaterialExporter, SlotMaterial
 from raybundle.scene_data import SceneData, Warnings
 
 SAMPLES = 16
@@ -75,7 +75,7 @@ def _emission_colors(objects: Collection[bpy.types.Object]
     materials = {slot.material for item in objects for slot in item.material_slots}
     colors = {}
     for material in materials - {None}:
-        index = exporter.export(material).index
+        index = exporter.export(SlotMaterial(material)).index
         emission = exporter.scene.materials[index].emission.max(axis=0)
         if emission.max() > 0.0:
             colors[material] = tuple(emission / emission.max())

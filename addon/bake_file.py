@@ -87,7 +87,7 @@ def _apply(scene: bpy.types.Scene, assignment: str) -> None:
     if not equals:
         raise raybundle.BakeError(f'--set "{assignment}": expected name=value')
     names = [item.identifier for item in type(scene.raybundle).bl_rna.properties
-             if item.identifier not in ('rna_type', 'name', 'report')]
+             if item.identifier not in ('rna_type', 'name', 'report') and not item.is_hidden]
     names += [f"skip.{item[0]}" for item in enum_skip]
     if name not in names:
         raise raybundle.BakeError(f'--set "{name}": there is no such setting; there are: '
