@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import bpy
@@ -116,6 +116,7 @@ class MaterialExporter:
         self._attributes: dict[bpy.types.Material, set[str]] = {}
         self._shown: dict[tuple[bpy.types.Material, bool], _Shown] = {}
         self._materials: dict[SlotMaterial, MaterialExport] = {}
+        self._baked: dict[bpy.types.Material, int] = {}  # by Cycles; one of its indices
         self._unread: dict[SlotMaterial, str | None] = {}
         self._image_indices: dict[tuple[str, str], int] = {}
 
@@ -141,6 +142,14 @@ class MaterialExporter:
         if slot not in self._materials:
             self._materials[slot] = self._export(slot, material or slot.material)
         return self._materials[slot]
+
+    def exported(self) -> Iterator[tuple[bpy.types.Material, bool]]:
+        """Original materials, each with whether it lets light straight through."""
+        for slot, export in self._materials.items():
+            if slot.material is not None:
+                yield slot.material, self.scene.materials[export.index].opacity < 1.0
+        for material, index in self._baked.items():
+            yield material, self.scene.materials[index].opacity_image is not None
 
     def unread(self, slot: SlotMaterial, material: bpy.types.Material) -> str | None:
         """What of the (evaluated) material only Cycles can tell, if anything."""
@@ -187,6 +196,7 @@ class MaterialExporter:
             **self._scattering([surface] * 2),
             translucence_image=index.get('translucence'),
             translucence_image_weight=None if baked.translucence is None else np.ones((2, 3))))
+        self._baked[material.original] = len(self.scene.materials) - 1
         # The images are not kept, their means are.
         mean = replace(surface, radiance=ColorExpression(baked.radiance_color),
                        transmittance=baked.transmittance,
@@ -340,6 +350,9 @@ class MaterialExporter:
         if output is None:
             warnings.add(f'material "{material.name}" has no output node: it is black')
             return None, Surface()
+        if output.inputs['Volume'].is_linked and not output.inputs['Surface'].is_linked:
+            # A border between two kinds of air.
+            return None, Surface(transmittance=WHITE)
         reader = NodeReader(f'material "{material.name}"', self.images, warnings, backfacing,
                             inexact, varying_emission=True, filter_glossy=self.filter_glossy,
                             unread_color=unread_color, results=results)

@@ -14,8 +14,10 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from . import left_out
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
 from .gloss import filter_glossy_of
+from .hidden_lights import hidden_light_instances
 from .last_surfaces import LastSurfaces
 from .light_export import export_light, is_portal
 from .light_sets import LightSet, LightSetMembers
@@ -28,7 +30,6 @@ from .world_export import export_world
 
 # Object types whose evaluated geometry is a mesh.
 GEOMETRY_TYPES = ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT')
-_UNREAD_TYPES = ('CURVES', 'POINTCLOUD', 'VOLUME')
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,7 @@ class _Exporter:
         self._instance_counts: Counter[tuple[str, str]] = Counter()
         self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
         self._placed: set[tuple[str, int, bytes]] = set()
+        self._drawn: dict[bpy.types.Object, None] = {}  # originals that take part
 
     def bake_surfaces(self, patch_size: float) -> None:
         """Asks Cycles for the materials that only it can tell. Not while others are evaluated."""
@@ -218,10 +220,16 @@ class _Exporter:
                 self._add_light(instance)
             elif item.type in GEOMETRY_TYPES:
                 self._add_geometry(instance)
-            elif item.type in _UNREAD_TYPES:
-                self._refuse(item.name, f"{item.type} geometry is not read")
+            elif item.type in left_out.UNREAD_TYPES:
+                self._refuse(item.name, left_out.UNREAD_TYPES[item.type])
+        hidden = self._hidden()
+        lights = self.result.scene.lights
+        shown = len(lights)
+        for instance in hidden_light_instances(self.context, hidden):
+            self._add_light(instance)
+        self._name_what_is_left_out(hidden, [light.name for light in lights[shown:]])
         scene = self.result.scene
-        world = export_world(self.context.scene, self.materials.images, self.result.warnings)
+        world = export_world(self.context, self.materials.images, self.result.warnings)
         scene.world, scene.world_image = world.radiance, world.image
         scene.lights.extend(world.suns)
         self.members.add_world_lights(len(world.suns))
@@ -232,6 +240,23 @@ class _Exporter:
             self.result.statuses[label] = (
                 f"{count} instance{plural} without own data: only reflects and blocks light")
         return self.result
+
+    def _hidden(self) -> list[bpy.types.Object]:
+        """Objects that the viewport hides and renders do not, original."""
+        shown = {item.original for item in self.context.evaluated_depsgraph_get().objects}
+        return [item for item in sorted(_objects_in_rendered_collections(self.context.view_layer),
+                                        key=lambda item: item.name_full)
+                if item not in shown and not item.hide_render]
+
+    def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str]) -> None:
+        """lights: names of the hidden ones, which are not."""
+        scene = self.context.scene
+        for text in (
+                *left_out.of_render_settings(scene, self.context.view_layer),
+                *left_out.of_world(scene.world), *left_out.of_objects(self._drawn),
+                *left_out.of_materials(scene, self.materials.exported()),
+                *left_out.of_hidden(hidden, lights, GEOMETRY_TYPES)):
+            self.result.warnings.add(text)
 
     def _name_showing_materials(self) -> None:
         if not self.materials.showing:
@@ -283,8 +308,11 @@ class _Exporter:
             parent = instance.parent.name if instance.parent else item.name
             self._instance_counts[parent, item.name] += 1
             role = 'OCCLUDE'
-        if original.is_holdout or original.is_shadow_catcher and bpy.app.version >= (4, 0, 0):
-            what = "holdout" if original.is_holdout else "shadow catcher"
+        self._drawn[original] = None
+        is_holdout = original.is_holdout or original.holdout_get(
+            view_layer=self.context.view_layer)
+        if is_holdout or original.is_shadow_catcher and bpy.app.version >= (4, 0, 0):
+            what = "holdout" if is_holdout else "shadow catcher"
             self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, here it '
                                      f'is an object like others')
         # Cycles has the flags of the instancer too.
@@ -294,6 +322,10 @@ class _Exporter:
                          stops_direct=all(source.visible_shadow for source in shown),
                          exchanges=all(source.visible_diffuse for source in shown)))
         self.members.add_instance(instance)
+        if (left_out.has_light_linking(original)
+                and self.result.scene.emits(len(self.result.scene.instances) - 1)):
+            self.result.warnings.add(f'"{item.name}": its light linking is not read, it lights all '
+                                     f'objects')
         if role == 'BAKE':
             index = len(self.result.scene.instances) - 1
             self.result.targets.append(
