@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles draws and the bake does not is named in a line, with what to do; lamps and worlds that
-the viewport, or a view layer, hides are as in Cycles."""
+"""What Cycles draws and the bake does not is named in a line, with what to do; lamps and worlds
+that the viewport, or a view layer, hides are as in Cycles."""
 
 import bpy
 import numpy as np

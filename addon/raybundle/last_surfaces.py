@@ -18,7 +18,7 @@ import numpy as np
 
 from .color_attribute import rendered_attribute
 from .color_expression import ColorExpression, Texture
-from .node_reader import Surface
+from .surface import Surface
 
 # Of a slot that no surface is known of.
 _NONE = "-"

@@ -14,9 +14,10 @@ from .diffuse_angles import lambert
 from .image_export import ImagePixels
 from .last_surfaces import LastSurface, LastSurfaces
 from .layers import LOBES
-from .node_reader import NodeReader, Surface, output_node
+from .node_reader import NodeReader, output_node
 from .scene_data import ImageData, MaterialData, SceneData, Warnings
 from .shown_results import RENDERED, attributes_read
+from .surface import Surface
 from .surface_bake import BakedMaterial
 
 # What Blender shows where a face has no material.
@@ -28,8 +29,8 @@ class SlotMaterial:
     """A material as an object has it in a slot."""
 
     material: bpy.types.Material | None  # original; None is the grey default
-    # For one that shows the result of a bake: whether the mesh's render colour attribute is one, and
-    # what the last bake took the slot for (last_surfaces.py), if that counts.
+    # For one that shows the result of a bake: whether the mesh's render colour attribute is one,
+    # and what the last bake took the slot for (last_surfaces.py), if that counts.
     renders_result: bool = False
     last: str | None = None
 
@@ -228,15 +229,15 @@ class MaterialExporter:
         """For a material that shows results alone, where no bake has been before."""
         if any(np.any(side.reflectance.mean() + side.translucence.mean() > 0.0) for side in sides):
             self.warnings.add(
-                f'material "{name}" shows the result of a bake alone, and no earlier bake tells its '
-                f'own colour: that of the socket it is linked to is used; set it there, or link '
+                f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
+                f'its own colour: that of the socket it is linked to is used; set it there, or link '
                 f'the result through a Multiply node')
         else:
             grey = Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
             sides = [replace(grey, transmittance=side.transmittance) for side in sides]
             self.warnings.add(
-                f'material "{name}" shows the result of a bake alone, and no earlier bake tells its '
-                f'own colour: grey of {DEFAULT_REFLECTANCE} is used; bake with its own material '
+                f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
+                f'its own colour: grey of {DEFAULT_REFLECTANCE} is used; bake with its own material '
                 f'first')
         return self._add(name, sides)
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
 from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Texture
-from .diffuse_angles import TERMS, oren_nayar
 from .gloss import gloss_albedo, seen_roughness
 from .image_export import ImagePixels, sphere_mean
 from .layers import Layer, microfibers, velvet
@@ -26,6 +25,7 @@ from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, 
 from .scattering import BURLEY, OREN_NAYAR, Scattering
 from .scene_data import Warnings
 from .shown_results import reads_result
+from .surface import Surface
 
 # Values of the Light Path node as diffuse light sees a surface.
 LIGHT_PATH = {'Is Diffuse Ray': 1.0, 'Is Reflection Ray': 1.0, 'Ray Depth': 1.0,
@@ -60,67 +60,6 @@ MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughne
 
 
 @dataclass(frozen=True)
-class Surface:
-    """What a shader is to diffuse light, seen from one side."""
-
-    reflectance: ColorExpression = field(default_factory=ColorExpression)
-    radiance: ColorExpression = field(default_factory=ColorExpression)
-    transmittance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) straight through
-    # What of the reflectance is a diffuse colour.
-    diffuse: ColorExpression = field(default_factory=ColorExpression)
-    # (TERMS, 3): how the reflectance depends on the light's angle (diffuse_angles.py).
-    reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (1 + TERMS, 3): what is seen of light by its angle, times the mean of the diffuse colour.
-    shown_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((1 + TERMS, 3)))
-    # What leaves it, diffusely, of the light on the other side.
-    translucence: ColorExpression = field(default_factory=ColorExpression)
-    scattering: Scattering = field(default_factory=Scattering)
-
-    @staticmethod
-    def matt(color: ColorExpression, roughness: float = 0.0) -> Surface:
-        mean = np.maximum(color.mean(), 0.0)
-        angles = oren_nayar(roughness, mean)
-        return Surface(color.scaled(angles.albedo), diffuse=color,
-                       reflected_by_angle=mean * angles.reflected,
-                       shown_by_angle=mean * angles.shown,
-                       scattering=Scattering.matt(mean, OREN_NAYAR, roughness))
-
-    @property
-    def emission(self) -> np.ndarray:
-        """(3,), the mean radiance."""
-        return self.radiance.mean()
-
-    def covered(self, layer: Layer, color: np.ndarray) -> Surface:
-        """Beneath a layer. color: (3,), times the layer's albedo."""
-        share = layer.taken(color)
-        under, above = 1.0 - share * layer.albedo, 1.0 - share * layer.above
-        return Surface(
-            self.reflectance.scaled(under).plus(ColorExpression(color * layer.albedo)),
-            self.radiance.scaled(under), self.transmittance * under,
-            self.diffuse.scaled(above).plus(ColorExpression(color * layer.above)),
-            self.reflected_by_angle * under + layer.arriving[:, None] * color,
-            self.shown_by_angle * above + layer.shown[:, None] * color,
-            self.translucence.scaled(under),
-            self.scattering.covered(share, layer).plus(Scattering.clothed(color, layer)))
-
-    def limited(self) -> Surface:
-        """With parts that fit a reflectance of 1, where the whole, which the native library clamps,
-        is more."""
-        whole = self.reflectance.mean()
-        if not np.any(whole > 1.0):
-            return self
-        share = 1.0 / np.maximum(whole, 1.0)
-        return replace(self, reflected_by_angle=self.reflected_by_angle * share,
-                       scattering=self.scattering.limited(share))
-
-    def scaled(self, factor: float) -> Surface:
-        return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
-                       self.transmittance * factor, self.diffuse.scaled(factor),
-                       self.reflected_by_angle * factor, self.shown_by_angle * factor,
-                       self.translucence.scaled(factor), self.scattering.scaled(factor))
-
-
-@dataclass(frozen=True)
 class _Source:
     """Where a socket's value comes from: an output of a node, or (node None) the socket itself."""
 
@@ -137,8 +76,8 @@ class NodeReader:
     goes to `inexact`, for there is another way to it (surface_bake.py); by default it is a warning
     too. varying_emission: whether emission may be more than a constant. filter_glossy: see
     gloss.filter_glossy_of. unread_color: (3,), what stands for colours that cannot be read; None:
-    that of the socket. results: names of the attributes that are results of a bake: as emission they
-    count 0, as a factor 1, and where they are a colour alone that of the socket is used.
+    that of the socket. results: names of the attributes that are results of a bake: as emission
+    they count 0, as a factor 1, and where they are a colour alone that of the socket is used.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,

@@ -123,7 +123,8 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
             asked: Wanted, pixel: float) -> bytes:
     content = hashlib.blake2b(digest_size=16)
     depsgraph = context.evaluated_depsgraph_get()
-    content.update(repr((sorted(asked.reasons), sorted(asked.results), round(pixel, 9), context.scene.frame_current,
+    content.update(repr((sorted(asked.reasons), sorted(asked.results), round(pixel, 9),
+                         context.scene.frame_current,
                          filter_glossy_of(context.scene),
                          [tuple(row) for row in item.evaluated_get(depsgraph).matrix_world],
                          tuple(item.color), item.pass_index,
