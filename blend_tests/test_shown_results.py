@@ -271,6 +271,22 @@ def test_other_materials_in_the_slots_and_a_saved_file(corner, tmp_path):
     assert '"Shown"' in naming(report)
 
 
+@pytest.mark.parametrize("topology", ['SUBDIVIDE', 'KEEP'])
+def test_subdivided_copies_that_show_the_result(corner, topology):
+    bake(topology='SUBDIVIDE')
+    copies = [bpy.data.objects[f"{item.name} (Radiosity)"] for item in corner]
+    before = [read_colors(item).mean(axis=0) for item in copies]
+    for item in copies[:2]:
+        as_only_color(item.data.materials[0], "Radiosity", 'VERTEX_COLOR')
+    report = bake(topology=topology)
+    assert not any("no earlier bake" in text for text in report.warnings)
+    copies = [bpy.data.objects[f"{item.name} (Radiosity)"] for item in corner]
+    for item, mean in zip(copies, before):
+        # Of the copies themselves the lines are others: noise of 64 bundles.
+        assert read_colors(item).mean(axis=0) == pytest.approx(
+            mean, rel=SAME if topology == 'SUBDIVIDE' else 0.02)
+
+
 def test_what_an_image_was_stays_one(corner):
     """A colour that was read from an image, and then only from the result."""
     image = bpy.data.images.new("Stripes", 4, 4, float_buffer=True)

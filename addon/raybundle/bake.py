@@ -290,6 +290,8 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
         status = native_report['objects'][item.target.instance]['status']
         error = native_report['objects'][item.target.instance]['error']
         reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status, error))
+    for original, copy in copies.items():
+        export.last.share(original, copy)
     names = {settings.attribute, *(name for item in lights for name in item.set_lights)}
     export.last.write(names)
     _warn_of_clipping(lights, settings, export)

@@ -92,6 +92,11 @@ class LastSurfaces:
         if item.library is None:
             self._taken[item] = " ".join(digests)
 
+    def share(self, original: bpy.types.Object, copy: bpy.types.Object) -> None:
+        """copy: the finer one of an original (subdivided_copy.py), with the same slots."""
+        if original in self._taken:
+            self._taken[copy] = self._taken[original]
+
     def forget_attributes(self) -> None:
         """They were removed; surfaces stay, since materials may still show what is gone."""
         self._attributes.clear()

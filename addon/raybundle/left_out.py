@@ -27,7 +27,10 @@ _BOUNCES, _DIFFUSE_BOUNCES, _CLAMP_INDIRECT = 12, 4, 10.0
 # Of modifiers and of the data of objects: in the viewport and in renders.
 _DETAIL = (('levels', 'render_levels'), ('steps', 'render_steps'),
            ('viewport_resolution', 'resolution'))
-_DATA_DETAIL = (('resolution_u', 'render_resolution_u'), ('resolution', 'render_resolution'))
+_DATA_DETAIL = {'CURVE': ('resolution_u', 'render_resolution_u'),
+                'SURFACE': ('resolution_u', 'render_resolution_u'),
+                'FONT': ('resolution_u', 'render_resolution_u'),
+                'META': ('resolution', 'render_resolution')}
 _MOST_NAMES = 3
 NO_CAUSTICS = "its Shadow Caustics are not read: light goes straight on through glass"
 
@@ -180,14 +183,14 @@ def _differences(item: bpy.types.Object) -> Iterator[str]:
             if (settings.render_type in ('OBJECT', 'COLLECTION')
                     and settings.display_percentage < 100):
                 yield f'{modifier.name}: {settings.display_percentage} % of its particles'
-    if _setting(item, 'use_adaptive_subdivision', False) or any(
-            getattr(modifier, 'use_adaptive_subdivision', False) for modifier in item.modifiers):
+    if item.modifiers and (_setting(item, 'use_adaptive_subdivision', False) or any(
+            getattr(modifier, 'use_adaptive_subdivision', False) for modifier in item.modifiers)):
         yield "adaptive subdivision"
-    for shown, rendered in _DATA_DETAIL:
-        values = [getattr(item.data, name, None) for name in (shown, rendered)]
+    if item.type in _DATA_DETAIL:
+        shown, rendered = (getattr(item.data, name) for name in _DATA_DETAIL[item.type])
         # 0 of renders is as in the viewport.
-        if None not in values and values[1] and values[0] != values[1]:
-            yield f'{shown} {values[0]:.3g} and {values[1]:.3g}'
+        if rendered and shown != rendered:
+            yield f'{_DATA_DETAIL[item.type][0]} {shown:.3g} and {rendered:.3g}'
 
 
 def has_light_linking(item: bpy.types.Object) -> bool:

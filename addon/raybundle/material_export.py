@@ -114,7 +114,8 @@ class MaterialExporter:
         self.last = last
         self.images = ImagePixels()
         self.showing: dict[str, None] = {}  # names of exported materials that show results
-        self._attributes: dict[bpy.types.Material, set[str]] = {}
+        self._attributes: dict[bpy.types.Material | None, set[str]] = {}
+        self._plain: dict[bpy.types.Material | None, SlotMaterial] = {}  # show no result
         self._shown: dict[tuple[bpy.types.Material, bool], _Shown] = {}
         self._materials: dict[SlotMaterial, MaterialExport] = {}
         self._baked: dict[bpy.types.Material, int] = {}  # by Cycles; one of its indices
@@ -124,17 +125,17 @@ class MaterialExporter:
     def slot(self, material: bpy.types.Material | None, renders_result: Callable[[], bool],
              last: Callable[[], str | None]) -> SlotMaterial:
         """renders_result, last: see SlotMaterial; asked for if they matter."""
-        if material is None:
-            return SlotMaterial(None)
-        key = material.original
+        key = material.original if material is not None else None
+        if key in self._plain:
+            return self._plain[key]
         if key not in self._attributes:
-            self._attributes[key] = (set() if material.node_tree is None
+            self._attributes[key] = (set() if key is None or material.node_tree is None
                                      else attributes_read(material.node_tree))
         read = self._attributes[key]
-        rendered = RENDERED in read and renders_result()
-        if not rendered and self.results.isdisjoint(read):
-            return SlotMaterial(key)
-        slot = SlotMaterial(key, rendered)
+        if RENDERED not in read and self.results.isdisjoint(read):
+            self._plain[key] = SlotMaterial(key)
+            return self._plain[key]
+        slot = SlotMaterial(key, RENDERED in read and renders_result())
         return replace(slot, last=last()) if self._shows(material, slot).only else slot
 
     def export(self, slot: SlotMaterial, material: bpy.types.Material | None = None

@@ -337,7 +337,11 @@ class NodeReader:
         factor = self.value(strength, path)
         radiance = self._emission_color(color, path).scaled(factor) if factor else ColorExpression()
         if not radiance.result and self._result_values == values:
-            self.tells_emission |= bool(color.is_linked or np.any(_default_color(color)))
+            # A Principled shader that was just added is white and switched off from 4.0 on.
+            is_usual = (color.node.type == 'BSDF_PRINCIPLED' and bpy.app.version >= (4, 0, 0)
+                        and factor == 0.0)
+            self.tells_emission |= not is_usual and bool(
+                color.is_linked or np.any(_default_color(color)))
             return radiance
         # The light of a bake is none of the scene's, whatever it is multiplied by.
         del self.inexact[inexact:], self.unread[unread:]
