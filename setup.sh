@@ -31,13 +31,28 @@ require_packages() {
         apt-get install -q -y --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# build TESTS [TARGET ...]: TESTS is ON or OFF.
+# Sets blender to BLENDER's or the first on PATH, as the caller has it, and gives what is started from here on an
+# environment of its own: Debian's Blender takes its Python's folders from the python3 that it finds on PATH, which
+# in a virtual environment, or after another Python was installed, has no numpy.
+use_own_environment() {
+    blender=$(command -v "${BLENDER:-blender}") ||
+        { echo "${BLENDER:-blender}: there is no such program" >&2; exit 1; }
+    unset VIRTUAL_ENV PYTHONHOME PYTHONPATH
+    export PATH=/usr/bin:/bin:$PATH
+}
+
+# build TESTS [TARGET ...]: TESTS is ON or OFF. Tests use the Blender of use_own_environment, if that was called.
 build() {
-    local tests=$1 log=build/release.log
+    local log=build/release.log cache=build/release/CMakeCache.txt options=("RAYBUNDLE_TESTS:BOOL=$1") option
+    local is_configured=true
+    [ -z "${blender:-}" ] || options+=("BLENDER:FILEPATH=$blender")
     shift
     mkdir -p build
-    if [ ! -f build/release/build.ninja ] || ! grep -q "RAYBUNDLE_TESTS:BOOL=$tests" build/release/CMakeCache.txt; then
-        cmake --preset release -D RAYBUNDLE_TESTS="$tests" >"$log" 2>&1 ||
+    for option in "${options[@]}"; do
+        grep -qxF "$option" "$cache" 2>/dev/null || is_configured=false
+    done
+    if [ ! -f build/release/build.ninja ] || ! $is_configured; then
+        cmake --preset release "${options[@]/#/-D}" >"$log" 2>&1 ||
             { cat "$log" >&2; exit 1; }
     fi
     cmake --build --preset release "$@" >"$log" 2>&1 || { cat "$log" >&2; exit 1; }

@@ -18,7 +18,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from mathutils import Vector
-from raybundle.material_export import MaterialExporter
+from raybundle.material_export import MaterialExporter, SlotMaterial
 from raybundle.scene_data import SceneData, Warnings
 
 SAMPLES = 16
@@ -29,7 +29,14 @@ GREY = (0.18, 0.18, 0.18)
 def render(context: bpy.types.Context, baked: Collection[str], attribute: str, path: Path) -> None:
     """baked: names of the objects that have the attribute."""
     scene = context.scene
-    objects = [item for item in scene.objects if item.name in baked]
+    if context.mode != 'OBJECT':
+        # Of a mesh in Edit Mode attributes have no data.
+        bpy.ops.object.mode_set(mode='OBJECT')
+    # A linked object may have the name of one of the file's own.
+    objects = [item for item in scene.objects if item.name in baked and item.type == 'MESH'
+               and attribute in item.data.color_attributes]
+    if not objects:
+        raise ValueError("no object in the scene shows the attribute")
     emitters = _emission_colors(objects)
     own_camera = scene.camera is not None
     if not own_camera:
@@ -40,6 +47,7 @@ def render(context: bpy.types.Context, baked: Collection[str], attribute: str, p
         if item.type == 'LIGHT':
             item.hide_render = True
     _set_up_cycles(scene)
+    _set_up_view_layer(context.view_layer)
     _set_exposure(scene, objects, attribute)
     scene.render.filepath = str(path)
     with _silent_stdout():
@@ -67,7 +75,7 @@ def _emission_colors(objects: Collection[bpy.types.Object]
     materials = {slot.material for item in objects for slot in item.material_slots}
     colors = {}
     for material in materials - {None}:
-        index = exporter.export(material).index
+        index = exporter.export(SlotMaterial(material)).index
         emission = exporter.scene.materials[index].emission.max(axis=0)
         if emission.max() > 0.0:
             colors[material] = tuple(emission / emission.max())
@@ -84,6 +92,9 @@ def _replace_materials(objects: Collection[bpy.types.Object],
     # Also those that are not in the scene but in collections it has instances of.
     for item in bpy.data.objects:
         if item.type not in ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT'):
+            continue
+        # What belongs to another file cannot be changed and stays as it is.
+        if item.library is not None or not item.material_slots and item.data.library is not None:
             continue
         is_baked = item in objects
         if not item.material_slots:
@@ -153,7 +164,11 @@ def _set_up_cycles(scene: bpy.types.Scene) -> None:
     cycles.max_bounces = 0
     # Culled back sides may lie behind each other.
     cycles.transparent_max_bounces = 8
+    cycles.film_exposure = 1.0
     render = scene.render
+    render.use_multiview = False
+    render.use_motion_blur = False
+    render.use_single_layer = True
     render.use_border = False
     render.use_compositing = False
     render.use_sequencer = False
@@ -165,6 +180,12 @@ def _set_up_cycles(scene: bpy.types.Scene) -> None:
     scene.view_settings.view_transform = 'Standard'
     scene.view_settings.look = 'None'
     scene.view_settings.gamma = 1.0
+
+
+def _set_up_view_layer(view_layer: bpy.types.ViewLayer) -> None:
+    view_layer.use = True
+    view_layer.material_override = None
+    view_layer.samples = 0
 
 
 def _set_exposure(scene: bpy.types.Scene, objects: Collection[bpy.types.Object], attribute: str

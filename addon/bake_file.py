@@ -5,7 +5,8 @@ r"""Bakes a .blend file in the background; the script behind the ./bake command.
         [--out DIR] [--set name=value ...]
 
 Writes DIR/NAME.baked.blend, DIR/NAME.json (the report) and DIR/NAME.png (a picture of the vertex
-colours). Leaves with exit code 1 and one line on an error.
+colours). Leaves with exit code 1 and one line on an error. A picture that cannot be made is none: a
+line of the summary says why.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -35,7 +37,7 @@ def main(arguments: list[str]) -> None:
     raybundle.register()
     name = Path(bpy.data.filepath).stem
     out = options.out.resolve()
-    out.mkdir(parents=True, exist_ok=True)
+    _check_writable(out)
     scene = bpy.context.scene
     for assignment in options.set:
         _apply(scene, assignment)
@@ -49,8 +51,26 @@ def main(arguments: list[str]) -> None:
                                 compress=True, copy=True)
     # From here on the open file is changed for the picture; it is not saved again.
     baked = {item.name for item in report.objects if item.status.startswith('baked')}
-    attribute_picture.render(bpy.context, baked, scene.raybundle.attribute, out / f"{name}.png")
-    _print_summary(report, out, name)
+    no_picture = _draw_picture(baked, scene.raybundle.attribute, out / f"{name}.png")
+    _print_summary(report, out, name, no_picture)
+
+
+def _check_writable(out: Path) -> None:
+    """Raises OSError: rather before the bake than after it."""
+    out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=out):
+        pass
+
+
+def _draw_picture(baked: set[str], attribute: str, path: Path) -> str:
+    """Returns why there is none, or nothing."""
+    try:
+        # Not that of an earlier bake.
+        path.unlink(missing_ok=True)
+        attribute_picture.render(bpy.context, baked, attribute, path)
+        return "" if path.is_file() else "Blender wrote none"
+    except Exception as error:  # Of whatever kind: the bake itself is done and saved.
+        return (str(error).strip() or type(error).__name__).splitlines()[0]
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
@@ -67,7 +87,7 @@ def _apply(scene: bpy.types.Scene, assignment: str) -> None:
     if not equals:
         raise raybundle.BakeError(f'--set "{assignment}": expected name=value')
     names = [item.identifier for item in type(scene.raybundle).bl_rna.properties
-             if item.identifier not in ('rna_type', 'name', 'report')]
+             if item.identifier not in ('rna_type', 'name', 'report') and not item.is_hidden]
     names += [f"skip.{item[0]}" for item in enum_skip]
     if name not in names:
         raise raybundle.BakeError(f'--set "{name}": there is no such setting; there are: '
@@ -100,7 +120,7 @@ def _write_whole(path: Path, text: str) -> None:
         part.unlink(missing_ok=True)
 
 
-def _print_summary(report: raybundle.BakeReport, out: Path, name: str) -> None:
+def _print_summary(report: raybundle.BakeReport, out: Path, name: str, no_picture: str) -> None:
     print(report.summary())
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
                        if stage != 'total')
@@ -115,7 +135,9 @@ def _print_summary(report: raybundle.BakeReport, out: Path, name: str) -> None:
             print(f"  {item.name}: error {100.0 * item.error['total']:.2g} %")
     for warning in report.warnings:
         print(f"  warning: {warning}")
-    for suffix in ("baked.blend", "png", "json"):
+    if no_picture:
+        print(f"  no picture: {no_picture}")
+    for suffix in ("baked.blend", "json") if no_picture else ("baked.blend", "png", "json"):
         print(f"  wrote {out / f'{name}.{suffix}'}")
 
 

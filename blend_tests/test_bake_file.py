@@ -2,6 +2,7 @@
 """The script behind the ./bake command, run as the command runs it: in a Blender of its own."""
 
 import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -83,3 +84,82 @@ def test_a_file_with_nothing_to_bake(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     result = bake_file(path, "--out", tmp_path / "out")
     assert result.returncode == 1 and "bake: Nothing to bake" in result.stderr
+
+
+# --------------------------------------------------------------------------------------------------
+# Files as people have them
+# --------------------------------------------------------------------------------------------------
+
+
+def save_edited(path):
+    bpy.context.view_layer.objects.active = bpy.data.objects["Box"]
+    bpy.ops.object.mode_set(mode='EDIT')
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+
+def save_bare(path):
+    """No camera, no light, no materials; an object of another file, and one that instances it."""
+    item = bpy.data.objects["Box"]
+    item.data.materials.clear()
+    library = path.with_name("library.blend")
+    bpy.data.libraries.write(str(library), {item})
+    with bpy.data.libraries.load(str(library), link=True) as (_, linked):
+        linked.objects = ["Box"]
+    collection = bpy.data.collections.new("Linked")
+    collection.objects.link(linked.objects[0])
+    bpy.context.scene.collection.objects.link(linked.objects[0])
+    instancer = bpy.data.objects.new("Instancer", None)
+    instancer.instance_type, instancer.instance_collection = 'COLLECTION', collection
+    bpy.context.scene.collection.objects.link(instancer)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+
+@pytest.mark.parametrize("save", [save_edited, save_bare])
+def test_a_picture_of_files_as_people_have_them(closed_box, tmp_path, save):
+    path, out = tmp_path / "file.blend", tmp_path / "out"
+    save(path)
+    result = bake_file(path, "--out", out, "--set", "max_patches=500")
+    assert result.returncode == 0, result.stderr
+    assert "Traceback" not in result.stderr and "no picture" not in result.stdout
+    assert "objects baked" in result.stdout and f"wrote {out / 'file.png'}" in result.stdout
+    assert {path.suffix for path in out.iterdir()} == {".blend", ".json", ".png"}
+
+
+def test_a_picture_that_cannot_be_made_is_a_line(saved_box, tmp_path):
+    out = tmp_path / "out"
+    # Nobody can write a file where a folder is.
+    (out / "box.png").mkdir(parents=True)
+    result = bake_file(saved_box, "--out", out, "--set", "max_patches=500")
+    assert result.returncode == 0, result.stderr
+    assert "Traceback" not in result.stderr
+    assert "1 objects baked" in result.stdout
+    lines = [line for line in result.stdout.splitlines() if line.startswith("  no picture: ")]
+    assert len(lines) == 1 and "box.png" in lines[0]
+    assert "wrote " + str(out / "box.png") not in result.stdout
+    assert json.loads((out / "box.json").read_text())["patches"] > 0
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_the_bake(saved_box):
+    result = bake_file(saved_box, "--out", saved_box / "out")
+    assert result.returncode == 1
+    lines = [line for line in result.stderr.splitlines() if line.startswith("bake: ")]
+    assert len(lines) == 1 and str(saved_box) in lines[0]
+    assert "bundles" not in result.stdout
+
+
+def test_blender_starts_in_a_shell_with_another_python(tmp_path):
+    # Another Python first on PATH that has nothing, as an active virtual environment has it.
+    folder = tmp_path / "venv" / "bin"
+    folder.mkdir(parents=True)
+    (folder.parent / "pyvenv.cfg").write_text("home = /usr/bin\nversion = 3.11\n")
+    for name in ("python", "python3"):
+        (folder / name).symlink_to("/usr/bin/python3")
+    environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}",
+                   "VIRTUAL_ENV": str(folder.parent), "PYTHONHOME": str(folder.parent),
+                   "PYTHONPATH": str(folder), "BLENDER": bpy.app.binary_path}
+    script = (f'. {SCRIPT.parent.parent / "setup.sh"}; use_own_environment; '
+              'exec "$blender" -b --factory-startup --python-exit-code 1 --python-expr '
+              '"import numpy; print(\'numpy is there\')"')
+    result = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True,
+                            timeout=60)
+    assert result.returncode == 0 and "numpy is there" in result.stdout, result.stderr

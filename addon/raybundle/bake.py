@@ -148,7 +148,8 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
             selected |= {original for original, copy in find_copies(context.scene).items()
                          if copy in selected}
     with originals_shown(context.scene) if refine else nullcontext():
-        export = export_scene(context, selected, light_sets, settings.patch_size)
+        export = export_scene(context, selected, light_sets, settings.patch_size,
+                              settings.attribute)
     _leave_out_unwritable(export, settings)
     if not export.targets:
         reasons = "; ".join(f'"{name}" {status}' for name, status in export.statuses.items())
@@ -289,6 +290,10 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
         status = native_report['objects'][item.target.instance]['status']
         error = native_report['objects'][item.target.instance]['error']
         reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status, error))
+    for original, copy in copies.items():
+        export.last.share(original, copy)
+    names = {settings.attribute, *(name for item in lights for name in item.set_lights)}
+    export.last.write(names)
     _warn_of_clipping(lights, settings, export)
     return reports
 

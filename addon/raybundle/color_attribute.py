@@ -74,6 +74,13 @@ def activate(mesh: bpy.types.Mesh, name: str) -> bool:
     return False
 
 
+def rendered_attribute(mesh: bpy.types.Mesh) -> bpy.types.Attribute | None:
+    """The render colour attribute."""
+    index = mesh.color_attributes.render_color_index
+    # The index is -1, or past the end, when there is none.
+    return mesh.color_attributes[index] if 0 <= index < len(mesh.color_attributes) else None
+
+
 def clear(mesh: bpy.types.Mesh, name: str) -> bool:
     """Remove the attribute and its error's; False if there is none."""
     clear_error(mesh, name)

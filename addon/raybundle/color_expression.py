@@ -8,6 +8,7 @@ operation that leaves it (image times image, say) replaces one operand by its me
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 
 import numpy as np
 
@@ -15,6 +16,14 @@ BLACK = np.zeros(3)
 WHITE = np.ones(3)
 
 IDENTITY_UV = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+class Result(IntEnum):
+    """What a colour has of the result of a bake (shown_results.py), which is no colour."""
+
+    NONE = 0
+    FACTOR = 1  # is multiplied by it, which counts as 1
+    ALONE = 2  # is it, or is mixed of it: the rest of the expression is a guess
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,7 @@ class ColorExpression:
     texture_weight: np.ndarray = field(default_factory=lambda: BLACK)  # (3,)
     attribute: str | None = None  # "" is the render colour attribute
     attribute_weight: np.ndarray = field(default_factory=lambda: BLACK)  # (3,)
+    result: Result = Result.NONE
 
     @property
     def is_constant(self) -> bool:
@@ -51,7 +61,8 @@ class ColorExpression:
         """This colour times a constant, per channel."""
         return ColorExpression(
             self.constant * factor, self.texture, self.texture_weight * factor,
-            self.attribute, self.attribute_weight * factor).simplified()
+            self.attribute, self.attribute_weight * factor,
+            self.result if np.any(factor) else Result.NONE).simplified()
 
     def simplified(self) -> ColorExpression:
         """Without terms of weight 0, so that they raise no needless questions later."""
@@ -60,7 +71,7 @@ class ColorExpression:
             self.constant,
             self.texture if textured else None, self.texture_weight if textured else BLACK,
             self.attribute if attributed else None,
-            self.attribute_weight if attributed else BLACK)
+            self.attribute_weight if attributed else BLACK, self.result)
 
     def can_add(self, other: ColorExpression) -> bool:
         """Whether plus() is exact."""
@@ -71,12 +82,12 @@ class ColorExpression:
     def plus(self, other: ColorExpression) -> ColorExpression:
         """The sum; where can_add() is False, the other's varying terms count with their mean."""
         if not self.can_add(other):
-            other = ColorExpression(other.mean())
+            other = ColorExpression(other.mean(), result=other.result)
         return ColorExpression(
             self.constant + other.constant,
             self.texture or other.texture, self.texture_weight + other.texture_weight,
             other.attribute if self.attribute is None else self.attribute,
-            self.attribute_weight + other.attribute_weight)
+            self.attribute_weight + other.attribute_weight, max(self.result, other.result))
 
     def mean(self) -> np.ndarray:
         """(3,); of an attribute, whose values belong to a mesh, half its range is assumed."""

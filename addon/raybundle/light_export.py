@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from .image_export import ImagePixels
+from .left_out import NO_CAUSTICS, has_light_linking
 from .node_reader import NodeReader, output_node
 from .scene_data import AreaLightData, LightData, PointLightData, SunLightData, Warnings
 
@@ -109,9 +110,9 @@ def _warn_of_unread_options(light_object: bpy.types.Object, warnings: Warnings) 
     if bounces < _ALL_BOUNCES:
         warnings.add(f'light "{name}": its light is reflected without end and not {bounces} times '
                      f'at most')
-    # From 4.0 on.
-    linking = getattr(light_object, 'light_linking', None)
-    if linking and (linking.receiver_collection or linking.blocker_collection):
+    if getattr(_cycles_settings(light_object.data), 'is_caustics_light', False):
+        warnings.add(f'light "{name}": {NO_CAUSTICS}')
+    if has_light_linking(light_object):
         warnings.add(f'light "{name}": its light linking is not read, it lights all objects')
 
 

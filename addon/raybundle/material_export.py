@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import bpy
@@ -11,13 +12,27 @@ import numpy as np
 from .color_expression import WHITE, ColorExpression, Texture
 from .diffuse_angles import lambert
 from .image_export import ImagePixels
+from .last_surfaces import LastSurface, LastSurfaces
 from .layers import LOBES
-from .node_reader import NodeReader, Surface, output_node
+from .node_reader import NodeReader, output_node
 from .scene_data import ImageData, MaterialData, SceneData, Warnings
+from .shown_results import RENDERED, attributes_read
+from .surface import Surface
 from .surface_bake import BakedMaterial
 
 # What Blender shows where a face has no material.
 DEFAULT_REFLECTANCE = 0.8
+
+
+@dataclass(frozen=True)
+class SlotMaterial:
+    """A material as an object has it in a slot."""
+
+    material: bpy.types.Material | None  # original; None is the grey default
+    # For one that shows the result of a bake: whether the mesh's render colour attribute is one,
+    # and what the last bake took the slot for (last_surfaces.py), if that counts.
+    renders_result: bool = False
+    last: str | None = None
 
 
 @dataclass(frozen=True)
@@ -28,6 +43,16 @@ class MaterialExport:
     texture: Texture | None = None
     attribute: str | None = None
     baked_uvs: bool = False  # the images are laid out by surface_bake.py
+    surface: LastSurface | None = None  # for the next bake; None: a guess
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """What a material shows of results."""
+
+    any: bool = False
+    only: bool = False  # nothing else of its colour
+    tells_emission: bool = False
 
 
 def _share_coordinates(*colors: ColorExpression) -> bool:
@@ -76,44 +101,83 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
 class MaterialExporter:
     """Adds each material, and each image it uses, once to the scene.
 
-    filter_glossy: see gloss.filter_glossy_of.
+    filter_glossy: see gloss.filter_glossy_of. results: names of the attributes that bakes write to.
+    last: what the last bake took materials for.
     """
 
-    def __init__(self, scene: SceneData, warnings: Warnings,
-                 filter_glossy: float | None = 1.0) -> None:
+    def __init__(self, scene: SceneData, warnings: Warnings, filter_glossy: float | None = 1.0,
+                 results: frozenset[str] = frozenset(), last: LastSurfaces | None = None) -> None:
         self.scene = scene
         self.warnings = warnings
         self.filter_glossy = filter_glossy
+        self.results = results
+        self.last = last
         self.images = ImagePixels()
-        self._materials: dict[bpy.types.Material | None, MaterialExport] = {}
-        self._unread: dict[bpy.types.Material, str | None] = {}
+        self.showing: dict[str, None] = {}  # names of exported materials that show results
+        self._attributes: dict[bpy.types.Material | None, set[str]] = {}
+        self._plain: dict[bpy.types.Material | None, SlotMaterial] = {}  # show no result
+        self._shown: dict[tuple[bpy.types.Material, bool], _Shown] = {}
+        self._materials: dict[SlotMaterial, MaterialExport] = {}
+        self._baked: dict[bpy.types.Material, int] = {}  # by Cycles; one of its indices
+        self._unread: dict[SlotMaterial, str | None] = {}
         self._image_indices: dict[tuple[str, str], int] = {}
 
-    def export(self, material: bpy.types.Material | None) -> MaterialExport:
-        """material: original or evaluated; None is the grey default."""
-        key = material.original if material else None
-        if key not in self._materials:
-            self._materials[key] = self._export(material)
-        return self._materials[key]
+    def slot(self, material: bpy.types.Material | None, renders_result: Callable[[], bool],
+             last: Callable[[], str | None]) -> SlotMaterial:
+        """renders_result, last: see SlotMaterial; asked for if they matter."""
+        key = material.original if material is not None else None
+        if key in self._plain:
+            return self._plain[key]
+        if key not in self._attributes:
+            self._attributes[key] = (set() if key is None or material.node_tree is None
+                                     else attributes_read(material.node_tree))
+        read = self._attributes[key]
+        if RENDERED not in read and self.results.isdisjoint(read):
+            self._plain[key] = SlotMaterial(key)
+            return self._plain[key]
+        slot = SlotMaterial(key, RENDERED in read and renders_result())
+        return replace(slot, last=last()) if self._shows(material, slot).only else slot
 
-    def unread(self, material: bpy.types.Material) -> str | None:
-        """What of the material only Cycles can tell, if anything."""
-        key = material.original
+    def export(self, slot: SlotMaterial, material: bpy.types.Material | None = None
+               ) -> MaterialExport:
+        """material: the evaluated one; None: as the original."""
+        if slot not in self._materials:
+            self._materials[slot] = self._export(slot, material or slot.material)
+        return self._materials[slot]
+
+    def exported(self) -> Iterator[tuple[bpy.types.Material, bool]]:
+        """Original materials, each with whether it lets light straight through."""
+        for slot, export in self._materials.items():
+            if slot.material is not None:
+                yield slot.material, self.scene.materials[export.index].opacity < 1.0
+        for material, index in self._baked.items():
+            yield material, self.scene.materials[index].opacity_image is not None
+
+    def unread(self, slot: SlotMaterial, material: bpy.types.Material) -> str | None:
+        """What of the (evaluated) material only Cycles can tell, if anything."""
+        key = replace(slot, last=None)
         if key not in self._unread:
-            surface = self._surface(material, False, Warnings(), unread := [])
+            surface = self._surface(material, False, Warnings(), unread := [],
+                                    results=self._results(slot))
             if not unread and not _share_coordinates(surface.reflectance, surface.radiance):
                 unread.append("its emission, which varies in another way than its reflectance")
             if not unread and not _is_laid_out(surface.translucence, surface.reflectance,
                                                surface.radiance):
                 unread.append("its translucence, which varies in another way than its reflectance")
+            if self._shows(material, slot).only:
+                unread.clear()
             self._unread[key] = unread[0] if unread else None
         return self._unread[key]
 
-    def add_baked(self, material: bpy.types.Material, baked: BakedMaterial) -> MaterialExport:
+    def add_baked(self, slot: SlotMaterial, material: bpy.types.Material, baked: BakedMaterial
+                  ) -> MaterialExport:
         """A material as Cycles baked it for the faces of one object (surface_bake.py)."""
+        if self._shows(material, slot).any:
+            self.showing[material.name] = None
         # What both ways only approximate is still named.
         approximated = Warnings()
-        surface = self._surface(material, False, approximated, [], baked.diffuse_color).limited()
+        surface = self._surface(material, False, approximated, [], baked.diffuse_color,
+                                self._results(slot)).limited()
         for text in (*approximated, baked.message):
             self.warnings.add(text)
         index = {}
@@ -134,12 +198,72 @@ class MaterialExporter:
             **self._scattering([surface] * 2),
             translucence_image=index.get('translucence'),
             translucence_image_weight=None if baked.translucence is None else np.ones((2, 3))))
-        return MaterialExport(len(self.scene.materials) - 1, baked_uvs=True)
+        self._baked[material.original] = len(self.scene.materials) - 1
+        # The images are not kept, their means are.
+        mean = replace(surface, radiance=ColorExpression(baked.radiance_color),
+                       transmittance=baked.transmittance,
+                       translucence=ColorExpression(baked.translucence_color))
+        return MaterialExport(len(self.scene.materials) - 1, baked_uvs=True,
+                              surface=LastSurface(material.name, (mean, mean)))
 
-    def _export(self, material: bpy.types.Material | None) -> MaterialExport:
-        name = material.name if material else "(none)"
-        sides = [self._surface(material, backfacing, self.warnings).limited()
-                 for backfacing in (False, True)]
+    def _export(self, slot: SlotMaterial, material: bpy.types.Material | None) -> MaterialExport:
+        shown = self._shows(material, slot)
+        # What is not used of a material is no warning.
+        warnings = Warnings() if shown.only else self.warnings
+        sides = [self._surface(material, backfacing, warnings, results=self._results(slot)
+                               ).limited() for backfacing in (False, True)]
+        surface = LastSurface(material.name if material else "(none)", tuple(sides))
+        if shown.any:
+            self.showing[material.name] = None
+        if not shown.only:
+            return replace(self._add(surface.material, sides), surface=surface)
+        last = self.last and self.last.surface(slot.last)
+        if last is None:
+            return self._guess(material.name, sides, shown)
+        if last.material == material.name and shown.tells_emission:
+            # That may have been changed since.
+            last = replace(last, sides=tuple(replace(kept, radiance=side.radiance)
+                                             for kept, side in zip(last.sides, sides)))
+        return replace(self._add(material.name, list(last.sides)), surface=last)
+
+    def _guess(self, name: str, sides: list[Surface], shown: _Shown) -> MaterialExport:
+        """For a material that shows results alone, where no bake has been before."""
+        if any(np.any(side.reflectance.mean() + side.translucence.mean() > 0.0) for side in sides):
+            self.warnings.add(
+                f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
+                f'its own colour: that of the socket it is linked to is used; set it there, or link '
+                f'the result through a Multiply node')
+        else:
+            grey = Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
+            sides = [replace(grey, transmittance=side.transmittance) for side in sides]
+            self.warnings.add(
+                f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
+                f'its own colour: grey of {DEFAULT_REFLECTANCE} is used; bake with its own material '
+                f'first')
+        return self._add(name, sides)
+
+    def _results(self, slot: SlotMaterial) -> frozenset[str]:
+        return self.results | {RENDERED} if slot.renders_result else self.results
+
+    def _shows(self, material: bpy.types.Material | None, slot: SlotMaterial) -> _Shown:
+        """material: the evaluated one of the slot."""
+        results = self._results(slot)
+        if material is None or results.isdisjoint(self._attributes.get(material.original, ())):
+            return _Shown()
+        key = material.original, slot.renders_result
+        if key not in self._shown:
+            parts = []
+            for backfacing in (False, True):
+                reader, surface = self._read(material, backfacing, Warnings(), Warnings(), None,
+                                             results)
+                parts.append((reader is not None and reader.shows_result,
+                              reader is not None and reader.shows_only_result(surface),
+                              reader is not None and reader.tells_emission
+                              and not reader.emits_result))
+            self._shown[key] = _Shown(*(any(values) for values in zip(*parts)))
+        return self._shown[key]
+
+    def _add(self, name: str, sides: list[Surface]) -> MaterialExport:
         if not sides[0].reflectance.same_variation(sides[1].reflectance):
             # The native library lays an image on both sides alike.
             self.warnings.add(f'material "{name}": an image or attribute differs between the '
@@ -205,26 +329,36 @@ class MaterialExporter:
                               texture or glow_texture or passed_texture,
                               glow_attribute if attribute is None else attribute)
 
-    def _surface(self, material: bpy.types.Material | None, backfacing: bool,
-                 warnings: Warnings, unread: list[str] | None = None,
-                 unread_color: np.ndarray | None = None) -> Surface:
-        """unread: gets what is inexact, which then is no warning. unread_color: see NodeReader."""
+    def _surface(self, material: bpy.types.Material | None, backfacing: bool, warnings: Warnings,
+                 unread: list[str] | None = None, unread_color: np.ndarray | None = None,
+                 results: frozenset[str] = frozenset()) -> Surface:
+        """unread: gets what is inexact, which then is no warning. Others: see NodeReader."""
+        reader, surface = self._read(material, backfacing, warnings,
+                                     None if unread is None else Warnings(), unread_color, results)
+        if unread is not None and reader is not None:
+            unread += reader.unread
+        return surface
+
+    def _read(self, material: bpy.types.Material | None, backfacing: bool, warnings: Warnings,
+              inexact: Warnings | None, unread_color: np.ndarray | None,
+              results: frozenset[str]) -> tuple[NodeReader | None, Surface]:
+        """Without a reader where there are no nodes."""
         if material is None:
-            return Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
+            return None, Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
         # From 5.0 on every material has nodes and use_nodes only warns.
         if bpy.app.version < (5, 0, 0) and not material.use_nodes or material.node_tree is None:
-            return Surface.matt(ColorExpression(np.array(material.diffuse_color[:3])))
+            return None, Surface.matt(ColorExpression(np.array(material.diffuse_color[:3])))
         output = output_node(material.node_tree)
         if output is None:
             warnings.add(f'material "{material.name}" has no output node: it is black')
-            return Surface()
+            return None, Surface()
+        if output.inputs['Volume'].is_linked and not output.inputs['Surface'].is_linked:
+            # A border between two kinds of air.
+            return None, Surface(transmittance=WHITE)
         reader = NodeReader(f'material "{material.name}"', self.images, warnings, backfacing,
-                            None if unread is None else Warnings(), varying_emission=True,
-                            filter_glossy=self.filter_glossy, unread_color=unread_color)
-        surface = reader.surface(output.inputs['Surface'])
-        if unread is not None:
-            unread += reader.unread
-        return surface
+                            inexact, varying_emission=True, filter_glossy=self.filter_glossy,
+                            unread_color=unread_color, results=results)
+        return reader, reader.surface(output.inputs['Surface'])
 
     @staticmethod
     def _scattering(sides: list[Surface]) -> dict[str, np.ndarray | int]:

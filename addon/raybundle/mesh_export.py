@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from .color_attribute import rendered_attribute
 from .color_expression import Texture
 from .material_export import MaterialExport
 from .scene_data import MeshData
@@ -214,8 +215,4 @@ def _corner_colors(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport],
 
 
 def _color_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    if name:
-        return mesh.color_attributes.get(name)
-    index = mesh.color_attributes.render_color_index
-    # The index is -1, or past the end, when there is none.
-    return mesh.color_attributes[index] if 0 <= index < len(mesh.color_attributes) else None
+    return mesh.color_attributes.get(name) if name else rendered_attribute(mesh)

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
-from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Texture
-from .diffuse_angles import TERMS, oren_nayar
+from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Texture
 from .gloss import gloss_albedo, seen_roughness
 from .image_export import ImagePixels, sphere_mean
 from .layers import Layer, microfibers, velvet
@@ -25,6 +24,8 @@ from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, 
                          SPECULAR_TINT, principled_albedo, sheen_on)
 from .scattering import BURLEY, OREN_NAYAR, Scattering
 from .scene_data import Warnings
+from .shown_results import reads_result
+from .surface import Surface
 
 # Values of the Light Path node as diffuse light sees a surface.
 LIGHT_PATH = {'Is Diffuse Ray': 1.0, 'Is Reflection Ray': 1.0, 'Ray Depth': 1.0,
@@ -59,67 +60,6 @@ MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughne
 
 
 @dataclass(frozen=True)
-class Surface:
-    """What a shader is to diffuse light, seen from one side."""
-
-    reflectance: ColorExpression = field(default_factory=ColorExpression)
-    radiance: ColorExpression = field(default_factory=ColorExpression)
-    transmittance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) straight through
-    # What of the reflectance is a diffuse colour.
-    diffuse: ColorExpression = field(default_factory=ColorExpression)
-    # (TERMS, 3): how the reflectance depends on the light's angle (diffuse_angles.py).
-    reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (1 + TERMS, 3): what is seen of light by its angle, times the mean of the diffuse colour.
-    shown_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((1 + TERMS, 3)))
-    # What leaves it, diffusely, of the light on the other side.
-    translucence: ColorExpression = field(default_factory=ColorExpression)
-    scattering: Scattering = field(default_factory=Scattering)
-
-    @staticmethod
-    def matt(color: ColorExpression, roughness: float = 0.0) -> Surface:
-        mean = np.maximum(color.mean(), 0.0)
-        angles = oren_nayar(roughness, mean)
-        return Surface(color.scaled(angles.albedo), diffuse=color,
-                       reflected_by_angle=mean * angles.reflected,
-                       shown_by_angle=mean * angles.shown,
-                       scattering=Scattering.matt(mean, OREN_NAYAR, roughness))
-
-    @property
-    def emission(self) -> np.ndarray:
-        """(3,), the mean radiance."""
-        return self.radiance.mean()
-
-    def covered(self, layer: Layer, color: np.ndarray) -> Surface:
-        """Beneath a layer. color: (3,), times the layer's albedo."""
-        share = layer.taken(color)
-        under, above = 1.0 - share * layer.albedo, 1.0 - share * layer.above
-        return Surface(
-            self.reflectance.scaled(under).plus(ColorExpression(color * layer.albedo)),
-            self.radiance.scaled(under), self.transmittance * under,
-            self.diffuse.scaled(above).plus(ColorExpression(color * layer.above)),
-            self.reflected_by_angle * under + layer.arriving[:, None] * color,
-            self.shown_by_angle * above + layer.shown[:, None] * color,
-            self.translucence.scaled(under),
-            self.scattering.covered(share, layer).plus(Scattering.clothed(color, layer)))
-
-    def limited(self) -> Surface:
-        """With parts that fit a reflectance of 1, where the whole, which the native library clamps,
-        is more."""
-        whole = self.reflectance.mean()
-        if not np.any(whole > 1.0):
-            return self
-        share = 1.0 / np.maximum(whole, 1.0)
-        return replace(self, reflected_by_angle=self.reflected_by_angle * share,
-                       scattering=self.scattering.limited(share))
-
-    def scaled(self, factor: float) -> Surface:
-        return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
-                       self.transmittance * factor, self.diffuse.scaled(factor),
-                       self.reflected_by_angle * factor, self.shown_by_angle * factor,
-                       self.translucence.scaled(factor), self.scattering.scaled(factor))
-
-
-@dataclass(frozen=True)
 class _Source:
     """Where a socket's value comes from: an output of a node, or (node None) the socket itself."""
 
@@ -136,13 +76,15 @@ class NodeReader:
     goes to `inexact`, for there is another way to it (surface_bake.py); by default it is a warning
     too. varying_emission: whether emission may be more than a constant. filter_glossy: see
     gloss.filter_glossy_of. unread_color: (3,), what stands for colours that cannot be read; None:
-    that of the socket.
+    that of the socket. results: names of the attributes that are results of a bake: as emission
+    they count 0, as a factor 1, and where they are a colour alone that of the socket is used.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
                  backfacing: bool = False, inexact: Warnings | None = None,
                  varying_emission: bool = False, filter_glossy: float | None = 1.0,
-                 unread_color: np.ndarray | None = None) -> None:
+                 unread_color: np.ndarray | None = None,
+                 results: frozenset[str] = frozenset()) -> None:
         self.owner = owner  # what warnings name, such as 'material "Wall"'
         self.images = images
         self.warnings = warnings
@@ -152,6 +94,22 @@ class NodeReader:
         self.filter_glossy = filter_glossy
         self.unread_color = unread_color
         self.unread: list[str] = []  # what is inexact, without the consequences
+        self.results = results
+        self.color_result = Result.NONE  # the most that a shader's colour has of a result
+        self.emits_result = False
+        self.tells_emission = False  # whether a shader emits, or would if it were switched on
+        self._result_values = 0  # how often a result was read as a value
+
+    @property
+    def shows_result(self) -> bool:
+        return bool(self.color_result or self.emits_result or self._result_values)
+
+    def shows_only_result(self, surface: Surface) -> bool:
+        """Whether a surface that was read tells nothing of its own colour, and perhaps light."""
+        if self.color_result == Result.ALONE:
+            return True
+        own = surface.diffuse, surface.translucence, surface.radiance
+        return self.emits_result and not any(np.any(color.mean() > 0.0) for color in own)
 
     # ----------------------------------------------------------------------------------------------
     # Shaders
@@ -165,7 +123,7 @@ class NodeReader:
         if node is None:
             return Surface()
         if node.type == 'BSDF_DIFFUSE':
-            return Surface.matt(self.color(node.inputs['Color'], path),
+            return Surface.matt(self._own_color(node.inputs['Color'], path),
                                 self._usual(node, *GLOSS_SOCKETS[0], path))
         if node.type == 'BSDF_PRINCIPLED':
             return self._principled(node, path)
@@ -173,13 +131,12 @@ class NodeReader:
             self._warn(node, MIRRORS)
             return self._glossy(node, path)
         if node.type in ('EMISSION', 'BACKGROUND'):
-            strength = self.value(node.inputs['Strength'], path)
             return Surface(
-                radiance=self._emission_color(node.inputs['Color'], path).scaled(strength))
+                radiance=self._radiance(node.inputs['Color'], node.inputs['Strength'], path))
         if node.type == 'BSDF_TRANSPARENT':
             return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
         if node.type == 'BSDF_TRANSLUCENT':
-            return Surface(translucence=self.color(node.inputs['Color'], path))
+            return Surface(translucence=self._own_color(node.inputs['Color'], path))
         if node.type in ('BSDF_GLASS', 'BSDF_REFRACTION'):
             self._warn(node, "lets light through: it goes straight on here, and nothing is "
                              "reflected")
@@ -196,7 +153,7 @@ class NodeReader:
             return self._cloth(node, path)
         if node.type == 'SUBSURFACE_SCATTERING':
             self._warn(node, "is read as a diffuse surface")
-            return Surface.matt(self.color(node.inputs['Color'], path))
+            return Surface.matt(self._own_color(node.inputs['Color'], path))
         self._warn(node, "is not diffuse: it reflects nothing and stops the light")
         return Surface()
 
@@ -205,10 +162,7 @@ class NodeReader:
         transmission = _input(node, 'Transmission Weight', 'Transmission')
         emission = _input(node, 'Emission Color', 'Emission')
         alpha = float(np.clip(self.value(node.inputs['Alpha'], path), 0.0, 1.0))
-        strength = self.value(node.inputs['Emission Strength'], path)
-        radiance = ColorExpression()
-        if strength:
-            radiance = self._emission_color(emission, path).scaled(strength)
+        radiance = self._radiance(emission, node.inputs['Emission Strength'], path)
         base = self._base_color(node, path)
         metallic = float(np.clip(self.value(node.inputs['Metallic'], path), 0.0, 1.0))
         if metallic > 0.0:
@@ -248,7 +202,7 @@ class NodeReader:
         return replace(surface, transmittance=surface.transmittance + WHITE * (1.0 - alpha))
 
     def _cloth(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
-        color = self.color(node.inputs['Color'], path)
+        color = self._own_color(node.inputs['Color'], path)
         layer = cloth_layer(node, self._usual(node, *CLOTH_ROUGHNESS, path))
         surface = Surface().covered(layer, np.maximum(color.mean(), 0.0))
         return replace(surface, reflectance=color.scaled(layer.albedo),
@@ -257,19 +211,19 @@ class NodeReader:
     def _base_color(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]
                     ) -> ColorExpression:
         """What is scattered under the surface has a colour of its own before 4.0."""
-        base = self.color(node.inputs['Base Color'], path)
+        base = self._own_color(node.inputs['Base Color'], path)
         if 'Subsurface Color' not in node.inputs:
             return base
         share = float(np.clip(self.value(node.inputs['Subsurface'], path), 0.0, 1.0))
         if share == 0.0:
             return base
-        under = self.color(node.inputs['Subsurface Color'], path)
+        under = self._own_color(node.inputs['Subsurface Color'], path)
         return self._plus(base.scaled(1.0 - share), under.scaled(share), node)
 
     def _glossy(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
         if self.filter_glossy is None:
             return Surface()
-        color = self.color(_input(node, 'Color', 'Base Color'), path)
+        color = self._own_color(_input(node, 'Color', 'Base Color'), path)
         roughness = self._usual(node, *GLOSS_SOCKETS[0], path)
         mean = np.maximum(np.clip(color.mean(), 0.0, 1.0), 1e-6)
         gloss = glossy_albedo(node, roughness, mean, self.filter_glossy,
@@ -309,7 +263,7 @@ class NodeReader:
 
     def _transmitted(self, node: bpy.types.Node, socket: bpy.types.NodeSocket,
                      path: tuple[bpy.types.Node, ...]) -> np.ndarray:
-        color = self.color(socket, path)
+        color = self._own_color(socket, path)
         if not color.is_constant:
             self._inexact(node, f"has a varying {socket.name}: its mean is used")
         return np.clip(color.mean(), 0.0, 1.0)
@@ -333,10 +287,19 @@ class NodeReader:
 
     def color(self, socket: bpy.types.NodeSocket,
               path: tuple[bpy.types.Node, ...] = ()) -> ColorExpression:
-        source = _follow(socket, path)
+        values = self._result_values
+        color = self._read_color(_follow(socket, path))
+        if self._result_values > values and not color.result:
+            # As the share of a mix, say.
+            color = replace(color, result=Result.FACTOR)
+        return color
+
+    def _read_color(self, source: _Source) -> ColorExpression:
         node, path = source.node, source.path
         if node is None:
             return ColorExpression(_default_color(source.socket))
+        if reads_result(node, source.output, self.results):
+            return _only_result(source)
         if node.type == 'RGB':
             return ColorExpression(_default_color(node.outputs[0]))
         if node.type == 'TEX_IMAGE':
@@ -350,10 +313,63 @@ class NodeReader:
         if node.type in _COLOR_FILTERS:
             return self._filter(node, path)
         if node.type in _VALUE_NODES:
-            return ColorExpression(WHITE * self._node_value(source))
+            values = self._result_values
+            value = self._node_value(source)
+            return (ColorExpression(WHITE * value) if self._result_values == values
+                    else _only_result(source))
+        behind = self._result_behind(node, path)
+        if behind == Result.ALONE:
+            return _only_result(source)
         self._inexact(node, "cannot be read: the colour of the socket it is linked to is used")
         return ColorExpression(_default_color(source.socket) if self.unread_color is None
-                               else self.unread_color)
+                               else self.unread_color, result=behind)
+
+    def _own_color(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
+                   ) -> ColorExpression:
+        """Of what a shader does with light."""
+        color = self.color(socket, path)
+        self.color_result = max(self.color_result, color.result)
+        return color
+
+    def _radiance(self, color: bpy.types.NodeSocket, strength: bpy.types.NodeSocket,
+                  path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        values, inexact, unread = self._result_values, len(self.inexact), len(self.unread)
+        factor = self.value(strength, path)
+        radiance = self._emission_color(color, path).scaled(factor) if factor else ColorExpression()
+        if not radiance.result and self._result_values == values:
+            # A Principled shader that was just added is white and switched off from 4.0 on.
+            is_usual = (color.node.type == 'BSDF_PRINCIPLED' and bpy.app.version >= (4, 0, 0)
+                        and factor == 0.0)
+            self.tells_emission |= not is_usual and bool(
+                color.is_linked or np.any(_default_color(color)))
+            return radiance
+        # The light of a bake is none of the scene's, whatever it is multiplied by.
+        del self.inexact[inexact:], self.unread[unread:]
+        self.emits_result = True
+        return ColorExpression()
+
+    def _result_behind(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Result:
+        """What a node that cannot be read has of a result: ALONE if nothing else that is linked
+        goes into it."""
+        has_result = has_others = False
+        pending, seen = [(node, path)], set()
+        while pending and self.results:
+            current, path = pending.pop()
+            if current in seen:
+                continue
+            seen.add(current)
+            sources = [_follow(socket, path) for socket in current.inputs]
+            linked = [source for source in sources if source.node is not None]
+            has_others |= (not linked and current.type != 'VALUE'
+                           or current.type.startswith('TEX_'))
+            for source in linked:
+                if reads_result(source.node, source.output, self.results):
+                    has_result = True
+                else:
+                    pending.append((source.node, source.path))
+        if not has_result:
+            return Result.NONE
+        return Result.FACTOR if has_others else Result.ALONE
 
     def _emission_color(self, socket: bpy.types.NodeSocket,
                         path: tuple[bpy.types.Node, ...]) -> ColorExpression:
@@ -362,7 +378,7 @@ class NodeReader:
         if color.is_constant or self.varying_emission:
             return color
         self._warn(socket.node, f"has a varying {socket.name}: its mean is used")
-        return ColorExpression(color.mean())
+        return ColorExpression(color.mean(), result=color.result)
 
     def _image(self, node: bpy.types.Node, output: bpy.types.NodeSocket,
                path: tuple[bpy.types.Node, ...]) -> ColorExpression:
@@ -452,6 +468,11 @@ class NodeReader:
             return ColorExpression(WHITE * 0.5)
         share = float(np.clip(self.value(factor, path), 0.0, 1.0))
         a, b = self.color(first, path), self.color(second, path)
+        if (Result.ALONE in (a.result, b.result)
+                and node.blend_type not in ('MIX', 'ADD', 'SUBTRACT', 'MULTIPLY')):
+            # The result counts as not there.
+            return a if a.result == b.result else replace(
+                b if a.result == Result.ALONE else a, result=Result.FACTOR)
         if node.blend_type == 'MIX':
             return self._plus(a.scaled(1.0 - share), b.scaled(share), node)
         if node.blend_type == 'ADD':
@@ -461,18 +482,23 @@ class NodeReader:
         if node.blend_type == 'MULTIPLY':
             return self._plus(a.scaled(1.0 - share), self._times(a, b, node).scaled(share), node)
         self._inexact(node, f"blends by {node.blend_type}: its first colour is used")
-        return a
+        return replace(a, result=max(a.result, b.result))
 
     def _filter(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
         name = {'VALTORGB': 'Fac', 'CLAMP': 'Value'}.get(node.type, 'Color')
         color = self.color(_input(node, name, 'Factor'), path)
+        if color.result == Result.ALONE:
+            return color
         if node.type == 'VALTORGB' and color.is_constant:
-            return ColorExpression(np.array(node.color_ramp.evaluate(color.constant.mean())[:3]))
+            return ColorExpression(np.array(node.color_ramp.evaluate(color.constant.mean())[:3]),
+                                   result=color.result)
         if node.type == 'VALTORGB':
             self._inexact(node, "maps a varying colour: its value for the mean is used")
-            return ColorExpression(np.array(node.color_ramp.evaluate(color.mean().mean())[:3]))
+            return ColorExpression(np.array(node.color_ramp.evaluate(color.mean().mean())[:3]),
+                                   result=color.result)
         if node.type == 'RGBTOBW' and color.is_constant:
-            return ColorExpression(WHITE * (color.constant @ [0.2126, 0.7152, 0.0722]))
+            return ColorExpression(WHITE * (color.constant @ [0.2126, 0.7152, 0.0722]),
+                                   result=color.result)
         self._inexact(node, "is left out: the colour that goes into it is used")
         return color
 
@@ -484,12 +510,14 @@ class NodeReader:
 
     def _times(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
                ) -> ColorExpression:
+        if Result.ALONE in (a.result, b.result):
+            return _times_result(a, b)
         if a.is_constant:
-            return b.scaled(a.constant)
+            return replace(b.scaled(a.constant), result=max(a.result, b.result))
         if not b.is_constant:
             self._inexact(node, "multiplies two images or attributes: the mean of the second is "
                                 "used")
-        return a.scaled(b.mean())
+        return replace(a.scaled(b.mean()), result=max(a.result, b.result))
 
     # ----------------------------------------------------------------------------------------------
     # Values
@@ -503,6 +531,9 @@ class NodeReader:
 
     def _node_value(self, source: _Source) -> float:
         node, path = source.node, source.path
+        if reads_result(node, source.output, self.results):
+            self._result_values += 1
+            return 1.0
         if node.type == 'VALUE':
             return node.outputs[0].default_value
         if node.type == 'NEW_GEOMETRY' and source.output.name == 'Backfacing':
@@ -520,8 +551,15 @@ class NodeReader:
             return min(max(result, 0.0), 1.0) if node.use_clamp else result
         if node.type in ('RGB', 'MIX', 'MIX_RGB', 'CLAMP'):
             color = self.color(source.socket, path)
+            self._result_values += bool(color.result)
+            if color.result == Result.ALONE:
+                return 1.0
             if color.is_constant:
                 return float(color.constant @ [0.2126, 0.7152, 0.0722])
+        behind = self._result_behind(node, path)
+        self._result_values += bool(behind)
+        if behind == Result.ALONE:
+            return 1.0
         self._inexact(node, f"is no constant: the value of the socket {source.socket.name} is "
                             f"used")
         return _default_value(source.socket)
@@ -618,6 +656,19 @@ def _group_output(tree: bpy.types.NodeTree, identifier: str) -> bpy.types.NodeSo
 
 def _input(node: bpy.types.Node, *names: str) -> bpy.types.NodeSocket:
     return next(node.inputs[name] for name in names if name in node.inputs)
+
+
+def _only_result(source: _Source) -> ColorExpression:
+    return ColorExpression(_default_color(source.socket), result=Result.ALONE)
+
+
+def _times_result(a: ColorExpression, b: ColorExpression) -> ColorExpression:
+    """Of which one at least is a result."""
+    result, other = (a, b) if a.result == Result.ALONE else (b, a)
+    # What no surface has as a colour makes the result brighter or leaves it as it is.
+    if other.result == Result.ALONE or other.is_constant and other.constant.max() >= 1.0:
+        return result
+    return replace(other, result=Result.FACTOR)
 
 
 def _default_color(socket: bpy.types.NodeSocket) -> np.ndarray:

@@ -6,6 +6,7 @@ import bpy
 from . import bake_cache, color_attribute, viewport_preview
 from .bake import bake
 from .bake_report import BakeError
+from .last_surfaces import LastSurfaces
 from .light_sets import written_attributes
 from .native import ErrorCode, RaybundleError
 from .subdivided_copy import remove_copies
@@ -93,6 +94,7 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
         for name in written_attributes(scene):
             for mesh in meshes:
                 color_attribute.clear(mesh, name)
+        LastSurfaces(scene).forget_attributes()
         scene.raybundle.report = ""
         bake_cache.discard(scene)
         self.report({'INFO'}, f'Attribute "{scene.raybundle.attribute}" removed from {cleared} '

@@ -290,6 +290,9 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     light_set_index: IntProperty(name="Light Set", description="The light set that is shown")
     report: StringProperty(
         name="Report", description="The report of the last bake, as JSON")
+    last_surfaces: StringProperty(
+        name="Last Surfaces", description="What the last bake took the materials for, as JSON",
+        options={'HIDDEN'})
 
 
 class RaybundleObjectSettings(bpy.types.PropertyGroup):
@@ -302,6 +305,10 @@ class RaybundleObjectSettings(bpy.types.PropertyGroup):
     source: PointerProperty(
         name="Source", description="The object that this one is the subdivided copy of",
         type=bpy.types.Object, poll=_is_mesh_object)
+    last_surfaces: StringProperty(
+        name="Last Surfaces", description="Those of the scene's table that the last bake took the "
+                                          "material slots for",
+        options={'HIDDEN'})
 
 
 @dataclass(frozen=True)

@@ -14,19 +14,22 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from . import left_out
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
 from .gloss import filter_glossy_of
+from .hidden_lights import hidden_light_instances
+from .last_surfaces import LastSurfaces
 from .light_export import export_light, is_portal
 from .light_sets import LightSet, LightSetMembers
-from .material_export import MaterialExporter
+from .material_export import MaterialExporter, SlotMaterial
 from .mesh_export import MeshError, export_mesh
 from .scene_data import InstanceData, MeshData, SceneData, Warnings
-from .surface_bake import BakedSurface, bake_surfaces
+from .shown_results import RENDERED, renders_result, result_names
+from .surface_bake import BakedSurface, Wanted, bake_surfaces
 from .world_export import export_world
 
 # Object types whose evaluated geometry is a mesh.
 GEOMETRY_TYPES = ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT')
-_UNREAD_TYPES = ('CURVES', 'POINTCLOUD', 'VOLUME')
 
 
 @dataclass(frozen=True)
@@ -46,15 +49,20 @@ class SceneExport:
     targets: list[BakeTarget] = field(default_factory=list)
     statuses: dict[str, str] = field(default_factory=dict)  # of objects that get no light
     warnings: Warnings = field(default_factory=Warnings)
+    last: LastSurfaces | None = None  # with what the materials are taken for, to be kept
 
 
 def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None,
-                 light_sets: Sequence[LightSet] = (), patch_size: float = 0.0) -> SceneExport:
-    """selected: the objects to bake, None for all; patch_size: m, 0 for the library's own choice.
+                 light_sets: Sequence[LightSet] = (), patch_size: float = 0.0,
+                 attribute: str | None = None) -> SceneExport:
+    """selected: the objects to bake, None for all; patch_size: m, 0 for the library's own choice;
+    attribute: where the light is written to, None for that of the scene's settings.
 
     The original data is as before on return.
     """
-    exporter = _Exporter(context, selected, light_sets)
+    if attribute is None:
+        attribute = context.scene.raybundle.attribute
+    exporter = _Exporter(context, selected, light_sets, attribute)
     exporter.bake_surfaces(patch_size)
     changed = _meshes_with_changed_topology(context, selected)
     try:
@@ -122,34 +130,34 @@ def _meshes_with_changed_topology(context: bpy.types.Context,
     return meshes
 
 
-def _slots(item: bpy.types.Object) -> tuple[bpy.types.Material | None, ...]:
-    return tuple(slot.material.original if slot.material else None
-                 for slot in item.material_slots)
-
-
 class _Exporter:
     """One walk over the evaluated scene."""
 
     def __init__(self, context: bpy.types.Context,
                  selected: Collection[bpy.types.Object] | None,
-                 light_sets: Sequence[LightSet]) -> None:
+                 light_sets: Sequence[LightSet], attribute: str) -> None:
         self.context = context
         self.selected = selected
-        self.result = SceneExport()
+        self.last = LastSurfaces(context.scene)
+        self.result = SceneExport(last=self.last)
+        self.results = result_names([attribute, *self.last.attributes,
+                                     *(item.attribute for item in light_sets)])
         self.materials = MaterialExporter(self.result.scene, self.result.warnings,
-                                          filter_glossy_of(context.scene))
+                                          filter_glossy_of(context.scene), self.results, self.last)
         self.members = LightSetMembers(list(light_sets), self.result.scene)
         self._baked: dict[bpy.types.Object, BakedSurface] = {}
         self._meshes: dict[tuple, int | MeshError] = {}
+        self._taken: dict[tuple, list[str]] = {}  # likewise, digests of last_surfaces.py by slot
         # Of the exported ones, by counts and digest; None: of one that needed no digest yet.
         self._alike: dict[tuple[int, int, int], dict[bytes | None, int]] = {}
         self._instance_counts: Counter[tuple[str, str]] = Counter()
         self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
         self._placed: set[tuple[str, int, bytes]] = set()
+        self._drawn: dict[bpy.types.Object, None] = {}  # originals that take part
 
     def bake_surfaces(self, patch_size: float) -> None:
         """Asks Cycles for the materials that only it can tell. Not while others are evaluated."""
-        wanted: dict[bpy.types.Object, dict[int, str]] = {}
+        wanted: dict[bpy.types.Object, Wanted] = {}
         seen: set[tuple] = set()
         for instance in renderable_instances(self.context):
             item = instance.object
@@ -157,7 +165,8 @@ class _Exporter:
             if (item.type != 'MESH' or item.original.type != 'MESH'
                     or _role(item.original, None) == 'IGNORE'):
                 continue
-            group = (item.data.as_pointer(), _slots(item))
+            slots = self._slots(item)
+            group = (item.data.as_pointer(), slots)
             if group in seen:
                 continue
             seen.add(group)
@@ -167,11 +176,12 @@ class _Exporter:
                                                          item.original.material_slots)):
                 if slot.material is None or original.material is None:
                     continue
-                unread = self.materials.unread(slot.material)
+                unread = self.materials.unread(slots[index], slot.material)
                 if unread is not None:
                     reasons[index] = unread
             if reasons:
-                wanted[item.original] = reasons
+                rendered = {RENDERED} if self._renders_result(item) else set()
+                wanted[item.original] = Wanted(reasons, self.results | rendered)
         if not wanted:
             return
         # A quarter of a patch, as the native library chooses them.
@@ -179,6 +189,19 @@ class _Exporter:
         self._baked, failures = bake_surfaces(self.context, wanted, pixel)
         for text in failures:
             self.result.warnings.add(text)
+
+    def _slots(self, item: bpy.types.Object) -> tuple[SlotMaterial, ...]:
+        """item: evaluated."""
+        return tuple(
+            self.materials.slot(slot.material, lambda: self._renders_result(item),
+                                lambda index=index: self.last.digest(item.original, index))
+            for index, slot in enumerate(item.material_slots))
+
+    def _renders_result(self, item: bpy.types.Object) -> bool:
+        if item.type != 'MESH' or item.original.type != 'MESH':
+            return False
+        return renders_result(item.data, self.results,
+                              _role(item.original, self.selected) == 'BAKE')
 
     def _diagonal(self) -> float:
         """About that of the exported scene, m."""
@@ -197,19 +220,52 @@ class _Exporter:
                 self._add_light(instance)
             elif item.type in GEOMETRY_TYPES:
                 self._add_geometry(instance)
-            elif item.type in _UNREAD_TYPES:
-                self._refuse(item.name, f"{item.type} geometry is not read")
+            elif item.type in left_out.UNREAD_TYPES:
+                self._refuse(item.name, left_out.UNREAD_TYPES[item.type])
+        hidden = self._hidden()
+        lights = self.result.scene.lights
+        shown = len(lights)
+        for instance in hidden_light_instances(self.context, hidden):
+            self._add_light(instance)
+        self._name_what_is_left_out(hidden, [light.name for light in lights[shown:]])
         scene = self.result.scene
-        world = export_world(self.context.scene, self.materials.images, self.result.warnings)
+        world = export_world(self.context, self.materials.images, self.result.warnings)
         scene.world, scene.world_image = world.radiance, world.image
         scene.lights.extend(world.suns)
         self.members.add_world_lights(len(world.suns))
+        self._name_showing_materials()
         for (parent, name), count in self._instance_counts.items():
             label = name if parent == name else f"{parent} / {name}"
             plural = "s" if count > 1 else ""
             self.result.statuses[label] = (
                 f"{count} instance{plural} without own data: only reflects and blocks light")
         return self.result
+
+    def _hidden(self) -> list[bpy.types.Object]:
+        """Objects that the viewport hides and renders do not, original."""
+        shown = {item.original for item in self.context.evaluated_depsgraph_get().objects}
+        return [item for item in sorted(_objects_in_rendered_collections(self.context.view_layer),
+                                        key=lambda item: item.name_full)
+                if item not in shown and not item.hide_render]
+
+    def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str]) -> None:
+        """lights: names of the hidden ones, which are not."""
+        scene = self.context.scene
+        for text in (
+                *left_out.of_render_settings(scene, self.context.view_layer),
+                *left_out.of_world(scene.world), *left_out.of_objects(self._drawn),
+                *left_out.of_materials(scene, self.materials.exported()),
+                *left_out.of_hidden(hidden, lights, GEOMETRY_TYPES)):
+            self.result.warnings.add(text)
+
+    def _name_showing_materials(self) -> None:
+        if not self.materials.showing:
+            return
+        names = ", ".join(f'"{name}"' for name in self.materials.showing)
+        self.result.warnings.add(
+            f'the result of a bake is shown by the materials {names}: no light is made of it; its '
+            f'emission counts 0, as a factor it counts 1, and a surface that shows it alone counts '
+            f'as what the last bake took it for')
 
     def _add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         item = instance.object
@@ -252,8 +308,11 @@ class _Exporter:
             parent = instance.parent.name if instance.parent else item.name
             self._instance_counts[parent, item.name] += 1
             role = 'OCCLUDE'
-        if original.is_holdout or original.is_shadow_catcher and bpy.app.version >= (4, 0, 0):
-            what = "holdout" if original.is_holdout else "shadow catcher"
+        self._drawn[original] = None
+        is_holdout = original.is_holdout or original.holdout_get(
+            view_layer=self.context.view_layer)
+        if is_holdout or original.is_shadow_catcher and bpy.app.version >= (4, 0, 0):
+            what = "holdout" if is_holdout else "shadow catcher"
             self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, here it '
                                      f'is an object like others')
         # Cycles has the flags of the instancer too.
@@ -263,6 +322,10 @@ class _Exporter:
                          stops_direct=all(source.visible_shadow for source in shown),
                          exchanges=all(source.visible_diffuse for source in shown)))
         self.members.add_instance(instance)
+        if (left_out.has_light_linking(original)
+                and self.result.scene.emits(len(self.result.scene.instances) - 1)):
+            self.result.warnings.add(f'"{item.name}": its light linking is not read, it lights all '
+                                     f'objects')
         if role == 'BAKE':
             index = len(self.result.scene.instances) - 1
             self.result.targets.append(
@@ -276,33 +339,39 @@ class _Exporter:
     def _mesh(self, item: bpy.types.Object, wants_map: bool) -> int | MeshError:
         """Index of the object's mesh in the scene; objects that share it export it once."""
         # Materials may sit on the object, and then differ between objects with the same mesh.
-        key = (item.data.as_pointer(), item.type, _slots(item))
+        key = (item.data.as_pointer(), item.type, self._slots(item))
         original = item.original
         needs_map = wants_map and original.type == 'MESH' and original not in self._corner_maps
         if key not in self._meshes or needs_map:
             mesh = item.to_mesh()
             try:
                 if key not in self._meshes:
-                    self._meshes[key] = self._exported(item, mesh)
+                    self._meshes[key] = self._exported(item, mesh, key)
                 index = self._meshes[key]
                 if needs_map and not isinstance(index, MeshError):
                     self._corner_maps[original] = self._corner_map(
                         original, mesh, self.result.scene.meshes[index])
             finally:
                 item.to_mesh_clear()
+        if key in self._taken:
+            self.last.take(original, self._taken[key])
         return self._meshes[key]
 
-    def _exported(self, item: bpy.types.Object, mesh: bpy.types.Mesh) -> int | MeshError:
+    def _exported(self, item: bpy.types.Object, mesh: bpy.types.Mesh, key: tuple
+                  ) -> int | MeshError:
         baked = self._baked.get(item.original)
         # Evaluated anew, it may be another mesh.
         if baked is not None and len(baked.uvs) != len(mesh.loops):
             baked = None
-        materials = [self.materials.add_baked(slot.material, baked.materials[index])
+        slots = self._slots(item)
+        materials = [self.materials.add_baked(slots[index], slot.material, baked.materials[index])
                      if baked is not None and index in baked.materials
-                     else self.materials.export(slot.material)
+                     else self.materials.export(slots[index], slot.material)
                      for index, slot in enumerate(item.material_slots)]
+        default = None if materials else self.materials.export(SlotMaterial(None))
+        self._taken[key] = [self.last.digest_of(material.surface, mesh)
+                            for material in materials or [default]]
         try:
-            default = None if materials else self.materials.export(None)
             data = export_mesh(mesh, item.data.name, materials, default,
                                baked.uvs if baked is not None else None)
         except MeshError as error:

@@ -19,6 +19,7 @@ from .layers import Layer
 from .node_reader import CLOTH, CLOTH_ROUGHNESS, EDGE_TINT, GLOSSY, cloth_layer, glossy_albedo
 from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, SHEEN_TINT,
                          SPECULAR_TINT, PrincipledAlbedo, principled_albedo, sheen_on)
+from .shown_results import reads_result
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
     'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
@@ -34,8 +35,10 @@ class ShaderColors:
     """Rewrites trees that nobody else uses; copies of groups are in `groups`, to be removed."""
 
     def __init__(self, wanted: str, light_path: dict[str, float], backfacing: bool = False,
-                 filter_glossy: float | None = 1.0) -> None:
+                 filter_glossy: float | None = 1.0, results: frozenset[str] = frozenset()
+                 ) -> None:
         self.wanted = wanted
+        self.results = results  # attributes that hold the result of a bake (shown_results.py)
         self.filter_glossy = filter_glossy  # see gloss.filter_glossy_of
         self.light_path = light_path  # values of the Light Path node's outputs; others are 0
         self.backfacing = backfacing
@@ -56,6 +59,11 @@ class ShaderColors:
             elif node.type == 'NEW_GEOMETRY' and node.outputs['Backfacing'].is_linked:
                 self.has_backfacing = True
                 _replace(tree, node.outputs['Backfacing'], float(self.backfacing))
+            elif node.type in ('ATTRIBUTE', 'VERTEX_COLOR'):
+                # As emission it is no light, as a factor it changes nothing.
+                for output in node.outputs:
+                    if reads_result(node, output, self.results):
+                        _replace(tree, output, 0.0 if self.wanted == RADIANCE else 1.0)
             elif node.type == 'OUTPUT_MATERIAL':
                 for name in ('Volume', 'Displacement'):
                     for link in list(node.inputs[name].links):

@@ -46,7 +46,11 @@ class BakedMaterial:
     # (3,) each: scale * reflectance + offset is diffuse, as nearly as that goes for all its pixels.
     diffuse_scale: np.ndarray
     diffuse_offset: np.ndarray
-    diffuse_color: np.ndarray  # (3,), the mean
+    # Means, (3,) each.
+    diffuse_color: np.ndarray
+    radiance_color: np.ndarray
+    transmittance: np.ndarray
+    translucence_color: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -63,9 +67,17 @@ def discard_all() -> None:
     _cache.clear()
 
 
-def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, dict[int, str]],
-                  pixel: float) -> tuple[dict[bpy.types.Object, BakedSurface], list[str]]:
-    """wanted: for each original object the slots in question and why; pixel: about its edge, m.
+@dataclass(frozen=True)
+class Wanted:
+    """Of an object."""
+
+    reasons: dict[int, str]  # of the slots in question
+    results: frozenset[str]  # attributes that hold the result of a bake (shown_results.py)
+
+
+def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, Wanted], pixel: float
+                  ) -> tuple[dict[bpy.types.Object, BakedSurface], list[str]]:
+    """wanted: by original object; pixel: about its edge, m.
 
     Returns what was baked, and why something was not.
     """
@@ -74,13 +86,13 @@ def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, dic
     kept: dict[bytes, BakedSurface] = {}
     result: dict[bpy.types.Object, BakedSurface] = {}
     failures: list[str] = []
-    for item, reasons in wanted.items():
+    for item, asked in wanted.items():
         try:
             with _evaluated_mesh(context, item) as mesh:
-                key = _digest(context, item, mesh, sorted(reasons), pixel)
+                key = _digest(context, item, mesh, asked, pixel)
                 surface = before.get(key) or kept.get(key)
                 if surface is None:
-                    surface = _bake(context, item, mesh, reasons, pixel)
+                    surface = _bake(context, item, mesh, asked, pixel)
             kept[key] = result[item] = surface
         except (RuntimeError, TypeError, ValueError) as error:
             failures.append(f'"{item.name}": Cycles could not bake its materials, which are read '
@@ -108,10 +120,11 @@ def _evaluated_mesh(context: bpy.types.Context, item: bpy.types.Object
 
 
 def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Mesh,
-            slots: list[int], pixel: float) -> bytes:
+            asked: Wanted, pixel: float) -> bytes:
     content = hashlib.blake2b(digest_size=16)
     depsgraph = context.evaluated_depsgraph_get()
-    content.update(repr((slots, round(pixel, 9), context.scene.frame_current,
+    content.update(repr((sorted(asked.reasons), sorted(asked.results), round(pixel, 9),
+                         context.scene.frame_current,
                          filter_glossy_of(context.scene),
                          [tuple(row) for row in item.evaluated_get(depsgraph).matrix_world],
                          tuple(item.color), item.pass_index,
@@ -129,6 +142,9 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
         layer.data.foreach_get('uv', values)
         content.update(layer.name.encode() + bytes([layer.active_render]) + values.tobytes())
     for attribute in mesh.attributes:
+        # Every bake changes its result, which is not looked at.
+        if attribute.name in asked.results:
+            continue
         content.update(attribute.name.encode() + _attribute_bytes(attribute))
     for slot in item.material_slots:
         content.update(material_fingerprint(slot.material).encode())
@@ -153,7 +169,8 @@ def _attribute_bytes(attribute: bpy.types.Attribute) -> bytes:
 
 
 def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Mesh,
-          reasons: dict[int, str], pixel: float) -> BakedSurface:
+          asked: Wanted, pixel: float) -> BakedSurface:
+    reasons = asked.reasons
     slots = np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get('material_index', slots)
     slots = np.clip(slots, 0, max(len(item.material_slots) - 1, 0))
@@ -168,7 +185,7 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
         raise RuntimeError("its mesh has no room for another UV map")
     layer.data.foreach_set('uv', atlas.uvs.ravel())
     images = {}
-    with _stage(context, item, mesh) as stage:
+    with _stage(context, item, mesh, asked.results) as stage:
         for wanted_property in PROPERTIES:
             if wanted_property == DIFFUSE and not stage.has_gloss:
                 continue
@@ -193,12 +210,15 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
     mesh.polygons.foreach_get('loop_total', sizes)
     materials = {}
     for slot, reason in reasons.items():
-        pixels, diffuse_pixels = _pixels(atlas, sizes, slots == slot, whole, diffuse)
+        pixels, diffuse_pixels, *others = _pixels(
+            atlas, sizes, slots == slot, whole, diffuse,
+            *(images.get(name, black) for name in (RADIANCE, TRANSMITTANCE, TRANSLUCENCE)))
         materials[slot] = BakedMaterial(
             f'material "{item.material_slots[slot].material.name}": baked by Cycles on '
             f'"{item.name}", because of {reason}', whole, images.get(RADIANCE), opacity,
             images.get(TRANSLUCENCE), *_line_through(pixels, diffuse_pixels),
-            diffuse_pixels.mean(axis=0) if len(diffuse_pixels) else np.zeros(3))
+            *(image.mean(axis=0) if len(image) else np.zeros(3)
+              for image in (diffuse_pixels, *others)))
     return BakedSurface(atlas.uvs, materials)
 
 
@@ -243,8 +263,9 @@ class _Stage:
     """The copy of an object, alone in a scene that Cycles renders."""
 
     def __init__(self, context: bpy.types.Context, source: bpy.types.Object,
-                 scene: bpy.types.Scene, item: bpy.types.Object) -> None:
+                 scene: bpy.types.Scene, item: bpy.types.Object, results: frozenset[str]) -> None:
         self.context, self.source, self.scene, self.item = context, source, scene, item
+        self.results = results
         self.has_backfacing = False
         self.has_gloss = False
 
@@ -279,7 +300,7 @@ class _Stage:
                 material = slot.material.copy()
                 made.append(material)
                 colors = ShaderColors(wanted, LIGHT_PATH, backfacing,
-                                      filter_glossy_of(self.context.scene))
+                                      filter_glossy_of(self.context.scene), self.results)
                 try:
                     colors.rewrite(material.node_tree)
                 finally:
@@ -313,8 +334,8 @@ class _Stage:
 
 
 @contextmanager
-def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types.Mesh
-           ) -> Iterator[_Stage]:
+def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types.Mesh,
+           results: frozenset[str]) -> Iterator[_Stage]:
     scene = bpy.data.scenes.new(_UV_MAP)
     item = bpy.data.objects.new(_UV_MAP, mesh)
     try:
@@ -330,7 +351,7 @@ def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types
         item.color, item.pass_index = source.color, source.pass_index
         scene.view_layers[0].objects.active = item
         item.select_set(True, view_layer=scene.view_layers[0])
-        yield _Stage(context, source, scene, item)
+        yield _Stage(context, source, scene, item, results)
     finally:
         bpy.data.objects.remove(item)
         bpy.data.scenes.remove(scene)

@@ -31,10 +31,14 @@ class WorldData:
 _evaluated: dict[bytes, WorldData] = {}
 
 
-def export_world(scene: bpy.types.Scene, images: ImagePixels, warnings: Warnings) -> WorldData:
+def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warnings
+                 ) -> WorldData:
     """The light of the scene's world on diffuse surfaces."""
+    scene = context.scene
     world = scene.world
-    if world is None or not getattr(world.cycles_visibility, 'diffuse', True):
+    # A view layer may leave it out.
+    if (world is None or not context.view_layer.use_sky
+            or not getattr(world.cycles_visibility, 'diffuse', True)):
         return WorldData()
     # From 5.0 on every world has nodes and use_nodes only warns.
     if bpy.app.version < (5, 0, 0) and not world.use_nodes or world.node_tree is None:

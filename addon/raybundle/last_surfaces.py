@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the last bake took each object's materials for, kept in the file.
+
+A material that shows nothing but the result of a bake (shown_results.py) tells neither the colour
+nor the light of its surface: the next bake takes it for the same as the last one did. The scene has
+a table of surfaces by their digest, the objects the digests of their slots.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+
+import bpy
+import numpy as np
+
+from .color_attribute import rendered_attribute
+from .color_expression import ColorExpression, Texture
+from .surface import Surface
+
+# Of a slot that no surface is known of.
+_NONE = "-"
+
+
+@dataclass(frozen=True)
+class LastSurface:
+    material: str  # name
+    sides: tuple[Surface, Surface]  # front and back
+
+
+class LastSurfaces:
+    """Of a scene: those of the last bake, and those that this one takes in their place."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self._scene = scene
+        self._table: dict[str, dict] = {}
+        self._attributes: set[str] = set()
+        try:
+            stored = json.loads(scene.raybundle.last_surfaces or "{}")
+            self._table = dict(stored.get('surfaces', {}))
+            self._attributes = set(stored.get('attributes', ()))
+        except (ValueError, TypeError, AttributeError):
+            # Not ours: as if there had been no bake.
+            pass
+        self._taken: dict[bpy.types.Object, str] = {}
+        self._new: dict[str, dict] = {}
+        # With the surface, whose place in memory tells it apart.
+        self._digests: dict[tuple, tuple[LastSurface, str]] = {}
+
+    @property
+    def attributes(self) -> frozenset[str]:
+        """Those that the scene's bakes have written so far and Clear has not removed."""
+        return frozenset(self._attributes)
+
+    def digest(self, item: bpy.types.Object, slot: int) -> str | None:
+        """Of an original object's surface in the last bake."""
+        digests = item.raybundle.last_surfaces.split()
+        digest = digests[slot] if slot < len(digests) else _NONE
+        return digest if digest in self._table else None
+
+    def surface(self, digest: str | None) -> LastSurface | None:
+        if digest not in self._table:
+            return None
+        try:
+            stored = self._table[digest]
+            return LastSurface(stored['material'],
+                               tuple(_decoded(side, Surface()) for side in stored['sides']))
+        except (KeyError, ValueError, TypeError):
+            # Of a version that has other terms.
+            return None
+
+    def digest_of(self, surface: LastSurface | None, mesh: bpy.types.Mesh) -> str:
+        """Of a surface that this bake takes on a mesh."""
+        if surface is None:
+            return _NONE
+        attribute = rendered_attribute(mesh)
+        rendered = attribute.name if attribute is not None else None
+        key = (id(surface), rendered)
+        if key not in self._digests:
+            stored = {'material': surface.material,
+                      'sides': [_encoded(side, rendered) for side in surface.sides]}
+            text = json.dumps(stored, sort_keys=True)
+            digest = hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
+            self._digests[key] = surface, digest
+            self._new[digest] = stored
+        return self._digests[key][1]
+
+    def take(self, item: bpy.types.Object, digests: Sequence[str]) -> None:
+        """Of all slots of an original object."""
+        if item.library is None:
+            self._taken[item] = " ".join(digests)
+
+    def share(self, original: bpy.types.Object, copy: bpy.types.Object) -> None:
+        """copy: the finer one of an original (subdivided_copy.py), with the same slots."""
+        if original in self._taken:
+            self._taken[copy] = self._taken[original]
+
+    def forget_attributes(self) -> None:
+        """They were removed; surfaces stay, since materials may still show what is gone."""
+        self._attributes.clear()
+        self.write(())
+
+    def write(self, attributes: Iterable[str]) -> None:
+        """Keep what was taken; attributes: those that the bake has written."""
+        used: set[str] = set()
+        for item, digests in self._taken.items():
+            used.update(digests.split())
+            try:
+                if item.raybundle.last_surfaces != digests:
+                    item.raybundle.last_surfaces = digests
+            except ReferenceError:
+                # Removed while the bake ran.
+                continue
+        # Objects that were no part of this bake keep theirs.
+        used.update(digest for item in self._scene.objects
+                    for digest in item.raybundle.last_surfaces.split())
+        table = {digest: stored for digest, stored in {**self._table, **self._new}.items()
+                 if digest in used}
+        text = json.dumps({'attributes': sorted(self._attributes.union(attributes)),
+                           'surfaces': table})
+        if self._scene.raybundle.last_surfaces != text:
+            self._scene.raybundle.last_surfaces = text
+
+
+# --------------------------------------------------------------------------------------------------
+# As JSON: zeros are null, so that matt surfaces are short
+# --------------------------------------------------------------------------------------------------
+
+
+def _encoded(value: object, rendered: str | None) -> object:
+    """rendered: name of the mesh's render colour attribute, which is another one after the bake."""
+    if isinstance(value, ColorExpression) and value.attribute == "":
+        value = replace(value, attribute=rendered)
+        if rendered is None:
+            # Nodes read black.
+            value = replace(value, attribute_weight=np.zeros(3))
+    if isinstance(value, Texture):
+        return {'image': value.image.name_full, 'extension': value.extension,
+                'mean': value.mean.tolist(), 'uv_layer': value.uv_layer,
+                'uv_matrix': value.uv_matrix.tolist()}
+    if is_dataclass(value):
+        return {item.name: _encoded(getattr(value, item.name), rendered)
+                for item in fields(value) if item.name != 'result'}
+    if isinstance(value, np.ndarray):
+        return value.tolist() if value.any() else None
+    return value
+
+
+def _decoded(stored: dict, default: object) -> object:
+    """A dataclass in the shape of its default."""
+    values = {}
+    for item in fields(default):
+        if item.name not in stored:
+            continue
+        value, usual = stored[item.name], getattr(default, item.name)
+        if item.name == 'texture':
+            value = value and _texture(value)
+        elif isinstance(usual, np.ndarray):
+            value = np.zeros(usual.shape) if value is None else np.array(value, float).reshape(
+                usual.shape)
+        elif is_dataclass(usual):
+            value = _decoded(value, usual)
+        values[item.name] = value
+    decoded = replace(default, **values)
+    if isinstance(decoded, ColorExpression) and decoded.texture and decoded.texture.image is None:
+        # The image is gone; its mean is known.
+        decoded = replace(decoded, constant=decoded.constant
+                          + decoded.texture_weight * decoded.texture.mean,
+                          texture=None, texture_weight=np.zeros(3))
+    return decoded
+
+
+def _texture(stored: dict) -> Texture:
+    image = next((image for image in bpy.data.images if image.name_full == stored['image']), None)
+    return Texture(image, stored['extension'], np.array(stored['mean'], float),
+                   stored['uv_layer'], np.array(stored['uv_matrix'], float).reshape(2, 3))

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What changes Cycles' diffuse light and not that of the bake: a line for each, with what to do.
+
+docs/limits.md has the table of all of it, and of what is followed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import bpy
+
+from .node_reader import output_node
+
+# Whatever a mesh is not made of.
+UNREAD_TYPES = {
+    'CURVES': "hair curves neither block nor reflect light here: convert them to a mesh with "
+              "thickness",
+    'POINTCLOUD': "points neither block nor reflect light here: have spheres instanced on them, or "
+                  "convert them to a mesh",
+    'VOLUME': "a volume neither dims nor scatters light here: convert it to a mesh, or hide it in "
+              "renders to compare with Cycles",
+}
+# Blender's own values: less is somebody's choice.
+_BOUNCES, _DIFFUSE_BOUNCES, _CLAMP_INDIRECT = 12, 4, 10.0
+# Of modifiers and of the data of objects: in the viewport and in renders.
+_DETAIL = (('levels', 'render_levels'), ('steps', 'render_steps'),
+           ('viewport_resolution', 'resolution'))
+_DATA_DETAIL = {'CURVE': ('resolution_u', 'render_resolution_u'),
+                'SURFACE': ('resolution_u', 'render_resolution_u'),
+                'FONT': ('resolution_u', 'render_resolution_u'),
+                'META': ('resolution', 'render_resolution')}
+_MOST_NAMES = 3
+NO_CAUSTICS = "its Shadow Caustics are not read: light goes straight on through glass"
+
+
+def of_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
+    if scene.background_set is not None:
+        yield (f'the background set "{scene.background_set.name}" is left out: link its objects to '
+               f'the scene')
+    if view_layer.material_override is not None:
+        yield (f'the material override "{view_layer.material_override.name}" of the view layer is '
+               f'not read: take it off to bake what Cycles bakes')
+    cycles = getattr(scene, 'cycles', None)
+    if cycles is None:
+        return
+    if cycles.film_exposure > 0.0 and abs(cycles.film_exposure - 1.0) > 1e-6:
+        yield (f"Cycles multiplies what it bakes by the film's Exposure of "
+               f"{cycles.film_exposure:.3g}: for the same values set exposure to "
+               f"{math.log2(cycles.film_exposure):.3g}")
+    if cycles.use_fast_gi:
+        yield ("Fast GI Approximation is not read: reflected light is computed in full; switch it "
+               "off to compare with Cycles")
+    bounces = min(cycles.max_bounces, cycles.diffuse_bounces)
+    if cycles.max_bounces < _BOUNCES or cycles.diffuse_bounces < _DIFFUSE_BOUNCES:
+        yield (f"Cycles reflects diffuse light {bounces} times at most, here it is reflected "
+               f"without end: raise the Max Bounces of the light paths to compare")
+    if cycles.sample_clamp_direct > 0.0 or 0.0 < cycles.sample_clamp_indirect < _CLAMP_INDIRECT:
+        yield ("Cycles clamps its samples, which takes light away: set the clamping of the light "
+               "paths to 0 to compare")
+    if scene.render.use_simplify and (cycles.use_camera_cull or cycles.use_distance_cull):
+        yield ("Simplify leaves out objects by their distance or the camera in Cycles; here all "
+               "take part: hide them in renders instead")
+
+
+def of_world(world: bpy.types.World | None) -> Iterator[str]:
+    tree = world.node_tree if world is not None else None
+    # From 5.0 on every world has nodes and use_nodes only warns.
+    if tree is None or bpy.app.version < (5, 0, 0) and not world.use_nodes:
+        return
+    output = output_node(tree)
+    if getattr(getattr(world, 'cycles', None), 'is_caustics_light', False):
+        yield f'world "{world.name}": {NO_CAUSTICS}'
+    if output is not None and output.inputs['Volume'].is_linked:
+        yield (f'world "{world.name}": its volume neither dims nor scatters light here: unlink it '
+               f'to compare with Cycles')
+
+
+def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Material, bool]]
+                 ) -> Iterator[str]:
+    """materials: original, each with whether it lets light straight through."""
+    turned, glassy = [], []
+    for material, is_transparent in materials:
+        output = output_node(material.node_tree) if material.node_tree is not None else None
+        if output is None or bpy.app.version < (5, 0, 0) and not material.use_nodes:
+            continue
+        if output.inputs['Displacement'].is_linked and _displacement(material) != 'BUMP':
+            yield (f'material "{material.name}": its displacement does not move the surface here: '
+                   f'use a Displace modifier, or apply it to the mesh')
+        if any(_turns_normals(node) for node in _nodes(material.node_tree)):
+            turned.append(f'"{material.name}"')
+        if output.inputs['Volume'].is_linked:
+            yield (f'material "{material.name}": its volume neither dims nor scatters light here; '
+                   f'where it has no surface light passes as through air')
+        if is_transparent and any(_is_glass(node) for node in _nodes(material.node_tree)):
+            glassy.append(f'"{material.name}"')
+    if turned:
+        yield (f"normal maps are not read, light is that of the surfaces without them: "
+               f"{_listed(turned)}: unlink them to compare with Cycles")
+    if glassy and not getattr(getattr(scene, 'cycles', None), 'caustics_refractive', True):
+        yield (f"Refractive Caustics are off, by which glass stops reflected light in Cycles; here "
+               f"it passes: {_listed(glassy)}: switch them on to compare")
+
+
+def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
+           ) -> Iterator[bpy.types.Node]:
+    """Of a tree and its groups."""
+    for node in tree.nodes:
+        yield node
+        group = getattr(node, 'node_tree', None)
+        if group is not None and group.name_full not in seen:
+            yield from _nodes(group, seen | {group.name_full})
+
+
+def _turns_normals(node: bpy.types.Node) -> bool:
+    """By more than bumps, which are not in Cycles' bake of vertices either."""
+    if node.type == 'NORMAL_MAP':
+        return not node.mute and any(output.is_linked for output in node.outputs)
+    socket = node.inputs.get('Normal') if any(item.type == 'SHADER' for item in node.outputs) \
+        else None
+    return socket is not None and any(link.from_node.type not in ('BUMP', 'NORMAL_MAP')
+                                      for link in socket.links)
+
+
+def _is_glass(node: bpy.types.Node) -> bool:
+    if node.type != 'BSDF_PRINCIPLED':
+        return node.type in ('BSDF_GLASS', 'BSDF_REFRACTION')
+    # Renamed in 4.0.
+    socket = node.inputs.get('Transmission Weight') or node.inputs.get('Transmission')
+    return socket.is_linked or socket.default_value > 0.0
+
+
+def _setting(owner: bpy.types.ID, name: str, usual: object) -> object:
+    """Of Cycles' settings as long as it has them, of Blender's since then."""
+    # Of the original: what a script changes in Cycles' does not reach the evaluated one.
+    cycles = getattr(owner.original, 'cycles', None)
+    return getattr(cycles, name, getattr(owner, name, usual))
+
+
+def _displacement(material: bpy.types.Material) -> str:
+    return _setting(material, 'displacement_method', 'BUMP')
+
+
+def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
+    """items: original, those that take part."""
+    differing = []
+    for item in items:
+        yield from _of_hair(item)
+        if getattr(getattr(item, 'cycles', None), 'shadow_terminator_offset', 0.0) > 0.0:
+            yield (f'"{item.name}": Shading Offset of its shadow terminator is not read: set it to '
+                   f'0 to compare with Cycles')
+        differing += [f'"{item.name}" ({how})' for how in _differences(item)]
+    if differing:
+        yield (f"geometry is as the viewport shows it, and not as renders do: "
+               f"{_listed(differing)}: make both alike")
+
+
+def _of_hair(item: bpy.types.Object) -> Iterator[str]:
+    for modifier in item.modifiers:
+        if modifier.type != 'PARTICLE_SYSTEM' or not modifier.show_render:
+            continue
+        system = modifier.particle_system
+        settings = system.settings
+        has_strands = settings.count > 0 or system.is_edited
+        if settings.type == 'HAIR' and settings.render_type == 'PATH' and has_strands:
+            yield (f'"{item.name}": the strands of its particle system "{system.name}" neither '
+                   f'block nor reflect light here: convert them to a mesh with thickness')
+
+
+def _differences(item: bpy.types.Object) -> Iterator[str]:
+    """Between viewport and renders."""
+    for modifier in item.modifiers:
+        if modifier.show_viewport != modifier.show_render:
+            yield f'{modifier.name} is on in one of them'
+        elif modifier.show_render:
+            for shown, rendered in _DETAIL:
+                values = [getattr(modifier, name, None) for name in (shown, rendered)]
+                if None not in values and values[0] != values[1]:
+                    yield f'{modifier.name}: {values[0]} and {values[1]} {shown}'
+        if modifier.type == 'PARTICLE_SYSTEM' and modifier.show_render:
+            settings = modifier.particle_system.settings
+            if (settings.render_type in ('OBJECT', 'COLLECTION')
+                    and settings.display_percentage < 100):
+                yield f'{modifier.name}: {settings.display_percentage} % of its particles'
+    if item.modifiers and (_setting(item, 'use_adaptive_subdivision', False) or any(
+            getattr(modifier, 'use_adaptive_subdivision', False) for modifier in item.modifiers)):
+        yield "adaptive subdivision"
+    if item.type in _DATA_DETAIL:
+        shown, rendered = (getattr(item.data, name) for name in _DATA_DETAIL[item.type])
+        # 0 of renders is as in the viewport.
+        if rendered and shown != rendered:
+            yield f'{_DATA_DETAIL[item.type][0]} {shown:.3g} and {rendered:.3g}'
+
+
+def has_light_linking(item: bpy.types.Object) -> bool:
+    """Of a lamp, or an object that emits; from 4.0 on."""
+    linking = getattr(item, 'light_linking', None)
+    return bool(linking and (linking.receiver_collection or linking.blocker_collection))
+
+
+def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str], types: Iterable[str]
+              ) -> Iterator[str]:
+    """hidden: in the viewport but not in renders, original; lights: names of the lamps among them,
+    which shine; types: those of objects that would take part."""
+    shining = [f'"{name}"' for name in dict.fromkeys(lights)]
+    if shining:
+        yield (f"lights that are hidden in the viewport shine, as in Cycles: {_listed(shining)}: "
+               f"disable them in renders to switch them off")
+    names = [f'"{item.name}"' for item in hidden
+             if item.type in types and item.raybundle.role != 'IGNORE']
+    if names:
+        yield (f"what is hidden in the viewport is left out, though Cycles renders it: "
+               f"{_listed(names)}: show it, or disable it in renders as well")
+
+
+def _listed(names: list[str]) -> str:
+    text = ", ".join(names[:_MOST_NAMES])
+    return text if len(names) <= _MOST_NAMES else f"{text} and {len(names) - _MOST_NAMES} more"
