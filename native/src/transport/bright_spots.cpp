@@ -51,7 +51,10 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
     std::vector<double> exitance(n, 0.0);  // of the brightest channel, W/m^2
     double power = 0, reflectance = 0;
     for (size_t side = 0; side < n; ++side) {
-        if (!patches.parentAt(uint32_t(side)).exchanges) continue;
+        const Parent& parent = patches.parentAt(uint32_t(side));
+        // What is inside of a solid, such as the body of a lamp, stays there.
+        const bool isInside = parent.isSolid && !parent.isInward && side % 2 == 1;
+        if (!parent.exchanges || isInside) continue;
         const double area = double(patches.area[side / 2]);
         exitance[side] = double(brightest(reflected(patches, shot, side)));
         power += area * (exitance[side] + double(brightest(shot.emission[side])));
