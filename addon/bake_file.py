@@ -28,6 +28,7 @@ from raybundle.properties import assign, enum_skip  # noqa: E402
 
 # Between two lines of progress within a stage.
 PROGRESS_SECONDS = 1.0
+MOST_IMBALANCE = 0.01  # as in native/src/bake/bake.cpp
 
 
 def main(arguments: list[str]) -> None:
@@ -121,6 +122,9 @@ def _write_whole(path: Path, text: str) -> None:
 
 
 def _print_summary(report: raybundle.BakeReport, out: Path, name: str, no_picture: str) -> None:
+    if report.energy['balance_error'] > MOST_IMBALANCE:
+        # The bake's first warning: light that is lost or made is worse than noise.
+        print(f"warning: {report.warnings[0]}")
     print(report.summary())
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
                        if stage != 'total')

@@ -450,10 +450,11 @@ SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLi
         halves.push_back({mean, mean});
         errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
     }
-    SetNoise noise({}, std::move(errorOfSets), tileWeight);
+    SetNoise noise({}, std::move(errorOfSets), tileWeight, tiles.patches());
     noise.look(halves, 1, 0);
     const std::vector<double> errors = noise.relative();
     report.estimatedError = errors.front();
+    report.error.noise = noise.shown();
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
     return noise.perSide();
@@ -472,7 +473,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     std::vector<std::vector<float>> errorOfSets;
     for (const SetLight& light : lights) errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
     std::vector<float> tileWeight(tiles.sideCount(), 0);
-    SetNoise noise(trace->looks, std::move(errorOfSets), tileWeight);
+    SetNoise noise(trace->looks, std::move(errorOfSets), tileWeight, tiles.patches());
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     const uint32_t most = std::max(2u, uint32_t(settings.maxBundles) & ~1u);
@@ -509,11 +510,11 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         const double target = settings.targetError;
         const double excess = std::max(noise.excess(target), onSmall / target);
         if (excess <= 1 && settings.skipBundles) {
-            if (*worst <= target)
+            if (*worst > target && noise.shown() > target)
+                warnOfDirectNoise(scene, patches, lights, area, noise.shown(), target, report);
+            else
                 report.skipped.push_back(
                     {"bundles", "the noise is at its target", most - std::min(most, bundles)});
-            else
-                warnOfDirectNoise(scene, patches, lights, area, *worst, target, report);
             break;
         }
         const double needed = bundles * std::pow(onSmall / target, 1 / kNoiseSlope);
@@ -555,13 +556,14 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                                   "the projector AUTO has none");
 
     // What more bundles do not help.
-    double wrong = trace->tracer->disorderedShare();
+    double shownNoise = noise.shown(), wrong = trace->tracer->disorderedShare();
     if (settings.smallPatches == "ROULETTE")
         wrong +=
             leakedShare(scene, patches, weight, trace->surrounding.open, transport.openShare());
     if (wrong > 0) {
         const double error = errorByWrongExchanges(patches, wrong);
         for (double& e : errors) e = std::hypot(e, error);
+        shownNoise = std::hypot(shownNoise, error);
         if (error > settings.targetError)
             report.warnings.push_back("the projector put " + std::to_string(100 * wrong) +
                                       " % of the lines in a wrong order or through surfaces, which "
@@ -569,6 +571,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                                       std::to_string(100 * error) + " %");
     }
     report.estimatedError = errors.front();
+    report.error.noise = shownNoise;
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
     progress.report(RB_STAGE_SOLVE, 1);

@@ -15,29 +15,62 @@ constexpr double kLeastOfBundles = 0.6;
 // Weight of the looks before.
 constexpr double kMemory = 0.5;
 
+// Per side of tiles: two numbers a cell.
+std::vector<uint32_t> cellsOf(const Patches& tiles) {
+    std::vector<uint32_t> cells(tiles.sideCount());
+    for (uint32_t side = 0; side < cells.size(); ++side)
+        cells[side] = 2 * tiles.parentAt(side).cell + side % 2;
+    return cells;
+}
+
 }  // namespace
 
 Noise::Noise(const Looks& before, const std::vector<float>& weight,
-             const std::vector<float>& directError)
-    : weight(weight), directError(directError), looked(before.count), before(before) {}
+             const std::vector<float>& directError, const std::vector<uint32_t>& cellOf)
+    : weight(weight),
+      directError(directError),
+      cellOf(cellOf),
+      looked(before.count),
+      before(before) {}
 
 void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double sharedBias) {
     const size_t n = weight.size();
     difference.resize(n);
+    // Sums over the sides of a cell: of the weight, of it times half the difference of the halves, and
+    // of its square times the variance of the first shot.
+    struct Cell {
+        double weight = 0, direct = 0;
+        glm::dvec3 difference{0.0};
+    };
+    std::vector<Cell> cells(n > 0 ? *std::max_element(cellOf.begin(), cellOf.end()) + 1 : 0);
     double squares = 0, direct = 0;
     signal = 0;
     for (size_t side = 0; side < n; ++side) {
         const glm::dvec3 a(half[0].direct[side] + half[0].indirect[side]);
         const glm::dvec3 b(half[1].direct[side] + half[1].indirect[side]);
-        const double square = 0.25 * glm::dot(a - b, a - b);
+        const double w = double(weight[side]);
+        const double variance = 3 * double(directError[side]) * double(directError[side]);
         difference[side] = glm::vec3(0.5 * (a - b));
-        squares += double(weight[side]) * square;
-        direct += double(weight[side]) * 3 * double(directError[side]) * directError[side];
-        signal += double(weight[side]) * 0.25 * glm::dot(a + b, a + b);
+        squares += w * 0.25 * glm::dot(a - b, a - b);
+        direct += w * variance;
+        signal += w * 0.25 * glm::dot(a + b, a + b);
+        Cell& cell = cells[cellOf[side]];
+        cell.weight += w;
+        cell.difference += w * 0.5 * (a - b);
+        cell.direct += w * w * variance;
+    }
+    double shownSquares = 0, shownVariance = 0;
+    for (const Cell& cell : cells) {
+        if (!(cell.weight > 0)) continue;
+        shownSquares += glm::dot(cell.difference, cell.difference) / cell.weight;
+        shownVariance += cell.direct / cell.weight;
     }
     bias = sharedBias;
-    bundleNoise = signal > 0 ? squares / signal : 0;
-    directNoise = signal > 0 ? direct / signal : 0;
+    const double scale = signal > 0 ? 1 / signal : 0;
+    bundleNoise = squares * scale;
+    directNoise = direct * scale;
+    shownOfBundles = shownSquares * scale;
+    shownDirect = shownVariance * scale;
     if (bundles == 0 && count == before.bundles) {
         // An earlier bake has seen the same lines.
         pooled = before.share * bundleNoise;
@@ -55,6 +88,12 @@ double Noise::factor() const { return 1 + kSmallSample / (double(looked) * looke
 
 double Noise::relative() const {
     return signal > 0 ? std::hypot(ofBundles(), std::sqrt(directNoise)) : 0;
+}
+
+double Noise::shown() const {
+    if (!(signal > 0)) return 0;
+    const double share = bundleNoise > 0 ? pooled / bundleNoise : 1;
+    return std::sqrt(factor() * factor() * share * shownOfBundles + bias * bias + shownDirect);
 }
 
 double Noise::ofBundles() const {
@@ -77,17 +116,17 @@ std::vector<glm::vec3> Noise::perSide() const {
 }
 
 SetNoise::SetNoise(const Looks& before, std::vector<std::vector<float>> errors,
-                   const std::vector<float>& weight)
-    : errorOfSets(std::move(errors)), directError(weight.size()) {
+                   const std::vector<float>& weight, const Patches& tiles)
+    : errorOfSets(std::move(errors)), cellOf(cellsOf(tiles)), directError(weight.size()) {
     for (size_t side = 0; side < directError.size(); ++side) {
         double variance = 0;
         for (const std::vector<float>& error : errorOfSets)
             variance += double(error[side]) * double(error[side]);
         directError[side] = float(std::sqrt(variance));
     }
-    noises.emplace_back(before, weight, directError);
+    noises.emplace_back(before, weight, directError, cellOf);
     for (size_t k = 1; k < errorOfSets.size(); ++k)
-        noises.emplace_back(before, weight, errorOfSets[k]);
+        noises.emplace_back(before, weight, errorOfSets[k], cellOf);
 }
 
 void SetNoise::look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles,

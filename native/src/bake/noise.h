@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The stated noise: how far the light on the patch sides is from that of infinitely many bundles
-// and shadow rays on the same patches.
+// The noise: how far the light on the patch sides, and that which is shown of it, is from that of
+// infinitely many bundles and shadow rays on the same patches. Light is shown interpolated over the
+// cells of the user's faces, so that what differs from patch to patch within a cell is not seen: the
+// shown noise is that of the cells' means.
 //
 // Source: thesis section 4.3.3 (stated error).
 // Differs:
@@ -32,17 +34,19 @@ struct Looks {
 
 class Noise {
   public:
-    // before: of earlier bakes with these lines. weight: per side, exposed area in m^2 where the
-    // light is a result, else 0. directError: per side, standard error of the first shot, W/m^2.
-    // Both must outlive the object.
+    // before: of earlier bakes with these lines. weight: per side of tiles, exposed area in m^2 where
+    // the light is a result, else 0. directError: per side, standard error of the first shot, W/m^2,
+    // independent of that of others. cellOf: per side, the cell that shows it. All must outlive the
+    // object.
     Noise(const Looks& before, const std::vector<float>& weight,
-          const std::vector<float>& directError);
+          const std::vector<float>& directError, const std::vector<uint32_t>& cellOf);
 
     // A look at the halves of so many bundles.
     void look(const std::array<Irradiance, 2>& half, uint32_t bundles, double bias);
 
-    // As of the last look, relative to the RMS of the light.
+    // As of the last look, relative to the RMS of the light: on the sides, and shown.
     double relative() const;
+    double shown() const;
     double ofBundles() const;  // without that of the first shot
     // So many times too large is the noise of bundles for a relative target: beside that of the
     // first shot, which they do not help.
@@ -54,12 +58,14 @@ class Noise {
   private:
     const std::vector<float>& weight;
     const std::vector<float>& directError;
+    const std::vector<uint32_t>& cellOf;
     double factor() const;
 
     std::vector<glm::vec3> difference;  // per side: half that of the halves, W/m^2
     double bundleNoise = 0;             // relative squares, of the last look
     double pooled = 0;                  // the same, averaged with the looks before
     double directNoise = 0, bias = 0, signal = 0;
+    double shownOfBundles = 0, shownDirect = 0;  // relative squares, of the last look
     uint32_t bundles = 0, looked = 0;
     Looks before;
 };
@@ -75,10 +81,10 @@ struct SideNoise {
 // The noise of the light of all, and that of each light set.
 class SetNoise {
   public:
-    // As above. errorOfSets: of each set, standard error of the first shot per side, W/m^2. weight
-    // must outlive the object.
+    // As above. errorOfSets: of each set, standard error of the first shot per side, W/m^2. tiles:
+    // whose sides these are. weight must outlive the object.
     SetNoise(const Looks& before, std::vector<std::vector<float>> errorOfSets,
-             const std::vector<float>& weight);
+             const std::vector<float>& weight, const Patches& tiles);
     SetNoise(const SetNoise&) = delete;
 
     // A look at the halves of all lights.
@@ -86,6 +92,8 @@ class SetNoise {
 
     // As of the last look, relative: of the light of all, then of each light set.
     std::vector<double> relative() const;
+    // Likewise of the light of all, shown.
+    double shown() const { return noises.front().shown(); }
     // The largest of theirs, see Noise::excess.
     double excess(double target) const;
     // Of the light of all.
@@ -94,6 +102,7 @@ class SetNoise {
 
   private:
     const std::vector<std::vector<float>> errorOfSets;
+    const std::vector<uint32_t> cellOf;
     std::vector<float> directError;  // of the light of all, per side, W/m^2
     std::vector<Noise> noises;       // of the light of all, then of each light set
 };

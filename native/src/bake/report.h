@@ -44,8 +44,8 @@ struct Report {
     uint64_t lines = 0;
     size_t exchanges = 0;  // merged pairs of patch sides
     uint64_t shadowRays = 0;
-    double estimatedError = 0;  // relative noise
-    Errors error;
+    double estimatedError = 0;                      // relative noise of the patch sides
+    Errors error;                                   // of what is shown
     double emitted = 0, absorbed = 0, escaped = 0;  // W, sum of the channels
     std::vector<LightSet> lightSets;
     std::vector<Object> objects;

@@ -29,7 +29,7 @@ struct SideErrors {
 };
 
 // Adds the errors, and warnings of objects whose mesh is too coarse, to the report, and the error
-// per corner to the light. report.estimatedError is the noise in all; targetError: that of the
+// per corner to the light. report.error.noise is the shown noise in all; targetError: that of the
 // settings. ranges: of the patches; irradiance: mean over each tile's side.
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
                  const Irradiance& irradiance, const SideErrors& sides, float targetError,

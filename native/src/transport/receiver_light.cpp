@@ -173,8 +173,9 @@ std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, cons
     // The error falls with the square of the parts, or at a kink with their number.
     error = brightest(glm::abs(*fine - *coarse)) / 4;
     if (error <= tolerance) return fine;
-    error /= 4;
-    return quadrature(source, place, 16, low, high);
+    const auto finest = quadrature(source, place, 16, low, high);
+    error = brightest(glm::abs(*finest - *fine)) / 4;
+    return finest;
 }
 
 // Samples [first, first + kBlocks * each), `each` to a block: consecutive ones are stratified.
