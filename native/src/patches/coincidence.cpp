@@ -4,85 +4,46 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 namespace raybundle {
 namespace {
 
 // Of two parts in the same place, relative.
 constexpr double kSameVolume = 1e-4;
-constexpr int32_t kOpen = -1;
 
-// Per face: one vertex of the part that it hangs together with, the same for all faces of the part;
-// kOpen where not each edge of the part has exactly two faces, which turn alike.
-std::vector<int32_t> closedParts(const Mesh& mesh) {
-    // Parts are sets of vertices joined by faces.
-    std::vector<int32_t> above(mesh.vertices.size());
-    std::iota(above.begin(), above.end(), 0);
-    auto root = [&](int32_t v) {
-        while (above[size_t(v)] != v) v = above[size_t(v)] = above[size_t(above[size_t(v)])];
-        return v;
-    };
-    struct Edge {
-        uint64_t key;
-        int32_t vertex;
-        int turn;  // +1 from the smaller vertex to the larger, else -1
-    };
-    std::vector<Edge> edges;
-    edges.reserve(mesh.cornerCount());
-    for (size_t f = 0; f < mesh.faceCount(); ++f) {
-        const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
-        for (int32_t c = begin; c < end; ++c) {
-            const int32_t a = mesh.cornerVertices[size_t(c)];
-            const int32_t b = mesh.cornerVertices[size_t(c + 1 < end ? c + 1 : begin)];
-            edges.push_back({edgeKey(a, b), a, a < b ? 1 : -1});
-            above[size_t(root(a))] = root(b);
-        }
-    }
-    std::sort(edges.begin(), edges.end(),
-              [](const Edge& a, const Edge& b) { return a.key < b.key; });
-    std::vector<bool> closed(mesh.vertices.size(), true);  // at the root of a part
-    for (size_t i = 0; i < edges.size();) {
-        size_t end = i;
-        int turns = 0;
-        for (; end < edges.size() && edges[end].key == edges[i].key; ++end)
-            turns += edges[end].turn;
-        if (end - i != 2 || turns != 0) closed[size_t(root(edges[i].vertex))] = false;
-        i = end;
-    }
-    std::vector<int32_t> result(mesh.faceCount());
-    for (size_t f = 0; f < mesh.faceCount(); ++f) {
-        const int32_t vertex = root(mesh.cornerVertices[size_t(mesh.faceOffsets[f])]);
-        result[f] = closed[size_t(vertex)] ? vertex : kOpen;
-    }
-    return result;
-}
-
-// Where a part lies and what it encloses.
+// Where a closed surface lies and what it encloses.
 struct Part {
     glm::vec3 low{INFINITY}, high{-INFINITY};
     double volume = 0;  // negative: turned inwards
     double area = 0;
-    bool isSolid = true;
+    uint32_t instance = 0;         // of its first face
+    uint32_t vertex = UINT32_MAX;  // its first
+    bool isSolid = false;
 
-    auto place() const { return std::make_tuple(low.x, low.y, low.z, high.x, high.y, high.z); }
+    auto place() const {
+        return std::make_tuple(instance, low.x, low.y, low.z, high.x, high.y, high.z);
+    }
     // Double: both sides of a slab.
     double thickness() const { return area > 0 ? 2 * std::abs(volume) / area : 0; }
 };
 
-// By the vertex that stands for the part.
-std::map<int32_t, Part> measured(const Mesh& mesh, const glm::vec3* places,
-                                 const std::vector<int32_t>& partOfFace) {
-    std::map<int32_t, Part> parts;
-    for (size_t f = 0; f < mesh.faceCount(); ++f) {
-        if (partOfFace[f] == kOpen) continue;
-        Part& part = parts[partOfFace[f]];
-        const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
-        auto place = [&](int32_t c) { return places[mesh.cornerVertices[size_t(c)]]; };
+// Per surface; those that are not closed stay empty.
+std::vector<Part> measured(const WeldedFaces& faces, const std::vector<glm::vec3>& places,
+                           const std::vector<bool>& closed) {
+    std::vector<Part> parts(faces.surfaceCount);
+    for (size_t f = 0; f < faces.count(); ++f) {
+        if (!closed[faces.surface[f]]) continue;
+        Part& part = parts[faces.surface[f]];
+        const size_t begin = faces.offsets[f], end = faces.offsets[f + 1];
+        auto place = [&](size_t c) { return places[faces.vertices[c]]; };
+        if (part.vertex == UINT32_MAX) {
+            part.vertex = faces.vertices[begin];
+            part.instance = faces.instance[f];
+        }
         // From a place of the part: far from the origin digits would be lost.
-        const glm::dvec3 origin(places[partOfFace[f]]), first(place(begin));
+        const glm::dvec3 origin(places[part.vertex]), first(place(begin));
         glm::dvec3 doubled(0.0);
-        for (int32_t c = begin; c < end; ++c) {
+        for (size_t c = begin; c < end; ++c) {
             part.low = glm::min(part.low, place(c));
             part.high = glm::max(part.high, place(c));
             if (c + 1 < end)
@@ -97,12 +58,44 @@ std::map<int32_t, Part> measured(const Mesh& mesh, const glm::vec3* places,
 
 }  // namespace
 
-std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double thinnest) {
-    const std::vector<int32_t> partOfFace = closedParts(mesh);
-    std::map<int32_t, Part> parts = measured(mesh, places, partOfFace);
+std::vector<bool> closedSurfaces(const WeldedFaces& faces) {
+    struct Edge {
+        uint64_t key;
+        uint32_t surface;
+        int turn;  // +1 from the smaller vertex to the larger, else -1
+    };
+    std::vector<Edge> edges;
+    edges.reserve(faces.vertices.size());
+    for (size_t f = 0; f < faces.count(); ++f) {
+        const size_t begin = faces.offsets[f], end = faces.offsets[f + 1];
+        for (size_t c = begin; c < end; ++c) {
+            const uint32_t a = faces.vertices[c], b = faces.vertices[c + 1 < end ? c + 1 : begin];
+            edges.push_back({uint64_t(std::min(a, b)) << 32 | std::max(a, b), faces.surface[f],
+                             a < b ? 1 : -1});
+        }
+    }
+    std::sort(edges.begin(), edges.end(),
+              [](const Edge& a, const Edge& b) { return a.key < b.key; });
+    std::vector<bool> closed(faces.surfaceCount, true);
+    for (size_t i = 0; i < edges.size();) {
+        size_t end = i;
+        int turns = 0;
+        for (; end < edges.size() && edges[end].key == edges[i].key; ++end)
+            turns += edges[end].turn;
+        if (turns != 0) closed[edges[i].surface] = false;
+        i = end;
+    }
+    return closed;
+}
+
+std::vector<bool> solidFaces(const WeldedFaces& faces, const std::vector<bool>& closed,
+                             const std::vector<glm::vec3>& places,
+                             const std::function<double(uint32_t)>& thinnest) {
+    std::vector<Part> parts = measured(faces, places, closed);
     std::map<decltype(Part().place()), std::vector<Part*>> byPlace;
-    for (auto& [vertex, part] : parts) {
-        part.isSolid = part.thickness() > thinnest;
+    for (Part& part : parts) {
+        if (part.vertex == UINT32_MAX) continue;
+        part.isSolid = part.thickness() > thinnest(part.vertex);
         byPlace[part.place()].push_back(&part);
     }
     for (auto& [place, there] : byPlace)
@@ -110,9 +103,8 @@ std::vector<bool> solidFaces(const Mesh& mesh, const glm::vec3* places, double t
             if (const double sum = there[0]->volume + there[k]->volume;
                 std::abs(sum) < kSameVolume * std::abs(there[0]->volume))
                 there[0]->isSolid = there[k]->isSolid = false;
-    std::vector<bool> result(mesh.faceCount());
-    for (size_t f = 0; f < mesh.faceCount(); ++f)
-        result[f] = partOfFace[f] != kOpen && parts.at(partOfFace[f]).isSolid;
+    std::vector<bool> result(faces.count());
+    for (size_t f = 0; f < faces.count(); ++f) result[f] = parts[faces.surface[f]].isSolid;
     return result;
 }
 
