@@ -20,6 +20,8 @@ constexpr double kTogether = 0.25;
 // a lamp and its rod. They touch where they are not further apart than kTouch of the smaller one's
 // diagonal.
 constexpr double kThing = 1.0 / 4, kTouch = 0.01;
+// See areOneIsland: two rooms of a size are one island up to a tenth of their length apart.
+constexpr double kMostOfSmaller = 0.8;
 // All tiny groups of one size have at most so many times the patches of what is around them, so
 // that pebbles on a lawn do not have more than the lawn is worth.
 constexpr double kMostOfTiny = 2;
@@ -97,11 +99,12 @@ std::vector<Group> groupsOf(std::vector<Group> open, const Belong& belong) {
     return groups;
 }
 
-// Whether two are no longer together than laid end to end.
+// Whether two are no longer together than the larger one and most of the smaller laid end to end.
 bool areOneIsland(const Extent& a, const Extent& b) {
     Extent both = a;
     both.add(b);
-    return both.diagonal() <= a.diagonal() + b.diagonal();
+    const double one = a.diagonal(), other = b.diagonal();
+    return both.diagonal() <= std::max(one, other) + kMostOfSmaller * std::min(one, other);
 }
 
 bool areNear(const Extent& a, const Extent& b, double distance) {

@@ -8,9 +8,8 @@
 
 #include "bake/error.h"
 #include "patches/coincidence.h"
-#include "patches/patch_size.h"
+#include "patches/placement.h"
 #include "patches/reflectance.h"
-#include "patches/welding.h"
 #include "scene/triangulation.h"
 
 namespace raybundle {
@@ -125,10 +124,6 @@ constexpr int kMaxGrid = 4096;
 // Solids of less thickness are sheets, of how far they lie from the centre: about what depth tells
 // apart.
 constexpr double kThinnest = 2e-6;
-// What of a surface lies in front of a face of it by more than this share of its diagonal is seen from
-// there; of so many faces.
-constexpr double kBlind = 1e-3;
-constexpr size_t kBlindFaces = 64;
 // Surfaces not further apart than these shares of an island's radius and of its finest patches
 // touch; far from the centre, where rounding tells less apart, than this share of how far it is.
 constexpr float kTouchOfRadius = 1e-4f, kTouchOfPatch = 0.02f, kTouchOfDistance = 1e-6f;
@@ -136,110 +131,20 @@ constexpr float kTouchOfRadius = 1e-4f, kTouchOfPatch = 0.02f, kTouchOfDistance 
 // Walks over the faces of all instances and appends vertices, cells and parents.
 class Subdivision {
   public:
-    Subdivision(const Scene& scene, Patches& patches) : scene(scene), patches(patches) {}
-
-    void placeInstances() {
-        for (const Instance& instance : scene.instances) {
-            firstVertex.push_back(world.size());
-            for (const glm::vec3& vertex : scene.meshes[instance.mesh].vertices) {
-                world.push_back(glm::dvec3(instance.transform * glm::dvec4(vertex, 1.0)));
-                if (!(glm::length(world.back()) <= kFarthest))
-                    throw invalidArgument("object \"" + instance.name +
-                                          "\" reaches further than 1e12 m from the origin");
-            }
-        }
-        welded = weldedVertices(scene, world, firstVertex);
-        faces = weldedFaces(scene, welded, firstVertex);
-    }
-
-    bool isEmpty() const { return world.empty(); }
-
-    // Finds the islands, and the automatic sizes.
-    void findIslands() {
-        std::vector<Surface> surfaces(faces.surfaceCount);
-        for (size_t f = 0; f < faces.count(); ++f) {
-            Surface& surface = surfaces[faces.surface[f]];
-            for (size_t c = faces.offsets[f]; c < faces.offsets[f + 1]; ++c)
-                surface.extent.add(world[faces.vertices[c]]);
-            surface.area += glm::length(areaVector(f));
-            // What is made of several objects is of none.
-            if (surface.faces++ == 0)
-                surface.object = faces.instance[f];
-            else if (surface.object != faces.instance[f])
-                surface.object = UINT32_MAX;
-        }
-        closed = closedSurfaces(faces);
-        findBlind(surfaces);
-        sizes = automaticPatchSizes(surfaces);
-        // Vertices of no face lie anywhere.
-        Extent all;
-        for (const glm::dvec3& vertex : world) all.add(vertex);
-        patches.centre = (sizes.extent.size() > 1 ? sizes.extent.front() : all).middle();
-        patches.vertices.reserve(world.size());
-        for (const glm::dvec3& vertex : world) {
-            patches.vertices.push_back(glm::vec3(vertex - patches.centre));
-            patches.radius = std::max(patches.radius, glm::length(patches.vertices.back()));
-        }
-        if (sizes.extent.size() <= 1) {
-            patches.islands = {{glm::vec3(0.0f), patches.radius, patches.radius}};
-            return;
-        }
-        for (const Extent& extent : sizes.extent)
-            patches.islands.push_back({glm::vec3(extent.middle() - patches.centre), 0, 0});
-        for (size_t f = 0; f < faces.count(); ++f)
-            for (size_t c = faces.offsets[f]; c < faces.offsets[f + 1]; ++c) {
-                Island& island = patches.islands[sizes.island[faces.surface[f]]];
-                const glm::vec3& vertex = patches.vertices[faces.vertices[c]];
-                island.radius = std::max(island.radius, glm::distance(vertex, island.centre));
-                island.reach = std::max(island.reach, glm::length(vertex));
-            }
-    }
-
-    // Finds the surfaces that no light goes on from one part of to another: by some of their faces,
-    // whether all their vertices lie behind, or in one plane with them.
-    void findBlind(std::vector<Surface>& surfaces) const {
-        std::vector<std::vector<uint32_t>> facesOf(surfaces.size());
-        for (size_t f = 0; f < faces.count(); ++f) facesOf[faces.surface[f]].push_back(uint32_t(f));
-        for (size_t s = 0; s < surfaces.size(); ++s) {
-            const double off = kBlind * surfaces[s].extent.diagonal();
-            const size_t step = 1 + facesOf[s].size() / kBlindFaces;
-            bool seesItself = false;
-            for (size_t k = 0; k < facesOf[s].size() && !seesItself; k += step) {
-                const size_t begin = faces.offsets[facesOf[s][k]];
-                const glm::dvec3 at = world[faces.vertices[begin]];
-                const glm::dvec3 across = areaVector(facesOf[s][k]);
-                if (!(glm::length(across) > 0)) continue;
-                const glm::dvec3 normal = glm::normalize(across);
-                for (uint32_t f : facesOf[s])
-                    for (size_t c = faces.offsets[f]; c < faces.offsets[f + 1] && !seesItself;
-                         ++c) {
-                        const double height = glm::dot(world[faces.vertices[c]] - at, normal);
-                        seesItself = height > off || (!closed[s] && height < -off);
-                    }
-            }
-            surfaces[s].seesItself = seesItself;
-        }
-    }
-
-    // Along the normal of a face, as long as its area, m^2.
-    glm::dvec3 areaVector(size_t face) const {
-        const size_t begin = faces.offsets[face], end = faces.offsets[face + 1];
-        const glm::dvec3 first = world[faces.vertices[begin]];
-        glm::dvec3 doubled(0.0);
-        for (size_t c = begin; c + 1 < end; ++c)
-            doubled +=
-                glm::cross(world[faces.vertices[c]] - first, world[faces.vertices[c + 1]] - first);
-        return 0.5 * doubled;
-    }
+    // placed: with its islands in the patches.
+    Subdivision(const Scene& scene, const Placement& placed, Patches& patches)
+        : scene(scene), placed(placed), patches(patches) {}
 
     // patchSize: edge of a patch, metres; 0: the automatic ones.
     void cutFaces(float patchSize) {
-        std::vector<double> reachOf(world.size(), 0);  // per vertex: of its island
+        const WeldedFaces& faces = placed.faces();
+        const PatchSizes& sizes = placed.sizes();
+        std::vector<double> reachOf(patches.vertices.size(), 0);  // per vertex: of its island
         for (size_t f = 0; f < faces.count(); ++f)
             reachOf[faces.vertices[faces.offsets[f]]] =
                 double(patches.islands[sizes.island[faces.surface[f]]].reach);
         const std::vector<bool> solid =
-            solidFaces(faces, closed, patches.vertices,
+            solidFaces(faces, placed.closed(), patches.vertices,
                        [&](uint32_t vertex) { return kThinnest * reachOf[vertex]; });
         for (size_t i = 0; i < scene.instances.size(); ++i) {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
@@ -325,8 +230,8 @@ class Subdivision {
     }
 
     uint32_t worldVertex(uint32_t instance, int32_t corner) const {
-        return welded[firstVertex[instance] +
-                      size_t(scene.meshes[scene.instances[instance].mesh].cornerVertices[corner])];
+        return placed.vertex(instance,
+                             scene.meshes[scene.instances[instance].mesh].cornerVertices[corner]);
     }
 
     static bool isParallelogram(const std::vector<glm::dvec3>& p) {
@@ -481,13 +386,8 @@ class Subdivision {
     }
 
     const Scene& scene;
+    const Placement& placed;
     Patches& patches;
-    std::vector<glm::dvec3> world;    // per vertex of all instances, metres
-    std::vector<size_t> firstVertex;  // per instance, into Patches::vertices
-    std::vector<uint32_t> welded;     // per vertex: the one that stands for it
-    WeldedFaces faces;
-    std::vector<bool> closed;  // per surface of them
-    PatchSizes sizes;
     std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
 };
 
@@ -532,11 +432,10 @@ void fillPatches(const Scene& scene, Patches& patches) {
 
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     Patches patches;
-    Subdivision subdivision(scene, patches);
-    subdivision.placeInstances();
-    if (subdivision.isEmpty()) return patches;
-    subdivision.findIslands();
-    subdivision.cutFaces(patchSize);
+    Placement placed(scene);
+    if (placed.isEmpty()) return patches;
+    placed.findIslands(patches);
+    Subdivision(scene, placed, patches).cutFaces(patchSize);
 
     // Fit into maxPatches; a parent keeps at least one patch.
     while (numberPatches(patches) > std::max(maxPatches, patches.parents.size())) {
