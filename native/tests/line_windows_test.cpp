@@ -161,7 +161,7 @@ TEST(LineWindows, AFurnaceIsExact) {
 
 TEST(LineWindows, DensityFollowsThePatches) {
     const Patches patches = subdivide(hallWithSmallThings(0.5f), 1, kMany);
-    const LineDensity density = densityByDetail(patches, 0.5f, 2, 0.001f);
+    const LineDensity density = densityByDetail(patches, {0.5f}, 2, {0.001f});
     ASSERT_FALSE(density.windows.empty());
     ASSERT_EQ(density.windowOf.size(), patches.parents.size());
     for (size_t p = 0; p < patches.parents.size(); ++p) {
@@ -187,7 +187,7 @@ TEST(LineWindows, DensityFollowsThePatches) {
 
 TEST(LineWindows, PatchesOfOneSizeNeedNone) {
     const Patches patches = subdivide(roomWithBoxes(0.5f), 0.2f, kMany);
-    const LineDensity density = densityByDetail(patches, 0.14f, 2, 0.001f);
+    const LineDensity density = densityByDetail(patches, {0.14f}, 2, {0.001f});
     EXPECT_TRUE(density.windows.empty());
     EXPECT_EQ(density.pixelSize, 0.14f);
 }
@@ -212,7 +212,7 @@ TEST(LineWindows, SmallThingsHaveLessNoiseThanOfAsManyUniformLines) {
                 ball.push_back(double(h.direct[i].x + h.indirect[i].x));
         return ball;
     };
-    const LineDensity density = densityByDetail(patches, 0.5f, 2, 0.001f);
+    const LineDensity density = densityByDetail(patches, {0.5f}, 2, {0.001f});
     const Traced dense = trace(patches, density.pixelSize, density.windows, 128);
     // Uniform lines with as many lines: finer pixels everywhere.
     const float finer =

@@ -222,38 +222,46 @@ TEST(Patches, AScenesDistanceFromTheOriginDoesNotMatter) {
 
 TEST(PatchSize, TinyGroupsInAVastSceneGetTheirOwn) {
     auto cube = [](const glm::dvec3& at, double edge) {
-        Extent extent;
-        extent.add(at);
-        extent.add(at + edge);
-        return extent;
+        Surface surface;
+        surface.extent.add(at);
+        surface.extent.add(at + edge);
+        surface.area = 6 * edge * edge;
+        surface.faces = 6;
+        return surface;
     };
     // A plain, a house with a chair in it, another house 200 m off, and a tree of 3 m by itself.
-    std::vector<Extent> objects(1);
-    objects[0].add({-500, -500, 0});
-    objects[0].add({500, 500, 0});
-    for (const Extent& extent :
-         {cube({0, 0, 0}, 8), cube({2, 2, 0}, 1), cube({200, 0, 0}, 8), cube({0, 300, 0}, 3)})
-        objects.push_back(extent);
-    const std::vector<double> sizes = automaticPatchSizes(objects);
-    const double plain = objects[0].diagonal() / 64, house = objects[1].diagonal() / 64;
+    std::vector<Surface> objects(1);
+    objects[0].extent.add({-500, -500, 0});
+    objects[0].extent.add({500, 500, 0});
+    objects[0].area = 1e6;
+    objects[0].faces = 100000;
+    for (const Surface& surface :
+         {cube({0, 0, 0}, 8), cube({2, 2, 0}, 1), cube({200, 0, 0}, 8), cube({0, 300, 0}, 3)}) {
+        objects.push_back(surface);
+        objects.back().object = uint32_t(objects.size());
+    }
+    const std::vector<double> sizes = automaticPatchSizes(objects).size;
+    auto alone = [&](size_t k) { return objects[k].extent.diagonal() / 64; };
+    const double plain = alone(0), house = alone(1);
     EXPECT_NEAR(sizes[0], plain, 1e-3 * plain);
     EXPECT_GE(sizes[1], house);
     EXPECT_LT(sizes[1], 2 * house);
     EXPECT_EQ(sizes[2], sizes[1]) << "a chair that is no more than tiny in its house";
     EXPECT_EQ(sizes[3], sizes[1]);
-    EXPECT_NEAR(sizes[4], objects[4].diagonal() / 64, 1e-9);
+    EXPECT_NEAR(sizes[4], alone(4), 1e-9);
 }
 
 TEST(PatchSize, ObjectsOfASceneOfTheirSizeHaveOneSize) {
-    std::vector<Extent> objects(3);
-    objects[0].add({0, 0, 0});
-    objects[0].add({6, 5, 3});
-    objects[1].add({1, 1, 0});
-    objects[1].add({2, 2, 1});
-    objects[2].add({4, 1, 0});
-    objects[2].add({4.4, 1.4, 0.5});
-    const double wanted = objects[0].diagonal() / 64;
-    for (double size : automaticPatchSizes(objects)) EXPECT_EQ(size, wanted);
+    std::vector<Surface> objects(3);
+    objects[0].extent.add({0, 0, 0});
+    objects[0].extent.add({6, 5, 3});
+    objects[1].extent.add({1, 1, 0});
+    objects[1].extent.add({2, 2, 1});
+    objects[2].extent.add({4, 1, 0});
+    objects[2].extent.add({4.4, 1.4, 0.5});
+    for (uint32_t k = 0; k < 3; ++k) objects[k].object = k;
+    const double wanted = objects[0].extent.diagonal() / 64;
+    for (double size : automaticPatchSizes(objects).size) EXPECT_EQ(size, wanted);
 }
 
 TEST(Reflectance, AnImageOfACheckerAveragesExactly) {

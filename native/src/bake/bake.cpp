@@ -476,7 +476,11 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     SetNoise noise(trace->looks, std::move(errorOfSets), tileWeight, tiles.patches());
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
-    const uint32_t most = std::max(2u, uint32_t(settings.maxBundles) & ~1u);
+    const uint32_t most =
+        std::max(2u, uint32_t(std::min(settings.maxBundles, trace->density.windows.empty()
+                                                                ? settings.maxBundles
+                                                                : trace->density.mostBundles)) &
+                         ~1u);
     uint32_t wanted = std::max(transport.bundleCount(),
                                std::min(most, (uint32_t(settings.minBundles) + 1) & ~1u));
     for (;;) {

@@ -14,18 +14,36 @@ constexpr float kPixelsPerPatch = 2.0f;
 // The same outside of windows of finer pixels: most lines are to be in the windows.
 constexpr float kPixelsPerPatchAround = 0.25f;
 constexpr int kMaxPlanePixels = 4096;  // along the scene's diameter
-// Surfaces not further apart than these shares of the scene's radius and of a patch touch.
-constexpr float kTouchOfRadius = 1e-4f;
-constexpr float kTouchOfPatch = 0.02f;
 
-// Edge of a pixel, metres. The same for all bundles: power per line is the same for all only then.
+// Edge of a pixel by the mean area of patches no larger than `size` times itself, metres.
+float pixelSize(double area, size_t count, float size, float radius) {
+    const double mean =
+        std::min(double(size) * double(size), area / double(std::max<size_t>(1, count)));
+    return std::max(float(std::sqrt(mean / double(kPixelsPerPatch))), 2 * radius / kMaxPlanePixels);
+}
+
+// The same for all patches and bundles: power per line is the same for all only then.
 float pixelSize(const Patches& patches, int linesPerBundle) {
     if (linesPerBundle > 0)
         return patches.radius * std::sqrt(glm::pi<float>() / float(linesPerBundle));
-    const double mean =
-        std::min(double(patches.size) * patches.size,
-                 patches.totalArea / double(std::max<size_t>(1, patches.tileCount)));
-    return std::max(float(std::sqrt(mean / kPixelsPerPatch)), 2 * patches.radius / kMaxPlanePixels);
+    return pixelSize(patches.totalArea, patches.tileCount, patches.size, patches.radius);
+}
+
+// Small patches get windows of finer pixels.
+LineDensity densityOf(const Patches& patches) {
+    std::vector<double> area(patches.islands.size(), 0);
+    std::vector<size_t> count(area.size(), 0);
+    for (const Parent& parent : patches.parents) {
+        area[parent.island] += double(parent.area());
+        count[parent.island] += parent.tileCount();
+    }
+    std::vector<float> pixels, least;
+    for (size_t k = 0; k < area.size(); ++k) {
+        const Island& island = patches.islands[k];
+        pixels.push_back(pixelSize(area[k], count[k], island.size, island.radius));
+        least.push_back(2 * island.radius / kMaxPlanePixels);
+    }
+    return densityByDetail(patches, pixels, kPixelsPerPatchAround, least);
 }
 
 }  // namespace
@@ -36,12 +54,12 @@ Trace::Trace(uint64_t hash, Patches made, const Settings& settings)
         if (parent.stopsDirect != parent.exchanges && !directVisibility)
             directVisibility =
                 std::make_unique<const Visibility>(patches, Blockers::STOPPING_DIRECT);
-    touchDistance = std::min(kTouchOfRadius * patches.radius, kTouchOfPatch * patches.finest);
-    density.pixelSize = pixelSize(patches, settings.linesPerBundle);
-    // Small patches get windows of finer pixels.
-    if (settings.hasLineWindows())
-        density = densityByDetail(patches, density.pixelSize, kPixelsPerPatchAround,
-                                  2 * patches.radius / kMaxPlanePixels);
+    for (const Island& island : patches.islands)
+        touchDistance = std::max(touchDistance, island.touchDistance);
+    if (settings.hasLineWindows() && patches.count() > 0)
+        density = densityOf(patches);
+    else
+        density.pixelSize = pixelSize(patches, settings.linesPerBundle);
 }
 
 void Trace::startLines(const Settings& settings) {

@@ -55,7 +55,7 @@ struct Trace {
 
     const uint64_t hash;  // geometryHash
     Patches patches;
-    float touchDistance = 0;  // surfaces not further apart touch, metres
+    float touchDistance = 0;  // the largest of all islands, metres
     const Visibility visibility;
     std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
     Surroundings surrounding;                            // empty: as the counts have it

@@ -6,19 +6,31 @@
 
 namespace raybundle {
 namespace {
-// A window darker than this share of the scene may have the noise of one that bright.
+// A window darker than this share of its island, and of the first one, may have the noise of one that
+// bright.
 constexpr double kDarkShare = 0.25;
+
+struct Sums {
+    double noise = 0, signal = 0, weight = 0, sides = 0;
+
+    void add(const Sums& other) {
+        noise += other.noise;
+        signal += other.signal;
+        weight += other.weight;
+        sides += other.sides;
+    }
+    double meanSignal() const { return weight > 0 ? signal / weight : 0; }
+};
+
 }  // namespace
 
 double windowNoise(const Patches& patches, const std::vector<int32_t>& windowOf,
                    const std::vector<std::array<Irradiance, 2>>& halves,
                    const std::vector<float>& weight) {
-    struct Sums {
-        double noise = 0, signal = 0, weight = 0, sides = 0;
-    };
-    if (windowOf.empty()) return 0;
-    std::vector<Sums> windows;
-    Sums all;
+    const size_t islandCount = patches.islands.size();
+    if (windowOf.empty() && islandCount < 2) return 0;
+    std::vector<Sums> windows, islands(islandCount);
+    std::vector<uint32_t> islandOf;  // per window
     for (size_t side = 0; side < weight.size(); ++side) {
         if (!(weight[side] > 0)) continue;
         glm::dvec3 a(0.0), b(0.0);
@@ -26,30 +38,40 @@ double windowNoise(const Patches& patches, const std::vector<int32_t>& windowOf,
             a += glm::dvec3(half[0].direct[side] + half[0].indirect[side]);
             b += glm::dvec3(half[1].direct[side] + half[1].indirect[side]);
         }
-        const double w = double(weight[side]), signal = w * glm::dot(a + b, a + b);
-        all.signal += signal;
-        all.weight += w;
-        const int32_t window = windowOf[patches.parentOf[side / 2]];
+        const double w = double(weight[side]);
+        const Sums own{w * glm::dot(a - b, a - b), w * glm::dot(a + b, a + b), w, 1};
+        const uint32_t parent = patches.parentOf[side / 2], island = patches.parents[parent].island;
+        islands[island].add(own);
+        const int32_t window = windowOf.empty() ? -1 : windowOf[parent];
         if (window < 0) continue;
-        windows.resize(std::max(windows.size(), size_t(window) + 1));
-        Sums& sums = windows[size_t(window)];
-        sums.noise += w * glm::dot(a - b, a - b);
-        sums.signal += signal;
-        sums.weight += w;
-        ++sums.sides;
+        const size_t count = std::max(windows.size(), size_t(window) + 1);
+        windows.resize(count);
+        islandOf.resize(count, 0);
+        windows[size_t(window)].add(own);
+        islandOf[size_t(window)] = island;
     }
-    Sums inWindows;
-    double squares = 0;
-    for (const Sums& sums : windows) {
-        const double least = kDarkShare * kDarkShare * all.signal / all.weight * sums.weight;
+    std::vector<Sums> inWindows(islandCount);  // per island
+    std::vector<double> squares(islandCount, 0);
+    for (size_t k = 0; k < windows.size(); ++k) {
+        const Sums& sums = windows[k];
+        const double usual =
+            std::max(islands[islandOf[k]].meanSignal(), islands.front().meanSignal());
+        const double least = kDarkShare * kDarkShare * usual * sums.weight;
         if (sums.sides == 0 || !(std::max(sums.signal, least) > 0)) continue;
-        squares += sums.sides * sums.noise / std::max(sums.signal, least);
-        inWindows.sides += sums.sides;
-        inWindows.noise += sums.noise;
-        inWindows.signal += sums.signal;
+        squares[islandOf[k]] += sums.sides * sums.noise / std::max(sums.signal, least);
+        inWindows[islandOf[k]].add(sums);
     }
-    if (!(inWindows.signal > 0)) return 0;
-    return std::sqrt(std::max(inWindows.noise / inWindows.signal, squares / inWindows.sides));
+    double most = 0;
+    for (size_t k = 0; k < islandCount; ++k) {
+        const Sums& sums = inWindows[k];
+        const double dark = kDarkShare * kDarkShare * islands.front().meanSignal() * sums.weight;
+        if (sums.signal > 0)
+            most = std::max({most, sums.noise / std::max(sums.signal, k == 0 ? 0 : dark),
+                             squares[k] / sums.sides});
+    }
+    if (islandCount > 1 && islands.front().signal > 0)
+        most = std::max(most, islands.front().noise / islands.front().signal);
+    return std::sqrt(most);
 }
 
 }  // namespace raybundle

@@ -7,9 +7,11 @@
 // line, metres (negative where b is nearer).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <vector>
 
 #include "patches/coincidence.h"
 #include "patches/patches.h"
@@ -18,8 +20,8 @@ namespace raybundle {
 
 class Contacts {
   public:
-    // touchDistance: two surfaces not further apart than this touch, metres. `patches` must outlive
-    // it.
+    // touchDistance: two surfaces not further apart than this touch, metres; in each island no further than
+    // Island::touchDistance. `patches` must outlive it.
     Contacts(const Patches& patches, float touchDistance)
         : patches(patches), touchDistance(double(touchDistance)) {}
 
@@ -27,15 +29,18 @@ class Contacts {
     void begin(const glm::dvec3& newDirection) { direction = newDirection; }
 
     // Surfaces not further apart than this coincide: depth does not tell their order, metres.
-    double coincidence() const {
-        // This share of the touching distance tells coinciding surfaces from merely close ones.
-        constexpr double kCoincidence = 0.05;
-        return kCoincidence * touchDistance;
-    }
+    double coincidence() const { return kCoincidence * touchDistance; }
 
     // Surfaces further apart along a line neither touch nor coincide, metres. (A grazing line
     // stretches the gap; beyond some stretch it is not worth a look.)
-    double zone() const { return 100 * touchDistance; }
+    double zone() const { return kZone * touchDistance; }
+    // The same in some islands.
+    double zone(const std::vector<uint32_t>& islands) const {
+        double most = 0;
+        for (uint32_t island : islands)
+            most = std::max(most, double(patches.islands[island].touchDistance));
+        return kZone * std::min(touchDistance, most);
+    }
 
     // Distance between the two across the nearer surface, metres.
     double gapAcross(uint32_t a, double along) const {
@@ -47,22 +52,22 @@ class Contacts {
     bool touches(uint32_t a, uint32_t b, double along) const {
         // Surfaces that meet at an angle are close only at their edge, and see each other.
         constexpr float kOpposite = -0.99f;  // cosine below which normals point against each other
-        return gapAcross(a, along) <= touchDistance &&
+        return gapAcross(a, along) <= touchAt(a) &&
                glm::dot(patches.normal(a ^ 1), patches.normal(b)) < kOpposite;
     }
 
     // Whether the two coincide and b belongs before a.
     bool belongBackwards(uint32_t a, uint32_t b, double along) const {
-        return gapAcross(a, along) <= coincidence() && areSidesParallel(a, b) && isFirst(b, a);
+        return gapAcross(a, along) <= coincidenceAt(a) && areSidesParallel(a, b) && isFirst(b, a);
     }
 
     // Whether b was put after a and belongs before it. Of surfaces that meet at an angle, only
     // beyond the touching distance: nearer to the common edge rounding decides.
     bool isDisordered(uint32_t a, uint32_t b, double along) const {
         const double gap = gapAcross(a, along);
-        if (along >= 0 && gap > coincidence()) return false;
-        if (!areSidesParallel(a, b)) return along < 0 && gap > touchDistance;
-        return gap <= coincidence() ? isFirst(b, a) : along < 0;
+        if (along >= 0 && gap > coincidenceAt(a)) return false;
+        if (!areSidesParallel(a, b)) return along < 0 && gap > touchAt(a);
+        return gap <= coincidenceAt(a) ? isFirst(b, a) : along < 0;
     }
 
     // Whether a line would have to pass through the surface of a solid between two sides that face
@@ -71,6 +76,14 @@ class Contacts {
     bool passesIntoSolid(uint32_t i, uint32_t j) const { return isInside(i) != isInside(j); }
 
   private:
+    // This share of the touching distance tells coinciding surfaces from merely close ones.
+    static constexpr double kCoincidence = 0.05;
+    static constexpr double kZone = 100;
+
+    double touchAt(uint32_t side) const {
+        return std::min(touchDistance, double(patches.islandAt(side).touchDistance));
+    }
+    double coincidenceAt(uint32_t side) const { return kCoincidence * touchAt(side); }
     bool areSidesParallel(uint32_t a, uint32_t b) const {
         return areParallel(patches.parents[patches.parentOf[a / 2]],
                            patches.parents[patches.parentOf[b / 2]]);

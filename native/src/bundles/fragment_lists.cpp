@@ -61,7 +61,14 @@ std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input) {
 void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
     rasteriser.begin(bundle);
     contacts.begin(bundle.direction);
-    projectView(out);
+    // By chance per pixel of the whole view: ROULETTE.
+    if (hasLeaks)
+        projectView(out);
+    else
+        for (size_t region = 0; region < rasteriser.regionCount(); ++region) {
+            rasteriser.lookAt(region);
+            projectView(out);
+        }
     for (size_t window = 0; window < rasteriser.windowCount(); ++window)
         if (rasteriser.lookThrough(window)) projectView(out);
 }
@@ -80,7 +87,8 @@ void FragmentLists::projectView(BundleLines& out) {
     depthSteps = kDepthSteps /
                  std::max(rasteriser.depthHigh() - depthLow, std::numeric_limits<double>::min());
     depthOffset = kIntegers + kFirstStep - depthLow * depthSteps;
-    nearSteps = uint32_t(std::min(contacts.zone() * depthSteps, kDepthSteps)) + 1;
+    nearSteps =
+        uint32_t(std::min(contacts.zone(rasteriser.islandsInView()) * depthSteps, kDepthSteps)) + 1;
     rasteriser.forEachRun([&](uint32_t pixel, int count, const double* depth,
                               const uint32_t* side) { keepRun(pixel, count, depth, side); });
     pairLists(out);

@@ -29,6 +29,12 @@ constexpr double kAlmostAll = 0.6;        // a window with so much of the one ar
 constexpr int kBins = 16;
 // The counts' bits: lines of the largest patch in the finest pixels, times the bundles.
 constexpr double kMostUnits = double(1u << 31) / kMostWindowBundles;
+// The same between islands, and the least bundles that must be possible: a side has half of the
+// units in each bundle at most, so that they need not fit twice.
+constexpr double kLeastMostBundles = 4096, kMostIslandUnits = 0x1p32 / kLeastMostBundles;
+// All islands together may cost so much more than each would alone, as a share of what the first one
+// costs: else the pixels of large ones are coarser.
+constexpr double kMostMore = 0.25;
 
 struct Box {
     glm::vec3 low{std::numeric_limits<float>::max()}, high{-std::numeric_limits<float>::max()};
@@ -150,6 +156,7 @@ class Clustering {
 // Patches of a window that are still too small for its pixels, and the window; kNoWindow is the
 // scene.
 constexpr int32_t kNoWindow = -1;
+constexpr int kMostHalvings = 30;
 struct Dense {
     Members members;
     int32_t window;
@@ -224,37 +231,157 @@ class Planner {
 
 }  // namespace
 
-LineDensity densityByDetail(const Patches& patches, float pixelSize, float pixelsPerPatch,
-                            float leastPixelSize) {
-    LineDensity density{pixelSize, {}, {}};
-    const double starvedArea = kStarvedPixels * double(pixelSize) * double(pixelSize);
-    size_t starved = 0;
-    double logSum = 0, largest = 0;
-    for (float area : patches.area) {
-        starved += double(area) < starvedArea;
-        logSum += double(area) * std::log(double(area));
-        largest = std::max(largest, double(area));
+namespace {
+
+// What one island has, by its parents, without those around it.
+struct IslandDensity {
+    Members members;
+    size_t patchCount = 0;
+    double area = 0, largest = 0;  // of its patches, m^2
+    Box box;
+    LineDensity density;
+
+    // What a bundle costs: pixels of its shadow, and where its surfaces are twice.
+    double cost(double pixel) const { return (box.meanShadow() + area / 2) / (pixel * pixel); }
+    double costAlone() const { return cost(double(density.pixelSize)) + windowPixels(); }
+    double windowPixels() const {
+        const double pixelArea = double(density.pixelSize) * double(density.pixelSize);
+        double sum = 0;
+        for (const LineWindow& window : density.windows)
+            sum +=
+                std::ldexp(Box{window.low, window.high}.meanShadow() / pixelArea, 2 * window.level);
+        return sum;
     }
-    if (starved < kLeastPatches || double(starved) < kLeastStarvedShare * double(patches.count()))
-        return density;
+};
+
+void findWindows(const Patches& patches, const Clustering& clustering, float pixelsPerPatch,
+                 float leastPixelSize, IslandDensity& island) {
+    LineDensity& density = island.density;
+    const double starvedArea =
+        kStarvedPixels * double(density.pixelSize) * double(density.pixelSize);
+    size_t starved = 0;
+    double logSum = 0;
+    for (uint32_t m : island.members) {
+        const Parent& parent = patches.parents[m];
+        for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
+            const double area = double(patches.area[p]);
+            starved += area < starvedArea;
+            logSum += area * std::log(area);
+        }
+    }
+    if (starved < kLeastPatches || double(starved) < kLeastStarvedShare * double(island.patchCount))
+        return;
 
     // Outside of the windows the pixels follow the patches that most of the area is made of.
-    const double usual = std::exp(logSum / patches.totalArea);
+    const double usual = std::exp(logSum / island.area);
+    const float before = density.pixelSize;
     density.pixelSize =
-        std::max({pixelSize, leastPixelSize, float(std::sqrt(usual / double(pixelsPerPatch)))});
+        std::max({before, leastPixelSize, float(std::sqrt(usual / double(pixelsPerPatch)))});
     density.windowOf.assign(patches.parents.size(), kNoWindow);
     const double coarse = double(density.pixelSize);
-    const int mostLevel = int(std::floor(0.5 * std::log2(kMostUnits * coarse * coarse / largest)));
-
-    const Clustering clustering(patches);
+    const int mostLevel =
+        int(std::floor(0.5 * std::log2(kMostUnits * coarse * coarse / island.largest)));
     Planner planner(clustering, coarse, density);
-    Members all(patches.parents.size());
-    std::iota(all.begin(), all.end(), 0u);
-    std::vector<Dense> outer{{std::move(all), kNoWindow}};
+    std::vector<Dense> outer{{island.members, kNoWindow}};
     for (int level = 1; level <= mostLevel && !outer.empty(); ++level)
         outer = planner.refine(outer, level);
-    if (density.windows.empty()) return {pixelSize, {}, {}};
-    return density;
+    if (density.windows.empty()) {
+        density.pixelSize = before;
+        density.windowOf.clear();
+    }
+}
+
+// How often the edge of a pixel is halved for an island: of those after the first not at all as long
+// as their patches have pixels enough.
+int halvings(const IslandDensity& island, double pixel, bool isFirst) {
+    const double finer = std::log2(pixel / double(island.density.pixelSize));
+    return isFirst || finer > 1.25 ? std::clamp(int(std::lround(finer)), 0, kMostHalvings) : 0;
+}
+
+}  // namespace
+
+LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pixelSizes,
+                            float pixelsPerPatch, const std::vector<float>& leastPixelSizes) {
+    const Clustering clustering(patches);
+    std::vector<IslandDensity> islands(patches.islands.size());
+    for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+        const Parent& parent = patches.parents[i];
+        IslandDensity& island = islands[parent.island];
+        island.members.push_back(i);
+        island.patchCount += parent.patchCount();
+        for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
+            island.area += double(patches.area[p]);
+            island.largest = std::max(island.largest, double(patches.area[p]));
+        }
+    }
+    double alone = 0, largest = 0;
+    for (size_t k = 0; k < islands.size(); ++k) {
+        IslandDensity& island = islands[k];
+        island.density.pixelSize = pixelSizes[k];
+        island.box = clustering.boxOf(island.members);
+        findWindows(patches, clustering, pixelsPerPatch, leastPixelSizes[k], island);
+        // Long wires, say, have a shadow of many pixels for few patches.
+        const double most = islands.front().costAlone();
+        if (k > 0 && island.costAlone() > most &&
+            island.costAlone() > kMostPixelsEach * double(island.patchCount)) {
+            island.density.windows.clear();
+            island.density.windowOf.clear();
+            island.density.pixelSize =
+                std::max(island.density.pixelSize, float(std::sqrt(island.cost(1) / most)));
+        }
+        alone += island.costAlone();
+        largest = std::max(largest, island.largest);
+    }
+    if (islands.size() == 1) return islands.front().density;
+
+    // The pixels of the first island, or coarser by powers of two.
+    const double first = double(islands.front().density.pixelSize);
+    int level = 0;
+    auto cost = [&] {
+        const double pixel = std::ldexp(first, level);
+        double sum = 0;
+        for (const IslandDensity& island : islands)
+            sum += island.windowPixels() +
+                   island.cost(
+                       std::ldexp(pixel, -halvings(island, pixel, &island == &islands.front())));
+        return sum;
+    };
+    while (level < kMostHalvings && cost() > alone + kMostMore * islands.front().costAlone())
+        ++level;
+    const double pixel = std::ldexp(first, level);
+    const int mostLevel =
+        int(std::floor(0.5 * std::log2(kMostIslandUnits * pixel * pixel / largest)));
+
+    // The first islands have the most patches.
+    LineDensity all;
+    all.pixelSize = float(pixel);
+    all.windowOf.assign(patches.parents.size(), kNoWindow);
+    for (const IslandDensity& island : islands) {
+        const int around =
+            std::min(halvings(island, pixel, &island == &islands.front()), mostLevel);
+        const int32_t before = int32_t(all.windows.size());
+        if (around > 0 && island.patchCount >= kLeastPatches && before < int32_t(kMostWindows)) {
+            for (uint32_t m : island.members) all.windowOf[m] = before;
+            all.windows.push_back({island.box.low, island.box.high, around});
+        }
+        const int32_t offset = int32_t(all.windows.size());
+        const int finer = int(std::lround(std::log2(pixel / double(island.density.pixelSize))));
+        for (LineWindow window : island.density.windows) {
+            // Of no effect where pixels are finer already.
+            window.level = std::clamp(window.level + finer, 1, std::max(1, mostLevel));
+            all.windows.push_back(window);
+        }
+        if (int32_t(all.windows.size()) == offset) continue;
+        for (uint32_t m : island.members)
+            if (const int32_t window = island.density.windowOf[m]; window != kNoWindow)
+                all.windowOf[m] = offset + window;
+    }
+    if (all.windows.empty()) all.windowOf.clear();
+    int finest = 0;
+    for (const LineWindow& window : all.windows) finest = std::max(finest, window.level);
+    const double units = std::ldexp(largest / (pixel * pixel), 2 * finest);
+    all.mostBundles = int(std::min(double(kMostWindowBundles), 0x1p32 / units));
+    return all;
 }
 
 }  // namespace raybundle

@@ -29,20 +29,24 @@ struct LineWindow {
     int level;            // its pixels are 2^level times smaller, 1 or more
 };
 
+// The most bundles with which the counts of finest lines fit into 31 bits.
+constexpr int kMostWindowBundles = 1 << 16;
+
 struct LineDensity {
     float pixelSize;  // edge of a pixel outside of all windows, metres
     std::vector<LineWindow> windows;
     // Per parent: the innermost window that was made for it, or -1; empty without windows.
     std::vector<int32_t> windowOf;
+    int mostBundles = kMostWindowBundles;  // fewer where patches far away are vast
 };
 
-// The most bundles with which the counts of finest lines fit into 31 bits.
-constexpr int kMostWindowBundles = 1 << 16;
-
-// Windows for patches that `pixelSize` (metres), the same for all lines, would starve. Without
-// enough of them there are no windows, and the pixels stay as they are. pixelsPerPatch: pixels that
-// a patch should have, by area; leastPixelSize: of the pixels outside of all windows, metres.
-LineDensity densityByDetail(const Patches& patches, float pixelSize, float pixelsPerPatch,
-                            float leastPixelSize);
+// Windows for patches that pixels of one size would starve, in each island (patches/patch_size.h)
+// as if it were alone, and around whole islands whose pixels are finer than those of large ones far
+// away. An island without enough starved patches has no windows in it, and its pixels stay as they
+// are. pixelSizes: per island, edge of a pixel by its patches, metres; pixelsPerPatch: pixels that a
+// patch should have outside of windows, by area; leastPixelSizes: per island, of the pixels outside
+// of its windows, metres.
+LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pixelSizes,
+                            float pixelsPerPatch, const std::vector<float>& leastPixelSizes);
 
 }  // namespace raybundle

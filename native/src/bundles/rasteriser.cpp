@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bundles/rasteriser.h"
 
+#include <numeric>
+
 namespace raybundle {
 
 Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches,
@@ -9,14 +11,32 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
       pixelSize(pixelSize),
       smallPatches(smallPatches),
       windows(std::move(windows)) {
-    std::vector<bool> isUsed(patches.vertices.size(), smallPatches == SmallPatches::ROULETTE);
-    for (const Sheet& sheet : patches.sheets.sheets)
-        for (const auto& edge : sheet.outline) isUsed[edge[0]] = true;
-    for (uint32_t i : patches.sheets.loose)
-        for (int k = 0; k < (patches.parents[i].isTriangle ? 3 : 4); ++k)
-            isUsed[patches.parents[i].vertex[size_t(k)]] = true;
-    for (uint32_t v = 0; v < isUsed.size(); ++v)
-        if (isUsed[v]) vertices.push_back(v);
+    islands.resize(std::max<size_t>(1, patches.islands.size()));
+    const bool all = smallPatches == SmallPatches::ROULETTE;
+    // Per vertex: the last island that has it, plus 1.
+    std::vector<uint32_t> user(patches.vertices.size(), 0);
+    auto use = [&](uint32_t island, uint32_t vertex) {
+        if (user[vertex] == island + 1) return;
+        user[vertex] = island + 1;
+        islands[island].vertices.push_back(vertex);
+    };
+    const std::vector<Sheet>& sheets = patches.sheets.sheets;
+    for (uint32_t i = 0; i < sheets.size(); ++i) {
+        const uint32_t island = patches.parents[patches.parentOf[sheets[i].patches[0]]].island;
+        islands[island].sheets.push_back(i);
+        for (const auto& edge : sheets[i].outline) use(island, edge[0]);
+    }
+    auto useAll = [&](const Parent& parent) {
+        for (int k = 0; k < (parent.isTriangle ? 3 : 4); ++k)
+            use(parent.island, parent.vertex[size_t(k)]);
+    };
+    for (uint32_t i = 0; i < patches.sheets.loose.size(); ++i) {
+        const Parent& parent = patches.parents[patches.sheets.loose[i]];
+        islands[parent.island].loose.push_back(i);
+        useAll(parent);
+    }
+    if (all)
+        for (const Parent& parent : patches.parents) useAll(parent);
     for (const LineWindow& window : this->windows)
         finestLevel = std::max(finestLevel, window.level);
 }
@@ -28,26 +48,32 @@ void Rasteriser::begin(const Bundle& bundle) {
     projected.resize(patches.vertices.size());
     depth.resize(patches.vertices.size());
     const double perPixel = 1 / double(pixelSize);
-    glm::dvec3 low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
-    for (uint32_t v : vertices) {
-        const glm::dvec3 p(patches.vertices[v]);
-        const glm::dvec3 q(glm::dot(p, frame.right) * perPixel, glm::dot(p, frame.up) * perPixel,
-                           glm::dot(p, frame.direction));
-        low = glm::min(low, q);
-        high = glm::max(high, q);
-        projected[v] = glm::dvec2(q);
-        depth[v] = q.z;
+    Rectangle whole;
+    std::vector<uint32_t> shown;
+    for (uint32_t k = 0; k < islands.size(); ++k) {
+        Island& island = islands[k];
+        glm::dvec3 low(std::numeric_limits<double>::max()),
+            high(-std::numeric_limits<double>::max());
+        for (uint32_t v : island.vertices) {
+            const glm::dvec3 p(patches.vertices[v]);
+            const glm::dvec3 q(glm::dot(p, frame.right) * perPixel,
+                               glm::dot(p, frame.up) * perPixel, glm::dot(p, frame.direction));
+            low = glm::min(low, q);
+            high = glm::max(high, q);
+            projected[v] = glm::dvec2(q);
+            depth[v] = q.z;
+        }
+        if (island.vertices.empty()) continue;
+        shown.push_back(k);
+        island.shadow = {glm::dvec2(low), glm::dvec2(high)};
+        island.lowest = low.z;
+        island.highest = high.z;
+        whole.low = glm::min(whole.low, island.shadow.low);
+        whole.high = glm::max(whole.high, island.shadow.high);
     }
-    if (vertices.empty()) low = high = glm::dvec3(0.0);
-    // Move the view to the scene by whole pixels, so that its corner does not undo the random
-    // shift.
-    level = 0;
-    zoom = 1;
-    corner = glm::floor(glm::dvec2(low)) - bundle.shift;
-    width = int(high.x - corner.x) + 2;  // a pixel more than needed, for the rounding to float
-    height = int(high.y - corner.y) + 2;
-    lowest = low.z;
-    highest = high.z;
+    if (shown.empty()) whole.low = whole.high = glm::dvec2(0.0);
+    findRegions();
+    showIslands(std::move(shown), whole.low, whole.high);
     if (windows.empty()) return;
 
     bounds.clear();
@@ -79,6 +105,77 @@ void Rasteriser::begin(const Bundle& bundle) {
     findTaken(windows.size());
 }
 
+void Rasteriser::showIslands(std::vector<uint32_t> shown, const glm::dvec2& low,
+                             const glm::dvec2& high) {
+    inSight = std::move(shown);
+    lowest = highest = 0;
+    for (size_t k = 0; k < inSight.size(); ++k) {
+        const Island& island = islands[inSight[k]];
+        lowest = k == 0 ? island.lowest : std::min(lowest, island.lowest);
+        highest = k == 0 ? island.highest : std::max(highest, island.highest);
+    }
+    // Move the view to the scene by whole pixels, so that its corner does not undo the random
+    // shift.
+    level = 0;
+    zoom = 1;
+    corner = glm::floor(low) - frame.shift;
+    // A pixel more than needed, for the rounding to float. (The whole of a vast scene may have too
+    // many, but is looked at in regions.)
+    constexpr double kMost = 1 << 30;
+    width = int(std::min(kMost, high.x - corner.x)) + 2;
+    height = int(std::min(kMost, high.y - corner.y)) + 2;
+}
+
+// Shadows that have pixels in common become one region, and regions likewise, by a sweep along x
+// until there are no more.
+void Rasteriser::findRegions() {
+    regions.clear();
+    for (uint32_t k = 0; k < islands.size(); ++k) {
+        if (islands[k].vertices.empty()) continue;
+        const Rectangle& shadow = islands[k].shadow;
+        // As wide as its view.
+        const glm::dvec2 first = glm::floor(shadow.low);
+        regions.push_back(
+            {first, first + glm::floor(shadow.high - first + frame.shift) + 2.0, {k}});
+    }
+    for (bool isDone = regions.size() < 2; !isDone;) {
+        isDone = true;
+        std::stable_sort(regions.begin(), regions.end(),
+                         [](const Region& a, const Region& b) { return a.first.x < b.first.x; });
+        for (size_t i = 0; i < regions.size(); ++i) {
+            Region& region = regions[i];
+            if (region.islands.empty()) continue;
+            for (size_t j = i + 1; j < regions.size() && regions[j].first.x < region.end.x; ++j) {
+                Region& other = regions[j];
+                if (other.islands.empty() || other.first.y >= region.end.y ||
+                    other.end.y <= region.first.y)
+                    continue;
+                region.first = glm::min(region.first, other.first);
+                region.end = glm::max(region.end, other.end);
+                region.islands.insert(region.islands.end(), other.islands.begin(),
+                                      other.islands.end());
+                other.islands.clear();
+                isDone = false;
+            }
+        }
+        regions.erase(std::remove_if(regions.begin(), regions.end(),
+                                     [](const Region& region) { return region.islands.empty(); }),
+                      regions.end());
+    }
+    for (Region& region : regions) std::sort(region.islands.begin(), region.islands.end());
+}
+
+void Rasteriser::lookAt(size_t region) {
+    Rectangle around;
+    for (uint32_t k : regions[region].islands) {
+        around.low = glm::min(around.low, islands[k].shadow.low);
+        around.high = glm::max(around.high, islands[k].shadow.high);
+    }
+    showIslands(regions[region].islands, around.low, around.high);
+    if (!patches.opacity.empty()) line = lineName(frame) + (region ? mixBits(region << 32) : 0);
+    if (!windows.empty()) findTaken(windows.size());
+}
+
 bool Rasteriser::lookThrough(size_t window) {
     level = windows[window].level;
     zoom = std::ldexp(1.0, level);
@@ -93,6 +190,22 @@ bool Rasteriser::lookThrough(size_t window) {
     width = int(last.x - first.x);
     height = int(last.y - first.y);
     if (width <= 0 || height <= 0) return false;
+    inSight.clear();
+    for (uint32_t k = 0; k < islands.size(); ++k) {
+        const Island& island = islands[k];
+        if (island.vertices.empty() || !isInView(island.shadow)) continue;
+        // The shadow of a long wire lies in many views, the wire itself in few.
+        const size_t sheets = patches.sheets.sheets.size();
+        auto isSeen = [&](size_t i) { return isInView(bounds[i]); };
+        if (islands.size() > 1 &&
+            std::none_of(island.sheets.begin(), island.sheets.end(), isSeen) &&
+            std::none_of(island.loose.begin(), island.loose.end(),
+                         [&](uint32_t i) { return isSeen(sheets + i); }))
+            continue;
+        lowest = inSight.empty() ? island.lowest : std::min(lowest, island.lowest);
+        highest = inSight.empty() ? island.highest : std::max(highest, island.highest);
+        inSight.push_back(k);
+    }
     findTaken(window);
     return true;
 }

@@ -7,9 +7,10 @@
 // every shape and size, and neighbouring faces never both take or both miss a pixel.
 // ROULETTE: see bundles/roulette.h.
 //
-// With windows (bundles/line_windows.h) the plane is looked at in several views, one after the
-// other: as a whole, and through each window with its finer pixels. Each point of the plane belongs
-// to one view.
+// The plane can be looked at in several views, one after the other: the regions where the shadows of
+// islands are (patches/patch_size.h), with nothing between, and each window with its finer pixels
+// (bundles/line_windows.h). Each point of the plane belongs to one view at most; regions have the
+// pixels that the whole has there.
 //
 // Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised, and sheets of
 // them (patches/sheets.h); the patch follows from the affine coordinates.
@@ -41,6 +42,10 @@ class Rasteriser {
 
     // Turns to a bundle and to the view of the whole scene.
     void begin(const Bundle& bundle);
+
+    // Turns to the view of a region: all of them together hold what the whole does.
+    void lookAt(size_t region);
+    size_t regionCount() const { return regions.size(); }
 
     // Turns to the view of a window; false if no pixel is in it.
     bool lookThrough(size_t window);
@@ -74,9 +79,11 @@ class Rasteriser {
     // The view, pixels; a pixel's index is y * width + x.
     size_t pixelCount() const { return size_t(width) * size_t(height); }
     const glm::dvec3& direction() const { return frame.direction; }
-    // Depths along the direction that hold the scene, metres.
+    // Depths along the direction that hold what is in the view, metres.
     double depthLow() const { return lowest; }
     double depthHigh() const { return highest; }
+    // The islands in the view.
+    const std::vector<uint32_t>& islandsInView() const { return inSight; }
 
   private:
     // Whether the line of a pixel belongs to the view and meets the patch of a side.
@@ -94,11 +101,13 @@ class Rasteriser {
         }
         const std::vector<Sheet>& sheets = patches.sheets.sheets;
         const std::vector<uint32_t>& loose = patches.sheets.loose;
-        for (size_t i = 0; i < sheets.size(); ++i)
-            if (level == 0 || isInView(bounds[i])) sampleSheet(sheets[i], visit);
-        for (size_t i = 0; i < loose.size(); ++i)
-            if (level == 0 || isInView(bounds[sheets.size() + i]))
-                sampleParent(patches.parents[loose[i]], visit);
+        for (uint32_t island : inSight) {
+            for (uint32_t i : islands[island].sheets)
+                if (level == 0 || isInView(bounds[i])) sampleSheet(sheets[i], visit);
+            for (uint32_t i : islands[island].loose)
+                if (level == 0 || isInView(bounds[sheets.size() + i]))
+                    sampleParent(patches.parents[loose[i]], visit);
+        }
     }
     template <class Visit>
     void sampleSheet(const Sheet& sheet, const Visit& visit);
@@ -128,8 +137,24 @@ class Rasteriser {
 
     // On the plane, in pixels of the whole scene's view, before the shift.
     struct Rectangle {
-        glm::dvec2 low, high;
+        glm::dvec2 low{std::numeric_limits<double>::max()},
+            high{-std::numeric_limits<double>::max()};
     };
+    // What an island has, and where it is seen along the bundle in hand.
+    struct Island {
+        std::vector<uint32_t> sheets, loose;  // into Patches::sheets
+        std::vector<uint32_t> vertices;       // all but those inside of sheets
+        Rectangle shadow;
+        double lowest = 0, highest = 0;  // depth, metres
+    };
+    // Islands whose shadows overlap, in pixels.
+    struct Region {
+        glm::dvec2 first, end;  // pixels before the shift
+        std::vector<uint32_t> islands;
+    };
+    void findRegions();
+    // The view of some islands, which lie between two places of the plane.
+    void showIslands(std::vector<uint32_t> shown, const glm::dvec2& low, const glm::dvec2& high);
     // A vertex in the view, pixels. The same for all parents that have it.
     glm::dvec2 inView(uint32_t vertex) const { return projected[vertex] * zoom - corner; }
     bool isInView(const Rectangle& r) const {
@@ -145,14 +170,16 @@ class Rasteriser {
     const std::vector<LineWindow> windows;
     int finestLevel = 0;
 
-    Bundle frame{};                     // the bundle in hand
-    uint64_t line = 0;                  // lineName of the bundle and the view
-    int level = 0;                      // of the view
-    double zoom = 1;                    // 2^level
-    glm::dvec2 corner{0.0};             // of the view, its pixels
-    int width = 0, height = 0;          // of the view, its pixels
-    double lowest = 0, highest = 0;     // depth, metres
-    std::vector<uint32_t> vertices;     // all but those inside of sheets
+    Bundle frame{};                  // the bundle in hand
+    uint64_t line = 0;               // lineName of the bundle and the view
+    int level = 0;                   // of the view
+    double zoom = 1;                 // 2^level
+    glm::dvec2 corner{0.0};          // of the view, its pixels
+    int width = 0, height = 0;       // of the view, its pixels
+    double lowest = 0, highest = 0;  // depth, metres
+    std::vector<Island> islands;     // of Patches::islands
+    std::vector<Region> regions;
+    std::vector<uint32_t> inSight;      // islands, ascending
     std::vector<glm::dvec2> projected;  // per vertex: on the plane
     std::vector<Rectangle> bounds;      // per sheet, then per loose parent, if there are windows
     std::vector<Rectangle> openings;    // per window: what of the plane is in it

@@ -2,22 +2,31 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <tuple>
 #include <vector>
 
 #include "patches/patches.h"
+#include "patches/welding.h"
 
 namespace raybundle {
 
-// Whether a part of a mesh encloses a volume, and whether its faces wind about that outwards.
+// Whether a surface encloses a volume, and whether its faces wind about that outwards.
 enum class Shell : uint8_t { OPEN, OUTWARD, INWARD };
 
-// Per face of a mesh, whose vertices lie at `places` (metres): whether it belongs to a part that
-// encloses a volume, that is, whether each edge of the part has exactly two faces, which turn alike.
-// Parts that are no thicker than `thinnest` (metres) do not, and neither do two that lie in the same
-// place and are turned each to another side: such a shell has light on both sides.
-std::vector<Shell> shellsOfFaces(const Mesh& mesh, const glm::vec3* places, double thinnest);
+// Per surface: whether it is closed, that is, whether each edge of it has as many faces on one side as
+// on the other, which turn alike. (Where two boxes with split edges stand against each other, welded
+// edges have four faces.)
+std::vector<bool> closedSurfaces(const WeldedFaces& faces);
+
+// Per face: whether it belongs to a closed surface that encloses a volume. places: of the vertices,
+// metres. Surfaces that are no thicker than `thinnest` (per vertex, metres) do not, and neither do two
+// of one instance that lie in the same place, within rounding, and are turned each to another side:
+// such a shell has light on both sides.
+std::vector<Shell> shellsOfFaces(const WeldedFaces& faces, const std::vector<bool>& closed,
+                                 const std::vector<glm::vec3>& places,
+                                 const std::function<double(uint32_t)>& thinnest);
 
 // Which of two parallel surfaces that lie in the same place comes first along a direction. Depth
 // cannot tell, but solids can: the surface by which the direction leaves a solid comes before any
@@ -38,9 +47,6 @@ inline bool comesBefore(const Patches& patches, uint32_t a, bool aEnters, uint32
     };
     return rank(a, aEnters) < rank(b, bEnters);
 }
-
-// Per face: a number of the part of the mesh that it hangs together with by its vertices.
-std::vector<int32_t> partsOfFaces(const Mesh& mesh);
 
 // Whether two parents are parallel, within what rounding does to coinciding faces.
 inline bool areParallel(const Parent& a, const Parent& b) {

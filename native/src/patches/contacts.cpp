@@ -76,7 +76,8 @@ class Gaps {
         float distance = 0;
         const auto hit = visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}), direction,
                                              &distance, farthest);
-        if (!hit || distance <= touchDistance) return std::nullopt;
+        if (!hit || distance <= std::min(touchDistance, patches.islandAt(side).touchDistance))
+            return std::nullopt;
         if (met) *met = *hit;
         return distance;
     }

@@ -90,9 +90,20 @@ std::vector<TilePair> neighbouringTiles(const Patches& patches, uint32_t firstPa
     for (size_t i = 0; i < border.size();) {
         size_t end = i + 1;
         while (end < border.size() && border[end].key() == border[i].key()) ++end;
-        const BorderEdge &a = border[i], &b = border[end - 1];
-        if (end - i == 2 && glm::dot(a.normal, b.normal) >= kSmoothCosine)
-            pairs.push_back({a.tile, b.tile});
+        // Of more than two, as where boxes with split edges stand against each other, those that
+        // have one alone to go on with.
+        auto onlyOne = [&](size_t k) {
+            size_t other = k, count = 0;
+            for (size_t m = i; m < end; ++m)
+                if (m != k && glm::dot(border[k].normal, border[m].normal) >= kSmoothCosine) {
+                    other = m;
+                    ++count;
+                }
+            return count == 1 ? other : k;
+        };
+        for (size_t k = i; k < end; ++k)
+            if (const size_t other = onlyOne(k); other > k && onlyOne(other) == k)
+                pairs.push_back({border[k].tile, border[other].tile});
         i = end;
     }
     return pairs;

@@ -2,8 +2,10 @@
 #include "patches/patch_size.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <map>
 #include <numeric>
+#include <tuple>
 
 namespace raybundle {
 namespace {
@@ -12,88 +14,231 @@ constexpr double kPatchesAcross = 64;
 // Groups smaller than this share of what is around them get finer patches; kFull times smaller
 // ones get those that they would have alone, and in between there is no jump.
 constexpr double kTiny = 1.0 / 16, kFull = 8;
-// Objects not further apart than this share of the larger one's diagonal belong together.
+// Surfaces not further apart than this share of the larger one's diagonal belong together.
 constexpr double kTogether = 0.25;
+// Surfaces of one object that touch are one thing, unless larger than this share of what is around:
+// a lamp and its rod. They touch where they are not further apart than kTouch of the smaller one's
+// diagonal.
+constexpr double kThing = 1.0 / 4, kTouch = 0.01;
+// See areOneIsland: two rooms of a size are one island up to a tenth of their length apart.
+constexpr double kMostOfSmaller = 0.8;
+// All tiny groups of one size have at most so many times the patches of what is around them, so
+// that pebbles on a lawn do not have more than the lawn is worth.
+constexpr double kMostOfTiny = 2;
+// The first island is that with the most patches of those that see themselves. Others that do and
+// have at least this share of its patches are as important, up to so many; all others together have
+// at most so many times the patches of the first.
+constexpr double kAsImportant = 0.5;
+constexpr size_t kMostImportant = 4;
+constexpr double kMostOfOthers = 0.25;
+// But no patch is more than so many times as large as those of the first island, so that lines can be
+// dense enough for both (bundles/line_windows.h), unless there would be so many times as many.
+constexpr double kLargest = 512, kMostOfVast = 2;
+// More members than these are brought together by a grid before.
+constexpr size_t kMostMembers = 4096;
 
-using Group = std::vector<size_t>;  // objects
+using Members = std::vector<size_t>;  // surfaces
+struct Group {
+    Extent extent;
+    Members members;
+};
 
-Extent grown(const Extent& extent) {
-    const double by = kTogether * extent.diagonal();
-    return {extent.low - by, extent.high + by};
+Group joined(Group a, Group b) {
+    if (a.members.size() < b.members.size()) std::swap(a, b);
+    a.extent.add(b.extent);
+    a.members.insert(a.members.end(), b.members.begin(), b.members.end());
+    return a;
 }
 
-bool meet(const Extent& a, const Extent& b) {
-    return glm::all(glm::lessThanEqual(a.low, b.high)) &&
-           glm::all(glm::lessThanEqual(b.low, a.high));
-}
-
-size_t rootOf(std::vector<size_t>& leader, size_t k) {
-    while (leader[k] != k) k = leader[k] = leader[leader[k]];
-    return k;
-}
-
-// Objects that lie together, by a sweep along x.
-std::vector<Group> groupsOf(const std::vector<Extent>& objects, Group members) {
-    std::vector<Extent> reach(objects.size());
-    for (size_t m : members) reach[m] = grown(objects[m]);
-    std::sort(members.begin(), members.end(),
-              [&](size_t a, size_t b) { return reach[a].low.x < reach[b].low.x; });
-    std::vector<size_t> leader(members.size());
-    std::iota(leader.begin(), leader.end(), size_t(0));
-    for (size_t i = 0; i < members.size(); ++i) {
-        const size_t a = members[i];
-        for (size_t j = i + 1; j < members.size(); ++j) {
-            const size_t b = members[j];
-            if (reach[b].low.x > reach[a].high.x) break;
-            if (meet(reach[a], objects[b]) || meet(reach[b], objects[a]))
-                leader[rootOf(leader, j)] = rootOf(leader, i);
+// Groups whose middles lie in one cell of a grid, which is made so coarse that few are left.
+std::vector<Group> gathered(std::vector<Group> groups) {
+    Extent all;
+    for (const Group& group : groups) all.add(group.extent);
+    for (double cells = 256; groups.size() > kMostMembers; cells /= 2) {
+        std::map<std::array<int, 3>, Group> byCell;
+        const double cell = all.diagonal() / cells;
+        for (Group& group : groups) {
+            const glm::dvec3 at = (group.extent.middle() - all.low) / cell;
+            Group& there = byCell[{int(at.x), int(at.y), int(at.z)}];
+            there = joined(std::move(there), std::move(group));
         }
+        groups.clear();
+        for (auto& [at, group] : byCell) groups.push_back(std::move(group));
     }
-    std::vector<Group> groups(members.size());
-    for (size_t i = 0; i < members.size(); ++i) groups[rootOf(leader, i)].push_back(members[i]);
-    groups.erase(std::remove_if(groups.begin(), groups.end(),
-                                [](const Group& group) { return group.empty(); }),
-                 groups.end());
     return groups;
 }
 
-// Sets the sizes of tiny groups within one of a diagonal, and of those within them.
-void refine(const std::vector<Extent>& objects, const Group& around, double diagonal,
-            std::vector<double>& sizes) {
-    Group tiny;
-    for (size_t m : around)
-        if (objects[m].diagonal() < kTiny * diagonal) tiny.push_back(m);
-    for (const Group& group : groupsOf(objects, tiny)) {
-        Extent extent;
-        for (size_t m : group) {
-            extent.add(objects[m].low);
-            extent.add(objects[m].high);
+// What belongs together, by a rule for two extents, and what that belongs to, until there is no
+// more. From the largest on, whatever the order of the members.
+template <class Belong>
+std::vector<Group> groupsOf(std::vector<Group> open, const Belong& belong) {
+    std::vector<Group> groups;
+    open = gathered(std::move(open));
+    std::sort(open.begin(), open.end(), [](const Group& a, const Group& b) {
+        auto key = [](const Group& g) {
+            return std::make_tuple(-g.extent.diagonal(), g.extent.low.x, g.extent.low.y,
+                                   g.extent.low.z, g.members.front());
+        };
+        return key(a) < key(b);
+    });
+    for (Group& next : open) {
+        Group group = std::move(next);
+        for (size_t k = 0; k < groups.size();) {
+            if (!belong(groups[k].extent, group.extent)) {
+                ++k;
+                continue;
+            }
+            const Extent before = groups[k].extent;
+            group = joined(std::move(group), std::move(groups[k]));
+            groups.erase(groups.begin() + ptrdiff_t(k));
+            // Grown, it may reach others.
+            if (group.extent.low != before.low || group.extent.high != before.high) k = 0;
         }
-        const double own = extent.diagonal();
-        if (!(own > 0) || own >= diagonal) continue;
-        const double ratio = own / (kTiny * diagonal);
-        const double coarser =
-            std::pow(1 / kTiny, std::max(0.0, 1 + std::log(ratio) / std::log(kFull)));
-        for (size_t m : group)
-            sizes[m] = std::min(sizes[m], own / kPatchesAcross * std::max(1.0, coarser));
-        refine(objects, group, own, sizes);
+        groups.push_back(std::move(group));
     }
+    return groups;
 }
+
+// Whether two are no longer together than the larger one and most of the smaller laid end to end.
+bool areOneIsland(const Extent& a, const Extent& b) {
+    Extent both = a;
+    both.add(b);
+    const double one = a.diagonal(), other = b.diagonal();
+    return both.diagonal() <= std::max(one, other) + kMostOfSmaller * std::min(one, other);
+}
+
+bool areNear(const Extent& a, const Extent& b, double distance) {
+    return glm::all(glm::lessThanEqual(a.low - distance, b.high)) &&
+           glm::all(glm::lessThanEqual(b.low, a.high + distance));
+}
+
+bool areTogether(const Extent& a, const Extent& b) {
+    return areNear(a, b, kTogether * std::max(a.diagonal(), b.diagonal()));
+}
+
+bool doTouch(const Extent& a, const Extent& b) {
+    return areNear(a, b, kTouch * std::min(a.diagonal(), b.diagonal()));
+}
+
+class Sizing {
+  public:
+    explicit Sizing(const std::vector<Surface>& surfaces)
+        : surfaces(surfaces), sizes(surfaces.size(), 0) {}
+
+    // Sets the sizes of a island, times a factor.
+    void setSizes(const Group& island, double factor) {
+        for (size_t m : island.members)
+            sizes[m] = factor * island.extent.diagonal() / kPatchesAcross;
+        refine(island.members, island.extent.diagonal(), factor);
+    }
+
+    // Patches of some surfaces.
+    double patchesOf(const Members& members) const {
+        double count = 0;
+        for (size_t m : members) count += patchesOf(m, sizes[m]);
+        return count;
+    }
+
+    std::vector<double> take() { return std::move(sizes); }
+
+  private:
+    double patchesOf(size_t m, double size) const {
+        const double faces = double(surfaces[m].faces);
+        return size > 0 ? std::max(faces, surfaces[m].area / (size * size)) : faces;
+    }
+
+    // Sets the sizes of tiny groups within one of a diagonal, times a factor, and of those within
+    // them.
+    void refine(const Members& around, double diagonal, double factor) {
+        std::map<uint32_t, std::vector<Group>> byObject;
+        for (size_t m : around)
+            if (surfaces[m].extent.diagonal() < kThing * diagonal)
+                byObject[surfaces[m].object].push_back({surfaces[m].extent, {m}});
+        std::vector<Group> tiny;
+        for (auto& [object, parts] : byObject)
+            for (Group& thing : groupsOf(std::move(parts), doTouch))
+                if (thing.extent.diagonal() < kTiny * diagonal) tiny.push_back(std::move(thing));
+        if (tiny.empty()) return;
+        const double before = patchesOf(around);
+        double after = 0;
+        std::vector<std::pair<Group, double>> finer;
+        for (Group& group : groupsOf(std::move(tiny), areTogether)) {
+            const double own = group.extent.diagonal();
+            if (!(own > 0) || own >= diagonal) continue;
+            const double ratio = own / (kTiny * diagonal);
+            const double coarser =
+                std::pow(1 / kTiny, std::max(0.0, 1 + std::log(ratio) / std::log(kFull)));
+            const double size = factor * own / kPatchesAcross * std::max(1.0, coarser);
+            for (size_t m : group.members) after += patchesOf(m, std::min(sizes[m], size));
+            finer.emplace_back(std::move(group), size);
+        }
+        const double more = std::sqrt(std::max(1.0, after / (kMostOfTiny * before)));
+        for (const auto& [group, size] : finer) {
+            for (size_t m : group.members) sizes[m] = std::min(sizes[m], more * size);
+            refine(group.members, group.extent.diagonal(), more * factor);
+        }
+    }
+
+    const std::vector<Surface>& surfaces;
+    std::vector<double> sizes;
+};
 
 }  // namespace
 
-std::vector<double> automaticPatchSizes(const std::vector<Extent>& objects) {
-    Extent scene;
-    Group all;
-    for (size_t m = 0; m < objects.size(); ++m) {
-        if (objects[m].isEmpty()) continue;
-        scene.add(objects[m].low);
-        scene.add(objects[m].high);
-        all.push_back(m);
+PatchSizes automaticPatchSizes(const std::vector<Surface>& surfaces) {
+    std::vector<Group> all;
+    for (size_t m = 0; m < surfaces.size(); ++m)
+        if (!surfaces[m].extent.isEmpty()) all.push_back({surfaces[m].extent, {m}});
+    PatchSizes result;
+    result.island.assign(surfaces.size(), 0);
+    std::vector<Group> islands = groupsOf(std::move(all), areOneIsland);
+    if (islands.empty()) {
+        result.size.assign(surfaces.size(), 0);
+        return result;
     }
-    std::vector<double> sizes(objects.size(), scene.diagonal() / kPatchesAcross);
-    refine(objects, all, scene.diagonal(), sizes);
-    return sizes;
+    Sizing sizing(surfaces);
+    std::vector<double> count;
+    std::vector<bool> isBlind;  // sees nothing of itself
+    for (const Group& island : islands) {
+        sizing.setSizes(island, 1);
+        count.push_back(sizing.patchesOf(island.members));
+        isBlind.push_back(island.members.size() == 1 &&
+                          !surfaces[island.members.front()].seesItself);
+    }
+
+    // By their importance; of equal ones the nearest to the world's origin first.
+    std::vector<size_t> order(islands.size());
+    std::iota(order.begin(), order.end(), size_t(0));
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+        auto key = [&](size_t k) {
+            const double about = std::round(16 * std::log2(std::max(1.0, count[k])));
+            return std::make_tuple(isBlind[k], -about, glm::length(islands[k].extent.middle()));
+        };
+        return key(a) < key(b);
+    });
+    const double first = count[order[0]];
+    size_t important = 1;
+    while (important < std::min(order.size(), kMostImportant) &&
+           isBlind[order[important]] == isBlind[order[0]] &&
+           count[order[important]] >= kAsImportant * first)
+        ++important;
+    double others = 0;
+    for (size_t k = important; k < order.size(); ++k) others += count[order[k]];
+    const double factor = std::sqrt(std::max(1.0, others / (kMostOfOthers * first)));
+    const double largest = kLargest * islands[order[0]].extent.diagonal();
+    for (size_t k = important; k < order.size(); ++k) {
+        const Group& island = islands[order[k]];
+        const double own = island.extent.diagonal(),
+                     few = std::sqrt(count[order[k]] / (kMostOfVast * first));
+        sizing.setSizes(island, own > 0 ? std::min(factor, std::max(largest / own, few)) : 1);
+    }
+
+    result.size = sizing.take();
+    for (size_t k = 0; k < order.size(); ++k) {
+        for (size_t m : islands[order[k]].members) result.island[m] = uint32_t(k);
+        result.extent.push_back(islands[order[k]].extent);
+    }
+    return result;
 }
 
 }  // namespace raybundle

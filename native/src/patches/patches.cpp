@@ -8,7 +8,7 @@
 
 #include "bake/error.h"
 #include "patches/coincidence.h"
-#include "patches/patch_size.h"
+#include "patches/placement.h"
 #include "patches/reflectance.h"
 #include "scene/triangulation.h"
 
@@ -121,104 +121,87 @@ constexpr double kNeedle = 16.0;
 // Share of the edge by which the fourth corner of a parallelogram may be off.
 constexpr double kParallelogramTolerance = 1e-4;
 constexpr int kMaxGrid = 4096;
-// Determinant of a transform that flattens, over the product of the lengths of its columns.
-constexpr double kFlat = 1e-9;
-// Solids of less thickness are sheets, of the scene's radius: about what depth tells apart.
+// Solids of less thickness are sheets, of how far they lie from the centre: about what depth tells
+// apart.
 constexpr double kThinnest = 2e-6;
+// Surfaces not further apart than these shares of an island's radius and of its finest patches
+// touch; far from the centre, where rounding tells less apart, than this share of how far it is.
+constexpr float kTouchOfRadius = 1e-4f, kTouchOfPatch = 0.02f, kTouchOfDistance = 1e-6f;
 
 // Walks over the faces of all instances and appends vertices, cells and parents.
 class Subdivision {
   public:
-    Subdivision(const Scene& scene, Patches& patches) : scene(scene), patches(patches) {}
+    // placed: with its islands in the patches.
+    Subdivision(const Scene& scene, const Placement& placed, Patches& patches)
+        : scene(scene), placed(placed), patches(patches) {}
 
-    void placeInstances() {
-        std::vector<glm::dvec3> world;
-        glm::dvec3 low(INFINITY), high(-INFINITY);
-        extents.resize(scene.instances.size());
-        for (size_t i = 0; i < scene.instances.size(); ++i) {
-            const Instance& instance = scene.instances[i];
-            firstVertex.push_back(world.size());
-            for (const glm::vec3& vertex : scene.meshes[instance.mesh].vertices) {
-                world.push_back(glm::dvec3(instance.transform * glm::dvec4(vertex, 1.0)));
-                if (!(glm::length(world.back()) <= kFarthest))
-                    throw invalidArgument("object \"" + instance.name +
-                                          "\" reaches further than 1e12 m from the origin");
-                extents[i].add(world.back());
-                low = glm::min(low, world.back());
-                high = glm::max(high, world.back());
-            }
-        }
-        if (world.empty()) return;
-        patches.centre = 0.5 * (low + high);
-        patches.vertices.reserve(world.size());
-        for (const glm::dvec3& vertex : world) {
-            patches.vertices.push_back(glm::vec3(vertex - patches.centre));
-            patches.radius = std::max(patches.radius, glm::length(patches.vertices.back()));
-        }
-    }
-
-    // sizes: edge of a patch of each instance, metres.
-    void cutFaces(const std::vector<double>& sizes) {
+    // patchSize: edge of a patch, metres; 0: the automatic ones.
+    void cutFaces(float patchSize) {
+        const WeldedFaces& faces = placed.faces();
+        const PatchSizes& sizes = placed.sizes();
+        std::vector<double> reachOf(patches.vertices.size(), 0);  // per vertex: of its island
+        for (size_t f = 0; f < faces.count(); ++f)
+            reachOf[faces.vertices[faces.offsets[f]]] =
+                double(patches.islands[sizes.island[faces.surface[f]]].reach);
+        const std::vector<Shell> shells =
+            shellsOfFaces(faces, placed.closed(), patches.vertices,
+                          [&](uint32_t vertex) { return kThinnest * reachOf[vertex]; });
         for (size_t i = 0; i < scene.instances.size(); ++i) {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
-            const std::vector<Shell> shells = shellsOfFaces(
-                mesh, patches.vertices.data() + firstVertex[i], kThinnest * double(patches.radius));
-            const Shell inward = isMirrored(uint32_t(i)) ? Shell::OUTWARD : Shell::INWARD;
-            const size_t firstParent = patches.parents.size();
             size_t degenerate = 0;
-            for (size_t f = 0; f < mesh.faceCount(); ++f)
-                if (!cutFace(uint32_t(i), int32_t(f), sizes[i])) ++degenerate;
-            for (size_t p = firstParent; p < patches.parents.size(); ++p) {
-                Parent& parent = patches.parents[p];
-                const Shell shell = shells[size_t(parent.face)];
-                parent.isSolid = shell != Shell::OPEN &&
-                                 !scene.materialOf(mesh, size_t(parent.face)).isTranslucent();
-                parent.isInward = shell == inward;
-                parent.stopsDirect = scene.instances[i].stopsDirect;
-                parent.exchanges = scene.instances[i].exchanges;
+            for (size_t f = 0; f < mesh.faceCount(); ++f) {
+                const size_t firstParent = patches.parents.size(), face = faces.firstFace[i] + f;
+                const uint32_t surface = faces.surface[face];
+                double size = patchSize > 0 ? double(patchSize) : sizes.size[surface];
+                if (!(size > 0)) size = 1;
+                Island& island = patches.islands[sizes.island[surface]];
+                island.size = std::max(island.size, float(size));
+                island.finest =
+                    island.finest > 0 ? std::min(island.finest, float(size)) : float(size);
+                if (!cutFace(uint32_t(i), int32_t(f), size)) ++degenerate;
+                for (size_t p = firstParent; p < patches.parents.size(); ++p) {
+                    Parent& parent = patches.parents[p];
+                    parent.isSolid = shells[face] != Shell::OPEN &&
+                                     !scene.materialOf(mesh, size_t(parent.face)).isTranslucent();
+                    parent.isInward = shells[face] == Shell::INWARD;
+                    parent.stopsDirect = scene.instances[i].stopsDirect;
+                    parent.exchanges = scene.instances[i].exchanges;
+                    parent.island = sizes.island[surface];
+                    parent.surface = surface;
+                }
             }
-            measureSurfaces(mesh, firstParent);
             patches.degenerateFaces += degenerate;
             if (degenerate)
                 patches.warnings.push_back("object \"" + scene.instances[i].name +
                                            "\": " + std::to_string(degenerate) +
                                            " faces of zero area were left out");
         }
+        measureSurfaces(faces.surfaceCount);
+        patches.finest = INFINITY;
+        for (const Island& island : patches.islands) {
+            patches.size = std::max(patches.size, island.size);
+            if (island.finest > 0) patches.finest = std::min(patches.finest, island.finest);
+        }
+        if (!(patches.finest < INFINITY)) patches.size = patches.finest = 1;
     }
-
-    std::vector<Extent> extents;  // per instance
 
   private:
     using Triangle = std::array<uint32_t, 3>;  // into Patches::vertices
 
-    // Of an instance's parents, from the first on.
-    void measureSurfaces(const Mesh& mesh, size_t firstParent) {
-        const std::vector<int32_t> parts = partsOfFaces(mesh);
-        std::vector<double> areaOf(mesh.vertices.size(), 0.0);  // of parts
-        double all = 0;
-        for (size_t p = firstParent; p < patches.parents.size(); ++p) {
-            const double area = double(patches.parents[p].area());
-            areaOf[size_t(parts[size_t(patches.parents[p].face)])] += area;
-            all += area;
+    void measureSurfaces(size_t surfaceCount) {
+        std::vector<double> ofSurface(surfaceCount, 0.0), ofInstance(scene.instances.size(), 0.0);
+        for (const Parent& parent : patches.parents) {
+            ofSurface[parent.surface] += double(parent.area());
+            ofInstance[parent.instance] += double(parent.area());
         }
         // In steps of 0.7 %, so that rounding does not order what is as large.
         auto steps = [](double area) {
             return uint32_t(
                 std::clamp(100 * std::log2(std::max(area, 1e-80)) + 32768, 0.0, 65535.0));
         };
-        for (size_t p = firstParent; p < patches.parents.size(); ++p) {
-            Parent& parent = patches.parents[p];
+        for (Parent& parent : patches.parents)
             parent.surfaceSize =
-                steps(all) << 16 | steps(areaOf[size_t(parts[size_t(parent.face)])]);
-        }
-    }
-
-    // A mirroring transform turns the winding, but the front stays outside as in Blender. One that
-    // flattens has a determinant of rounding alone, and does not mirror.
-    bool isMirrored(uint32_t instance) const {
-        const glm::dmat3 turn(scene.instances[instance].transform);
-        return glm::determinant(turn) <
-               -kFlat * glm::length(turn[0]) * glm::length(turn[1]) * glm::length(turn[2]);
+                steps(ofInstance[parent.instance]) << 16 | steps(ofSurface[parent.surface]);
     }
 
     bool cutFace(uint32_t instance, int32_t face, double size) {
@@ -226,7 +209,7 @@ class Subdivision {
         const int32_t begin = mesh.faceOffsets[face], end = mesh.faceOffsets[face + 1];
         std::vector<int32_t> corners;
         for (int32_t c = begin; c < end; ++c) corners.push_back(c);
-        if (isMirrored(instance)) std::reverse(corners.begin(), corners.end());
+        if (scene.instances[instance].isMirrored()) std::reverse(corners.begin(), corners.end());
         std::vector<glm::dvec3> points;
         for (int32_t c : corners) points.push_back(patches.vertices[worldVertex(instance, c)]);
 
@@ -264,8 +247,8 @@ class Subdivision {
     }
 
     uint32_t worldVertex(uint32_t instance, int32_t corner) const {
-        return uint32_t(firstVertex[instance] +
-                        scene.meshes[scene.instances[instance].mesh].cornerVertices[corner]);
+        return placed.vertex(instance,
+                             scene.meshes[scene.instances[instance].mesh].cornerVertices[corner]);
     }
 
     static bool isParallelogram(const std::vector<glm::dvec3>& p) {
@@ -420,8 +403,8 @@ class Subdivision {
     }
 
     const Scene& scene;
+    const Placement& placed;
     Patches& patches;
-    std::vector<size_t> firstVertex;  // per instance, into Patches::vertices
     std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
 };
 
@@ -466,29 +449,30 @@ void fillPatches(const Scene& scene, Patches& patches) {
 
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     Patches patches;
-    Subdivision subdivision(scene, patches);
-    subdivision.placeInstances();
-    if (patches.vertices.empty()) return patches;
-    std::vector<double> sizes = patchSize > 0
-                                    ? std::vector<double>(scene.instances.size(), double(patchSize))
-                                    : automaticPatchSizes(subdivision.extents);
-    for (double& size : sizes)
-        if (!(size > 0)) size = 1;
-    patches.size = float(*std::max_element(sizes.begin(), sizes.end()));
-    patches.finest = float(*std::min_element(sizes.begin(), sizes.end()));
-    subdivision.cutFaces(sizes);
+    Placement placed(scene);
+    if (placed.isEmpty()) return patches;
+    placed.findIslands(patches);
+    Subdivision(scene, placed, patches).cutFaces(patchSize);
 
     // Fit into maxPatches; a parent keeps at least one patch.
     while (numberPatches(patches) > std::max(maxPatches, patches.parents.size())) {
         coarsen(patches, 1.1);
         patches.size *= 1.1f;
         patches.finest *= 1.1f;
+        for (Island& island : patches.islands) {
+            island.size *= 1.1f;
+            island.finest *= 1.1f;
+        }
     }
     const size_t count = numberPatches(patches);
     if (count > kMostPatches)
         throw invalidArgument("the scene has too many faces: they are " + std::to_string(count) +
                               " patches at least, and " + std::to_string(kMostPatches) +
                               " are possible");
+    for (Island& island : patches.islands)
+        island.touchDistance =
+            std::max(std::min(kTouchOfRadius * island.radius, kTouchOfPatch * island.finest),
+                     kTouchOfDistance * (island.reach - island.radius));
     patches.tileCount = count;
     for (const Parent& parent : patches.parents) patches.totalArea += parent.area();
     fillPatches(scene, patches);

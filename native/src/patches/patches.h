@@ -49,12 +49,14 @@ struct Parent {
     bool isTriangle = true;
     bool isSolid = false;   // part of a surface that encloses a volume
     bool isInward = false;  // its front looks into that volume
+    uint32_t surface = 0;   // that it hangs together with (patches/welding.h)
     // Orders surfaces by the area of their object, and then of the part of it that hangs together.
     uint32_t surfaceSize = 0;
     // As the instance has it.
     bool stopsDirect = true, exchanges = true;
     uint32_t instance = 0;    // into Scene::instances
     int32_t face = 0;         // of the instance's mesh
+    uint32_t island = 0;      // into Patches::islands
     uint32_t scattering = 0;  // half the index of its front's in Patches::scattering
     // The mesh triangle or quad that the parent is part of, for interpolation between its corners:
     // one of Patches::cells.
@@ -102,12 +104,24 @@ struct Cell {
     std::array<float, 4> weights(const glm::vec3& point) const;
 };
 
+// Surfaces with empty space around them (patches/patch_size.h).
+struct Island {
+    glm::vec3 centre;  // of its bounding box, metres, relative to Patches::centre
+    float radius;      // of a sphere around it that holds the island, metres
+    float reach;       // how far it reaches from Patches::centre: what rounding goes with, metres
+    float size = 0;    // target edge of a tile, metres
+    float finest = 0;  // the same where it is least
+    float touchDistance = 0;  // surfaces not further apart touch, metres
+};
+
 // Two indices a patch: side 2 * p is its front, 2 * p + 1 its back.
 struct Patches {
     glm::dvec3 centre{
         0.0};          // world position of the local origin, so that floats stay exact far away
     float radius = 0;  // of a sphere around the centre that holds everything, metres
     std::vector<glm::vec3> vertices;  // metres, relative to centre
+    std::vector<Island>
+        islands;  // the one with the most patches first; the centre is that of its box
     std::vector<Parent> parents;
     std::vector<Cell> cells;
     Sheets sheets;                   // of the parents
@@ -142,6 +156,9 @@ struct Patches {
     glm::vec3 normal(uint32_t side) const {
         const glm::vec3& front = parents[parentOf[side / 2]].normal;
         return side % 2 ? -front : front;
+    }
+    const Island& islandAt(uint32_t side) const {
+        return islands[parents[parentOf[side / 2]].island];
     }
     const Parent& parentAt(uint32_t side) const { return parents[parentOf[side / 2]]; }
     // The point (u, v) in [0, 1]^2 of a patch, relative to centre.

@@ -15,8 +15,8 @@ namespace {
 
 // Share of the longer edge by which the edges of congruent parents may differ.
 constexpr float kCongruence = 1e-4f;
-// How far a vertex may lie from its place on the sheet: across it, as a share of the scene's radius
-// (what rounding to float leaves, some units in the last place), and along it, as a share
+// How far a vertex may lie from its place on the sheet: across it, as a share of how far its island
+// reaches (what rounding to float leaves, some units in the last place), and along it, as a share
 // of the parents' edges.
 constexpr float kFlatness = 3e-7f, kEvenness = 0.01f;
 
@@ -220,11 +220,12 @@ class SheetSearch {
     bool fits(const Sheet& sheet, const Place& place, int x, int y, int width, int height) const {
         const glm::vec3 a = sheet.a / float(width), b = sheet.b / float(height);
         const glm::vec3 normal = glm::normalize(glm::cross(sheet.a, sheet.b));
+        const float reach = patches.islands[patches.parents[place.parent].island].reach;
         constexpr int kCorners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
         for (int k = 0; k < 4; ++k) {
             const glm::vec3 off = place.position(patches, k) - sheet.origin -
                                   float(x + kCorners[k][0]) * a - float(y + kCorners[k][1]) * b;
-            if (std::abs(glm::dot(off, normal)) > kFlatness * patches.radius ||
+            if (std::abs(glm::dot(off, normal)) > kFlatness * reach ||
                 glm::length(off) > kEvenness * std::min(glm::length(a), glm::length(b)))
                 return false;
         }

@@ -48,8 +48,9 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
         float distance = 0;
-        const auto met = visibility.firstHit(receiver.side, *receiver.point, normal, &distance,
-                                             2 * touchDistance);
+        const auto met = visibility.firstHit(
+            receiver.side, *receiver.point, normal, &distance,
+            2 * std::min(touchDistance, patches.islandAt(receiver.side).touchDistance));
         return met && isCovered(patches, receiver.side, *met, normal, distance, touchDistance);
     };
     for (size_t i = 0; i < ranges.size(); ++i) {

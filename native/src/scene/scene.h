@@ -135,6 +135,15 @@ struct Instance {
     int32_t lightSet = kNoLightSet;  // of its emission
     bool stopsDirect = true;         // blocks the light of the sources
     bool exchanges = true;           // sends light to other surfaces, and blocks what they send
+
+    // A mirroring transform turns the winding of faces, but the front stays outside as in Blender. One
+    // that flattens has a determinant of rounding alone, and does not mirror.
+    bool isMirrored() const {
+        constexpr double kFlat = 1e-9;  // over the product of the lengths of the columns
+        const glm::dmat3 turn(transform);
+        return glm::determinant(turn) <
+               -kFlat * glm::length(turn[0]) * glm::length(turn[1]) * glm::length(turn[2]);
+    }
 };
 
 struct Light {

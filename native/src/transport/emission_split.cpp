@@ -18,8 +18,9 @@ constexpr double kBundledEmission = 1.5;
 // Paths by which the light that leaves the scene is estimated: a share of one half to 2 % of all.
 constexpr uint32_t kPaths = 512;
 
-// The light of a set, as a mean over the scene's surfaces, W/m^2. Only orders of magnitude matter.
+// The light of a set, as a mean over an island's surfaces, W/m^2. Only orders of magnitude matter.
 struct MeanLight {
+    double area = 0;     // m^2
     double emitted = 0;  // by surfaces
     double lamps = 0;
     double sky = 0;
@@ -33,44 +34,67 @@ struct MeanLight {
     double mostExitance() const { return exitance(1) + sky / std::max(0.05, 1 - reflectance); }
 };
 
-MeanLight meanLight(const Scene& scene, const Patches& patches,
-                    const std::vector<glm::vec3>& emission, int32_t lightSet) {
-    MeanLight mean;
-    for (size_t side = 0; side < patches.sideCount(); ++side) {
+// The island that a lamp lies in or nearest to.
+size_t islandNear(const Patches& patches, const glm::dvec3& position) {
+    auto distance = [&](const Island& island) {
+        return glm::distance(glm::dvec3(island.centre), position - patches.centre) -
+               double(island.radius);
+    };
+    const auto nearest = std::min_element(
+        patches.islands.begin(), patches.islands.end(),
+        [&](const Island& a, const Island& b) { return distance(a) < distance(b); });
+    return size_t(nearest - patches.islands.begin());
+}
+
+// Per island: what is bright far away does not make dim what is near.
+std::vector<MeanLight> meanLights(const Scene& scene, const Patches& patches,
+                                  const std::vector<glm::vec3>& emission, int32_t lightSet) {
+    std::vector<MeanLight> means(patches.islands.size());
+    if (means.size() == 1)
+        means.front().area = patches.totalArea;
+    else
+        for (const Parent& parent : patches.parents)
+            means[parent.island].area += double(parent.area());
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        MeanLight& mean = means[patches.parentAt(side).island];
         mean.emitted += patches.area[side / 2] * brightest(emission[side]);
         if (side % 2 == 0)
             mean.reflectance += patches.area[side / 2] *
                                 brightest(patches.reflectance[side] + patches.translucenceOf(side));
     }
-    const double area = patches.totalArea;
     for (const Light& light : scene.lights) {
-        if (light.lightSet != lightSet) continue;
+        if (light.lightSet != lightSet || means.empty()) continue;
         const double strength = brightest(light.strength);
         switch (light.kind) {
             case Light::Kind::POINT:
-                mean.lamps += 4 * glm::pi<double>() * strength;
+                means[islandNear(patches, light.position)].lamps +=
+                    4 * glm::pi<double>() * strength;
                 break;
             case Light::Kind::SUN:
-                mean.lamps += 0.25 * area * strength;
+                for (MeanLight& mean : means) mean.lamps += 0.25 * mean.area * strength;
                 break;
             case Light::Kind::AREA:
-                mean.lamps += 4 * glm::pi<double>() * strength *
-                              glm::length(glm::cross(light.axisU, light.axisV));
+                means[islandNear(patches, light.position)].lamps +=
+                    4 * glm::pi<double>() * strength *
+                    glm::length(glm::cross(light.axisU, light.axisV));
                 break;
         }
     }
-    mean.emitted /= area;
-    mean.lamps /= area;
-    mean.reflectance /= area;
     glm::vec3 world = scene.worldRadianceOf(lightSet);
     if (scene.worldLightSet == lightSet) world += scene.worldImage.meanRadiance();
-    mean.sky = glm::pi<double>() * brightest(world);
-    return mean;
+    for (MeanLight& mean : means) {
+        mean.emitted /= mean.area;
+        mean.lamps /= mean.area;
+        mean.reflectance /= mean.area;
+        mean.sky = glm::pi<double>() * brightest(world);
+    }
+    return means;
 }
 
-// Share of lines from the surfaces that emission lights which meet a surface.
+// Share of lines from the surfaces that an island's emission lights which meet a surface.
 double metShare(const Patches& patches, const Visibility& visibility,
-                const std::vector<glm::vec3>& emission, double power, uint32_t seed) {
+                const std::vector<glm::vec3>& emission, uint32_t island, double power,
+                uint32_t seed) {
     // From the middle of a side: where it starts matters less than that there are few paths.
     auto nextHit = [&](uint32_t side, glm::vec2 u) {
         return visibility.firstHit(side, patches.point(side / 2, glm::vec2(1 / 3.0f)),
@@ -82,6 +106,7 @@ double metShare(const Patches& patches, const Visibility& visibility,
     uint32_t lit = 0, met = 0, path = 0;
     double sum = 0, start = uniform(random);  // of all, and of the next path: power / kPaths
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        if (patches.parentAt(side).island != island) continue;
         sum += patches.area[side / 2] * brightest(emission[side]) / power * kPaths;
         for (; path < kPaths && start < sum; start = ++path + uniform(random)) {
             const glm::vec4 u = uniformPoint(random);
@@ -105,16 +130,23 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
         const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
         if (scene.instances[instance].lightSet != lightSet) split.emitted[side] = glm::vec3(0.0f);
     }
-    const MeanLight mean = meanLight(scene, patches, split.emitted, lightSet);
-    double limit = kBundledEmission * mean.mostExitance();
-    if (std::any_of(split.emitted.begin(), split.emitted.end(), [&](const glm::vec3& emission) {
-            return brightest(emission) > 0 && brightest(emission) <= limit;
-        }))
-        limit = kBundledEmission * mean.exitance(metShare(patches, visibility, split.emitted,
-                                                          mean.emitted * patches.totalArea, seed));
+    const std::vector<MeanLight> means = meanLights(scene, patches, split.emitted, lightSet);
+    std::vector<double> limits;  // per island
+    for (const MeanLight& mean : means) limits.push_back(kBundledEmission * mean.mostExitance());
+    std::vector<bool> isNear(limits.size(), false);  // whether the share of the sky may matter
+    for (uint32_t side = 0; side < sides; ++side) {
+        const uint32_t island = patches.parentAt(side).island;
+        const double emission = brightest(split.emitted[side]);
+        if (emission > 0 && emission <= limits[island]) isNear[island] = true;
+    }
+    for (uint32_t k = 0; k < limits.size(); ++k)
+        if (isNear[k])
+            limits[k] = kBundledEmission *
+                        means[k].exitance(metShare(patches, visibility, split.emitted, k,
+                                                   means[k].emitted * means[k].area, seed));
     for (uint32_t side = 0; side < sides; ++side) {
         if (!patches.parentAt(side).exchanges) continue;
-        if (brightest(split.emitted[side]) > limit) {
+        if (brightest(split.emitted[side]) > limits[patches.parentAt(side).island]) {
             split.isSource[side] = true;
             split.gathered[side] = patches.opacityOf(side / 2) * split.emitted[side];
         } else {

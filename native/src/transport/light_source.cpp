@@ -367,32 +367,32 @@ uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents, u
     return hasher.value();
 }
 
-// What light of one side of an object's faces does not get out of.
-struct Enclosed {
-    std::optional<Enclosure> box;  // none: it may get anywhere
-    uint32_t side = 0;             // 0: of the fronts
+// Of surfaces: where they lie, and which of their sides nothing outside of them sees. Of what encloses
+// a volume and lets no light through, a line from outside meets the outer side first.
+struct Enclosing {
+    Enclosure box;
+    bool hides[2] = {true, true};  // fronts, backs
+
+    void add(const Enclosing& other) {
+        box.add(other.box.low);
+        box.add(other.box.high);
+        for (int k = 0; k < 2; ++k) hides[k] = hides[k] && other.hides[k];
+    }
 };
 
-// Faces that enclose volumes and all look outwards hide their backs from all that is outside: a line
-// from there meets a front first.
-Enclosed enclosedBy(const Patches& patches, uint32_t instance) {
-    Enclosure box;
-    std::optional<bool> isInward;
-    // Parents are in the order of their instances.
-    const auto first =
-        std::partition_point(patches.parents.begin(), patches.parents.end(),
-                             [&](const Parent& parent) { return parent.instance < instance; });
-    for (auto p = first; p != patches.parents.end() && p->instance == instance; ++p) {
-        const Parent& parent = *p;
-        if (!parent.isSolid || !parent.stopsDirect ||
-            isInward.value_or(parent.isInward) != parent.isInward)
-            return {};
-        isInward = parent.isInward;
+// Per surface.
+std::vector<Enclosing> enclosingSurfaces(const Patches& patches) {
+    std::vector<Enclosing> surfaces;
+    for (const Parent& parent : patches.parents) {
+        if (parent.surface >= surfaces.size()) surfaces.resize(parent.surface + 1);
+        Enclosing& surface = surfaces[parent.surface];
+        const bool isShell = parent.isSolid && parent.stopsDirect;
+        surface.hides[0] = surface.hides[0] && isShell && parent.isInward;
+        surface.hides[1] = surface.hides[1] && isShell && !parent.isInward;
         for (size_t k = 0; k < (parent.isTriangle ? 3 : 4); ++k)
-            box.add(patches.vertices[parent.vertex[k]]);
+            surface.box.add(patches.vertices[parent.vertex[k]]);
     }
-    if (!isInward) return {};
-    return {box, *isInward ? 0u : 1u};
+    return surfaces;
 }
 
 }  // namespace
@@ -412,6 +412,8 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
         groups[{parent.instance, mesh.faceMaterials[parent.face]}].push_back(uint32_t(p));
     }
+    const std::vector<Enclosing> surfaces =
+        groups.empty() ? std::vector<Enclosing>() : enclosingSurfaces(patches);
     for (const auto& [key, parents] : groups) {
         std::array<glm::vec3, 2> most{glm::vec3(0.0f), glm::vec3(0.0f)};
         const uint32_t first = 2 * patches.parents[parents.front()].firstPatch;
@@ -425,12 +427,13 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
             }
         }
         // Fronts and backs apart: of a lamp that encloses a volume one of them is never seen.
-        const Enclosed enclosed = enclosedBy(patches, key.first);
+        Enclosing enclosing;
+        for (uint32_t p : parents) enclosing.add(surfaces[patches.parents[p].surface]);
         for (uint32_t back = 0; back < 2; ++back) {
             if (most[back] == glm::vec3(0.0f)) continue;
             sources.push_back(std::make_unique<MeshSource>(
                 patches, parents, back, most[back], varies ? &emission : nullptr,
-                enclosed.side == back ? enclosed.box : std::nullopt));
+                enclosing.hides[back] ? std::optional(enclosing.box) : std::nullopt));
             sources.back()->name = "object \"" + scene.instances[key.first].name + "\"";
             sources.back()->magnitude = most[back];
             sources.back()->shape = shapeOf(patches, parents, back, emission, most[back]);

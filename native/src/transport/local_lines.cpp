@@ -67,7 +67,8 @@ bool isCovered(const Patches& patches, uint32_t side, uint32_t met, const glm::v
                float distance, float touchDistance) {
     constexpr float kOpposite = -0.99f;  // cosine below which normals point against each other
     const glm::vec3 normal = patches.normal(side);
-    return distance * glm::dot(direction, normal) <= touchDistance &&
+    return distance * glm::dot(direction, normal) <=
+               std::min(touchDistance, patches.islandAt(side).touchDistance) &&
            glm::dot(normal, patches.normal(met)) < kOpposite;
 }
 

@@ -65,7 +65,8 @@ std::optional<uint32_t> LocalRays::fromWorld(std::mt19937_64& random) const {
 
 // Whether another surface lies against a side at a point.
 bool LocalRays::isCovered(uint32_t side, const glm::vec3& point) const {
-    return visibility.isBlocked(side, point, patches.normal(side), touchDistance);
+    return visibility.isBlocked(side, point, patches.normal(side),
+                                std::min(touchDistance, patches.islandAt(side).touchDistance));
 }
 
 std::optional<uint32_t> LocalRays::fromSide(uint32_t side, std::mt19937_64& random,

@@ -125,7 +125,8 @@ Outlooks::Outlooks(const PartNeighbours& parts, const std::vector<uint32_t>& the
         const Receiver receiver = receiverAt(these[k]);
         const glm::vec3 at =
             receiver.point ? *receiver.point : patches.point(receiver.side / 2, {0.5f, 0.5f});
-        const glm::vec3 normal = kNormalExtent * patches.radius * receiver.normal;
+        const glm::vec3 normal =
+            kNormalExtent * patches.islandAt(receiver.side).radius * receiver.normal;
         keys[k] = {at.x, at.y, at.z, normal.x, normal.y, normal.z};
     });
     Clustering(parts, these, sightings, keys, clusterSize, clusterOf, clusters);

@@ -18,7 +18,7 @@
 namespace raybundle {
 namespace {
 
-// Share of the scene's radius: some tens of float rounding errors.
+// Share of how far an island reaches: some tens of float rounding errors.
 constexpr float kRelativeOffset = 2e-6f;
 
 [[noreturn]] void fail(RTCError code, const char* what) {
@@ -238,7 +238,7 @@ struct Visibility::FromSide : Start {
         parent = patches.parentOf[side / 2];
         isFront = side % 2 == 0;
         normal = patches.normal(side);
-        zone = 2 * visibility.surfaceOffset;
+        zone = 2 * visibility.offsetAt(parent);
         target.fill(kNoParent);
     }
     // Rays start this much behind the surface, so that they meet what coincides with it.
@@ -254,8 +254,10 @@ struct Visibility::FromSide : Start {
             // Aim at the far end from the shifted origin, or the ray would pass beside it.
             const glm::vec3 segment = shadow.point + shadow.distance * shadow.direction - from;
             const float length = glm::length(segment);
-            if (length <= zone) return false;
-            setRay(ray, from, segment / length, length - zone);
+            // The far end is rounded by how far it is.
+            const float end = std::max(zone, kRelativeOffset * length);
+            if (length <= end) return false;
+            setRay(ray, from, segment / length, length - end);
         } else {
             setRay(ray, from, shadow.direction, shadow.distance);
         }
@@ -339,6 +341,10 @@ void findFirst(const RTCFilterFunctionNArguments* args) {
 
 }  // namespace
 
+float Visibility::offsetAt(uint32_t parent) const {
+    return kRelativeOffset * patches.islands[patches.parents[parent].island].reach;
+}
+
 // Of the parents that coincide with one that a ray meets at some distance, the first.
 uint32_t Visibility::firstCoinciding(uint32_t parent, const glm::vec3& origin,
                                      const glm::vec3& direction, float distance) const {
@@ -351,7 +357,7 @@ uint32_t Visibility::firstCoinciding(uint32_t parent, const glm::vec3& origin,
     meeting.first = parent;
     meeting.direction = direction;
     const float cosine = std::abs(glm::dot(patches.parents[parent].normal, direction));
-    const float zone = 2 * surfaceOffset / std::max(0.01f, cosine);
+    const float zone = 2 * offsetAt(parent) / std::max(0.01f, cosine);
     RTCRay ray{};
     setRay(ray, origin, direction, distance + zone);
     ray.tnear = std::max(0.0f, distance - zone);
@@ -466,7 +472,8 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
         return a.depth != b.depth ? a.depth < b.depth : a.side < b.side;
     });
     auto isSameCrossing = [&](const LineHit& a, const LineHit& b) {
-        return b.depth - a.depth <= 2 * double(surfaceOffset) && a.side % 2 == b.side % 2 &&
+        return b.depth - a.depth <= 2 * double(offsetAt(patches.parentOf[a.side / 2])) &&
+               a.side % 2 == b.side % 2 &&
                haveCommonVertex(patches.parents[patches.parentOf[a.side / 2]],
                                 patches.parents[patches.parentOf[b.side / 2]]);
     };

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/placement.h"
+
+#include <algorithm>
+
+#include "bake/error.h"
+#include "patches/coincidence.h"
+
+namespace raybundle {
+namespace {
+
+// What of a surface lies in front of a face of it by more than this share of its diagonal is seen
+// from there; of about so many faces.
+constexpr double kBlind = 1e-3;
+constexpr size_t kBlindFaces = 16;
+
+}  // namespace
+
+Placement::Placement(const Scene& scene) {
+    for (const Instance& instance : scene.instances) {
+        firstVertex.push_back(world.size());
+        for (const glm::vec3& vertex : scene.meshes[size_t(instance.mesh)].vertices) {
+            world.push_back(glm::dvec3(instance.transform * glm::dvec4(vertex, 1.0)));
+            if (!(glm::length(world.back()) <= kFarthest))
+                throw invalidArgument("object \"" + instance.name +
+                                      "\" reaches further than 1e12 m from the origin");
+        }
+    }
+    welded = weldedVertices(scene, world, firstVertex);
+    allFaces = weldedFaces(scene, welded, firstVertex);
+    closedOnes = closedSurfaces(allFaces);
+}
+
+void Placement::findIslands(Patches& patches) {
+    patchSizes = automaticPatchSizes(surfaces());
+    const std::vector<Extent>& extents = patchSizes.extent;
+    // Vertices of no face lie anywhere.
+    Extent all;
+    for (const glm::dvec3& vertex : world) all.add(vertex);
+    patches.centre = (extents.size() > 1 ? extents.front() : all).middle();
+    patches.vertices.reserve(world.size());
+    for (const glm::dvec3& vertex : world) {
+        patches.vertices.push_back(glm::vec3(vertex - patches.centre));
+        patches.radius = std::max(patches.radius, glm::length(patches.vertices.back()));
+    }
+    if (extents.size() <= 1) {
+        patches.islands = {{glm::vec3(0.0f), patches.radius, patches.radius}};
+        return;
+    }
+    for (const Extent& extent : extents)
+        patches.islands.push_back({glm::vec3(extent.middle() - patches.centre), 0, 0});
+    for (size_t f = 0; f < allFaces.count(); ++f)
+        for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c) {
+            Island& island = patches.islands[patchSizes.island[allFaces.surface[f]]];
+            const glm::vec3& vertex = patches.vertices[allFaces.vertices[c]];
+            island.radius = std::max(island.radius, glm::distance(vertex, island.centre));
+            island.reach = std::max(island.reach, glm::length(vertex));
+        }
+}
+
+std::vector<Surface> Placement::surfaces() const {
+    std::vector<Surface> result(allFaces.surfaceCount);
+    std::vector<std::vector<uint32_t>> facesOf(result.size());
+    for (size_t f = 0; f < allFaces.count(); ++f) {
+        Surface& surface = result[allFaces.surface[f]];
+        for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c)
+            surface.extent.add(world[allFaces.vertices[c]]);
+        surface.area += glm::length(areaVector(f));
+        // What is made of several objects is of none.
+        if (surface.faces++ == 0)
+            surface.object = allFaces.instance[f];
+        else if (surface.object != allFaces.instance[f])
+            surface.object = UINT32_MAX;
+        facesOf[allFaces.surface[f]].push_back(uint32_t(f));
+    }
+    for (size_t s = 0; s < result.size(); ++s)
+        result[s].seesItself =
+            seesItself(facesOf[s], kBlind * result[s].extent.diagonal(), closedOnes[s]);
+    return result;
+}
+
+// Whether light goes on from one part of a surface to another: by some of its faces, whether not
+// all vertices lie behind, or in one plane with them. off: what is in the plane, metres.
+bool Placement::seesItself(const std::vector<uint32_t>& faces, double off, bool isClosed) const {
+    for (size_t k = 0; k < faces.size(); k += 1 + faces.size() / kBlindFaces) {
+        const glm::dvec3 at = world[allFaces.vertices[allFaces.offsets[faces[k]]]];
+        const glm::dvec3 across = areaVector(faces[k]);
+        if (!(glm::length(across) > 0)) continue;
+        const glm::dvec3 normal = glm::normalize(across);
+        for (uint32_t f : faces)
+            for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c) {
+                const double height = glm::dot(world[allFaces.vertices[c]] - at, normal);
+                if (height > off || (!isClosed && height < -off)) return true;
+            }
+    }
+    return false;
+}
+
+// Along the normal of a face, as long as its area, m^2.
+glm::dvec3 Placement::areaVector(size_t face) const {
+    const size_t begin = allFaces.offsets[face], end = allFaces.offsets[face + 1];
+    const glm::dvec3 first = world[allFaces.vertices[begin]];
+    glm::dvec3 doubled(0.0);
+    for (size_t c = begin; c + 1 < end; ++c)
+        doubled += glm::cross(world[allFaces.vertices[c]] - first,
+                              world[allFaces.vertices[c + 1]] - first);
+    return 0.5 * doubled;
+}
+
+}  // namespace raybundle
