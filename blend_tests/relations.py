@@ -11,7 +11,7 @@ other settings, and compares it with the scene as it was:
     light      of each object the mean by area of LIGHTING, each channel: within 2 %, or twice the
                noise that is stated of the object in either bake, if that is more. Objects with less
                than 5 % of the scene's mean light are compared by 5 % of that mean. Faces that
-               another object lies against are left out: nobody sees them
+               something lies against are left out: nobody sees them
     balance    energy neither absorbed nor escaped, of what is emitted: below 5e-3
     bundles    within twice (not where the method is another)
 

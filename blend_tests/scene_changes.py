@@ -84,31 +84,37 @@ def bounds() -> tuple[np.ndarray, np.ndarray]:
 
 
 def covered_faces() -> dict[str, np.ndarray]:
-    """(faces,) by object name: whether another object lies against some of the face.
+    """(faces,) by object name: whether another face lies against some of the face.
 
-    Looked for near the corners, a tenth of the way to the centre."""
+    Looked for near the corners, a tenth of the way to the centre; those that share a vertex with
+    the face are its neighbours.
+    """
     found = mesh_items()
-    places, faces, sizes = [], [], []
-    for item in found:
-        places.append(world_positions(item))
-        sizes.append(face_sizes(item.data))
-        faces.append([tuple(polygon.vertices) for polygon in item.data.polygons])
+    sizes = [face_sizes(item.data) for item in found]
+    places = [world_positions(item) for item in found]
     begins = np.cumsum([0, *map(len, places)])
-    tree = BVHTree.FromPolygons(np.concatenate(places).tolist(), [
-        [begin + vertex for vertex in face] for begin, entry in zip(begins.tolist(), faces)
-        for face in entry])
-    owners = np.repeat(np.arange(len(found)), [len(entry) for entry in faces])
-    reach = TOUCH * diagonal()
-    result = {}
-    for index, item in enumerate(found):
-        corners = places[index][corner_vertices(item.data)].astype(float)
-        centres = np.repeat(face_means(item, corners), sizes[index], axis=0)
-        touched = np.array([any(owners[face] != index
-                                for _, _, face, _ in tree.find_nearest_range(point, reach))
-                            for point in (0.9 * corners + 0.1 * centres).tolist()])
-        ends = np.cumsum(sizes[index])
-        result[item.name] = np.logical_or.reduceat(touched, ends - sizes[index])
-    return result
+    # By corner, in all of them.
+    vertices = np.concatenate([corner_vertices(item.data) + begin
+                               for item, begin in zip(found, begins)])
+    corners = np.concatenate(places).astype(float)[vertices]
+    centres = np.concatenate([np.repeat(face_means(item, corner), size, axis=0)
+                              for item, size, corner in zip(found, sizes, np.split(
+                                  corners, np.cumsum([size.sum() for size in sizes])[:-1]))])
+    all_sizes = np.concatenate(sizes)
+    ends = np.cumsum(all_sizes)
+    polygons = [vertices[end - size:end].tolist() for end, size in zip(ends, all_sizes)]
+    tree = BVHTree.FromPolygons(np.concatenate(places).tolist(), polygons)
+    rims = list(map(set, polygons))
+    reach = np.minimum(TOUCH * diagonal(), 0.01 * np.linalg.norm(corners - centres, axis=1))
+    owner = np.repeat(np.arange(len(all_sizes)), all_sizes)
+    points = 0.9 * corners + 0.1 * centres
+    touched = np.array([any(rims[own].isdisjoint(rims[face])
+                            for _, _, face, _ in tree.find_nearest_range(point, near))
+                        for own, point, near in zip(owner.tolist(), points.tolist(),
+                                                    reach.tolist())])
+    covered = np.logical_or.reduceat(touched, ends - all_sizes)
+    faces = np.split(covered, np.cumsum([len(size) for size in sizes])[:-1])
+    return {item.name: own for item, own in zip(found, faces)}
 
 
 def mark_covered(covered: dict[str, np.ndarray]) -> None:

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random scenes (fuzz_scenes.py) baked by Raybundle at its defaults and by Cycles, object by object.
+
+    blender -b --factory-startup --python-exit-code 1 -P blend_tests/fuzz_cycles.py -- FIRST LAST \\
+        [--samples 128] [--json FILE]
+
+For each seed from FIRST to LAST a line:
+
+    light      of the object that is worst for what it may be: deviation of the mean by area of
+               LIGHTING, the channel that is most off, from Cycles' mean, relative to that (or to
+               5 % of the scene's mean light, if that is more). It may be 6 %, or three times the
+               noise of both, if that is more: that which Raybundle states of the object, and
+               Cycles' own, from two bakes of half the samples
+    smooth     the same of objects that are shaded smooth, which do not count: Cycles lights them
+               by the vertices' normals
+    balance    of energy, at most 1 %
+    bundles    at most 4000
+
+Cycles bakes probes: a quarter of each face, in its middle and just above it, that no ray meets. So
+its values are at four points inside each quad, whose mean is that of the face, and none is at an
+edge. The light of emissive meshes is found without sampling them as lights: with it Cycles 3.4 is
+some per cent too dark beside them (docs/validation.md).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
+sys.dont_write_bytecode = True
+
+import fuzz_scenes  # noqa: E402
+import raybundle  # noqa: E402
+from cycles_reference import bake_objects  # noqa: E402
+from surface_error import (  # noqa: E402
+    corner_areas, corner_vertices, face_means, face_sizes, read_colors, world_positions)
+
+LIGHT, NOISES, DARK, BALANCE, BUNDLES = 0.06, 3.0, 0.05, 0.01, 4000
+HEIGHT = 1e-3  # of a probe above its face, of the face's size
+# Rays of a kind that no scene here has: without any Cycles leaves an object out.
+INVISIBLE = ("camera", "diffuse", "glossy", "transmission", "shadow")
+
+
+@dataclass
+class ObjectLight:
+    name: str
+    is_smooth: bool
+    deviation: float
+    allowed: float
+
+
+@dataclass
+class Outcome:
+    seed: int
+    kind: str
+    objects: list[ObjectLight] = field(default_factory=list)
+    balance: float = np.nan
+    bundles: int = 0
+    seconds: float = 0.0
+    cycles_seconds: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+
+
+# --------------------------------------------------------------------------------------------------
+# Cycles
+# --------------------------------------------------------------------------------------------------
+
+
+def add_probe(item: bpy.types.Object) -> bpy.types.Object:
+    """Its corners are those of the object's faces, half-way to the faces' centres."""
+    mesh = item.data
+    corners = world_positions(item)[corner_vertices(mesh)].astype(float)
+    sizes = face_sizes(mesh)
+    centres = np.repeat(face_means(item, corners), sizes, axis=0)
+    normals = np.empty(3 * len(mesh.polygons), np.float32)
+    mesh.polygons.foreach_get('normal', normals)
+    to_world = np.linalg.inv(np.array(item.matrix_world)[:3, :3])
+    normals = np.repeat(_unit(normals.reshape(-1, 3) @ to_world), sizes, axis=0)
+    extent = np.repeat(np.sqrt(corner_areas(item) * sizes.repeat(sizes)), 1)[:, None]
+    places = 0.5 * (corners + centres) + HEIGHT * extent * normals
+    ends = np.cumsum(sizes)
+    faces = [list(range(end - size, end)) for end, size in zip(ends.tolist(), sizes.tolist())]
+    is_mirrored = item.matrix_world.determinant() < 0.0
+    probe_mesh = bpy.data.meshes.new(f"{item.name}.probe")
+    probe_mesh.from_pydata(places.tolist(), [], [face[::-1] if is_mirrored else face
+                                                 for face in faces])
+    if is_smooth(item):
+        vertex_normals = np.empty(3 * len(mesh.loops), np.float32)
+        mesh.calc_normals_split()
+        mesh.loops.foreach_get('normal', vertex_normals)
+        vertex_normals = vertex_normals.reshape(-1, 3) @ to_world
+        mean = np.repeat(face_means(item, vertex_normals), sizes, axis=0)
+        probe_mesh.polygons.foreach_set('use_smooth', np.ones(len(sizes), bool))
+        probe_mesh.use_auto_smooth = True
+        probe_mesh.normals_split_custom_set_from_vertices(
+            _unit(0.5 * (vertex_normals + mean)).tolist())
+    probe_mesh.materials.append(_white())
+    probe = bpy.data.objects.new(probe_mesh.name, probe_mesh)
+    for ray in INVISIBLE:
+        setattr(probe, f"visible_{ray}", False)
+    bpy.context.scene.collection.objects.link(probe)
+    return probe
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-30)[:, None]
+
+
+def _white() -> bpy.types.Material:
+    found = bpy.data.materials.get("white probe")
+    if found is None:
+        found = bpy.data.materials.new("white probe")
+        found.use_nodes = True
+        tree = found.node_tree
+        tree.nodes.clear()
+        tree.links.new(tree.nodes.new('ShaderNodeBsdfDiffuse').outputs[0],
+                       tree.nodes.new('ShaderNodeOutputMaterial').inputs['Surface'])
+    return found
+
+
+def is_smooth(item: bpy.types.Object) -> bool:
+    return any(polygon.use_smooth for polygon in item.data.polygons)
+
+
+def cycles_light(items: list[bpy.types.Object], samples: int) -> dict[str, np.ndarray]:
+    """By object name (2, corners, 3): two independent bakes of half the samples."""
+    for material in bpy.data.materials:
+        if hasattr(material.cycles, 'emission_sampling'):  # from 3.5 on
+            material.cycles.emission_sampling = 'NONE'
+        else:
+            material.cycles.sample_as_light = False
+    probes = [add_probe(item) for item in items]
+    bpy.context.view_layer.update()
+    bakes = [bake_objects(probes, samples // 2, seed) for seed in (1, 2)]
+    result = {}
+    for item, probe in zip(items, probes):
+        # The faces of a mirrored object run the other way round: the values are by vertex.
+        vertices = corner_vertices(probe.data)
+        result[item.name] = np.empty((2, len(vertices), 3))
+        for k, bake in enumerate(bakes):
+            result[item.name][k, vertices] = bake[probe.name]
+    return result
+
+
+# --------------------------------------------------------------------------------------------------
+# Comparison
+# --------------------------------------------------------------------------------------------------
+
+
+def measure(seed: int, samples: int = 128) -> Outcome:
+    outcome = Outcome(seed, fuzz_scenes.build(seed))
+    items = [item for item in bpy.context.scene.objects if item.type == 'MESH']
+    started = time.perf_counter()
+    try:
+        report = raybundle.bake(bpy.context, output='LIGHTING', domain='CORNER')
+    except (raybundle.BakeError, raybundle.RaybundleError) as error:
+        outcome.failures.append(f"refused: {error}")
+        return outcome
+    outcome.seconds = time.perf_counter() - started
+    outcome.balance, outcome.bundles = report.energy['balance_error'], report.bundles
+    outcome.warnings = [text for text in report.warnings if "too coarse" not in text]
+    light = {item.name: read_colors(item).astype(float) for item in items}
+    weights = {item.name: corner_areas(item) for item in items}
+    stated = {entry.name: entry.error.get('noise', 0.0) for entry in report.objects}
+    started = time.perf_counter()
+    expected = cycles_light(items, samples)
+    outcome.cycles_seconds = time.perf_counter() - started
+    means = {name: weights[name] @ values.mean(axis=0) / weights[name].sum()
+             for name, values in expected.items()}
+    areas = np.array([weights[name].sum() for name in means])
+    dark = DARK * float(areas @ [mean.mean() for mean in means.values()] / areas.sum())
+    for item in items:
+        name, weight = item.name, weights[item.name] / weights[item.name].sum()
+        size = max(float(means[name].mean()), dark, 1e-30)
+        deviation = np.abs(weight @ light[name] - means[name]).max() / size
+        # Each of Cycles' values has its own random numbers.
+        halves = expected[name]
+        noise = 0.5 * np.sqrt((weight ** 2 @ (halves[0] - halves[1]) ** 2).max()) / size
+        own = stated.get(name, 0.0) * np.sqrt(weight @ (light[name] ** 2).mean(axis=1)) / size
+        allowed = max(LIGHT, NOISES * float(np.hypot(noise, own)))
+        outcome.objects.append(ObjectLight(name, is_smooth(item), float(deviation), allowed))
+        if not is_smooth(item) and not deviation <= allowed:
+            outcome.failures.append(f"{name} {100 * deviation:.3g} % off")
+    if not outcome.balance <= BALANCE:
+        outcome.failures.append(f"balance {outcome.balance:.2g}")
+    if outcome.bundles > BUNDLES:
+        outcome.failures.append(f"{outcome.bundles} bundles")
+    return outcome
+
+
+def worst(objects: list[ObjectLight]) -> str:
+    if not objects:
+        return "-"
+    found = max(objects, key=lambda entry: entry.deviation / entry.allowed)
+    return f"{100 * found.deviation:.2g} % of {100 * found.allowed:.2g} % ({found.name})"
+
+
+def line(outcome: Outcome) -> str:
+    flat = [entry for entry in outcome.objects if not entry.is_smooth]
+    smooth = [entry for entry in outcome.objects if entry.is_smooth]
+    verdict = f"FAIL: {'; '.join(outcome.failures)}" if outcome.failures else "PASS"
+    return (f"seed {outcome.seed} {outcome.kind}: light {worst(flat)}, smooth {worst(smooth)}, "
+            f"balance {outcome.balance:.1e}, {outcome.bundles} bundles, {outcome.seconds:.1f} s "
+            f"(Cycles {outcome.cycles_seconds:.1f} s): {verdict}")
+
+
+def summary(outcomes: list[Outcome]) -> str:
+    failed = [outcome for outcome in outcomes if outcome.failures]
+    largest = max((entry.deviation for outcome in outcomes for entry in outcome.objects
+                   if not entry.is_smooth), default=np.nan)
+    return (f"{len(outcomes)} scenes: {len(failed)} failed"
+            f"{' (' + ', '.join(str(outcome.seed) for outcome in failed) + ')' if failed else ''}; "
+            f"flat objects up to {100 * largest:.2g} % off, balance up to "
+            f"{max(outcome.balance for outcome in outcomes):.1e}, bundles up to "
+            f"{max(outcome.bundles for outcome in outcomes)}")
+
+
+def main(arguments: list[str]) -> None:
+    parser = argparse.ArgumentParser(prog="fuzz_cycles.py", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("first", type=int)
+    parser.add_argument("last", type=int)
+    parser.add_argument("--samples", type=int, default=128)
+    parser.add_argument("--json", type=Path, help="all figures, written to this file")
+    options = parser.parse_args(arguments)
+    raybundle.register()
+    outcomes = []
+    for seed in range(options.first, options.last + 1):
+        outcomes.append(measure(seed, options.samples))
+        print(line(outcomes[-1]), flush=True)
+        if options.json:
+            options.json.write_text(json.dumps([asdict(outcome) for outcome in outcomes], indent=1))
+    print(summary(outcomes))
+    if any(outcome.failures for outcome in outcomes):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
