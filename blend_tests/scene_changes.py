@@ -86,8 +86,8 @@ def bounds() -> tuple[np.ndarray, np.ndarray]:
 def covered_faces() -> dict[str, np.ndarray]:
     """(faces,) by object name: whether another face lies against some of the face.
 
-    Looked for near the corners, a tenth of the way to the centre; those that share a vertex with
-    the face are its neighbours.
+    Looked for at a tenth of the way from the corners to the centre, half-way and there; those that
+    share a vertex with the face are its neighbours.
     """
     found = mesh_items()
     sizes = [face_sizes(item.data) for item in found]
@@ -107,11 +107,12 @@ def covered_faces() -> dict[str, np.ndarray]:
     rims = list(map(set, polygons))
     reach = np.minimum(TOUCH * diagonal(), 0.01 * np.linalg.norm(corners - centres, axis=1))
     owner = np.repeat(np.arange(len(all_sizes)), all_sizes)
-    points = 0.9 * corners + 0.1 * centres
-    touched = np.array([any(rims[own].isdisjoint(rims[face])
-                            for _, _, face, _ in tree.find_nearest_range(point, near))
-                        for own, point, near in zip(owner.tolist(), points.tolist(),
-                                                    reach.tolist())])
+    touched = np.zeros(len(corners), bool)
+    for share in (0.1, 0.5, 1.0):
+        points = ((1.0 - share) * corners + share * centres).tolist()
+        touched |= [any(rims[own].isdisjoint(rims[face])
+                        for _, _, face, _ in tree.find_nearest_range(point, near))
+                    for own, point, near in zip(owner.tolist(), points, reach.tolist())]
     covered = np.logical_or.reduceat(touched, ends - all_sizes)
     faces = np.split(covered, np.cumsum([len(size) for size in sizes])[:-1])
     return {item.name: own for item, own in zip(found, faces)}
