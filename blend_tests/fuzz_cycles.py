@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random scenes (fuzz_scenes.py) baked by Raybundle at its defaults and by Cycles, object by object.
+"""Random scenes (fuzz_scenes.py), baked at the defaults and by Cycles, object by object.
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/fuzz_cycles.py -- FIRST LAST \\
         [--samples 128] [--json FILE]

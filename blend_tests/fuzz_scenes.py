@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 
 import bpy
-import lamp_rooms  # noqa: F401  (it makes the scenes' construction known)
+import lamp_rooms  # noqa: F401  (by which the construction of scenes is found)
 import numpy as np
 from build.construction import (Diffuse, Emission, FaceBlock, Shape, Sum, add_mesh, add_object, box,
                                 cylinder, grid, material, room, set_world, smooth, uv_sphere)

@@ -5,15 +5,19 @@
         [--quick] [--only TEXT] [--noise] [SCENE ...]
 
 SCENE is a name of scenes/, the path of a .blend, or `room:NAME` (lamp_rooms.py); without any it is
-all scenes and all rooms. Each relation bakes a scene that was changed (scene_changes.py), or with
-other settings, and compares it with the scene as it was:
+all scenes and all rooms, or some small ones and all rooms (`--quick`). Each relation bakes a scene
+that was changed (place_changes.py, mesh_changes.py, light_changes.py), or with other settings, and
+compares it with the scene as it was:
 
     light      of each object the mean by area of LIGHTING, each channel: within 2 %, or twice the
                noise that is stated of the object in either bake, if that is more. Objects with less
                than 5 % of the scene's mean light are compared by 5 % of that mean. Faces that
-               something lies against are left out: nobody sees them
-    balance    energy neither absorbed nor escaped, of what is emitted: below 5e-3
-    bundles    within twice (not where the method is another)
+               something lies against are left out: nobody sees them. By chance alone one mean in
+               twenty is more than twice its noise off where that is the same on a whole wall: what
+               is just too far off is looked at again, in the mean of four seeds
+    balance    energy neither absorbed nor escaped, of what is emitted: below 5e-3, or 1.5e-2 of the
+               methods that are only asked for 3 % of noise
+    bundles    within twice (not where the method is another, or each light set has a noise target)
 
 Of methods that approximate, light may be wrong where a warning says so. Relations that a scene has
 nothing for are not counted. Failures are listed above the table; the exit code is then 1. `--noise`
@@ -27,10 +31,9 @@ import argparse
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 HERE = Path(__file__).parent
@@ -39,13 +42,18 @@ sys.dont_write_bytecode = True
 
 import lamp_noise  # noqa: E402
 import lamp_rooms  # noqa: E402
+import light_changes  # noqa: E402
+import mesh_changes  # noqa: E402
+import place_changes  # noqa: E402
 import raybundle  # noqa: E402
-import scene_changes as changes  # noqa: E402
-from surface_error import corner_areas, face_sizes, read_colors  # noqa: E402
+from object_light import SCENES, Bake, bake, open_scene  # noqa: E402
+from scene_items import NotApplicable, apply_modifiers  # noqa: E402
 
-SCENES = HERE.parent / "scenes"
 LIGHT, NOISES, DARK, BALANCE, COST = 0.02, 2.0, 0.05, 5e-3, 2.0
 SAME = 1e-5  # where only the threads are others
+# What is up to so many times as far off as it may be is looked at again with these seeds too.
+AGAIN, SEEDS = 3.0, (11, 12, 13)
+SMALL = ("cornell_box", "instances", "thin_wall")
 SETTINGS = {'output': 'LIGHTING', 'domain': 'CORNER', 'target_error': 0.01, 'max_bundles': 8192}
 
 
@@ -73,43 +81,43 @@ def method(name: str, says: str = "noise is", costs_same: bool = False, **settin
 
 
 RELATIONS = (
-    Relation("turned by (0.4, 0.7, 1.1)", changes.turned(0.4, 0.7, 1.1), is_quick=True),
-    Relation("turned by (90°, 0, 0)", changes.turned(np.pi / 2, 0.0, 0.0)),
-    Relation("turned by (0, 0, 0.5)", changes.turned(0.0, 0.0, 0.5)),
-    Relation("turned by 1e-3", changes.turned_slightly, is_quick=True),
-    Relation("turned at random, 1", changes.turned_at_random(1)),
-    Relation("turned at random, 2", changes.turned_at_random(2)),
-    Relation("turned in the meshes", changes.turned_in_meshes, changes.apply_modifiers),
-    Relation("moved by 1 km", changes.moved_far, is_quick=True),
-    Relation("0.001 times as large", changes.scaled(1e-3)),
-    Relation("1000 times as large", changes.scaled(1e3)),
-    Relation("mirrored", changes.mirrored, is_quick=True),
-    Relation("sheared in the meshes, not by parents", changes.sheared_in_meshes,
-             changes.sheared_by_parents),
-    Relation("vertices moved by 1e-7", changes.jittered(1e-7)),
-    Relation("vertices moved by 1e-6", changes.jittered(1e-6), is_quick=True),
-    Relation("faces in another order", changes.elements_reordered("faces"), is_quick=True),
-    Relation("vertices in another order", changes.elements_reordered("verts")),
-    Relation("objects in another order", changes.objects_reordered),
-    Relation("materials in another order", changes.materials_reordered),
-    Relation("quads triangulated", changes.triangulated, changes.apply_modifiers, is_quick=True),
-    Relation("edges split", changes.edges_split, changes.apply_modifiers),
-    Relation("joined", changes.joined, changes.apply_modifiers, is_quick=True),
-    Relation("emissive meshes joined", changes.lamps_joined, changes.apply_modifiers),
-    Relation("separated by loose parts", changes.separated_parts, changes.apply_modifiers),
-    Relation("separated into halves", changes.separated_halves, changes.apply_modifiers),
+    Relation("turned by (0.4, 0.7, 1.1)", place_changes.turned(0.4, 0.7, 1.1), is_quick=True),
+    Relation("turned by (90°, 0, 0)", place_changes.turned(np.pi / 2, 0.0, 0.0)),
+    Relation("turned by (0, 0, 0.5)", place_changes.turned(0.0, 0.0, 0.5)),
+    Relation("turned by 1e-3", place_changes.turned_slightly, is_quick=True),
+    Relation("turned at random, 1", place_changes.turned_at_random(1)),
+    Relation("turned at random, 2", place_changes.turned_at_random(2)),
+    Relation("turned in the meshes", place_changes.turned_in_meshes, apply_modifiers),
+    Relation("moved by 1 km", place_changes.moved_far, is_quick=True),
+    Relation("0.001 times as large", place_changes.scaled(1e-3)),
+    Relation("1000 times as large", place_changes.scaled(1e3)),
+    Relation("mirrored", place_changes.mirrored, is_quick=True),
+    Relation("sheared in the meshes, not by parents", place_changes.sheared_in_meshes,
+             place_changes.sheared_by_parents),
+    Relation("vertices moved by 1e-7", place_changes.jittered(1e-7)),
+    Relation("vertices moved by 1e-6", place_changes.jittered(1e-6), is_quick=True),
+    Relation("faces in another order", mesh_changes.elements_reordered("faces"), is_quick=True),
+    Relation("vertices in another order", mesh_changes.elements_reordered("verts")),
+    Relation("objects in another order", mesh_changes.objects_reordered),
+    Relation("materials in another order", mesh_changes.materials_reordered),
+    Relation("quads triangulated", mesh_changes.triangulated, apply_modifiers, is_quick=True),
+    Relation("edges split", mesh_changes.edges_split, apply_modifiers),
+    Relation("joined", mesh_changes.joined, apply_modifiers, is_quick=True),
+    Relation("emissive meshes joined", mesh_changes.lamps_joined, apply_modifiers),
+    Relation("separated by loose parts", mesh_changes.separated_parts, apply_modifiers),
+    Relation("separated into halves", mesh_changes.separated_halves, apply_modifiers),
     # What gets no colours of its own is not judged by its noise.
-    Relation("instanced", changes.instanced, changes.apply_modifiers, least_cost=0.0),
-    Relation("made real", changes.made_real),
-    Relation("an object far away", changes.far_object_added, is_quick=True),
-    Relation("a copy of the scene far away", changes.far_copy_added),
-    Relation("black dust", changes.dust_added),
-    Relation("1000 times the power", changes.power_scaled(1e3), factor=1e3),
-    Relation("a thousandth of the power", changes.power_scaled(1e-3), factor=1e-3),
-    Relation("each lamp two of half", changes.lamps_halved, is_quick=True),
-    Relation("area lamps as emissive faces", changes.area_lamps_as_faces,
-             changes.area_lamps_before_plates),
-    Relation("the sum of light sets", changes.in_light_sets, is_quick=True),
+    Relation("instanced", mesh_changes.instanced, apply_modifiers, least_cost=0.0),
+    Relation("made real", mesh_changes.made_real),
+    Relation("an object far away", light_changes.far_object_added, is_quick=True),
+    Relation("a copy of the scene far away", light_changes.far_copy_added),
+    Relation("black dust", light_changes.dust_added),
+    Relation("1000 times the power", light_changes.power_scaled(1e3), factor=1e3),
+    Relation("a thousandth of the power", light_changes.power_scaled(1e-3), factor=1e-3),
+    Relation("each lamp two of half", light_changes.lamps_halved, is_quick=True),
+    Relation("area lamps as emissive faces", light_changes.area_lamps_as_faces,
+             light_changes.area_lamps_before_plates),
+    Relation("the sum of light sets", light_changes.in_light_sets, costs_same=False, is_quick=True),
     Relation("seed 1", settings={'seed': 1}),
     Relation("seed 2", settings={'seed': 2}),
     Relation("one thread", settings={'threads': 1}, tolerance=SAME, is_quick=True),
@@ -127,97 +135,6 @@ RELATIONS = (
     method("directions RANDOM", **RANDOM),
     method("directions ADAPTIVE", solver='MULTIPATH', directions='ADAPTIVE', target_error=0.03),
 )
-
-
-# --------------------------------------------------------------------------------------------------
-# A bake
-# --------------------------------------------------------------------------------------------------
-
-
-@dataclass
-class Bake:
-    """light and noise: by the name of the object that was, before it was joined or cut up."""
-
-    light: dict[str, np.ndarray]  # (3,) mean by area of LIGHTING
-    areas: dict[str, float]  # m^2
-    noise: dict[str, float]  # stated, in the unit of the light
-    balance: float
-    bundles: int
-    seconds: float
-    warnings: list[str]
-
-    def scene_mean(self) -> float:
-        areas = np.array(list(self.areas.values()))
-        return float(areas @ np.mean(list(self.light.values()), axis=1) / areas.sum())
-
-
-_covered: dict[str, dict[str, np.ndarray]] = {}  # by scene
-
-
-def open_scene(name: str, cells: int = lamp_rooms.FINE) -> None:
-    """As it is, but that its faces remember whether they are covered."""
-    _open_file(name, cells)
-    bpy.context.view_layer.update()
-    if name not in _covered:
-        _covered[name] = changes.covered_faces()
-    changes.mark_covered(_covered[name])
-
-
-def _open_file(name: str, cells: int) -> None:
-    kind, _, room = name.partition(":")
-    if kind == "room":
-        lamp_rooms.build(room, cells)
-        return
-    path = SCENES / f"{name}.blend"
-    bpy.ops.wm.open_mainfile(filepath=str(path if path.is_file() else Path(name).resolve()))
-
-
-def bake(**settings: object) -> Bake:
-    """The open scene."""
-    bpy.context.view_layer.update()
-    started = time.perf_counter()
-    report = raybundle.bake(bpy.context, **{**SETTINGS, **settings})
-    seconds = time.perf_counter() - started
-    scene = bpy.context.scene
-    attributes = [entry['attribute'] for entry in report.light_sets] or [scene.raybundle.attribute]
-    light: dict[str, np.ndarray] = {}
-    areas: dict[str, float] = {}
-    noise: dict[str, float] = {}
-    for entry in report.objects:
-        if not entry.status.startswith('baked'):
-            continue
-        item = bpy.data.objects[entry.name]
-        values = sum(read_colors(item, name).astype(float) for name in attributes)
-        sizes = face_sizes(item.data)
-        weights = corner_areas(item) * np.repeat(1 - face_numbers(item, changes.COVERED), sizes)
-        size = np.sqrt(weights @ (values ** 2).mean(axis=1) / max(weights.sum(), 1e-30))
-        for name, own in _by_origin(item):
-            area = weights[own].sum()
-            if area <= 0.0:
-                continue
-            light[name] = light.get(name, 0.0) + weights[own] @ values[own]
-            areas[name] = areas.get(name, 0.0) + area
-            noise[name] = max(noise.get(name, 0.0), float(entry.error.get('noise', 0.0) * size))
-    light = {name: total / areas[name] for name, total in light.items()}
-    return Bake(light, areas, noise, report.energy['balance_error'], report.bundles, seconds,
-                report.warnings)
-
-
-def face_numbers(item: bpy.types.Object, attribute: str) -> np.ndarray:
-    """(faces,) of an attribute, 0 where there is none."""
-    numbers = np.zeros(len(item.data.polygons), np.int32)
-    if attribute in item.data.attributes:
-        item.data.attributes[attribute].data.foreach_get('value', numbers)
-    return numbers
-
-
-def _by_origin(item: bpy.types.Object) -> list[tuple[str, np.ndarray]]:
-    """(corners,) masks of an object's corners by the object that they belonged to."""
-    if changes.ORIGIN not in item.data.attributes:
-        return [(item.name, np.ones(len(item.data.loops), bool))]
-    names = bpy.context.scene[changes.ORIGINS]
-    origins = np.repeat(face_numbers(item, changes.ORIGIN), face_sizes(item.data))
-    return [(names[index], origins == index) for index in np.unique(origins)]
 
 
 # --------------------------------------------------------------------------------------------------
@@ -245,41 +162,60 @@ class Result:
 
 
 class Scene:
-    """A scene and its bakes before any change, one for each reference."""
+    """A scene and its bakes before any change, one for each reference and seed."""
 
     def __init__(self, name: str, cells: int = lamp_rooms.FINE) -> None:
         self.name = name
         self._cells = cells
-        self._references: dict[Callable[[], None] | None, Bake] = {}
+        self._references: dict[tuple[Callable[[], None] | None, int], Bake] = {}
 
     def measure(self, relation: Relation) -> Result:
         result = Result(relation.name, self.name)
         try:
-            before = self._reference(relation.reference)
-            open_scene(self.name, self._cells)
-            relation.change()
-            after = bake(**relation.settings)
-        except changes.NotApplicable as reason:
+            before, after = self._reference(relation.reference), self._bake(
+                relation.change, relation.settings)
+            wrong, result.worst, result.deviation, result.allowed = compare(relation, before, after)
+            if relation.tolerance > SAME and 1.0 < result.deviation / result.allowed < AGAIN:
+                pairs = [(before, after)] + [
+                    (self._reference(relation.reference, seed),
+                     self._bake(relation.change, {**relation.settings, 'seed': seed}))
+                    for seed in SEEDS]
+                mean_before, mean_after = (mean_of(list(bakes)) for bakes in zip(*pairs))
+                wrong, result.worst, result.deviation, result.allowed = compare(
+                    relation, mean_before, mean_after)
+        except NotApplicable as reason:
             result.skipped = str(reason)
         except (raybundle.BakeError, raybundle.RaybundleError) as error:
             (result.said if relation.says else result.failures).append(f"refused: {error}")
         else:
-            compare(relation, before, after, result)
+            judge(relation, before, after, wrong, result)
         return result
 
-    def _reference(self, change: Callable[[], None] | None) -> Bake:
-        if change not in self._references:
-            open_scene(self.name, self._cells)
-            if change:
-                change()
-            self._references[change] = bake()
-        return self._references[change]
+    def _bake(self, change: Callable[[], None], settings: dict[str, object]) -> Bake:
+        open_scene(self.name, self._cells)
+        change()
+        return bake(**{**SETTINGS, **settings})
+
+    def _reference(self, change: Callable[[], None] | None, seed: int = 0) -> Bake:
+        if (change, seed) not in self._references:
+            self._references[change, seed] = self._bake(change or (lambda: None), {'seed': seed})
+        return self._references[change, seed]
 
 
-def compare(relation: Relation, before: Bake, after: Bake, result: Result) -> None:
+def mean_of(bakes: list[Bake]) -> Bake:
+    """The light of several seeds; the noise stays that of one."""
+    names = set.intersection(*(set(entry.light) for entry in bakes))
+    return replace(bakes[0], light={name: np.mean([entry.light[name] for entry in bakes], axis=0)
+                                    for name in names})
+
+
+def compare(relation: Relation, before: Bake, after: Bake
+            ) -> tuple[dict[str, str], str, float, float]:
+    """What is wrong with which object; of the worst object the deviation and what is allowed."""
     dark = DARK * before.scene_mean()
-    is_warned = relation.says and any(relation.says in text for text in after.warnings)
-    for name in before.light.keys() & after.light.keys():
+    wrong: dict[str, str] = {}
+    worst = ("", np.nan, np.nan)
+    for name in sorted(before.light.keys() & after.light.keys()):
         size = max(float(before.light[name].mean()), dark, 1e-30)
         deviation = np.abs(after.light[name] / relation.factor - before.light[name]).max() / size
         noise = max(before.noise[name], after.noise[name] / relation.factor) / size
@@ -287,18 +223,25 @@ def compare(relation: Relation, before: Bake, after: Bake, result: Result) -> No
         if relation.tolerance > SAME:
             allowed = max(allowed, NOISES * noise)
         if not deviation <= allowed:
-            text = f"{name} {100 * deviation:.3g} % off, {100 * allowed:.2g} % allowed"
-            named = any(f'"{name}"' in warning and "too coarse" not in warning
-                        for warning in after.warnings)
-            says_so = is_warned or relation.says and named
-            (result.said if says_so else result.failures).append(text)
-        if not deviation / allowed <= result.deviation / result.allowed:
-            result.worst, result.deviation, result.allowed = name, deviation, allowed
+            wrong[name] = f"{name} {100 * deviation:.3g} % off, {100 * allowed:.2g} % allowed"
+        if not deviation / allowed <= worst[1] / worst[2]:
+            worst = (name, float(deviation), float(allowed))
+    return wrong, *worst
+
+
+def judge(relation: Relation, before: Bake, after: Bake, wrong: dict[str, str], result: Result
+          ) -> None:
+    is_warned = relation.says and any(relation.says in text for text in after.warnings)
+    for name, text in wrong.items():
+        is_named = relation.says and any(f'"{name}"' in warning and "too coarse" not in warning
+                                         for warning in after.warnings)
+        (result.said if is_warned or is_named else result.failures).append(text)
     if not before.light.keys() & after.light.keys():
         result.failures.append("nothing is baked")
     result.balance, result.seconds = after.balance, after.seconds
     result.bundles = (before.bundles, after.bundles)
-    if not after.balance < BALANCE:
+    share = relation.settings.get('target_error', 0.0) / SETTINGS['target_error']
+    if not after.balance < BALANCE * max(share, 1.0):
         result.failures.append(f"balance {after.balance:.2g} (before {before.balance:.2g})")
     if relation.costs_same and not relation.least_cost <= result.cost() <= COST:
         result.failures.append(f"{after.bundles} bundles instead of {before.bundles}")
@@ -333,8 +276,9 @@ def row(name: str, results: list[Result]) -> str:
     return f"| {name} | {len(counted)} | {' | '.join(cells)} | {outcome} |"
 
 
-def all_scenes() -> list[str]:
-    return ([path.stem for path in sorted(SCENES.glob("*.blend"))]
+def all_scenes(quick: bool) -> list[str]:
+    files = [path.stem for path in sorted(SCENES.glob("*.blend"))]
+    return ([name for name in files if name in SMALL or not quick]
             + [f"room:{name}" for name in lamp_rooms.ROOMS])
 
 
@@ -343,14 +287,15 @@ def main(arguments: list[str]) -> None:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
     parser.add_argument("--quick", action="store_true", help="those of the tests, coarse rooms")
-    parser.add_argument("--only", default="", help="relations with this in their name")
+    parser.add_argument("--only", default="", help="relations, or rooms, with this in their name")
     parser.add_argument("--noise", action="store_true", help="the rooms' noise by seeds instead")
     options = parser.parse_args(arguments)
     raybundle.register()
-    names = options.scenes or all_scenes()
+    names = options.scenes or all_scenes(options.quick)
     cells = lamp_rooms.COARSE if options.quick else lamp_rooms.FINE
     if options.noise:
-        rooms = [name.partition(":")[2] for name in names if name.startswith("room:")]
+        rooms = [name.partition(":")[2] for name in names
+                 if name.startswith("room:") and options.only in name]
         sys.exit(lamp_noise.print_table(rooms, options.quick))
     chosen = [relation for relation in RELATIONS if options.only in relation.name
               and (relation.is_quick or not options.quick)]

@@ -14,7 +14,8 @@ pytestmark = pytest.mark.needs_library
 QUICK = [relation for relation in relations.RELATIONS if relation.is_quick]
 # What each scene is tested for, beside a turn about all axes: what it is most likely to break.
 CHOSEN = {
-    "cornell_box": [relation.name for relation in QUICK],
+    "cornell_box": [relation.name for relation in QUICK if relation.name not in
+                    ("each lamp two of half", "the sum of light sets")],  # it has one, a mesh
     "room:area_flush": ["each lamp two of half", "mirrored"],
     "room:panel": ["vertices moved by 1e-6", "quads triangulated"],
     "room:panel_on_wall": ["joined"],
