@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A short run of relations.py, which states what must hold: the Cornell box and some coarse rooms.
+
+Seeds are fixed: a relation holds or fails the same each time.
+"""
+
+import lamp_noise
+import lamp_rooms
+import pytest
+import relations
+
+pytestmark = pytest.mark.needs_library
+
+QUICK = [relation for relation in relations.RELATIONS if relation.is_quick]
+# What each scene is tested for, beside a turn about all axes: what it is most likely to break.
+CHOSEN = {
+    "cornell_box": [relation.name for relation in QUICK if relation.name not in
+                    ("each lamp two of half", "the sum of light sets")],  # it has one, a mesh
+    "room:area_flush": ["each lamp two of half", "mirrored"],
+    "room:panel": ["vertices moved by 1e-6", "quads triangulated"],
+    "room:panel_on_wall": ["joined"],
+    "room:two_panels": ["emissive meshes joined", "the sum of light sets"],
+    "room:ring": ["faces in another order"],
+    "room:sun": ["an object far away"],
+}
+TURN = "turned by (0.4, 0.7, 1.1)"
+CASES = [(scene, relation) for scene, names in CHOSEN.items()
+         for relation in relations.RELATIONS if relation.name in (TURN, *names)]
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    """Each keeps the bakes before any change."""
+    return {name: relations.Scene(name, lamp_rooms.COARSE) for name in CHOSEN}
+
+
+@pytest.mark.parametrize("scene, relation", CASES,
+                         ids=[f"{scene}, {relation.name}" for scene, relation in CASES])
+def test_relation(scenes, scene, relation):
+    result = scenes[scene].measure(relation)
+    if result.skipped:
+        pytest.skip(result.skipped)
+    assert result.failures == []
+
+
+@pytest.mark.parametrize("room", ["area_near", "tube"])
+def test_noise(room):
+    target = lamp_noise.TARGETS[0]
+    assert lamp_noise.measure(room, target, cells=lamp_rooms.COARSE).failures(target) == []
+
+
+def test_all_relations_have_names_of_their_own():
+    names = [relation.name for relation in relations.RELATIONS]
+    assert len(set(names)) == len(names)
+    assert {name for entry in CHOSEN.values() for name in entry} <= set(names)
