@@ -131,8 +131,10 @@ def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, streng
     if light.type == 'POINT':
         return PointLightData(name, position, intensity, light.shadow_soft_size, shape)
     if bpy.app.version < (3, 5, 0):
-        # The scale is not looked at, and the cosine to the axis dims the light.
-        world_to_light = np.array(matrix_world.to_quaternion().to_matrix().inverted())
+        # Only the direction of -Z is looked at, also where the object is scaled or mirrored, and the
+        # cosine to it dims the light.
+        axis = matrix_world.col[2].to_3d()
+        world_to_light = np.array(axis.to_track_quat('Z', 'Y').to_matrix().transposed())
     else:
         # The object's scale deforms the cone; the power is not renormalised for it.
         world_to_light = np.array(matrix_world.to_3x3().inverted_safe())

@@ -198,6 +198,33 @@ TEST(MeshSource, WhatIsConvexDoesNotLightItself) {
     }
 }
 
+// A part of a wall emits, and the vertices are off by a millionth of its size, more than its plane
+// is thick beside the lamp's own size: neither lamp nor wall gets light of it.
+TEST(MeshSource, APartOfAWallThatIsPlaneButForRoundingLightsNothingOfIt) {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> off(-5e-6f, 5e-6f);
+    for (int k = 0; k < 8; ++k) {
+        Scene scene;
+        Mesh wall = grid("wall", {-2, 2, 0}, {4, 0, 0}, {0, 0, 3}, 16, 12);
+        for (glm::vec3& vertex : wall.vertices)
+            vertex += glm::vec3(off(random), off(random), off(random));
+        place(scene, wall, grey("wall", 0.5f));
+        const int32_t lamp = scene.addMaterial(grey("lamp", 0.5f, 10, 10));
+        std::vector<int32_t>& materials = scene.meshes[0].faceMaterials;
+        for (size_t f = 0; f < materials.size(); ++f)
+            if (f % 16 >= 6 && f % 16 < 10 && f / 16 >= 4 && f / 16 < 8) materials[f] = lamp;
+        place(scene, grid("floor", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("floor", 0.5f));
+        const ShotScene shots(scene, 0.1f);
+        const FirstShot shot = shots.shoot("GATHER", 0);
+        for (uint32_t side = 0; side < shots.patches.sideCount(); ++side) {
+            if (shots.patches.parentAt(side).instance != 0) continue;
+            // Beside the lamp's edge the wall may look at it under a hundred thousandth of a turn.
+            EXPECT_LT(shot.irradiance[side].x, 0.02f) << k;
+        }
+        EXPECT_GT(meanLight(shots.patches, shot, 1).value, 0.1);
+    }
+}
+
 // An area lamp in the plane of a turned ceiling gives it nothing, and the floor what it gives it
 // where nothing is turned.
 TEST(AreaLight, InThePlaneOfATurnedCeilingLightsTheFloorAlone) {

@@ -18,7 +18,8 @@ enum class PlaneSide { BEHIND = -1, WITHIN = 0, FRONT = 1 };
 
 struct Plane {
     glm::dvec3 origin{0.0}, normal{0.0};  // metres, relative to Patches::centre; unit
-    double thickness = 0;                 // of each half, metres
+    double thickness = 0;                 // of each half at the origin, metres
+    double slope = 0;                     // it grows by so much with the distance from there
 
     // Half the thickness over the extent of what lies in the plane: some times the 1e-6 by which
     // the vertices of a mesh may be off that was turned, sheared or joined.
@@ -26,20 +27,27 @@ struct Plane {
     // The same over the coordinates, and over the distance of a point: their roundings, and that of
     // the normal.
     static constexpr double kOfCoordinates = 4 * double(std::numeric_limits<float>::epsilon());
+    // More than this the normal of a sliver is not known at all.
+    static constexpr double kMostSlope = 0.01;
 
     Plane() = default;
-    // extent: radius of what lies in the plane, metres.
-    Plane(const glm::dvec3& origin, const glm::dvec3& normal, double extent)
+    // extent: radius of what lies in the plane, or of the mesh that it is part of, metres; narrowest:
+    // half the width of the face whose normal it has, metres, over which vertices that are off tilt it.
+    Plane(const glm::dvec3& origin, const glm::dvec3& normal, double extent, double narrowest)
         : origin(origin),
           normal(normal),
-          thickness(kOfExtent * extent + kOfCoordinates * mostOf(origin)) {}
+          thickness(kOfExtent * extent + kOfCoordinates * mostOf(origin)),
+          slope(narrowest > 0 ? std::min(kMostSlope, kOfCoordinates + thickness / narrowest)
+                              : kMostSlope) {}
 
     double height(const glm::dvec3& point) const { return glm::dot(point - origin, normal); }
     PlaneSide side(const glm::dvec3& point) const {
-        const glm::dvec3 d = point - origin;
-        const double h = glm::dot(d, normal);
-        const double off = thickness + kOfCoordinates * mostOf(d);
+        const double off = halfThickness(point), h = height(point);
         return h > off ? PlaneSide::FRONT : h < -off ? PlaneSide::BEHIND : PlaneSide::WITHIN;
+    }
+    // At a point, metres.
+    double halfThickness(const glm::dvec3& point) const {
+        return thickness + slope * mostOf(point - origin);
     }
 
   private:

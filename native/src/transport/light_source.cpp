@@ -86,7 +86,7 @@ class PointSource : public LightSource {
     // What leaves towards the patch: its solid angle times the intensity, however near it is.
     std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& patch) const override {
         if (cone || isDisk()) return std::nullopt;
-        const Plane plane(patch.origin, patch.normal, double(patch.radius));
+        const Plane plane(patch.origin, patch.normal, double(patch.radius), double(patch.radius));
         const double height = plane.height(position);
         if (height < std::max(double(light.radius), plane.thickness)) return std::nullopt;
         const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
@@ -225,7 +225,8 @@ class AreaSource : public LightSource {
         normal = area > 0 ? glm::normalize(n) : glm::vec3(0.0f);
         if (isEllipse) area *= glm::quarter_pi<float>();
         isNarrow = !spread.isWhole();
-        plane = Plane(position, normal, double(glm::length(u) + glm::length(v)));
+        plane = Plane(position, normal, double(glm::length(u) + glm::length(v)),
+                      double(std::min(glm::length(u), glm::length(v))));
     }
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
@@ -431,9 +432,9 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
         for (uint32_t p : parents) enclosing.add(surfaces[patches.parents[p].surface]);
         for (uint32_t back = 0; back < 2; ++back) {
             if (most[back] == glm::vec3(0.0f)) continue;
-            sources.push_back(std::make_unique<MeshSource>(
-                patches, parents, back, most[back], varies ? &emission : nullptr,
-                enclosing.hides[back] ? std::optional(enclosing.box) : std::nullopt));
+            sources.push_back(std::make_unique<MeshSource>(patches, parents, back, most[back],
+                                                           varies ? &emission : nullptr,
+                                                           enclosing.box, enclosing.hides[back]));
             sources.back()->name = "object \"" + scene.instances[key.first].name + "\"";
             sources.back()->magnitude = most[back];
             sources.back()->shape = shapeOf(patches, parents, back, emission, most[back]);

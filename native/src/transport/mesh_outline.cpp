@@ -13,8 +13,9 @@ namespace {
 
 // Edges that follow each other and turn by less are one, radians.
 constexpr double kStraight = 1e-5;
-// Planes that meet at less are parallel, radians.
-constexpr double kParallel = 1e-5;
+// Faces of one facet are off its plane by no more than this share of what the plane is thick: what is
+// in front of it is in front of all of them.
+constexpr double kFlat = 0.25;
 // Meshes of more parents are not looked at.
 constexpr size_t kMostParents = 1 << 17;
 
@@ -99,7 +100,8 @@ class Facets {
     // A facet from a parent on, over edges, as far as its plane reaches.
     void grow(uint32_t seed) {
         const Parent& first = patches.parents[parents[seed]];
-        const Plane plane(first.origin, turn * glm::normalize(glm::dvec3(first.normal)), extent);
+        const Plane plane(first.origin, turn * glm::normalize(glm::dvec3(first.normal)), extent,
+                          double(first.halfWidth()));
         const uint32_t facet = uint32_t(planes.size());
         planes.push_back(plane);
         std::vector<uint32_t> open{seed};
@@ -125,7 +127,8 @@ class Facets {
         const Parent& parent = patches.parents[parents[k]];
         return turn * glm::dot(glm::dvec3(parent.normal), plane.normal) > 0 &&
                std::all_of(cornersOf[k].begin(), cornersOf[k].end(), [&](uint32_t vertex) {
-                   return plane.side(places[vertex]) == PlaneSide::WITHIN;
+                   return std::abs(plane.height(places[vertex])) <=
+                          kFlat * plane.halfThickness(places[vertex]);
                });
     }
 
@@ -219,8 +222,7 @@ double polygonIrradiance(const glm::dvec3& point, const glm::dvec3& normal,
 }
 
 MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& parents, bool ofBacks,
-                         double extent)
-    : extent(extent) {
+                         double extent) {
     if (parents.empty() || parents.size() > kMostParents) return;
     const Facets made(patches, parents, ofBacks, extent);
     if (made.planes.size() > kMostFacets) return;
@@ -231,6 +233,7 @@ MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& pa
         high = glm::max(high, glm::dvec3(place));
     }
     centre = 0.5 * (low + high);
+    radius = 0.5 * glm::length(high - low);
     const uint32_t none = uint32_t(facets.size());
     for (const Facets::Edge& edge : made.edges())
         edges.push_back({made.places[edge.from], made.places[edge.to], std::min(edge.along, none),
@@ -238,9 +241,12 @@ MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& pa
     if (edges.size() > kMostEdges) edges.clear();
 }
 
-// Per facet: whether it looks at a point. One more for `none`.
+// Per facet: whether it looks at a point (one more for `none`), and the first place where the horizon
+// cuts it, from which the angles of others count.
 struct MeshOutline::Facing {
     std::array<bool, kMostFacets + 1> looks;
+    std::array<bool, kMostFacets> isCut;
+    std::array<glm::dvec3, kMostFacets> firstCut;
 
     // How often the sum over all that do passes an edge, one way less the other.
     int countOf(const Edge& edge) const { return looks[edge.along] - looks[edge.against]; }
@@ -248,16 +254,17 @@ struct MeshOutline::Facing {
 
 double MeshOutline::irradiance(const glm::dvec3& point, const glm::dvec3& normal) const {
     const double middle = glm::dot(centre - point, normal);
-    if (middle < -extent) return 0;
+    if (middle < -radius) return 0;
     Facing facing;
     bool any = false;
     for (size_t f = 0; f < facets.size(); ++f) {
         facing.looks[f] = facets[f].side(point) == PlaneSide::FRONT;
+        facing.isCut[f] = false;
         any |= facing.looks[f];
     }
     if (!any) return 0;
     facing.looks[facets.size()] = false;
-    const bool isClipped = middle < extent;
+    const bool isClipped = middle < radius;
     double sum = 0;
     for (const Edge& edge : edges) {
         if (isClipped)
@@ -272,8 +279,8 @@ double MeshOutline::irradiance(const glm::dvec3& point, const glm::dvec3& normal
 
 // Where the receiver's horizon cuts facets, the cuts close their outlines: of each along the line in
 // which the two planes meet, from where edges go down to where they come up, whichever belong
-// together.
-double MeshOutline::clippedTerm(const Edge& edge, const Facing& facing, const glm::dvec3& point,
+// together. All cuts of a facet lie within half a turn, since the receiver is not in its plane.
+double MeshOutline::clippedTerm(const Edge& edge, Facing& facing, const glm::dvec3& point,
                                 const glm::dvec3& normal) const {
     if (!facing.looks[edge.along] && !facing.looks[edge.against]) return 0;
     const glm::dvec3 a = edge.from - point, b = edge.to - point;
@@ -287,15 +294,15 @@ double MeshOutline::clippedTerm(const Edge& edge, const Facing& facing, const gl
     const double up = ha > 0 ? -1 : 1;
     for (const auto& [facet, way] : {std::pair(edge.along, 1.0), std::pair(edge.against, -1.0)}) {
         if (!facing.looks[facet]) continue;
-        // Towards the line, along the horizon; and the angle there of the cut. Where the planes are
-        // parallel but for a rounding error, the line is far off, and so is the facet.
-        const Plane& plane = facets[facet];
-        const glm::dvec3 across = plane.normal - glm::dot(plane.normal, normal) * normal;
-        const glm::dvec3 ahead =
-            glm::dot(across, across) > kParallel * kParallel ? -across : plane.origin - point;
-        const glm::dvec3 aside = glm::cross(normal, ahead);
-        sum +=
-            way * up * double(std::atan2(float(glm::dot(cut, aside)), float(glm::dot(cut, ahead))));
+        if (!facing.isCut[facet]) {
+            facing.isCut[facet] = true;
+            facing.firstCut[facet] = cut;
+            continue;
+        }
+        const glm::dvec3& first = facing.firstCut[facet];
+        sum += way * up *
+               double(std::atan2(float(glm::dot(cut, glm::cross(normal, first))),
+                                 float(glm::dot(cut, first))));
     }
     return sum;
 }

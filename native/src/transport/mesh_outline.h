@@ -25,8 +25,8 @@ namespace raybundle {
 class MeshOutline {
   public:
     MeshOutline() = default;
-    // Of the fronts of parents (into Patches::parents) or of their backs. extent: radius of a sphere
-    // around them, metres.
+    // Of the fronts of parents (into Patches::parents) or of their backs. extent: radius of what they
+    // are part of, metres: vertices are off by rounding in proportion to it.
     MeshOutline(const Patches& patches, const std::vector<uint32_t>& parents, bool ofBacks,
                 double extent);
 
@@ -48,11 +48,11 @@ class MeshOutline {
         uint32_t along, against;
     };
     struct Facing;
-    double clippedTerm(const Edge& edge, const Facing& facing, const glm::dvec3& point,
+    double clippedTerm(const Edge& edge, Facing& facing, const glm::dvec3& point,
                        const glm::dvec3& normal) const;
 
-    glm::dvec3 centre{0.0};
-    double extent = 0;
+    glm::dvec3 centre{0.0};  // of a sphere around them
+    double radius = 0;       // metres
     std::vector<Plane> facets;
     std::vector<Edge> edges;
 };

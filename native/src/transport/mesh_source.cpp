@@ -64,12 +64,17 @@ std::optional<FaceDirection> directionTo(const LightFace& face, const glm::vec3&
 
 MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                        const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission,
-                       const std::optional<Enclosure>& enclosure)
-    : patches(patches), emission(emission), sideEmission(sideEmission), enclosure(enclosure) {
+                       const Enclosure& whole, bool isEnclosed)
+    : patches(patches),
+      emission(emission),
+      sideEmission(sideEmission),
+      whole(whole),
+      isEnclosed(isEnclosed) {
     boundSource(parents);
+    wholeExtent = double(std::max(extent, whole.radius()));
     collectFaces(parents, back);
     tree = LightTree(faces);
-    if (!sideEmission) outline = MeshOutline(patches, parents, back == 1, double(extent));
+    if (!sideEmission) outline = MeshOutline(patches, parents, back == 1, wholeExtent);
 }
 
 // Sphere around the source.
@@ -122,7 +127,8 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     const auto choice = tree.choose(point, receiver, uv.x);
     if (!choice) return {};
     const LightFace& face = faces[choice->face];
-    const Plane plane(face.origin, face.normal, double(extent));
+    const Parent& parent = patches.parents[patches.parentOf[face.side / 2]];
+    const Plane plane(face.origin, face.normal, wholeExtent, double(parent.halfWidth()));
     if (plane.side(point) != PlaneSide::FRONT) return {};
     const glm::vec3 radiance = emissionOf(face.side) / glm::pi<float>();
     LightSample sample;
@@ -149,7 +155,7 @@ std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
 bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
                               float radius) const {
     if (glm::dot(receiver, centre - point) < -(radius + extent)) return true;
-    if (enclosure && enclosure->distance(point) > radius) return true;
+    if (isEnclosed && whole.distance(point) > radius) return true;
     return outline.plane() && outline.plane()->height(point) < -double(radius);
 }
 

@@ -25,6 +25,7 @@ struct Enclosure {
     float distance(const glm::vec3& point) const {
         return glm::length(glm::max(glm::max(low - point, point - high), glm::vec3(0.0f)));
     }
+    float radius() const { return low.x > high.x ? 0.0f : 0.5f * glm::length(high - low); }
 };
 
 class MeshSource : public LightSource {
@@ -32,10 +33,10 @@ class MeshSource : public LightSource {
     // parents: into Patches::parents; back: 0 for their fronts, 1 for their backs; emission: of
     // those, W/m^2. `patches` must outlive it. Where the emission varies, sideEmission holds it per
     // side of all patches, W/m^2 of the whole patch, must outlive the source too, and there is no
-    // closed form. enclosure: what the light does not get out of, if that is known.
+    // closed form. whole: what the faces are part of; isEnclosed: the light does not get out of that.
     MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission = nullptr,
-               const std::optional<Enclosure>& enclosure = std::nullopt);
+               const Enclosure& whole = {}, bool isEnclosed = false);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override;
@@ -60,10 +61,12 @@ class MeshSource : public LightSource {
     const Patches& patches;
     const glm::vec3 emission;                          // W/m^2
     const std::vector<glm::vec3>* const sideEmission;  // where it varies
-    const std::optional<Enclosure> enclosure;
+    const Enclosure whole;
+    const bool isEnclosed;
     glm::vec3 totalPower{0.0f};  // W
     glm::vec3 centre{0.0f};
-    float extent = 0;  // radius of a sphere around centre, metres
+    float extent = 0;        // radius of a sphere around centre, metres
+    double wholeExtent = 0;  // of one around what it is part of
     // Sides of parents, or of patches where the emission varies.
     std::vector<LightFace> faces;
     std::vector<double> powerUpTo;  // of them, sum of the channels, cumulative, W
