@@ -133,8 +133,10 @@ def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, streng
     if bpy.app.version < (3, 5, 0):
         # Only the direction of -Z is looked at, also where the object is scaled or mirrored, and the
         # cosine to it dims the light.
-        axis = matrix_world.col[2].to_3d()
-        world_to_light = np.array(axis.to_track_quat('Z', 'Y').to_matrix().transposed())
+        axis = matrix_world.col[2].to_3d().normalized()
+        across = matrix_world.col[0].to_3d()
+        across = (across - across.dot(axis) * axis).normalized()
+        world_to_light = np.array([across, axis.cross(across), axis])
     else:
         # The object's scale deforms the cone; the power is not renormalised for it.
         world_to_light = np.array(matrix_world.to_3x3().inverted_safe())

@@ -17,7 +17,7 @@
 
 namespace raybundle {
 
-// A bounding box, metres.
+// A bounding box along the scene's own axes (Placement::ownAxes), metres.
 struct Extent {
     glm::dvec3 low{INFINITY}, high{-INFINITY};
 

@@ -13,6 +13,10 @@ namespace {
 // from there; of about so many faces.
 constexpr double kBlind = 1e-3;
 constexpr size_t kBlindFaces = 16;
+// Directions that are tried for the scene's own axes, and faces that they are judged by.
+constexpr size_t kTriedAxes = 64, kJudgingFaces = size_t(1) << 16;
+// Cosine of what counts as parallel, and as at right angles; and of axes that are the world's.
+constexpr double kParallel = 0.9998, kAcross = 0.02, kSameAxes = 1 - 1e-9;
 
 }  // namespace
 
@@ -31,13 +35,62 @@ Placement::Placement(const Scene& scene) {
     closedOnes = closedSurfaces(allFaces);
 }
 
+// The axes along which most faces lie, for boxes that do not depend on how the scene is turned: the
+// normal of most of the area, and of most of what is at right angles to it. The world's, where they are
+// the same.
+glm::dmat3 Placement::ownAxes() const {
+    std::vector<glm::dvec3> across;  // see areaVector
+    double total = 0;
+    for (size_t f = 0; f < allFaces.count(); f += 1 + allFaces.count() / kJudgingFaces) {
+        across.push_back(areaVector(f));
+        total += glm::length(across.back());
+    }
+    // The normal of most area among those at right angles to `first`, or among all.
+    auto mostOf = [&](const glm::dvec3* first) {
+        glm::dvec3 best(0.0);
+        double most = 0, passed = 0, next = 0;
+        for (const glm::dvec3& candidate : across) {
+            const double own = glm::length(candidate);
+            passed += own;
+            if (!(own > 0) || passed < next) continue;
+            next = passed + total / double(kTriedAxes);
+            const glm::dvec3 normal = candidate / own;
+            if (first && std::abs(glm::dot(normal, *first)) > kAcross) continue;
+            double area = 0;
+            for (const glm::dvec3& other : across)
+                if (std::abs(glm::dot(other, normal)) > kParallel * glm::length(other))
+                    area += glm::length(other);
+            // By more than rounding, so that equal ones stay in their order.
+            if (area > most * (1 + 1e-6)) {
+                most = area;
+                best = normal;
+            }
+        }
+        return best;
+    };
+    const glm::dvec3 x = mostOf(nullptr);
+    if (x == glm::dvec3(0.0)) return glm::dmat3(1.0);
+    glm::dvec3 y = mostOf(&x);
+    if (y == glm::dvec3(0.0)) y = std::abs(x.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
+    y = glm::normalize(y - glm::dot(x, y) * x);
+    const glm::dmat3 own(x, y, glm::cross(x, y));
+    bool isWorlds = true;
+    for (int k = 0; k < 3; ++k) {
+        const glm::dvec3 c = glm::abs(own[k]);
+        isWorlds = isWorlds && std::max({c.x, c.y, c.z}) > kSameAxes;
+    }
+    return isWorlds ? glm::dmat3(1.0) : glm::transpose(own);
+}
+
 void Placement::findIslands(Patches& patches) {
+    axes = ownAxes();
     patchSizes = automaticPatchSizes(surfaces());
     const std::vector<Extent>& extents = patchSizes.extent;
     // Vertices of no face lie anywhere.
     Extent all;
-    for (const glm::dvec3& vertex : world) all.add(vertex);
-    patches.centre = (extents.size() > 1 ? extents.front() : all).middle();
+    for (const glm::dvec3& vertex : world) all.add(axes * vertex);
+    auto middleOf = [&](const Extent& extent) { return glm::transpose(axes) * extent.middle(); };
+    patches.centre = middleOf(extents.size() > 1 ? extents.front() : all);
     patches.vertices.reserve(world.size());
     for (const glm::dvec3& vertex : world) {
         patches.vertices.push_back(glm::vec3(vertex - patches.centre));
@@ -48,7 +101,7 @@ void Placement::findIslands(Patches& patches) {
         return;
     }
     for (const Extent& extent : extents)
-        patches.islands.push_back({glm::vec3(extent.middle() - patches.centre), 0, 0});
+        patches.islands.push_back({glm::vec3(middleOf(extent) - patches.centre), 0, 0});
     for (size_t f = 0; f < allFaces.count(); ++f)
         for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c) {
             Island& island = patches.islands[patchSizes.island[allFaces.surface[f]]];
@@ -64,7 +117,7 @@ std::vector<Surface> Placement::surfaces() const {
     for (size_t f = 0; f < allFaces.count(); ++f) {
         Surface& surface = result[allFaces.surface[f]];
         for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c)
-            surface.extent.add(world[allFaces.vertices[c]]);
+            surface.extent.add(axes * world[allFaces.vertices[c]]);
         surface.area += glm::length(areaVector(f));
         // What is made of several objects is of none.
         if (surface.faces++ == 0)

@@ -37,11 +37,13 @@ class Placement {
     const PatchSizes& sizes() const { return patchSizes; }
 
   private:
+    glm::dmat3 ownAxes() const;
     std::vector<Surface> surfaces() const;
     bool seesItself(const std::vector<uint32_t>& faces, double off, bool isClosed) const;
     glm::dvec3 areaVector(size_t face) const;
 
     std::vector<glm::dvec3> world;    // per vertex of all instances, metres
+    glm::dmat3 axes{1.0};             // from the world's to those of the scene, see ownAxes
     std::vector<size_t> firstVertex;  // per instance
     std::vector<uint32_t> welded;     // per vertex: the one that stands for it
     WeldedFaces allFaces;
