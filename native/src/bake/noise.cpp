@@ -12,6 +12,10 @@ constexpr double kSmallSample = 0.15;
 // Where the first shot has nearly all the noise of the target, or more, bundles may have this share
 // of it: less of theirs would cost many and hardly be seen in the sum.
 constexpr double kLeastOfBundles = 0.6;
+// The values at corners whose interpolation is nearest to the light have so many times the variance of
+// the cells' means, as far as that is random: of a grid, the inverse of the hat functions' mass matrix
+// has sqrt 3 on its diagonal along each axis.
+constexpr double kCornersOfMeans = 3;
 // Weight of the looks before.
 constexpr double kMemory = 0.5;
 
@@ -36,11 +40,23 @@ Noise::Noise(const Looks& before, const std::vector<float>& weight,
 void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double sharedBias) {
     const size_t n = weight.size();
     difference.resize(n);
-    // Sums over the sides of a cell: of the weight, of it times half the difference of the halves, and
-    // of its square times the variance of the first shot.
+    // Sums over the sides of a cell: of the weight, of it times half the difference of the halves, of
+    // its square times the variance of the first shot; and of its square times the powers of the
+    // difference, for what differs from side to side.
     struct Cell {
-        double weight = 0, direct = 0;
+        double weight = 0, direct = 0, sides = 0;
         glm::dvec3 difference{0.0};
+        double squares0 = 0, squares2 = 0;
+        glm::dvec3 squares1{0.0};
+
+        // Of the mean times the weight, by what differs from side to side at random: squares.
+        double random() const {
+            if (sides < 2) return 0;
+            const glm::dvec3 mean = difference / weight;
+            const double sum =
+                squares2 - 2 * glm::dot(mean, squares1) + glm::dot(mean, mean) * squares0;
+            return std::max(0.0, sum) / weight * sides / (sides - 1);
+        }
     };
     std::vector<Cell> cells(n > 0 ? *std::max_element(cellOf.begin(), cellOf.end()) + 1 : 0);
     double squares = 0, direct = 0;
@@ -58,11 +74,17 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
         cell.weight += w;
         cell.difference += w * 0.5 * (a - b);
         cell.direct += w * w * variance;
+        if (!(w > 0)) continue;
+        ++cell.sides;
+        cell.squares0 += w * w;
+        cell.squares1 += w * w * 0.5 * (a - b);
+        cell.squares2 += w * w * 0.25 * glm::dot(a - b, a - b);
     }
     double shownSquares = 0, shownVariance = 0;
     for (const Cell& cell : cells) {
         if (!(cell.weight > 0)) continue;
-        shownSquares += glm::dot(cell.difference, cell.difference) / cell.weight;
+        shownSquares += glm::dot(cell.difference, cell.difference) / cell.weight +
+                        (kCornersOfMeans - 1) * cell.random();
         shownVariance += cell.direct / cell.weight;
     }
     bias = sharedBias;

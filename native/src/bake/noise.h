@@ -3,7 +3,7 @@
 // The noise: how far the light on the patch sides, and that which is shown of it, is from that of
 // infinitely many bundles and shadow rays on the same patches. Light is shown interpolated over the
 // cells of the user's faces, so that what differs from patch to patch within a cell is not seen: the
-// shown noise is that of the cells' means.
+// shown noise is that of the values at the corners, by that of the cells' means.
 //
 // Source: thesis section 4.3.3 (stated error).
 // Differs:
