@@ -84,10 +84,6 @@ struct Parent {
     glm::vec2 pointOn(uint32_t patchInParent, glm::vec2 uv) const;
     glm::vec3 position(glm::vec2 st) const { return origin + st.x * a + st.y * b; }
     float area() const { return glm::length(glm::cross(a, b)) * (isTriangle ? 0.5f : 1.0f); }
-    // About half of how wide it is where it is narrowest, metres.
-    float halfWidth() const {
-        return glm::length(glm::cross(a, b)) / (glm::length(a) + glm::length(b));
-    }
 };
 
 // A triangle or parallelogram of the user's mesh, over whose corners the result is interpolated.

@@ -18,8 +18,7 @@ enum class PlaneSide { BEHIND = -1, WITHIN = 0, FRONT = 1 };
 
 struct Plane {
     glm::dvec3 origin{0.0}, normal{0.0};  // metres, relative to Patches::centre; unit
-    double thickness = 0;                 // of each half at the origin, metres
-    double slope = 0;                     // it grows by so much with the distance from there
+    double thickness = 0;                 // of each half over the face that spans it, metres
 
     // Half the thickness over the extent of what lies in the plane: some times the 1e-6 by which
     // the vertices of a mesh may be off that was turned, sheared or joined.
@@ -27,30 +26,38 @@ struct Plane {
     // The same over the coordinates, and over the distance of a point: their roundings, and that of
     // the normal.
     static constexpr double kOfCoordinates = 4 * double(std::numeric_limits<float>::epsilon());
-    // More than this the normal of a sliver is not known at all.
-    static constexpr double kMostSlope = 0.01;
 
     Plane() = default;
-    // extent: radius of what lies in the plane, or of the mesh that it is part of, metres; narrowest:
-    // half the width of the face whose normal it has, metres, over which vertices that are off tilt it.
-    Plane(const glm::dvec3& origin, const glm::dvec3& normal, double extent, double narrowest)
+    // a, b: what spans it from the origin on, metres; normal: unit, along their cross product or
+    // against it; extent: radius of what lies in the plane, or of the mesh that it is part of, metres.
+    Plane(const glm::dvec3& origin, const glm::dvec3& a, const glm::dvec3& b,
+          const glm::dvec3& normal, double extent)
         : origin(origin),
           normal(normal),
-          thickness(kOfExtent * extent + kOfCoordinates * mostOf(origin)),
-          slope(narrowest > 0 ? std::min(kMostSlope, kOfCoordinates + thickness / narrowest)
-                              : kMostSlope) {}
+          thickness(kOfExtent * extent + kOfCoordinates * mostOf(origin)) {
+        const glm::dvec3 n = glm::cross(a, b);
+        const double square = glm::dot(n, n);
+        if (!(square > 0)) return;
+        alongA = glm::cross(b, n) / square;
+        alongB = glm::cross(n, a) / square;
+    }
 
     double height(const glm::dvec3& point) const { return glm::dot(point - origin, normal); }
     PlaneSide side(const glm::dvec3& point) const {
         const double off = halfThickness(point), h = height(point);
         return h > off ? PlaneSide::FRONT : h < -off ? PlaneSide::BEHIND : PlaneSide::WITHIN;
     }
-    // At a point, metres.
+    // At a point, metres: vertices that are off by the thickness tilt the plane, the more the
+    // narrower what spans it.
     double halfThickness(const glm::dvec3& point) const {
-        return thickness + slope * mostOf(point - origin);
+        const glm::dvec3 d = point - origin;
+        return thickness * (1 + std::abs(glm::dot(d, alongA)) + std::abs(glm::dot(d, alongB))) +
+               kOfCoordinates * mostOf(d);
     }
 
   private:
+    glm::dvec3 alongA{0.0}, alongB{0.0};  // shares of a and b in a vector, per metre
+
     static double mostOf(const glm::dvec3& v) {
         return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
     }

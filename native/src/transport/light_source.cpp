@@ -86,7 +86,7 @@ class PointSource : public LightSource {
     // What leaves towards the patch: its solid angle times the intensity, however near it is.
     std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& patch) const override {
         if (cone || isDisk()) return std::nullopt;
-        const Plane plane(patch.origin, patch.normal, double(patch.radius), double(patch.radius));
+        const Plane plane(patch.origin, patch.a, patch.b, patch.normal, double(patch.radius));
         const double height = plane.height(position);
         if (height < std::max(double(light.radius), plane.thickness)) return std::nullopt;
         const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
@@ -225,8 +225,7 @@ class AreaSource : public LightSource {
         normal = area > 0 ? glm::normalize(n) : glm::vec3(0.0f);
         if (isEllipse) area *= glm::quarter_pi<float>();
         isNarrow = !spread.isWhole();
-        plane = Plane(position, normal, double(glm::length(u) + glm::length(v)),
-                      double(std::min(glm::length(u), glm::length(v))));
+        plane = Plane(position, u, v, normal, double(glm::length(u) + glm::length(v)));
     }
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,

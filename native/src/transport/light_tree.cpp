@@ -2,6 +2,7 @@
 #include "transport/light_tree.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 

@@ -100,8 +100,8 @@ class Facets {
     // A facet from a parent on, over edges, as far as its plane reaches.
     void grow(uint32_t seed) {
         const Parent& first = patches.parents[parents[seed]];
-        const Plane plane(first.origin, turn * glm::normalize(glm::dvec3(first.normal)), extent,
-                          double(first.halfWidth()));
+        const Plane plane(first.origin, first.a, first.b,
+                          turn * glm::normalize(glm::dvec3(first.normal)), extent);
         const uint32_t facet = uint32_t(planes.size());
         planes.push_back(plane);
         std::vector<uint32_t> open{seed};

@@ -128,7 +128,7 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     if (!choice) return {};
     const LightFace& face = faces[choice->face];
     const Parent& parent = patches.parents[patches.parentOf[face.side / 2]];
-    const Plane plane(face.origin, face.normal, wholeExtent, double(parent.halfWidth()));
+    const Plane plane(parent.origin, parent.a, parent.b, face.normal, wholeExtent);
     if (plane.side(point) != PlaneSide::FRONT) return {};
     const glm::vec3 radiance = emissionOf(face.side) / glm::pi<float>();
     LightSample sample;
