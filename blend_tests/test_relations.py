@@ -24,7 +24,12 @@ CHOSEN = {
     "room:sun": ["an object far away"],
 }
 TURN = "turned by (0.4, 0.7, 1.1)"
-CASES = [(scene, relation) for scene, names in CHOSEN.items()
+# What is known not to hold yet (docs/stability.md "Relations").
+OPEN = {("room:ring", TURN): "the energy balance is 5.5e-3 off, by the ring's light on itself"}
+CASES = [pytest.param(scene, relation, id=f"{scene}, {relation.name}",
+                      marks=[pytest.mark.xfail(reason=OPEN[scene, relation.name])]
+                      if (scene, relation.name) in OPEN else [])
+         for scene, names in CHOSEN.items()
          for relation in relations.RELATIONS if relation.name in (TURN, *names)]
 
 
@@ -34,8 +39,7 @@ def scenes():
     return {name: relations.Scene(name, lamp_rooms.COARSE) for name in CHOSEN}
 
 
-@pytest.mark.parametrize("scene, relation", CASES,
-                         ids=[f"{scene}, {relation.name}" for scene, relation in CASES])
+@pytest.mark.parametrize("scene, relation", CASES)
 def test_relation(scenes, scene, relation):
     result = scenes[scene].measure(relation)
     if result.skipped:
