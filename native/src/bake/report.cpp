@@ -3,6 +3,7 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -56,7 +57,8 @@ std::string errors(const Report::Errors& error) {
 }  // namespace
 
 double Report::Errors::total() const {
-    return std::sqrt(noise * noise + discretisation * discretisation + mesh * mesh);
+    const double most = std::max(noise, ofPatches);
+    return std::sqrt(most * most + discretisation * discretisation + mesh * mesh);
 }
 
 double Report::balanceError() const {

@@ -16,7 +16,8 @@ struct Report {
     // Relative RMS by exposed area; what each covers: reconstruction/stated_error.h.
     struct Errors {
         double noise = 0, discretisation = 0, mesh = 0;
-        double total() const;
+        double ofPatches = 0;  // the noise of the patches, of which `noise` is shown
+        double total() const;  // with that: on the safe side
     };
     struct Object {
         std::string name;

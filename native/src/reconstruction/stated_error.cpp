@@ -43,8 +43,9 @@ struct Squares {
         knownArea += o.knownArea;
         area += o.area;
     }
-    // The residual without the noise in it, and the noise without what is not shown of it.
-    double mesh() const { return std::max(0.0, residual - ripple); }
+    // The residual without the noise in it.
+    double mesh(double noiseScale) const { return std::max(0.0, residual - noiseScale * ripple); }
+    // The noise without what is not shown of it.
     double shownNoise() const { return noise - ripple; }
     // The surplus over the signal, squares; by chance steps may be below zero.
     double smoothShare() const { return known > 0 ? smooth / known : 0; }
@@ -101,7 +102,7 @@ class InstanceErrors {
 
     const Squares& squares() const { return sum; }
 
-    // RMS error around each corner, as radiance, W/(m^2 sr). noiseScale: of the shown noise's squares.
+    // RMS error around each corner, as radiance, W/(m^2 sr). noiseScale: of the squares.
     // unknownShare: surplus over signal, squares, where there are too few patches around.
     std::vector<float> perCorner(size_t corners, double noiseScale, double unknownShare) const {
         std::vector<double> squares(corners, 0), weights(corners, 0);
@@ -110,9 +111,9 @@ class InstanceErrors {
                          const std::array<float, 4>& w, double residual, const Surplus& s) {
             const double beyond = s.isKnown ? double(s.smooth + std::max(s.step, 0.0f))
                                             : unknownShare * square(lightAt(at));
-            const double noise = noiseAt(at);
+            const double noise = noiseScale * noiseAt(at);
             const double mesh = std::max(0.0, residual - ripple * noise);
-            const double error = mesh + noiseScale * (1 - ripple) * noise + beyond;
+            const double error = mesh + noise + beyond;
             for (int k = 0; k < 4; ++k)
                 if (cell.corner[k] >= 0) {
                     squares[size_t(cell.corner[k])] += weight * double(w[k]) * error;
@@ -197,10 +198,12 @@ class InstanceErrors {
     Squares sum;
 };
 
-Report::Errors relative(const Squares& s, double noiseScale, double discretisation) {
+// shownScale: of the shown noise's squares.
+Report::Errors relative(const Squares& s, double noiseScale, double shownScale,
+                        double discretisation) {
     if (!(s.signal > 0)) return {};
-    return {std::sqrt(noiseScale * s.shownNoise() / s.signal), std::sqrt(discretisation),
-            std::sqrt(s.mesh() / s.signal)};
+    return {std::sqrt(shownScale * s.shownNoise() / s.signal), std::sqrt(discretisation),
+            std::sqrt(s.mesh(noiseScale) / s.signal), std::sqrt(noiseScale * s.noise / s.signal)};
 }
 
 // The edge at which the mesh's error would be `limit`: that of smooth light falls with its square,
@@ -218,15 +221,15 @@ double edgeFor(double limit, double smoothShare, double stepShare, double patchE
 // A mesh that is too coarse: its squared error, and what to say of it.
 using CoarseMesh = std::pair<double, std::string>;
 
-std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, double limit,
-                                     double smoothShare, double stepShare) {
-    const double mesh = std::sqrt(s.mesh() / s.signal);
+std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, double noiseScale,
+                                     double limit, double smoothShare, double stepShare) {
+    const double mesh = std::sqrt(s.mesh(noiseScale) / s.signal);
     if (mesh <= limit || s.cells == 0) return std::nullopt;
     const double faceEdge = std::sqrt(s.cellArea / s.cells);
     const double patchEdge = std::sqrt(s.area / s.patches);
     const double edge = std::min(edgeFor(limit, smoothShare, stepShare, patchEdge), 0.5 * faceEdge);
     return CoarseMesh{
-        s.mesh(),
+        s.mesh(noiseScale),
         "object \"" + name + "\": its faces, " + inMetres(faceEdge) +
             " wide in the mean, are too coarse for its light: interpolated over them it is " +
             inPercent(mesh) + " off. Edges of about " + inMetres(edge) + " would bring that to " +
@@ -264,10 +267,13 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     for (InstanceLight& baked : light) baked.error.assign(baked.direct.size(), 0.0f);
     if (!(all.signal > 0)) return;
 
-    // As the bake has measured what is shown of it, and what the halves have in common.
-    const double noise = report.error.noise;
+    // Also what the halves have in common.
     const double noiseScale =
-        all.shownNoise() > 0 ? noise * noise * all.signal / all.shownNoise() : 0;
+        all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
+    // As the bake has measured what is shown of it.
+    const double shown = report.error.noise;
+    const double shownScale =
+        all.shownNoise() > 0 ? shown * shown * all.signal / all.shownNoise() : 0;
     const double limit = std::max(kCoarse, kCoarseTargets * double(targetError));
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;
@@ -277,15 +283,16 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         const Squares& known = own.knownArea >= kKnownShare * own.area ? own : all;
         const double smooth = known.smoothShare(), step = known.stepShare();
         discretisation += (smooth + step) * own.signal / all.signal;
-        report.objects[i].error = relative(own, noiseScale, smooth + step);
+        report.objects[i].error = relative(own, noiseScale, shownScale, smooth + step);
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         if (own.signal / own.area > kDark * all.signal / all.area)
-            if (auto mesh = coarseMesh(light[i].name, own, limit, smooth, step))
+            if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
                 coarse.push_back(std::move(*mesh));
     }
     warnOf(std::move(coarse), report);
-    report.error = relative(all, noiseScale, discretisation);
-    report.error.noise = noise;
+    report.error = relative(all, noiseScale, shownScale, discretisation);
+    report.error.noise = shown;
+    report.error.ofPatches = report.estimatedError;
 }
 
 }  // namespace raybundle
