@@ -81,6 +81,10 @@ Mesh triangulated(const Mesh& quads) {
     return polygons(quads.name, quads.vertices, faces);
 }
 
+double areaOf(const Cell& cell) {
+    return double(glm::length(glm::cross(cell.a, cell.b))) * (cell.isTriangle() ? 0.5 : 1.0);
+}
+
 Mesh plane(int n) { return grid("plane", {0, 0, 0}, {2, 0, 0}, {0, 1, 0}, n, n); }
 
 TEST(Reconstruction, ConstantLightStaysConstant) {
@@ -228,35 +232,126 @@ TEST(Reconstruction, CoveredPatchesDoNotCount) {
     }
 }
 
-TEST(Reconstruction, NothingIsNegativeOrBrighterThanTheLight) {
+// The integral over all patches of what is interpolated between the corners, W.
+glm::dvec3 integral(const Surface& surface, const std::vector<glm::vec3>& corners) {
+    glm::dvec3 sum(0.0);
+    for (uint32_t p = 0; p < surface.patches.count(); ++p) {
+        const Parent& parent = surface.patches.parents[surface.patches.parentOf[p]];
+        const Cell& cell = surface.patches.cells[parent.cell];
+        const glm::vec2 uv = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
+        const std::array<float, 4> weights = cell.weights(surface.patches.point(p, uv));
+        for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k)
+            sum += double(surface.patches.area[p] * weights[size_t(k)]) *
+                   glm::dvec3(corners[size_t(cell.corner[size_t(k)])]);
+    }
+    return sum;
+}
+
+glm::dvec3 integral(const Surface& surface, const std::function<glm::vec3(uint32_t)>& ofPatch) {
+    glm::dvec3 sum(0.0);
+    for (uint32_t p = 0; p < surface.patches.count(); ++p)
+        sum += double(surface.patches.area[p]) * glm::dvec3(ofPatch(p));
+    return sum;
+}
+
+// As the light of a lamp close to a wall: one patch, or faces here and there, among dark ones, next
+// to even light and random light.
+std::vector<glm::vec3> hotSpots(const Surface& surface) {
     std::mt19937 random(3);
     std::uniform_real_distribution<float> uniform(0, 1);
-    Surface surface(triangulated(plane(8)), 0.05f);
-    std::vector<glm::vec3> steps(surface.patches.sideCount());
-    for (glm::vec3& v : steps) v = glm::vec3(uniform(random) < 0.1f ? 10 : 0, uniform(random), 0);
-    for (const glm::vec3& v : surface.reconstruct(steps, kRegularization)) {
-        EXPECT_TRUE(v.x >= 0 && v.y >= 0);
-        EXPECT_EQ(v.z, 0);
-        EXPECT_LE(v.x, 20) << "overshoots by more than the step itself";
+    std::vector<glm::vec3> field(surface.patches.sideCount(), glm::vec3(0));
+    for (uint32_t p = 0; p < surface.patches.count(); ++p)
+        field[2 * p] = {p == surface.patches.count() / 3 ? 1000 : 0.1f,
+                        uniform(random) < 0.1f ? 10 : 0, 5 + uniform(random)};
+    return field;
+}
+
+std::vector<Surface> surfacesOfAllKinds() {
+    Mesh ball = icosphere("ball", 1, 2, false);
+    for (int32_t v : ball.cornerVertices)
+        ball.cornerNormals.push_back(glm::normalize(ball.vertices[size_t(v)]));
+    std::vector<Surface> surfaces;
+    for (const Mesh& mesh : {plane(1), plane(6), plane(12), triangulated(plane(8)), ball})
+        for (float patchSize : {0.05f, 0.5f}) surfaces.emplace_back(mesh, patchSize);
+    return surfaces;
+}
+
+TEST(Reconstruction, NothingLeavesTheRangeOfTheLightAround) {
+    for (const Surface& surface : surfacesOfAllKinds()) {
+        const std::vector<glm::vec3> field = hotSpots(surface);
+        for (const glm::vec3& v : surface.reconstruct(field, kRegularization)) {
+            ASSERT_TRUE(v.x >= 0 && v.y >= 0 && v.z >= 4.4f) << "at " << surface.mesh().name;
+            ASSERT_TRUE(v.x <= 1200.1f && v.y <= 12.1f && v.z <= 6.6f) << surface.mesh().name;
+        }
     }
 }
 
-TEST(Reconstruction, TheMeanOverTheSurfaceIsKept) {
-    // Least squares without regularisation is orthogonal to constants, up to what clamping takes.
-    const Surface surface(plane(6), 0.05f);
-    auto light = [](glm::vec3 at, glm::vec3) {
-        return glm::vec3(2 + std::sin(3 * at.x) * std::cos(5 * at.y));
+TEST(Reconstruction, TheMeanIsKeptWhateverTheLight) {
+    for (const Surface& surface : surfacesOfAllKinds())
+        for (float regularization : {0.0f, kRegularization, 1.0f}) {
+            const std::vector<glm::vec3> field = hotSpots(surface);
+            const glm::dvec3 wanted = integral(surface, [&](uint32_t p) { return field[2 * p]; }),
+                             found = integral(surface, surface.reconstruct(field, regularization));
+            for (int c = 0; c < 3; ++c)
+                ASSERT_NEAR(found[c], wanted[c], 1e-4 * wanted[c])
+                    << surface.mesh().name << ", channel " << c << ", " << surface.patches.count()
+                    << " patches, regularization " << regularization;
+        }
+}
+
+TEST(Reconstruction, FacesWithoutHeightChangeNothing) {
+    // A grid of 12 x 12 whose odd columns are cut in two, and the thin triangles that fill the
+    // T-junctions: the light is that of triangles of 1e-2 of the edge, up to a tenth of its step,
+    // since the faces beside them are cut in another way.
+    auto floorOf = [](float ratio) {
+        constexpr int kCells = 12;
+        std::vector<glm::vec3> vertices;
+        std::vector<std::vector<int32_t>> faces;
+        auto vertex = [&](float x, float y) {
+            const glm::vec3 at(x, y, 0);
+            for (size_t v = 0; v < vertices.size(); ++v)
+                if (vertices[v] == at) return int32_t(v);
+            vertices.push_back(at);
+            return int32_t(vertices.size() - 1);
+        };
+        for (int i = 0; i < kCells; ++i)
+            for (int j = 0; j < kCells; ++j) {
+                const float x0 = float(i), x1 = x0 + 1, y0 = float(j), y1 = y0 + 1, y = y0 + 0.5f;
+                const int32_t a = vertex(x0, y0), b = vertex(x1, y0), c = vertex(x1, y1),
+                              d = vertex(x0, y1);
+                if (i % 2 == 0) {
+                    faces.push_back({a, b, c, d});
+                    continue;
+                }
+                const int32_t left = vertex(x0 + ratio, y), right = vertex(x1 - ratio, y);
+                faces.insert(
+                    faces.end(),
+                    {{a, b, right, left}, {left, right, c, d}, {a, left, d}, {b, c, right}});
+            }
+        Mesh mesh = polygons("floor", vertices, faces);
+        mesh.cornerNormals.assign(mesh.cornerVertices.size(), glm::vec3(0, 0, 1));
+        return Surface(mesh, 0.3f);
     };
-    double wanted = 0, found = 0;
-    for (uint32_t p = 0; p < surface.patches.count(); ++p)
-        wanted += double(surface.patches.area[p]) *
-                  double(light(glm::vec3(glm::dvec3(surface.patches.point(p, {0.5f, 0.5f})) +
-                                         surface.patches.centre),
-                               {})
-                             .x);
-    const std::vector<glm::vec3> corners = surface.reconstruct(light, 0);
-    for (size_t c = 0; c < corners.size(); ++c) found += double(corners[c].x) * (2.0 / 36) / 4;
-    EXPECT_NEAR(found, wanted, 1e-3 * wanted);
+    auto light = [](glm::vec3 at, glm::vec3) {
+        return glm::vec3(glm::distance(at, {6, 6, 0}) < 2 ? 0.3f : 1.3f);
+    };
+    auto onQuads = [](const Surface& surface, const std::vector<glm::vec3>& corners) {
+        std::vector<float> values;
+        for (const Cell& cell : surface.patches.cells)
+            if (areaOf(cell) > 0.9)
+                for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k)
+                    values.push_back(corners[size_t(cell.corner[size_t(k)])].x);
+        return values;
+    };
+    const Surface fine = floorOf(1e-2f);
+    const std::vector<float> wanted = onQuads(fine, fine.reconstruct(light));
+    for (float ratio : {1e-3f, 1e-4f, 1e-5f, 1e-6f}) {
+        const Surface surface = floorOf(ratio);
+        const std::vector<float> found = onQuads(surface, surface.reconstruct(light));
+        ASSERT_EQ(found.size(), wanted.size());
+        for (size_t k = 0; k < found.size(); ++k)
+            ASSERT_NEAR(found[k], wanted[k], 0.1) << "ratio " << ratio;
+    }
 }
 
 }  // namespace

@@ -13,7 +13,10 @@
 // - A twist term for quads takes the place of their diagonal.
 // - Shares of patches that lie against another surface, which nobody sees, do not count, so that
 //   contacts are neither dark nor leaking.
-// - No value is negative, and at contacts none leaves the range of the light around it.
+// - Values keep to the range of the light around them, by fluxes that keep the mean
+//   (reconstruction/fit_terms.h): no wall near a lamp gets more than arrives there.
+// - The slope change is taken times the harmonic mean of the heights of both faces, not divided by
+//   each, so that faces almost without height make no matrix that cannot be solved.
 #pragma once
 
 #include <glm/glm.hpp>

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/fit_terms.h"
+
+#include <algorithm>
+
+namespace raybundle {
+namespace {
+
+// Passes that cut fluxes only around nodes out of bounds; what is left is Zalesak's.
+constexpr int kMaxPasses = 40;
+// Values within bounds but for this share of the largest are.
+constexpr double kSettled = 1e-6;
+
+// A symmetric matrix as the sum of small ones. Each entry is kept once, however many add to it: a
+// list of all that is added would take ten times the memory.
+class SymmetricSum {
+  public:
+    explicit SymmetricSum(size_t size) : rows(size) {}
+
+    // To (i, j) and, if they differ, to (j, i).
+    void add(uint32_t i, uint32_t j, double value) {
+        std::vector<Entry>& row = rows[std::max(i, j)];
+        const uint32_t column = std::min(i, j);
+        const auto found = std::find_if(row.begin(), row.end(),
+                                        [&](const Entry& e) { return e.column == column; });
+        if (found != row.end())
+            found->value += value;
+        else
+            row.push_back({column, value});
+    }
+
+    // valueAt(a, b), symmetric, at (node[a], node[b]); a node may occur several times.
+    template <size_t N, class ValueAt>
+    void add(const std::array<uint32_t, N>& node, const ValueAt& valueAt) {
+        for (size_t a = 0; a < N; ++a)
+            for (size_t b = 0; b <= a; ++b)
+                if (const double value = valueAt(a, b); value != 0)
+                    add(node[a], node[b], a != b && node[a] == node[b] ? 2 * value : value);
+    }
+
+    Eigen::SparseMatrix<double> matrix() {
+        for (uint32_t i = 0; i < rows.size(); ++i)
+            if (rows[i].empty()) add(i, i, 1);
+        const Eigen::Index n = Eigen::Index(rows.size());
+        Eigen::SparseMatrix<double> lower(n, n);
+        std::vector<int> counts(rows.size(), 0);
+        for (const auto& row : rows)
+            for (const Entry& entry : row) ++counts[entry.column];
+        lower.reserve(counts);
+        // In the order of rows, so that columns are.
+        for (Eigen::Index i = 0; i < n; ++i)
+            for (const Entry& entry : rows[size_t(i)])
+                lower.insertBackUncompressed(i, entry.column) = entry.value;
+        lower.makeCompressed();
+        return lower.selfadjointView<Eigen::Lower>();
+    }
+
+  private:
+    struct Entry {
+        uint32_t column;
+        double value;
+    };
+    std::vector<std::vector<Entry>> rows;  // of the lower triangle
+};
+
+}  // namespace
+
+void FitTerms::addPatches(const std::array<uint32_t, 4>& node,
+                          const std::array<std::array<double, 4>, 4>& square) {
+    for (size_t a = 0; a < 4; ++a)
+        for (size_t b = 0; b < 4; ++b) mass[node[a]] += square[a][b];
+    ofPatches.push_back({node, square});
+}
+
+void FitTerms::addSquare(const std::array<uint32_t, 8>& node, const std::array<double, 8>& stencil,
+                         double weight) {
+    if (weight > 0) squares.push_back({node, stencil, weight});
+}
+
+Eigen::SparseMatrix<double> FitTerms::matrix() const {
+    SymmetricSum sum(nodeCount);
+    for (const CellTerm& term : ofPatches)
+        sum.add(term.node, [&](size_t a, size_t b) { return term.square[a][b]; });
+    for (const Square& term : squares)
+        sum.add(term.node, [&](size_t a, size_t b) {
+            return term.weight * term.stencil[a] * term.stencil[b];
+        });
+    return sum.matrix();
+}
+
+template <class Visit>
+void FitTerms::forEachFlux(const Eigen::VectorXd& values, const Visit& visit) const {
+    size_t index = 0;
+    for (const CellTerm& term : ofPatches) {
+        for (size_t a = 0; a < 4; ++a) {
+            double amount = 0;
+            for (size_t b = 0; b < 4; ++b)
+                amount += term.square[a][b] * (values[term.node[a]] - values[term.node[b]]);
+            visit(index, term.node[a], amount);
+        }
+        ++index;
+    }
+    for (const Square& term : squares) {
+        double slope = 0;
+        for (size_t a = 0; a < 8; ++a) slope += term.stencil[a] * values[term.node[a]];
+        for (size_t a = 0; a < 8; ++a)
+            visit(index, term.node[a], -term.weight * term.stencil[a] * slope);
+        ++index;
+    }
+}
+
+Eigen::VectorXd FitTerms::within(const Eigen::VectorXd& low, const Eigen::VectorXd& high,
+                                 const Eigen::VectorXd& mean,
+                                 const Eigen::VectorXd& solution) const {
+    const double settled =
+        kSettled * std::max(mean.cwiseAbs().maxCoeff(), solution.cwiseAbs().maxCoeff());
+    auto isOut = [&](Eigen::Index v, double value) {
+        return value < low[v] - settled || value > high[v] + settled;
+    };
+    auto bounded = [&](const Eigen::VectorXd& values) {
+        return Eigen::VectorXd(values.cwiseMax(low).cwiseMin(high));
+    };
+    bool isWithin = true;
+    for (Eigen::Index v = 0; v < solution.size(); ++v)
+        isWithin = isWithin && !isOut(v, solution[v]);
+    if (isWithin) return bounded(solution);
+
+    std::vector<double> share(ofPatches.size() + squares.size(), 1);  // kept, per term
+    auto withShares = [&] {
+        Eigen::VectorXd added = Eigen::VectorXd::Zero(mean.size());
+        forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
+            added[v] += share[term] * amount;
+        });
+        for (Eigen::Index v = 0; v < mean.size(); ++v)
+            added[v] = mass[v] > 0 ? mean[v] + added[v] / mass[v] : solution[v];
+        return added;
+    };
+    // Per node the share of what all its terms add that keeps it within bounds, for as long as that
+    // settles.
+    Eigen::VectorXd values = withShares();
+    for (int pass = 0; pass < kMaxPasses; ++pass) {
+        Eigen::VectorXd kept = Eigen::VectorXd::Ones(mean.size());
+        bool isSettled = true;
+        for (Eigen::Index v = 0; v < mean.size(); ++v)
+            if (mass[v] > 0 && isOut(v, values[v])) {
+                const double bound = values[v] < low[v] ? low[v] : high[v];
+                kept[v] = std::clamp((bound - mean[v]) / (values[v] - mean[v]), 0.0, 1.0);
+                isSettled = false;
+            }
+        if (isSettled) return bounded(values);
+        std::vector<double> least(share.size(), 1);
+        forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
+            if (amount != 0) least[term] = std::min(least[term], kept[v]);
+        });
+        for (size_t term = 0; term < share.size(); ++term) share[term] *= least[term];
+        values = withShares();
+    }
+
+    Eigen::VectorXd more = Eigen::VectorXd::Zero(mean.size()), less = more;
+    forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
+        (amount > 0 ? more : less)[v] += share[term] * amount;
+    });
+    std::vector<double> least(share.size(), 1);
+    forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
+        if (amount == 0 || mass[v] <= 0) return;
+        const double room = mass[v] * ((amount > 0 ? high : low)[v] - mean[v]);
+        const double wanted = (amount > 0 ? more : less)[v];
+        if (wanted != 0) least[term] = std::min(least[term], std::clamp(room / wanted, 0.0, 1.0));
+    });
+    for (size_t term = 0; term < share.size(); ++term) share[term] *= least[term];
+    return bounded(withShares());
+}
+
+}  // namespace raybundle
