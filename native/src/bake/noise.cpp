@@ -9,8 +9,8 @@ namespace {
 
 // At the first look the noise is stated so much above what the halves say; less with each look.
 constexpr double kSmallSample = 0.15;
-// Where the first shot has nearly all the noise of the target, or more, bundles may have this share
-// of it: less of theirs would cost many and hardly be seen in the sum.
+// Bundles may have this share of the target at least: less of theirs would cost many and hardly be
+// seen beside the noise of the first shot.
 constexpr double kLeastOfBundles = 0.6;
 // The values at corners whose interpolation is nearest to the light have so many times the variance of
 // the cells' means, as far as that is random: of a grid, the inverse of the hat functions' mass matrix
@@ -123,9 +123,9 @@ double Noise::ofBundles() const {
 }
 
 double Noise::excess(double target) const {
-    const double left = std::max(target * target - directNoise,
-                                 kLeastOfBundles * kLeastOfBundles * target * target);
-    return ofBundles() / std::sqrt(left);
+    const double all = target * target, least = kLeastOfBundles * kLeastOfBundles * all;
+    const double left = all - directNoise;
+    return ofBundles() / std::sqrt(left > least ? left : std::max(least, all - shownDirect));
 }
 
 Looks Noise::looks() const { return {looked, bundles, bundleNoise > 0 ? pooled / bundleNoise : 1}; }

@@ -48,8 +48,9 @@ class Noise {
     double relative() const;
     double shown() const;
     double ofBundles() const;  // without that of the first shot
-    // So many times too large is the noise of bundles for a relative target: beside that of the
-    // first shot, which they do not help.
+    // So many times too large is the noise of bundles for a relative target beside that of the first
+    // shot, which they do not help: beside what is shown of that, where the target is out of reach
+    // on the sides.
     double excess(double target) const;
     Looks looks() const;
     // Per side: half the difference of the halves, brought to the stated size, W/m^2.

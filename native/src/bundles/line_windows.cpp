@@ -22,6 +22,9 @@ constexpr size_t kMostWindows = 24, kLeastPatches = 64;
 // Where a window has more pixels for each of the patches that it is made for, these are slivers or
 // far apart.
 constexpr double kMostPixelsEach = 64;
+// An object of less than this share of the surface of its box is dust or wires: nearly all lines of
+// a window would pass it by. It gathers with local rays.
+constexpr double kLeastFilled = 1e-3;
 // What a window costs besides its pixels, in pixels: looking whether the parents meet it.
 constexpr double kWindowCost = 500, kParentCost = 1.0 / 32;
 constexpr double kWorthSplitting = 0.97;  // share of the cost that splitting must come below
@@ -54,6 +57,14 @@ struct Box {
         const glm::dvec3 d(high - low);
         return 0.5 * (d.x * d.y + d.y * d.z + d.z * d.x);
     }
+    // Of the rectangle around its shadow, which is what a window has, mean over all directions and
+    // turns of the plane, in proportion: for a cube it is the shadow. (Of two axes at right angles at
+    // random |r.x u.x| has the mean 2 / (3 pi), and |r.x u.y| by simulation 0.2705.)
+    double meanRectangle() const {
+        if (isEmpty()) return 0;
+        const glm::dvec3 d(high - low);
+        return 0.141 * glm::dot(d, d) + 0.359 * (d.x * d.y + d.y * d.z + d.z * d.x);
+    }
 };
 
 using Members = std::vector<uint32_t>;  // parents
@@ -63,10 +74,12 @@ class Clustering {
     explicit Clustering(const Patches& patches) : patches(patches), boxes(patches.parents.size()) {
         for (size_t i = 0; i < boxes.size(); ++i) {
             const Parent& parent = patches.parents[i];
-            boxes[i].add(parent.origin);
-            boxes[i].add(parent.origin + parent.a);
-            boxes[i].add(parent.origin + parent.b);
-            if (!parent.isTriangle) boxes[i].add(parent.origin + parent.a + parent.b);
+            const glm::vec3 origin = patches.axes * parent.origin, a = patches.axes * parent.a,
+                            b = patches.axes * parent.b;
+            boxes[i].add(origin);
+            boxes[i].add(origin + a);
+            boxes[i].add(origin + b);
+            if (!parent.isTriangle) boxes[i].add(origin + a + b);
         }
     }
 
@@ -102,9 +115,29 @@ class Clustering {
         return box;
     }
 
+    Members withoutDust(const Members& members) const {
+        std::vector<Box> box;  // per instance
+        std::vector<double> area;
+        for (uint32_t m : members) {
+            const Parent& parent = patches.parents[m];
+            if (parent.instance >= box.size()) {
+                box.resize(parent.instance + 1);
+                area.resize(parent.instance + 1, 0.0);
+            }
+            box[parent.instance].add(boxes[m]);
+            area[parent.instance] += double(parent.area());
+        }
+        Members rest;
+        for (uint32_t m : members)
+            if (const uint32_t i = patches.parents[m].instance;
+                area[i] > kLeastFilled * 4 * box[i].meanShadow())
+                rest.push_back(m);
+        return rest;
+    }
+
   private:
     double cost(const Box& box, double pixelArea) const {
-        return box.meanShadow() / pixelArea + kWindowCost + kParentCost * double(boxes.size());
+        return box.meanRectangle() / pixelArea + kWindowCost + kParentCost * double(boxes.size());
     }
 
     // Moves a part of the cluster to `part` if two windows cost less than one.
@@ -191,7 +224,9 @@ class Planner {
 
   private:
     double pixelArea(int level) const { return std::ldexp(coarse * coarse, -2 * level); }
-    double pixelsOf(const Box& box, int level) const { return box.meanShadow() / pixelArea(level); }
+    double pixelsOf(const Box& box, int level) const {
+        return box.meanRectangle() / pixelArea(level);
+    }
 
     // Adds a window, or makes the one around finer if that is hardly larger. kNoWindow if it would
     // have too many pixels.
@@ -200,7 +235,7 @@ class Planner {
         if (around != kNoWindow) {
             LineWindow& outer = density.windows[size_t(around)];
             const Box outerBox{outer.low, outer.high};
-            if (box.meanShadow() > kAlmostAll * outerBox.meanShadow()) {
+            if (box.meanRectangle() > kAlmostAll * outerBox.meanRectangle()) {
                 const double more = pixelsOf(outerBox, level) - pixelsOf(outerBox, outer.level);
                 const bool isWorthIt = double(clustering.patchCount(members)) >=
                                        kLeastFinerShare * double(madeFor[size_t(around)]);
@@ -248,8 +283,8 @@ struct IslandDensity {
         const double pixelArea = double(density.pixelSize) * double(density.pixelSize);
         double sum = 0;
         for (const LineWindow& window : density.windows)
-            sum +=
-                std::ldexp(Box{window.low, window.high}.meanShadow() / pixelArea, 2 * window.level);
+            sum += std::ldexp(Box{window.low, window.high}.meanRectangle() / pixelArea,
+                              2 * window.level);
         return sum;
     }
 };
@@ -257,11 +292,12 @@ struct IslandDensity {
 void findWindows(const Patches& patches, const Clustering& clustering, float pixelsPerPatch,
                  float leastPixelSize, IslandDensity& island) {
     LineDensity& density = island.density;
+    const Members members = clustering.withoutDust(island.members);
     const double starvedArea =
         kStarvedPixels * double(density.pixelSize) * double(density.pixelSize);
     size_t starved = 0;
     double logSum = 0;
-    for (uint32_t m : island.members) {
+    for (uint32_t m : members) {
         const Parent& parent = patches.parents[m];
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
             const double area = double(patches.area[p]);
@@ -269,7 +305,8 @@ void findWindows(const Patches& patches, const Clustering& clustering, float pix
             logSum += area * std::log(area);
         }
     }
-    if (starved < kLeastPatches || double(starved) < kLeastStarvedShare * double(island.patchCount))
+    if (starved < kLeastPatches ||
+        double(starved) < kLeastStarvedShare * double(clustering.patchCount(members)))
         return;
 
     // Outside of the windows the pixels follow the patches that most of the area is made of.
@@ -282,7 +319,7 @@ void findWindows(const Patches& patches, const Clustering& clustering, float pix
     const int mostLevel =
         int(std::floor(0.5 * std::log2(kMostUnits * coarse * coarse / island.largest)));
     Planner planner(clustering, coarse, density);
-    std::vector<Dense> outer{{island.members, kNoWindow}};
+    std::vector<Dense> outer{{members, kNoWindow}};
     for (int level = 1; level <= mostLevel && !outer.empty(); ++level)
         outer = planner.refine(outer, level);
     if (density.windows.empty()) {

@@ -25,7 +25,7 @@ namespace raybundle {
 
 // A box of the scene that lines of a bundle meet more densely.
 struct LineWindow {
-    glm::vec3 low, high;  // metres, relative to Patches::centre
+    glm::vec3 low, high;  // metres, relative to Patches::centre, along Patches::axes
     int level;            // its pixels are 2^level times smaller, 1 or more
 };
 

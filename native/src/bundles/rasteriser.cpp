@@ -94,12 +94,13 @@ void Rasteriser::begin(const Bundle& bundle) {
     // The shadows of the boxes do not depend on the shift, or lines near their borders would not be
     // uniform.
     openings.clear();
+    const glm::dmat3 axes(patches.axes);
+    const glm::dvec3 right = axes * frame.right, up = axes * frame.up;
     for (const LineWindow& window : windows) {
         const glm::dvec3 middle(0.5f * (window.low + window.high));
         const glm::dvec3 half(0.5f * (window.high - window.low));
-        const glm::dvec2 at(glm::dot(middle, frame.right), glm::dot(middle, frame.up));
-        const glm::dvec2 reach(glm::dot(half, glm::abs(frame.right)),
-                               glm::dot(half, glm::abs(frame.up)));
+        const glm::dvec2 at(glm::dot(middle, right), glm::dot(middle, up));
+        const glm::dvec2 reach(glm::dot(half, glm::abs(right)), glm::dot(half, glm::abs(up)));
         openings.push_back({(at - reach) * perPixel, (at + reach) * perPixel});
     }
     findTaken(windows.size());

@@ -35,6 +35,7 @@ struct Extent {
 };
 
 // A connected surface.
+// A connected surface, or what one object has of it.
 struct Surface {
     Extent extent;
     double area = 0;  // m^2

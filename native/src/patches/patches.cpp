@@ -142,7 +142,7 @@ class Subdivision {
         std::vector<double> reachOf(patches.vertices.size(), 0);  // per vertex: of its island
         for (size_t f = 0; f < faces.count(); ++f)
             reachOf[faces.vertices[faces.offsets[f]]] =
-                double(patches.islands[sizes.island[faces.surface[f]]].reach);
+                double(patches.islands[sizes.island[faces.piece[f]]].reach);
         const std::vector<Shell> shells =
             shellsOfFaces(faces, placed.closed(), patches.vertices,
                           [&](uint32_t vertex) { return kThinnest * reachOf[vertex]; });
@@ -152,9 +152,9 @@ class Subdivision {
             for (size_t f = 0; f < mesh.faceCount(); ++f) {
                 const size_t firstParent = patches.parents.size(), face = faces.firstFace[i] + f;
                 const uint32_t surface = faces.surface[face];
-                double size = patchSize > 0 ? double(patchSize) : sizes.size[surface];
+                double size = patchSize > 0 ? double(patchSize) : sizes.size[faces.piece[face]];
                 if (!(size > 0)) size = 1;
-                Island& island = patches.islands[sizes.island[surface]];
+                Island& island = patches.islands[sizes.island[faces.piece[face]]];
                 island.size = std::max(island.size, float(size));
                 island.finest =
                     island.finest > 0 ? std::min(island.finest, float(size)) : float(size);
@@ -166,7 +166,7 @@ class Subdivision {
                     parent.isInward = shells[face] == Shell::INWARD;
                     parent.stopsDirect = scene.instances[i].stopsDirect;
                     parent.exchanges = scene.instances[i].exchanges;
-                    parent.island = sizes.island[surface];
+                    parent.island = sizes.island[faces.piece[face]];
                     parent.surface = surface;
                 }
             }

@@ -18,6 +18,34 @@ constexpr size_t kTriedAxes = 64, kJudgingFaces = size_t(1) << 16;
 // Cosine of what counts as parallel, and as at right angles; and of axes that are the world's.
 constexpr double kParallel = 0.9998, kAcross = 0.02, kSameAxes = 1 - 1e-9;
 
+// The direction along which most of some vectors lie, by their lengths; 0 without any. pole: what
+// lies at right angles to the direction and to this counts too, as the sides of a grid do and its
+// diagonals do not.
+glm::dvec3 commonest(const std::vector<glm::dvec3>& vectors, const glm::dvec3* pole) {
+    double total = 0, passed = 0, next = 0, most = 0;
+    for (const glm::dvec3& v : vectors) total += glm::length(v);
+    glm::dvec3 best(0.0);
+    for (const glm::dvec3& candidate : vectors) {
+        const double own = glm::length(candidate);
+        passed += own;
+        if (!(own > 0) || passed < next) continue;
+        next = passed + total / double(kTriedAxes);
+        const glm::dvec3 direction = candidate / own;
+        const glm::dvec3 other = pole ? glm::cross(*pole, direction) : glm::dvec3(0.0);
+        double along = 0;
+        for (const glm::dvec3& v : vectors)
+            if (std::max(std::abs(glm::dot(v, direction)), std::abs(glm::dot(v, other))) >
+                kParallel * glm::length(v))
+                along += glm::length(v);
+        // By more than rounding, so that equal ones stay in their order.
+        if (along > most * (1 + 1e-6)) {
+            most = along;
+            best = direction;
+        }
+    }
+    return best;
+}
+
 }  // namespace
 
 Placement::Placement(const Scene& scene) {
@@ -36,41 +64,29 @@ Placement::Placement(const Scene& scene) {
 }
 
 // The axes along which most faces lie, for boxes that do not depend on how the scene is turned: the
-// normal of most of the area, and of most of what is at right angles to it. The world's, where they are
-// the same.
+// normal of most of the area, and of most of what is at right angles to it; if nothing is, an edge.
+// The world's, where they are the same.
 glm::dmat3 Placement::ownAxes() const {
-    std::vector<glm::dvec3> across;  // see areaVector
-    double total = 0;
-    for (size_t f = 0; f < allFaces.count(); f += 1 + allFaces.count() / kJudgingFaces) {
-        across.push_back(areaVector(f));
-        total += glm::length(across.back());
-    }
-    // The normal of most area among those at right angles to `first`, or among all.
-    auto mostOf = [&](const glm::dvec3* first) {
-        glm::dvec3 best(0.0);
-        double most = 0, passed = 0, next = 0;
-        for (const glm::dvec3& candidate : across) {
-            const double own = glm::length(candidate);
-            passed += own;
-            if (!(own > 0) || passed < next) continue;
-            next = passed + total / double(kTriedAxes);
-            const glm::dvec3 normal = candidate / own;
-            if (first && std::abs(glm::dot(normal, *first)) > kAcross) continue;
-            double area = 0;
-            for (const glm::dvec3& other : across)
-                if (std::abs(glm::dot(other, normal)) > kParallel * glm::length(other))
-                    area += glm::length(other);
-            // By more than rounding, so that equal ones stay in their order.
-            if (area > most * (1 + 1e-6)) {
-                most = area;
-                best = normal;
+    std::vector<glm::dvec3> faces, walls, edges;
+    const size_t step = 1 + allFaces.count() / kJudgingFaces;
+    for (size_t f = 0; f < allFaces.count(); f += step) faces.push_back(areaVector(f));
+    const glm::dvec3 x = commonest(faces, nullptr);
+    if (x == glm::dvec3(0.0)) return glm::dmat3(1.0);
+    for (const glm::dvec3& face : faces)
+        if (std::abs(glm::dot(face, x)) < kAcross * glm::length(face)) walls.push_back(face);
+    glm::dvec3 y = commonest(walls, &x);
+    if (y == glm::dvec3(0.0)) {
+        for (size_t f = 0; f < allFaces.count(); f += step) {
+            const size_t begin = allFaces.offsets[f], end = allFaces.offsets[f + 1];
+            for (size_t c = begin; c < end; ++c) {
+                const glm::dvec3 edge = world[allFaces.vertices[c + 1 < end ? c + 1 : begin]] -
+                                        world[allFaces.vertices[c]];
+                if (std::abs(glm::dot(edge, x)) < kAcross * glm::length(edge))
+                    edges.push_back(edge);
             }
         }
-        return best;
-    };
-    const glm::dvec3 x = mostOf(nullptr);
-    if (x == glm::dvec3(0.0)) return glm::dmat3(1.0);
-    glm::dvec3 y = mostOf(&x);
+        y = commonest(edges, &x);
+    }
     if (y == glm::dvec3(0.0)) y = std::abs(x.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
     y = glm::normalize(y - glm::dot(x, y) * x);
     const glm::dmat3 own(x, y, glm::cross(x, y));
@@ -84,6 +100,7 @@ glm::dmat3 Placement::ownAxes() const {
 
 void Placement::findIslands(Patches& patches) {
     axes = ownAxes();
+    patches.axes = glm::mat3(axes);
     patchSizes = automaticPatchSizes(surfaces());
     const std::vector<Extent>& extents = patchSizes.extent;
     // Vertices of no face lie anywhere.
@@ -104,7 +121,7 @@ void Placement::findIslands(Patches& patches) {
         patches.islands.push_back({glm::vec3(middleOf(extent) - patches.centre), 0, 0});
     for (size_t f = 0; f < allFaces.count(); ++f)
         for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c) {
-            Island& island = patches.islands[patchSizes.island[allFaces.surface[f]]];
+            Island& island = patches.islands[patchSizes.island[allFaces.piece[f]]];
             const glm::vec3& vertex = patches.vertices[allFaces.vertices[c]];
             island.radius = std::max(island.radius, glm::distance(vertex, island.centre));
             island.reach = std::max(island.reach, glm::length(vertex));
@@ -112,23 +129,22 @@ void Placement::findIslands(Patches& patches) {
 }
 
 std::vector<Surface> Placement::surfaces() const {
-    std::vector<Surface> result(allFaces.surfaceCount);
+    std::vector<Surface> result(allFaces.pieceCount);
+    std::vector<bool> isClosed(result.size());
     std::vector<std::vector<uint32_t>> facesOf(result.size());
     for (size_t f = 0; f < allFaces.count(); ++f) {
-        Surface& surface = result[allFaces.surface[f]];
+        Surface& surface = result[allFaces.piece[f]];
         for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c)
             surface.extent.add(axes * world[allFaces.vertices[c]]);
         surface.area += glm::length(areaVector(f));
-        // What is made of several objects is of none.
-        if (surface.faces++ == 0)
-            surface.object = allFaces.instance[f];
-        else if (surface.object != allFaces.instance[f])
-            surface.object = UINT32_MAX;
-        facesOf[allFaces.surface[f]].push_back(uint32_t(f));
+        ++surface.faces;
+        surface.object = allFaces.instance[f];
+        facesOf[allFaces.piece[f]].push_back(uint32_t(f));
+        isClosed[allFaces.piece[f]] = closedOnes[allFaces.surface[f]];
     }
     for (size_t s = 0; s < result.size(); ++s)
         result[s].seesItself =
-            seesItself(facesOf[s], kBlind * result[s].extent.diagonal(), closedOnes[s]);
+            seesItself(facesOf[s], kBlind * result[s].extent.diagonal(), isClosed[s]);
     return result;
 }
 

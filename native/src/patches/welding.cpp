@@ -146,10 +146,20 @@ WeldedFaces weldedFaces(const Scene& scene, const std::vector<uint32_t>& welded,
             above[std::max(a, b)] = std::min(a, b);
         }
     std::vector<uint32_t> number(welded.size(), UINT32_MAX);
+    struct Piece {
+        uint32_t instance, piece;
+    };
+    std::vector<Piece> last;  // per surface; faces are in the order of their instances
     for (size_t f = 0; f < faces.count(); ++f) {
         uint32_t& surface = number[root(faces.vertices[faces.offsets[f]])];
-        if (surface == UINT32_MAX) surface = faces.surfaceCount++;
+        if (surface == UINT32_MAX) {
+            surface = faces.surfaceCount++;
+            last.push_back({UINT32_MAX, 0});
+        }
+        if (last[surface].instance != faces.instance[f])
+            last[surface] = {faces.instance[f], faces.pieceCount++};
         faces.surface.push_back(surface);
+        faces.piece.push_back(last[surface].piece);
     }
     return faces;
 }

@@ -29,6 +29,8 @@ struct WeldedFaces {
     std::vector<size_t> firstFace;   // per instance
     std::vector<uint32_t> surface;   // per face: the connected surface that it is part of
     uint32_t surfaceCount = 0;
+    std::vector<uint32_t> piece;  // per face: what one instance has of that surface
+    uint32_t pieceCount = 0;
 
     size_t count() const { return instance.size(); }
 };

@@ -75,6 +75,7 @@ class Clustering {
         const uint32_t samples = std::accumulate(taken.begin(), taken.end(), 0u);
         const uint32_t seenInAll = std::accumulate(seen.begin(), seen.end(), 0u);
         own.isDark = seenInAll == 0;
+        own.receivers = last - first;
         own.mean = float(seenInAll) / float(std::max(1u, samples));
         own.seen.resize(parts.size());
         for (size_t part = 0; part < parts.size(); ++part) {

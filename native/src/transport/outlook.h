@@ -60,6 +60,7 @@ struct Outlook {
     // alike.
     std::vector<float> seen;
     float mean = 0;      // share of the samples that were visible
+    size_t receivers = 1;
     bool isDark = true;  // none was
 };
 

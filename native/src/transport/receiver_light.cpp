@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "transport/direct_light.h"
+#include "transport/outlook.h"
 #include "transport/receiver_place.h"
 
 namespace raybundle {
@@ -236,6 +237,10 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     const Outlook* const outlook = hasParts ? aim.outlook : nullptr;
     const int darkSamples = outlook && outlook->isDark ? kDarkSamplesOfDark : kDarkSamples;
     const bool isGuided = outlook && !outlook->seen.empty();
+    // Among receivers that look alike a part that one alone sees is missed there alone, and one that
+    // all see is missed by all their samples: in the mean of squares over so many, what is missed is
+    // less by their number at least.
+    const float alike = outlook ? float(outlook->receivers) : 1.0f;
     if (isOutOfSight(source, place)) {
         ++sum.hidden;
         return {};
@@ -286,18 +291,20 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                 next = 4 * all.count;
                 continue;
             }
-            return {glm::vec3(0.0f), missed * missed, 0, glm::vec4(0.0f), {}};
+            return {glm::vec3(0.0f), missed * missed / alike, 0, glm::vec4(0.0f), {}};
         }
         // By the first pass alone, so that the order of the receivers does not matter.
         if (std::isinf(tolerance)) seen[index] = true;
         const glm::vec3 mean = all.estimate(closed);
-        variance = missed * missed;
+        variance = missed * missed / alike;
+        float wanted = missed * missed;
         for (const Block& block : blocks) {
             const float d = brightest(glm::abs(block.estimate(closed) - mean));
             variance += d * d / (kBlocks * (kBlocks - 1));
+            wanted += d * d / (kBlocks * (kBlocks - 1));
         }
         if (all.count >= aim.samples &&
-            (variance <= tolerance * tolerance || all.count >= source.mostSamples()))
+            (wanted <= tolerance * tolerance || all.count >= source.mostSamples()))
             break;
         next = all.count < aim.samples ? aim.samples : (isGuided ? 2 : 4) * all.count;
     }

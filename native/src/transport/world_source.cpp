@@ -217,14 +217,9 @@ WorldSource::Choice WorldSource::choose(const Region& from, glm::vec2 uv, float 
 WorldSource::Choice WorldSource::chooseFacing(const Region& from, glm::vec2 uv, float probability,
                                               const glm::vec3& normal) const {
     const Facing& facing = facingOf(normal);
-    bool isCut = true;
     return choose(from, uv, probability, [&](const Region& region, float& wa, float& wb) {
-        isCut = isCut && isCutBy(region, normal);
-        const uint32_t first = firstChild(region);
-        wa = isCut ? facing.weight[first] : glm::dot(normal, regions[first].moment);
-        wb = isCut ? facing.weight[region.second] : glm::dot(normal, regions[region.second].moment);
-        wa = std::max(0.0f, wa);
-        wb = std::max(0.0f, wb);
+        wa = weightOf(firstChild(region), facing);
+        wb = weightOf(region.second, facing);
     });
 }
 
@@ -261,11 +256,7 @@ std::vector<float> WorldSource::sumOfSeen(const glm::vec3& normal,
     std::vector<float> sums(partRegions.size());
     float sum = 0;
     for (size_t k = 0; k < partRegions.size(); ++k) {
-        const Region& region = regions[partRegions[k]];
-        const float s = glm::dot(normal, region.axis);
-        if (region.strength > 0 && s > -region.reach)
-            sum += seen[k] * std::max(0.0f, s >= region.reach ? glm::dot(normal, region.moment)
-                                                              : facing.weight[partRegions[k]]);
+        sum += seen[k] * weightOf(partRegions[k], facing);
         sums[k] = sum;
     }
     return sums;
@@ -284,8 +275,9 @@ LightSample WorldSource::sampleSeen(const glm::vec3& normal, glm::vec2 uv,
                          : LightSample{};
 }
 
-bool WorldSource::isCutBy(const Region& region, const glm::vec3& normal) const {
-    return std::abs(glm::dot(normal, region.axis)) < region.reach;
+float WorldSource::weightOf(uint32_t index, const Facing& facing) const {
+    if (facing.weight[index] >= 0) return facing.weight[index];
+    return std::max(0.0f, glm::dot(facing.normal, regions[index].moment));
 }
 
 // Irradiance from a region; notes the weights of all regions that it looks at.
@@ -297,7 +289,7 @@ glm::vec3 WorldSource::look(uint32_t index, const glm::vec3& normal,
     weight = 0;
     if (!(region.strength > 0) || s <= -h) return glm::vec3(0.0f);
     if (s >= h) {
-        weight = glm::dot(normal, region.moment);
+        weight = std::max(0.0f, glm::dot(normal, region.moment));
         return {glm::dot(normal, region.moments[0]), glm::dot(normal, region.moments[1]),
                 glm::dot(normal, region.moments[2])};
     }
@@ -318,7 +310,7 @@ const WorldSource::Facing& WorldSource::facingOf(const glm::vec3& normal) const 
     Facing& known = facing.local();
     if (known.normal != normal) {
         known.normal = normal;
-        known.weight.resize(regions.size());
+        known.weight.assign(regions.size(), -1.0f);
         known.irradiance = glm::max(glm::vec3(0.0f), look(0, normal, known.weight));
     }
     return known;

@@ -81,7 +81,7 @@ class WorldSource : public LightSource {
     struct Facing {
         glm::vec3 normal{0.0f}, irradiance{0.0f};
         // Per region that the horizon cuts, and its children: the irradiance from it, all channels
-        // together. Others are left from earlier planes.
+        // together. -1 of all others.
         std::vector<float> weight;
     };
 
@@ -100,7 +100,8 @@ class WorldSource : public LightSource {
     glm::vec3 directionIn(const Region& region, glm::vec2 uv) const;
     glm::vec3 look(uint32_t index, const glm::vec3& normal, std::vector<float>& weights) const;
     const Facing& facingOf(const glm::vec3& normal) const;
-    bool isCutBy(const Region& region, const glm::vec3& normal) const;
+    // The irradiance from a region, all channels together, or nearly.
+    float weightOf(uint32_t region, const Facing& facing) const;
     bool isSeen(uint32_t region, const glm::vec3& normal) const;
     uint32_t firstChild(const Region& region) const { return uint32_t(&region - &regions[0]) + 1; }
 
