@@ -24,11 +24,7 @@ CHOSEN = {
     "room:sun": ["an object far away"],
 }
 TURN = "turned by (0.4, 0.7, 1.1)"
-# What is known not to hold yet (docs/stability.md "Relations").
-OPEN = {("room:ring", TURN): "the energy balance is 5.5e-3 off, by the ring's light on itself"}
-CASES = [pytest.param(scene, relation, id=f"{scene}, {relation.name}",
-                      marks=[pytest.mark.xfail(reason=OPEN[scene, relation.name])]
-                      if (scene, relation.name) in OPEN else [])
+CASES = [pytest.param(scene, relation, id=f"{scene}, {relation.name}")
          for scene, names in CHOSEN.items()
          for relation in relations.RELATIONS if relation.name in (TURN, *names)]
 

@@ -135,6 +135,10 @@ class LightSource {
     // few samples agree means little then.
     virtual bool surrounds() const { return false; }
 
+    // Whether its light stays within what it is part of, as that of the insides of a lamp's body: it
+    // is not dark in there.
+    virtual bool staysInside() const { return false; }
+
     // Emitted power, W; zero for sources whose power depends on where their light arrives: suns,
     // worlds, and disks that turn towards each receiver.
     virtual glm::vec3 power() const = 0;

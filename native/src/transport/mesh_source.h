@@ -42,6 +42,7 @@ class MeshSource : public LightSource {
                        glm::vec2 uv) const override;
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& receiver) const override;
+    bool staysInside() const override { return isEnclosed; }
     bool isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
                       float radius) const override;
     float distance(const glm::vec3& point) const override {

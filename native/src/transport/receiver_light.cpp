@@ -247,7 +247,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     }
     // Inside a solid it is dark, unless a source is in there too: look before taking all
     // samples.
-    const bool isInside = skips.skipInside && receiver.side % 2 == 1 &&
+    const bool isInside = skips.skipInside && !source.staysInside() && receiver.side % 2 == 1 &&
                           patches.parents[patches.parentOf[receiver.side / 2]].isSolid;
     if (isInside) ++sum.inside;
     int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
