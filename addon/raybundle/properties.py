@@ -398,9 +398,11 @@ def checked_value(name: str, value: object) -> object:
         number = int(value) if definition.type == 'INT' else float(value)
     except (TypeError, ValueError) as error:
         raise ValueError(f'{name}: "{value}" is not a number') from error
-    if not definition.hard_min <= number <= definition.hard_max:
-        raise ValueError(f"{name}: {number} is not between {definition.hard_min:g} and "
-                         f"{definition.hard_max:g}")
+    low, high = definition.hard_min, definition.hard_max
+    if definition.type == 'FLOAT':  # kept as float32, which 0.0005 is a little more of
+        low, high = float(f"{low:g}"), float(f"{high:g}")
+    if not low <= number <= high:
+        raise ValueError(f"{name}: {number} is not between {low:g} and {high:g}")
     return number
 
 

@@ -223,6 +223,7 @@ TEST(MeshSource, FillsTheHemisphereInsideOfItself) {
         for (bool isTurned : {false, true}) {
             Scene scene;
             place(scene, lamp.mesh, grey("lamp", 0.5f, 5, 5), isTurned ? kTurn : glm::dmat4(1));
+            scene.instances.back().side = RB_SIDE_BACK;  // or it would be left out
             // Beside much that is dark it is a source.
             place(scene, rectangle("floor", {-5, -5, -2}, {10, 0, 0}, {0, 10, 0}), grey("", 0));
             const ShotScene shots(scene, 0.1f);

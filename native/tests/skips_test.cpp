@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <functional>
+#include <glm/gtc/matrix_transform.hpp>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -35,6 +36,16 @@ Scene roomWithCarpet() {
     Scene scene = roomOfLamps();
     place(scene, grid("carpet", {0.4f, 0.4f, 0.2f}, {3.0f, 0, 0}, {0, 2.4f, 0}, 12, 10),
           grey("carpet", 0.4f));
+    return scene;
+}
+
+// With a lamp that is a ball and emits from both sides, and another in a box of its own.
+Scene roomOfBulbs() {
+    Scene scene = litRoom();
+    place(scene, icosphere("bulb", 0.2f, 1, false), grey("bulb", 0.5f, 20, 20),
+          glm::translate(glm::dmat4(1), {1, 1, 1.5}));
+    place(scene, box("case", {2.4f, 1.4f, 1.4f}, {2.9f, 1.9f, 1.9f}, false), grey("", 0.5f, 2, 2));
+    place(scene, box("core", {2.5f, 1.5f, 1.5f}, {2.8f, 1.8f, 1.8f}, false), grey("", 0.5f, 2, 2));
     return scene;
 }
 
@@ -90,6 +101,7 @@ INSTANTIATE_TEST_SUITE_P(
                          [](Settings& settings) { settings.skipGeometry = 0; }},
                     Case{"lit", "closed form", 0}, Case{"weak", "little of the light", 0},
                     Case{"inside", "inside of a solid", 0},
+                    Case{"lamp_insides", "that hold nothing else", 0, roomOfBulbs},
                     Case{"gather", "whose light interpolation follows", 0, roomOfLamps,
                          [](Settings& settings) { settings.reconstruction = "POINT"; }},
                     Case{"bundles", "at its target", 0, roomOfLamps,

@@ -415,6 +415,8 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
                 report.skipped.push_back(
                     {"bundles", "few bright sides: their reflected light is gathered", spots});
         report.skipped.push_back(
+            {"emission", "inside of closed surfaces that hold nothing else", direct.unseenSides()});
+        report.skipped.push_back(
             {"noise of direct light", "source wholly visible: closed form", shot.unblockedSides});
         report.skipped.push_back(
             {"shadow rays", "side and source face away from each other", shot.hiddenSides});

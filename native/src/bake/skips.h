@@ -16,6 +16,7 @@ struct Skips {
     int skipFacing = 1;      // shadow rays to a source that the receiver cannot face
     int skipSheets = 1;      // projection of faces that lie in a plane with others of their kind
     int skipOccluders = 1;   // reconstruction of objects that only occlude
+    int skipLampInsides = 1;     // emission inside of closed surfaces with nothing else in them
     // Within the stated error.
     int skipLit = 1;        // noise of a source wholly visible: its closed form
     int skipWeak = 1;       // most shadow rays to a source that gives little of the light

@@ -36,7 +36,7 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
       seed(seed),
       skips(skips),
       split(std::make_unique<const EmissionSplit>(
-          splitEmission(scene, patches, visibility, lightSet, seed))),
+          splitEmission(scene, patches, visibility, lightSet, seed, skips))),
       sources(raybundle::lightSources(scene, patches, split->isSource, split->gathered, lightSet)) {
 }
 

@@ -57,6 +57,8 @@ class DirectLight {
 
     // Per side: all emission of the set, W/m^2.
     const std::vector<glm::vec3>& emission() const { return split->emitted; }
+    // Sides whose emission is left out: nobody ever sees it.
+    size_t unseenSides() const { return split->unseen; }
 
     // Per side: emission that is no source here, for the bundles to carry, W/m^2.
     const std::vector<glm::vec3>& bundledEmission() const { return split->bundled; }

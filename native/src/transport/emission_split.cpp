@@ -6,6 +6,7 @@
 #include <random>
 
 #include "bundles/directions.h"
+#include "transport/enclosing.h"
 #include "transport/local_lines.h"
 #include "transport/receiver.h"
 #include "transport/sphere_sampling.h"
@@ -122,13 +123,22 @@ double metShare(const Patches& patches, const Visibility& visibility,
 }  // namespace
 
 EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
-                            const Visibility& visibility, int32_t lightSet, uint32_t seed) {
+                            const Visibility& visibility, int32_t lightSet, uint32_t seed,
+                            const Skips& skips) {
     const size_t sides = patches.sideCount();
     EmissionSplit split{patches.emission, std::vector<glm::vec3>(sides),
                         std::vector<glm::vec3>(sides), std::vector<bool>(sides, false)};
     for (size_t side = 0; side < sides; ++side) {
         const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
         if (scene.instances[instance].lightSet != lightSet) split.emitted[side] = glm::vec3(0.0f);
+    }
+    if (skips.skipLampInsides) {
+        const std::vector<bool> isEmpty = emptyInsides(scene, patches, split.emitted);
+        for (size_t side = 1; side < sides; side += 2) {
+            if (!isEmpty[patches.parentAt(uint32_t(side)).surface]) continue;
+            split.unseen += split.emitted[side] != glm::vec3(0.0f);
+            split.emitted[side] = glm::vec3(0.0f);
+        }
     }
     const std::vector<MeanLight> means = meanLights(scene, patches, split.emitted, lightSet);
     std::vector<double> limits;  // per island

@@ -9,6 +9,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "bake/skips.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
 #include "visibility/visibility.h"
@@ -21,9 +22,11 @@ struct EmissionSplit {
     std::vector<glm::vec3> gathered;  // of sources, of the whole patch
     std::vector<glm::vec3> bundled;
     std::vector<bool> isSource;
+    size_t unseen = 0;  // sides whose emission nobody ever sees, and which is left out
 };
 
 EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
-                            const Visibility& visibility, int32_t lightSet, uint32_t seed);
+                            const Visibility& visibility, int32_t lightSet, uint32_t seed,
+                            const Skips& skips = {});
 
 }  // namespace raybundle

@@ -11,6 +11,7 @@
 #include "bake/hasher.h"
 #include "patches/plane.h"
 #include "transport/area_spread.h"
+#include "transport/enclosing.h"
 #include "transport/mesh_source.h"
 #include "transport/receiver_place.h"
 #include "transport/sphere_sampling.h"
@@ -365,34 +366,6 @@ uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents, u
             }
     }
     return hasher.value();
-}
-
-// Of surfaces: where they lie, and which of their sides nothing outside of them sees. Of what encloses
-// a volume and lets no light through, a line from outside meets the outer side first.
-struct Enclosing {
-    Enclosure box;
-    bool hides[2] = {true, true};  // fronts, backs
-
-    void add(const Enclosing& other) {
-        box.add(other.box.low);
-        box.add(other.box.high);
-        for (int k = 0; k < 2; ++k) hides[k] = hides[k] && other.hides[k];
-    }
-};
-
-// Per surface.
-std::vector<Enclosing> enclosingSurfaces(const Patches& patches) {
-    std::vector<Enclosing> surfaces;
-    for (const Parent& parent : patches.parents) {
-        if (parent.surface >= surfaces.size()) surfaces.resize(parent.surface + 1);
-        Enclosing& surface = surfaces[parent.surface];
-        const bool isShell = parent.isSolid && parent.stopsDirect;
-        surface.hides[0] = surface.hides[0] && isShell && parent.isInward;
-        surface.hides[1] = surface.hides[1] && isShell && !parent.isInward;
-        for (size_t k = 0; k < (parent.isTriangle ? 3 : 4); ++k)
-            surface.box.add(patches.vertices[parent.vertex[k]]);
-    }
-    return surfaces;
 }
 
 }  // namespace

@@ -1,32 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The fronts or the backs of the emissive faces of one object and material as a source of light. What a receiver gets without
-// occluders has a closed form (transport/mesh_outline.h); which of it is seen, samples tell, whose
-// faces are chosen by a tree (transport/light_tree.h).
+// The fronts or the backs of the emissive faces of one object and material as a source of light.
+// What a receiver gets without occluders has a closed form (transport/mesh_outline.h); which of it is
+// seen, samples tell, whose faces are chosen by a tree (transport/light_tree.h).
 #pragma once
 
 #include <optional>
 #include <vector>
 
+#include "transport/enclosing.h"
 #include "transport/light_source.h"
 #include "transport/light_tree.h"
 #include "transport/mesh_outline.h"
 
 namespace raybundle {
-
-// A box, metres, relative to Patches::centre.
-struct Enclosure {
-    glm::vec3 low{INFINITY}, high{-INFINITY};
-
-    void add(const glm::vec3& point) {
-        low = glm::min(low, point);
-        high = glm::max(high, point);
-    }
-    float distance(const glm::vec3& point) const {
-        return glm::length(glm::max(glm::max(low - point, point - high), glm::vec3(0.0f)));
-    }
-    float radius() const { return low.x > high.x ? 0.0f : 0.5f * glm::length(high - low); }
-};
 
 class MeshSource : public LightSource {
   public:
