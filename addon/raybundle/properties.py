@@ -68,6 +68,8 @@ enum_skip = (
     ('bundles', "Bundles", "Bundles once the noise is at its target"),
     ('warm_start', "Warm Start", "Iterations that a solve from zero takes more"),
     ('sheets', "Sheets", "Projection of faces that lie in a plane with others of their kind"),
+    ('lamp_insides', "Lamp Insides",
+     "Emission inside of closed surfaces that hold nothing else"),
 )
 
 enum_solver = (

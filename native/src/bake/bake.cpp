@@ -409,6 +409,12 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
                                           1});
             if (isGather) last = {hash, aims, shot};
         }
+        if (!isGather && !patches.byAngle.empty() && lights.empty())
+            report.warnings.push_back(
+                "first_shot " + settings.firstShot +
+                " does not know at which angles light arrives: what reflects more at some angles, "
+                "as Principled and rough materials do, reflects it as light from everywhere, which "
+                "may be some percent off; GATHER is right");
         if (isGather && settings.solver == "LINE_REUSE")
             if (const size_t spots =
                     gatherBrightSpots(scene, input, trace->visibility, trace->density, shot))

@@ -188,6 +188,18 @@ class SheetSearch {
         for (int y = 0; y < height && isOne; ++y)
             for (int x = 0; x < width && isOne; ++x)
                 isOne = fits(sheet, at(x, y), x, y, width, height);
+        auto addEdge = [&](const Place& place, int side) {
+            sheet.outline.push_back(
+                {place.vertex(patches, side), place.vertex(patches, (side + 1) % 4)});
+        };
+        for (int x = 0; x < width; ++x) addEdge(at(x, 0), 0);
+        for (int y = 0; y < height; ++y) addEdge(at(width - 1, y), 1);
+        for (int x = width - 1; x >= 0; --x) addEdge(at(x, height - 1), 2);
+        for (int y = height - 1; y >= 0; --y) addEdge(at(0, y), 3);
+        // Parents that are one with others along some edges only have vertices of their own elsewhere.
+        for (size_t k = 0; k < sheet.outline.size(); ++k)
+            isOne =
+                isOne && sheet.outline[k][1] == sheet.outline[(k + 1) % sheet.outline.size()][0];
         if (!isOne) {
             for (int y = 0; y < height; ++y)
                 for (int x = 0; x < width; ++x) result.loose.push_back(at(x, y).parent);
@@ -204,14 +216,6 @@ class SheetSearch {
                 sheet.patches[size_t(row) * sheet.columns + column] = patchOf(
                     at(int(column / countA), int(row / countB)), column % countA, row % countB);
 
-        auto addEdge = [&](const Place& place, int side) {
-            sheet.outline.push_back(
-                {place.vertex(patches, side), place.vertex(patches, (side + 1) % 4)});
-        };
-        for (int x = 0; x < width; ++x) addEdge(at(x, 0), 0);
-        for (int y = 0; y < height; ++y) addEdge(at(width - 1, y), 1);
-        for (int x = width - 1; x >= 0; --x) addEdge(at(x, height - 1), 2);
-        for (int y = height - 1; y >= 0; --y) addEdge(at(0, y), 3);
         result.sheets.push_back(std::move(sheet));
         result.joined += size_t(width) * size_t(height);
     }
