@@ -16,9 +16,9 @@ constexpr double kPatchesAcross = 64;
 constexpr double kTiny = 1.0 / 16, kFull = 8;
 // Surfaces not further apart than this share of the larger one's diagonal belong together.
 constexpr double kTogether = 0.25;
-// Surfaces of one object that touch are one thing, unless larger than this share of what is around:
-// a lamp and its rod. They touch where they are not further apart than kTouch of the smaller one's
-// diagonal.
+// Surfaces of one object that touch are one thing, such as a lamp and its rod, unless the object is
+// larger than this share of what is around: a table and all that lies on it may be one object too.
+// They touch where they are not further apart than kTouch of the smaller one's diagonal.
 constexpr double kThing = 1.0 / 4, kTouch = 0.01;
 // See areOneIsland: two rooms of a size are one island up to a tenth of their length apart.
 constexpr double kMostOfSmaller = 0.8;
@@ -150,14 +150,21 @@ class Sizing {
     // Sets the sizes of tiny groups within one of a diagonal, times a factor, and of those within
     // them.
     void refine(const Members& around, double diagonal, double factor) {
-        std::map<uint32_t, std::vector<Group>> byObject;
-        for (size_t m : around)
-            if (surfaces[m].extent.diagonal() < kThing * diagonal)
-                byObject[surfaces[m].object].push_back({surfaces[m].extent, {m}});
+        std::map<uint32_t, Group> objects;
+        for (size_t m : around) {
+            Group& object = objects[surfaces[m].object];
+            object.extent.add(surfaces[m].extent);
+            object.members.push_back(m);
+        }
         std::vector<Group> tiny;
-        for (auto& [object, parts] : byObject)
-            for (Group& thing : groupsOf(std::move(parts), doTouch))
-                if (thing.extent.diagonal() < kTiny * diagonal) tiny.push_back(std::move(thing));
+        for (auto& [index, object] : objects) {
+            std::vector<Group> parts;
+            for (size_t m : object.members) parts.push_back({surfaces[m].extent, {m}});
+            if (object.extent.diagonal() < kThing * diagonal)
+                parts = groupsOf(std::move(parts), doTouch);
+            for (Group& part : parts)
+                if (part.extent.diagonal() < kTiny * diagonal) tiny.push_back(std::move(part));
+        }
         if (tiny.empty()) return;
         const double before = patchesOf(around);
         double after = 0;

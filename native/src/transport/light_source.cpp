@@ -7,6 +7,7 @@
 #include <glm/gtc/constants.hpp>
 #include <limits>
 #include <map>
+#include <tuple>
 
 #include "bake/hasher.h"
 #include "patches/plane.h"
@@ -22,6 +23,8 @@
 namespace raybundle {
 
 namespace {
+
+constexpr ptrdiff_t kMostOfObject = 32;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -368,14 +371,33 @@ uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents, u
     return hasher.value();
 }
 
+// Lamps that are one object are several sources, or few samples would tell what all of them together
+// give, and which one is hidden from a receiver. Of an object with more than kMostOfObject, as a tree
+// full of little lights is, they are one.
+template <class Groups>
+void joinMany(Groups& groups) {
+    Groups joined;
+    for (auto first = groups.begin(); first != groups.end();) {
+        const auto [instance, material, surface] = first->first;
+        const auto last = groups.upper_bound({instance, material, UINT32_MAX});
+        const bool isOne = std::distance(first, last) > kMostOfObject;
+        for (; first != last; ++first) {
+            std::vector<uint32_t>& own =
+                joined[{instance, material, isOne ? surface : std::get<2>(first->first)}];
+            own.insert(own.end(), first->second.begin(), first->second.end());
+        }
+    }
+    groups = std::move(joined);
+}
+
 }  // namespace
 
 std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
                                                       const std::vector<bool>& gatheredSides,
                                                       const std::vector<glm::vec3>& emission) {
     std::vector<std::unique_ptr<LightSource>> sources;
-    std::map<std::pair<uint32_t, int32_t>, std::vector<uint32_t>>
-        groups;  // by instance and material
+    using Group = std::tuple<uint32_t, int32_t, uint32_t>;  // instance, material and surface
+    std::map<Group, std::vector<uint32_t>> groups;
     for (size_t p = 0; p < patches.parents.size(); ++p) {
         const Parent& parent = patches.parents[p];
         const auto first = gatheredSides.begin() + 2 * int64_t(parent.firstPatch);
@@ -383,8 +405,10 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
                          [](bool isGathered) { return isGathered; }))
             continue;
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
-        groups[{parent.instance, mesh.faceMaterials[parent.face]}].push_back(uint32_t(p));
+        groups[{parent.instance, mesh.faceMaterials[parent.face], parent.surface}].push_back(
+            uint32_t(p));
     }
+    joinMany(groups);
     const std::vector<Enclosing> surfaces =
         groups.empty() ? std::vector<Enclosing>() : enclosingSurfaces(patches);
     for (const auto& [key, parents] : groups) {
@@ -407,7 +431,7 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
             sources.push_back(std::make_unique<MeshSource>(patches, parents, back, most[back],
                                                            varies ? &emission : nullptr,
                                                            enclosing.box, enclosing.hides[back]));
-            sources.back()->name = "object \"" + scene.instances[key.first].name + "\"";
+            sources.back()->name = "object \"" + scene.instances[std::get<0>(key)].name + "\"";
             sources.back()->magnitude = most[back];
             sources.back()->shape = shapeOf(patches, parents, back, emission, most[back]);
         }
