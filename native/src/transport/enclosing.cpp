@@ -54,8 +54,10 @@ std::vector<bool> emptyInsides(const Scene& scene, const Patches& patches,
     for (const Parent& parent : patches.parents) {
         if (candidates.empty()) break;
         const Enclosure box = boxOf(patches, parent);
+        const float touchDistance = patches.islands[parent.island].touchDistance;
         for (uint32_t s : candidates)
-            if (s != parent.surface && box.meets(surfaces[s].box)) isEmpty[s] = false;
+            if (s != parent.surface && box.meets(surfaces[s].box, touchDistance))
+                isEmpty[s] = false;
     }
     return isEmpty;
 }

@@ -27,9 +27,10 @@ struct Enclosure {
         low = glm::min(low, other.low);
         high = glm::max(high, other.high);
     }
-    bool meets(const Enclosure& other) const {
-        return glm::all(glm::lessThanEqual(low, other.high)) &&
-               glm::all(glm::lessThanEqual(other.low, high));
+    // Whether they have more in common than what touches.
+    bool meets(const Enclosure& other, float touchDistance) const {
+        return glm::all(glm::lessThan(low + touchDistance, other.high)) &&
+               glm::all(glm::lessThan(other.low + touchDistance, high));
     }
     float distance(const glm::vec3& point) const {
         return glm::length(glm::max(glm::max(low - point, point - high), glm::vec3(0.0f)));
