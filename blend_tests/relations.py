@@ -73,7 +73,7 @@ class Relation:
     is_quick: bool = False
 
 
-RANDOM = {'directions': 'RANDOM', 'target_error': 0.03}
+RANDOM = {'directions': 'RANDOM', 'target_error': 0.01}
 
 
 def method(name: str, says: str = "noise is", costs_same: bool = False, **settings) -> Relation:
@@ -133,7 +133,7 @@ RELATIONS = (
     method("projector PLANE", projector='PLANE', target_error=0.03),
     method("projector PLANES", projector='PLANES', target_error=0.03),
     method("directions RANDOM", **RANDOM),
-    method("directions ADAPTIVE", solver='MULTIPATH', directions='ADAPTIVE', target_error=0.03),
+    method("directions ADAPTIVE", solver='MULTIPATH', directions='ADAPTIVE'),
 )
 
 

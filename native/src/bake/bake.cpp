@@ -284,7 +284,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         stateErrors(scene, tiles, instanceRanges(scene, patches),
                     meanOver(tiles, shown.of(lights, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
-                    settings.targetError, made, report);
+                    settings.targetError, settings.hasIndependentDirections(), made, report);
         checkFinite(made);
     }
     report.patches = trace->patches.count();

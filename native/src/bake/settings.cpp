@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bake/error.h"
+#include "bundles/directions.h"
 #include "patches/patches.h"
 
 namespace raybundle {
@@ -152,6 +153,13 @@ void Settings::get(const std::string& name, float& value) const {
 
 const std::string& Settings::get(const std::string& name) const {
     return this->*find(choices(), name).member;
+}
+
+bool Settings::hasIndependentDirections() const {
+    const auto& kinds = directionKinds();
+    return std::find_if(kinds.begin(), kinds.end(), [&](const DirectionKind& kind) {
+               return directions == kind.name;
+           })->isIndependent;
 }
 
 }  // namespace raybundle

@@ -54,6 +54,8 @@ struct Settings : Skips {
         return solver == "LINE_REUSE" && isProjectionExact() && linesPerBundle == 0 &&
                maxBundles <= kMostWindowBundles;
     }
+    // Whether each bundle's direction is independent of those before.
+    bool hasIndependentDirections() const;
     // Whether the projector sees all surfaces along a line.
     bool isProjectionExact() const {
         return (projector == "AUTO" || projector == "FRAGMENT_LISTS") &&

@@ -254,7 +254,7 @@ void warnOf(std::vector<CoarseMesh> meshes, Report& report) {
 
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
                  const Irradiance& irradiance, const SideErrors& sides, float targetError,
-                 std::vector<InstanceLight>& light, Report& report) {
+                 bool errsAlike, std::vector<InstanceLight>& light, Report& report) {
     std::vector<std::optional<InstanceErrors>> errors(light.size());
     tbb::parallel_for(size_t(0), light.size(), [&](size_t i) {
         if (light[i].isBaked)
@@ -284,6 +284,8 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         const double smooth = known.smoothShare(), step = known.stepShare();
         discretisation += (smooth + step) * own.signal / all.signal;
         report.objects[i].error = relative(own, noiseScale, shownScale, smooth + step);
+        if (errsAlike && own.signal > 0)
+            report.objects[i].error.noise = std::max(report.objects[i].error.noise, shown);
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         if (own.signal / own.area > kDark * all.signal / all.area)
             if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
