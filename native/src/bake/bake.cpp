@@ -10,11 +10,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <iomanip>
-#include <map>
 #include <numeric>
-#include <sstream>
 
+#include "bake/bake_warnings.h"
 #include "bake/combination.h"
 #include "bake/energy_balance.h"
 #include "bake/geometry_hash.h"
@@ -42,9 +40,6 @@ constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e
 constexpr double kFarAway = 2.5;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 
-// Relative; above it the energy balance is worth a warning.
-constexpr double kMostImbalance = 0.01;
-
 class Stopwatch {
   public:
     explicit Stopwatch(double& seconds) : seconds(seconds), start(Clock::now()) {}
@@ -71,37 +66,6 @@ Irradiance meanOver(const Tiles& tiles, const Irradiance& light, const std::vect
     result.gathered = tiles.mean(light.gathered, weight);
     result.indirect = tiles.mean(light.indirect, weight);
     return result;
-}
-
-// Names the instances whose visibility is only approximated.
-void warnOfVisibility(const Scene& scene, const SetLights& lights, const Settings& settings,
-                      Report& report) {
-    const bool hasDimEmission =
-        std::any_of(lights.begin(), lights.end(), [](const SetLight& light) {
-            return std::any_of(light.shot.emission.begin(), light.shot.emission.end(),
-                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); });
-        });
-    for (const Instance& instance : scene.instances) {
-        const std::string object = "object \"" + instance.name + "\": ";
-        if (hasDimEmission && instance.stopsDirect != instance.exchanges)
-            report.warnings.push_back(object +
-                                      "it blocks the light of dim emission as it blocks that of "
-                                      "the world and not as it blocks that of lights");
-        if (!instance.exchanges && instance.role == RB_ROLE_BAKE && settings.solver != "LINE_REUSE")
-            report.warnings.push_back(
-                object + "it takes no part in the exchange of light, so that " + settings.solver +
-                " finds no light of the world and of " + "other surfaces on it; LINE_REUSE does");
-    }
-}
-
-// Names the materials whose light through them the solver does not carry.
-void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& report) {
-    if (settings.solver == "LINE_REUSE") return;
-    for (const Material& material : scene.materials)
-        if (material.isTranslucent())
-            report.warnings.push_back("material \"" + material.name + "\": " + settings.solver +
-                                      " does not carry on the light that passes through it; "
-                                      "LINE_REUSE does");
 }
 
 // Per side, m^2: the whole area of those that have a result, else 0.
@@ -142,50 +106,6 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
             "no light reaches any surface: there is no lamp, no emission and no world that does; "
             "the result is black");
     return isEmpty || isDark;
-}
-
-std::string percent(double share) {
-    std::ostringstream text;
-    text << std::setprecision(3) << 100 * share << " %";
-    return text.str();
-}
-
-// Names the source and the object that most of the first shot's noise comes from and is on. area:
-// per side, of what is wanted.
-void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
-                       const std::vector<float>& area, double noise, double target,
-                       Report& report) {
-    std::map<std::pair<std::string, uint32_t>, double> variances;  // by source and instance
-    for (const SetLight& light : lights) {
-        const auto& sources = light.direct.lightSources();
-        for (size_t side = 0; side < light.shot.error.size(); ++side) {
-            const double error = double(light.shot.error[side]);
-            const bool isKnown = !light.shot.noisiest.empty() && !sources.empty();
-            variances[{isKnown ? sources[light.shot.noisiest[side]]->name : "the sources",
-                       patches.parentAt(uint32_t(side)).instance}] +=
-                double(area[side]) * error * error;
-        }
-    }
-    if (variances.empty()) return;
-    const auto most =
-        std::max_element(variances.begin(), variances.end(),
-                         [](const auto& a, const auto& b) { return a.second < b.second; });
-    report.warnings.push_back(
-        "the noise is " + percent(noise) + " and not below " + percent(target) +
-        ": most of it is in the light of " + most->first.first + " on object \"" +
-        scene.instances[most->first.second].name +
-        "\", which more bundles do not help; smaller patches there or a larger distance do");
-}
-
-// First of all that is said: light that is lost or made is worse than noise.
-void warnOfImbalance(Report& report) {
-    if (!(report.balanceError() > kMostImbalance)) return;
-    report.warnings.insert(
-        report.warnings.begin(),
-        "the energy balance is off by " + percent(report.balanceError()) +
-            ": so much of the light that is emitted is neither absorbed nor leaves the scene, or "
-            "comes from nowhere; look for lamps inside of other surfaces, and compare with a bake "
-            "of smaller patches (patch_size)");
 }
 
 // What is bright by itself is refused by Scene; what adds up to too much, or shines from nearly no
@@ -250,6 +170,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         const Tiles tiles(patches);
         warnOfVisibility(scene, lights, settings, report);
         warnOfTranslucence(scene, settings, report);
+        if (!patches.byAngle.empty()) warnOfAngles(settings, report);
         SideNoise noise(tiles.sideCount());
         exposed.assign(patches.sideCount(), 1.0f);
         const bool dark = isDark(scene, lights, report);
@@ -409,12 +330,6 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
                                           1});
             if (isGather) last = {hash, aims, shot};
         }
-        if (!isGather && !patches.byAngle.empty() && lights.empty())
-            report.warnings.push_back(
-                "first_shot " + settings.firstShot +
-                " does not know at which angles light arrives: what reflects more at some angles, "
-                "as Principled and rough materials do, reflects it as light from everywhere, which "
-                "may be some percent off; GATHER is right");
         if (isGather && settings.solver == "LINE_REUSE")
             if (const size_t spots =
                     gatherBrightSpots(scene, input, trace->visibility, trace->density, shot))

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/bake_warnings.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <map>
+#include <sstream>
+
+namespace raybundle {
+namespace {
+
+// Relative; above it the energy balance is worth a warning.
+constexpr double kMostImbalance = 0.01;
+
+}  // namespace
+
+std::string percent(double share) {
+    std::ostringstream text;
+    text << std::setprecision(3) << 100 * share << " %";
+    return text.str();
+}
+
+void warnOfVisibility(const Scene& scene, const SetLights& lights, const Settings& settings,
+                      Report& report) {
+    const bool hasDimEmission =
+        std::any_of(lights.begin(), lights.end(), [](const SetLight& light) {
+            return std::any_of(light.shot.emission.begin(), light.shot.emission.end(),
+                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); });
+        });
+    for (const Instance& instance : scene.instances) {
+        const std::string object = "object \"" + instance.name + "\": ";
+        if (hasDimEmission && instance.stopsDirect != instance.exchanges)
+            report.warnings.push_back(object +
+                                      "it blocks the light of dim emission as it blocks that of "
+                                      "the world and not as it blocks that of lights");
+        if (!instance.exchanges && instance.role == RB_ROLE_BAKE && settings.solver != "LINE_REUSE")
+            report.warnings.push_back(
+                object + "it takes no part in the exchange of light, so that " + settings.solver +
+                " finds no light of the world and of " + "other surfaces on it; LINE_REUSE does");
+    }
+}
+
+void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& report) {
+    if (settings.solver == "LINE_REUSE") return;
+    for (const Material& material : scene.materials)
+        if (material.isTranslucent())
+            report.warnings.push_back("material \"" + material.name + "\": " + settings.solver +
+                                      " does not carry on the light that passes through it; "
+                                      "LINE_REUSE does");
+}
+
+void warnOfAngles(const Settings& settings, Report& report) {
+    auto warn = [&](const std::string& what, const std::string& remedy) {
+        report.warnings.push_back(
+            what +
+            " does not know at which angles light arrives: what reflects more at some angles, as "
+            "Principled and rough materials do, reflects it as light from everywhere, which may be "
+            "some percent off; " +
+            remedy + " is right");
+    };
+    if (settings.firstShot != "GATHER") warn("first_shot " + settings.firstShot, "GATHER");
+    if (settings.solver != "LINE_REUSE") warn("solver " + settings.solver, "LINE_REUSE");
+}
+
+void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
+                       const std::vector<float>& area, double noise, double target,
+                       Report& report) {
+    std::map<std::pair<std::string, uint32_t>, double> variances;  // by source and instance
+    for (const SetLight& light : lights) {
+        const auto& sources = light.direct.lightSources();
+        for (size_t side = 0; side < light.shot.error.size(); ++side) {
+            const double error = double(light.shot.error[side]);
+            const bool isKnown = !light.shot.noisiest.empty() && !sources.empty();
+            variances[{isKnown ? sources[light.shot.noisiest[side]]->name : "the sources",
+                       patches.parentAt(uint32_t(side)).instance}] +=
+                double(area[side]) * error * error;
+        }
+    }
+    if (variances.empty()) return;
+    const auto most =
+        std::max_element(variances.begin(), variances.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    report.warnings.push_back(
+        "the noise is " + percent(noise) + " and not below " + percent(target) +
+        ": most of it is in the light of " + most->first.first + " on object \"" +
+        scene.instances[most->first.second].name +
+        "\", which more bundles do not help; smaller patches there or a larger distance do");
+}
+
+void warnOfImbalance(Report& report) {
+    if (!(report.balanceError() > kMostImbalance)) return;
+    report.warnings.insert(
+        report.warnings.begin(),
+        "the energy balance is off by " + percent(report.balanceError()) +
+            ": so much of the light that is emitted is neither absorbed nor leaves the scene, or "
+            "comes from nowhere; look for lamps inside of other surfaces, and compare with a bake "
+            "of smaller patches (patch_size)");
+}
+
+}  // namespace raybundle

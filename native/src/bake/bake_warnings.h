@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What a bake says of its result where that is limited or approximated, each with what to do.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bake/report.h"
+#include "bake/settings.h"
+#include "patches/patches.h"
+#include "scene/scene.h"
+#include "transport/set_light.h"
+
+namespace raybundle {
+
+std::string percent(double share);  // with three digits and its sign
+
+// Names the instances whose visibility is only approximated.
+void warnOfVisibility(const Scene& scene, const SetLights& lights, const Settings& settings,
+                      Report& report);
+
+// Names the materials whose light through them the solver does not carry.
+void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& report);
+
+// Where materials reflect by angle: names the first shot and the solver that do not.
+void warnOfAngles(const Settings& settings, Report& report);
+
+// Names the source and the object that most of the first shot's noise comes from and is on. area:
+// per side, of what is wanted.
+void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
+                       const std::vector<float>& area, double noise, double target, Report& report);
+
+// First of all that is said: light that is lost or made is worse than noise.
+void warnOfImbalance(Report& report);
+
+}  // namespace raybundle
