@@ -12,8 +12,8 @@ constexpr float kDarkShare = 0.25f;
 // elsewhere, while all of them together keep to this share of the target.
 constexpr float kMostLaxity = 3;
 constexpr double kLaxShare = 0.25;
-// A shadow's edge lies between two neighbours where the light differs by this share, or where one
-// has more of it by so many times the error that it may have.
+// A shadow's edge lies between two neighbours where so much more of the light is visible to one, or
+// where one has more of its contrast by so many times the error that it may have.
 constexpr float kStep = 0.33f, kEdge = 6;
 
 // How many times these tolerances the errors may be, so that all of them together are no more than
@@ -42,9 +42,8 @@ std::vector<bool> besideShadows(const std::vector<Gathered>& results,
                                 const std::vector<float>& tolerance) {
     std::vector<bool> beside(results.size(), false);
     for (const auto& [a, b] : neighbours) {
-        const float light = brightest(results[a].irradiance),
-                    other = brightest(results[b].irradiance);
-        const bool isStep = std::abs(light - other) > kStep * std::max(light, other);
+        const bool isStep =
+            std::abs(results[a].visibleShare() - results[b].visibleShare()) > kStep;
         const float edge = results[b].contrast - results[a].contrast;
         if (isStep || edge > kEdge * tolerance[a]) beside[a] = true;
         if (isStep || -edge > kEdge * tolerance[b]) beside[b] = true;

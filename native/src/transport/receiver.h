@@ -62,6 +62,7 @@ struct Gathered {
     float contrast = 0;          // sums over the sources: of theirs
     glm::vec4 angles{0.0f};      // of theirs
     float brightness = 0;        // of their brightest channels
+    float unblockedLight = 0;    // of their brightest channels, if nothing was in between
     Incoming incoming;           // of theirs, by brightness
     uint32_t noisiest = 0;       // of them: the one with the most variance
     float mostVariance = 0;      // of that one
@@ -89,6 +90,10 @@ struct Gathered {
         if (!(all > 0)) return;
         incoming.add(part.incoming, sampled / all, random);
         incoming.weight = all / brightness;
+    }
+    // Share of the light that nothing stops on its way; 1 where there is none.
+    float visibleShare() const {
+        return unblockedLight > 0 ? brightness / unblockedLight : 1.0f;
     }
     // Means of angleTerms.
     glm::vec4 meanAngles() const { return brightness > 0 ? angles / brightness : kEverywhere; }

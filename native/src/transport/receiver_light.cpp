@@ -291,6 +291,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                 next = 4 * all.count;
                 continue;
             }
+            sum.unblockedLight += brightest(all.open) / float(all.count);
             return {glm::vec3(0.0f), missed * missed / alike, 0, glm::vec4(0.0f), {}};
         }
         // By the first pass alone, so that the order of the receivers does not matter.
@@ -314,9 +315,10 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
     if (brightest(irradiance) > 0)
         origins.incoming.weight =
             brightest(all.visible) / (float(all.count) * brightest(irradiance));
+    const float open = brightest(closed ? *closed : all.open / float(all.count));
+    sum.unblockedLight += open;
     return {irradiance, variance + closedError * closedError,
-            brightest(closed ? *closed : all.open / float(all.count)) *
-                std::sqrt(visible * (1 - visible)),
+            open * std::sqrt(visible * (1 - visible)),
             brightest(irradiance) * all.meanAngles(blocks), origins.incoming};
 }
 
