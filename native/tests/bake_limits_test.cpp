@@ -45,6 +45,25 @@ TEST(BadScenes, WithoutFacesThereIsAWarning) {
     for (const glm::vec3& v : cornerLight(bake, 0, RB_OUTPUT_COMBINED)) EXPECT_EQ(v, glm::vec3(0));
 }
 
+TEST(BadScenes, SmallThingsThatFewLinesMeetAreNamed) {
+    Scene scene;
+    place(scene, grid("plain", {-50, -50, 0}, {100, 0, 0}, {0, 100, 0}, 8, 8), grey("", 0.5f));
+    place(scene, box("crate", {0, 0, 0.01f}, {0.1f, 0.1f, 0.1f}, false), grey("", 0.5f));
+    scene.worldRadiance = glm::vec3(1);
+    for (const char* solver : {"LINE_REUSE", "MULTIPATH", "STOCHASTIC_ITERATION"}) {
+        Bake bake;
+        setQuick(bake);
+        bake.settings.patchSize = 0;
+        bake.settings.solver = solver;
+        bake.settings.directions = "RANDOM";
+        bake.run(scene);
+        const Json warnings = reportOf(bake)["warnings"];
+        const bool hasWindows = bake.settings.solver == "LINE_REUSE";
+        EXPECT_EQ(mentions(warnings, "lines meet each patch of \\\"crate\\\""), !hasWindows)
+            << warnings;
+    }
+}
+
 TEST(BadScenes, AnObjectThatIsInsideOutIsNamed) {
     Scene scene;
     place(scene, box("shed", {-1, -1, -1}, {1, 1, 1}, false), grey("", 0.5f));

@@ -195,6 +195,9 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                 balanceEnergy(patches, light, exposed, transports.front()->openShare(), report);
             warnOfImbalance(report);
             report.bundles = transports.front()->bundleCount();
+            if (settings.solver != "LINE_REUSE" && settings.solver != "RANDOM_WALK")
+                warnOfFewLines(scene, patches, trace->density.pixelSize, uint32_t(report.bundles),
+                               settings, report);
         }
         irradiance = sumOf(lights);
 

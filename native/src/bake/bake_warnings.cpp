@@ -11,6 +11,9 @@ namespace {
 
 // Relative; above it the energy balance is worth a warning.
 constexpr double kMostImbalance = 0.01;
+// With fewer lines a patch than this two halves of them may agree by chance.
+constexpr double kFewLines = 16;
+constexpr size_t kMostNamed = 20;
 
 }  // namespace
 
@@ -60,6 +63,34 @@ void warnOfAngles(const Settings& settings, Report& report) {
     };
     if (settings.firstShot != "GATHER") warn("first_shot " + settings.firstShot, "GATHER");
     if (settings.solver != "LINE_REUSE") warn("solver " + settings.solver, "LINE_REUSE");
+}
+
+void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
+                    const Settings& settings, Report& report) {
+    std::vector<double> area(scene.instances.size(), 0.0), count(area.size(), 0.0);
+    for (const Parent& parent : patches.parents) {
+        area[parent.instance] += double(parent.area());
+        count[parent.instance] += double(parent.patchCount());
+    }
+    std::string names;
+    size_t few = 0;
+    for (size_t i = 0; i < area.size(); ++i) {
+        if (scene.instances[i].role != RB_ROLE_BAKE || !(count[i] > 0)) continue;
+        // The mean shadow of a flat patch is half of its area.
+        const double lines =
+            bundles * area[i] / count[i] / (2 * double(pixelSize) * double(pixelSize));
+        if (lines < kFewLines && ++few <= kMostNamed)
+            names += (few > 1 ? ", \"" : "\"") + scene.instances[i].name + "\"";
+    }
+    if (few == 0) return;
+    if (few > kMostNamed) names += " and " + std::to_string(few - kMostNamed) + " more";
+    report.warnings.push_back("fewer than " + std::to_string(int(kFewLines)) +
+                              " lines meet each patch of " + names +
+                              ", whose noise may be more "
+                              "than is stated: solver " +
+                              settings.solver +
+                              " has the same lines everywhere; LINE_REUSE has more where patches "
+                              "are small");
 }
 
 void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,

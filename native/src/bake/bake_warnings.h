@@ -26,6 +26,11 @@ void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& re
 // Where materials reflect by angle: names the first shot and the solver that do not.
 void warnOfAngles(const Settings& settings, Report& report);
 
+// Names the objects whose patches about so few lines meet that nobody knows their noise. pixelSize:
+// edge of the pixels of `bundles` bundles, metres, the same everywhere.
+void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
+                    const Settings& settings, Report& report);
+
 // Names the source and the object that most of the first shot's noise comes from and is on. area:
 // per side, of what is wanted.
 void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
