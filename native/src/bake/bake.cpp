@@ -171,6 +171,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         warnOfVisibility(scene, lights, settings, report);
         warnOfTranslucence(scene, settings, report);
         if (!patches.byAngle.empty()) warnOfAngles(settings, report);
+        if (trace->uncutGaps > 0) warnOfGaps(trace->uncutGaps, report);
         SideNoise noise(tiles.sideCount());
         exposed.assign(patches.sideCount(), 1.0f);
         const bool dark = isDark(scene, lights, report);
@@ -245,8 +246,14 @@ void Bake::makePatches(const Scene& scene, Report& report) {
 std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     // Other solvers follow the lines of single patches and other first shots meet them with rays:
     // smaller ones are noisier.
-    if (settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER") return {};
     Patches& patches = trace->patches;
+    if (settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER") {
+        if (settings.contacts)
+            trace->uncutGaps = contactCuts(patches, trace->visibility, trace->touchDistance,
+                                           size_t(settings.maxPatches))
+                                   .contacts;
+        return {};
+    }
     Cuts cuts;
     if (settings.contacts) {
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);

@@ -65,6 +65,14 @@ void warnOfAngles(const Settings& settings, Report& report) {
     if (settings.solver != "LINE_REUSE") warn("solver " + settings.solver, "LINE_REUSE");
 }
 
+void warnOfGaps(size_t patches, Report& report) {
+    report.warnings.push_back(
+        std::to_string(patches) +
+        " patches lie beside gaps much narrower than they are, as below cutlery on a table: what "
+        "lies in such a gap gets too much light; solver LINE_REUSE with first_shot GATHER cuts "
+        "them smaller");
+}
+
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
                     const Settings& settings, Report& report) {
     std::vector<double> area(scene.instances.size(), 0.0), count(area.size(), 0.0);

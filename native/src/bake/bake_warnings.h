@@ -26,6 +26,9 @@ void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& re
 // Where materials reflect by angle: names the first shot and the solver that do not.
 void warnOfAngles(const Settings& settings, Report& report);
 
+// Of so many patches beside gaps that are left whole.
+void warnOfGaps(size_t patches, Report& report);
+
 // Names the objects whose patches about so few lines meet that nobody knows their noise. pixelSize:
 // edge of the pixels of `bundles` bundles, metres, the same everywhere.
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,

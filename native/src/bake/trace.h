@@ -61,6 +61,7 @@ struct Trace {
     Surroundings surrounding;                            // empty: as the counts have it
     LineDensity density{};
     std::vector<Report::Cut> cuts;
+    size_t uncutGaps = 0;  // patches beside narrow gaps that the solver does not have cut
     LineCounts counts;
     std::unique_ptr<BundleTracer> tracer;
     Looks looks;  // at the light along its lines
