@@ -180,9 +180,15 @@ std::vector<std::vector<glm::vec3>> leastSquares(
     addRegularization(patches, range, regions, openness, double(regularization), terms);
     const Eigen::SparseMatrix<double> matrix = terms.matrix();
 
+    // At a contact the exposed part of a face is small, and its slope uncertain: the more is covered,
+    // the nearer to what is seen around it stays the value there.
+    std::vector<double> freedom(size_t(nodes), 1.0);
     std::vector<std::array<uint32_t, 4>> cells;
-    for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+    for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
         cells.push_back(nodesOf(patches.cells[c], regions));
+        const double free = std::max(0.0, 2 * openness[c - range.firstCell] - 1);
+        for (uint32_t v : cells.back()) freedom[v] = std::min(freedom[v], free);
+    }
 
     std::vector<std::vector<glm::vec3>> result(fields.size(),
                                                std::vector<glm::vec3>(size_t(nodes)));
@@ -195,8 +201,9 @@ std::vector<std::vector<glm::vec3>> leastSquares(
             if (terms.areas()[v] > 0) mean[v] = rhs(v, Eigen::Index(c)) / terms.areas()[v];
             const double least = seen[c].least[v], most = seen[c].most[v];
             if (!(least <= most)) continue;
-            const double below = kBeyond * (wide.most[v] - least);
-            const double above = std::min(kBeyond * (most - wide.least[v]), kMostAbove * most);
+            const double below = kBeyond * freedom[size_t(v)] * (wide.most[v] - least);
+            const double above = std::min(kBeyond * freedom[size_t(v)] * (most - wide.least[v]),
+                                          kMostAbove * most);
             low[v] = std::min(std::max(least - below, 0.0), mean[v]);
             high[v] = std::max(most + above, mean[v]);
         }

@@ -44,6 +44,8 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
             const uint32_t at = 2 * patches.parents[p].firstPatch + k;
             glm::dvec3 total(0.0);
             for (const SideLight& light : lights) total += light.shown.all(at);
+            // The inside of a lamp, whose light nobody asked for.
+            if (at % 2 != uint32_t(side)) total += patches.emission[at];
             lit[at % 2] += double(patches.area[at / 2]) * sum(total);
         }
     return lit[side] < kInsideOut * lit[1 - side];
