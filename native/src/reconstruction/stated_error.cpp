@@ -28,12 +28,14 @@ constexpr double kKnownShare = 0.3;
 // Squares summed over RGB times exposed area, (W/m^2)^2 m^2.
 struct Squares {
     double signal = 0, noise = 0, residual = 0;
+    double shown = 0;   // signal at the corners, which have less of what is narrower than a face
     double ripple = 0;  // of the noise: what interpolation between the corners cannot follow
     double smooth = 0, step = 0, known = 0;  // of the patches whose surplus is known; their signal
     double knownArea = 0, area = 0, cellArea = 0, patches = 0, cells = 0;
 
     void add(const Squares& o) {
         signal += o.signal;
+        shown += o.shown;
         noise += o.noise;
         residual += o.residual;
         ripple += o.ripple;
@@ -79,8 +81,10 @@ class InstanceErrors {
           light(light),
           surplus(surplusOf(patches, range.firstParent, range.lastParent, side, irradiance,
                             sides.exposed, sides.directError)) {
-        forEachPatch([&](uint32_t at, double weight, const Cell&, const auto&, double residual,
+        std::vector<double> exposed(range.lastCell - range.firstCell, 0.0);  // per cell, m^2
+        forEachPatch([&](uint32_t at, double weight, const Cell& cell, const auto&, double residual,
                          const Surplus& s) {
+            exposed[size_t(&cell - &patches.cells[range.firstCell])] += weight;
             const double signal = weight * square(lightAt(at));
             sum.area += weight;
             sum.signal += signal;
@@ -96,6 +100,14 @@ class InstanceErrors {
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
             // Of the parallelogram of which a triangle is half: the square of about an edge.
             sum.cellArea += double(glm::length(glm::cross(patches.cells[c].a, patches.cells[c].b)));
+        for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
+            const Cell& cell = patches.cells[c];
+            const double share = exposed[c - range.firstCell] / (cell.isTriangle() ? 3 : 4);
+            for (int32_t corner : cell.corner)
+                if (corner >= 0)
+                    sum.shown += share * square(light.direct[size_t(corner)] +
+                                                light.indirect[size_t(corner)]);
+        }
         sum.cells = range.lastCell - range.firstCell;
         sum.ripple = sum.noise * rippleShare();
     }
@@ -202,8 +214,9 @@ class InstanceErrors {
 Report::Errors relative(const Squares& s, double noiseScale, double shownScale,
                         double discretisation) {
     if (!(s.signal > 0)) return {};
-    return {std::sqrt(shownScale * s.shownNoise() / s.signal), std::sqrt(discretisation),
-            std::sqrt(s.mesh(noiseScale) / s.signal), std::sqrt(noiseScale * s.noise / s.signal)};
+    return {s.shown > 0 ? std::sqrt(shownScale * s.shownNoise() / s.shown) : 0,
+            std::sqrt(discretisation), std::sqrt(s.mesh(noiseScale) / s.signal),
+            std::sqrt(noiseScale * s.noise / s.signal)};
 }
 
 // The edge at which the mesh's error would be `limit`: that of smooth light falls with its square,
@@ -270,10 +283,11 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     // Also what the halves have in common.
     const double noiseScale =
         all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
-    // As the bake has measured what is shown of it.
-    const double shown = report.error.noise;
+    // As the bake has measured what is shown of it, relative to what is shown.
+    const double measured = report.error.noise,
+                 shown = all.shown > 0 ? measured * std::sqrt(all.signal / all.shown) : 0;
     const double shownScale =
-        all.shownNoise() > 0 ? shown * shown * all.signal / all.shownNoise() : 0;
+        all.shownNoise() > 0 ? measured * measured * all.signal / all.shownNoise() : 0;
     const double limit = std::max(kCoarse, kCoarseTargets * double(targetError));
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;
