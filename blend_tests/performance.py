@@ -12,7 +12,7 @@ Raybundle's time is the least over several targets that meets the error. Cycles'
 without samples and what the samples take that bring its noise to the error: how far it is off
 beside emissive faces is forgiven.
 
-Rows: equal (rooms), open (sun and sky), others (the scenes that remain), million (patches), slope
+Rows: equal (rooms), lamps (rooms whose lamp is a mesh), open (sun and sky), others (the scenes that remain), million (patches), slope
 (10k to 1M patches), relight, warm (a scripted bake of cornell_box), threads, micro.
 """
 
@@ -33,6 +33,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import lamp_rooms  # noqa: E402
 import raybundle  # noqa: E402
 from area_lamps import area_lamps  # noqa: E402
 from benchmark import bake_cycles, bake_raybundle  # noqa: E402
@@ -46,6 +47,7 @@ ROOMS = ("cornell_box", "big_room", "office", "two_rooms")
 OPEN = ("open_court", "instances")
 OTHERS = ("facing_squares", "furnace", "house_on_plain", "laid_table", "sphere_interior",
           "thin_wall")
+LAMPS = ("bulb", "tube", "ring", "box", "wavy_panel")
 ERRORS = (0.02, 0.01)
 TARGETS = (0.04, 0.03, 0.0225, 0.015, 0.01, 0.0075, 0.005)
 # Of which the first tell what Cycles takes without any.
@@ -68,7 +70,10 @@ class Row:
 
 
 def open_scene(name: str):
-    bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
+    if name.startswith("room:"):
+        lamp_rooms.build(name.partition(":")[2])
+    else:
+        bpy.ops.wm.open_mainfile(filepath=str(SCENES / f"{name}.blend"))
     settings = bpy.context.scene.raybundle
     settings.output = 'LIGHTING'
     return settings
@@ -266,6 +271,11 @@ def equal(options: argparse.Namespace) -> Iterator[Row]:
         yield from equal_error(name, "100", options)
 
 
+def lamps_of_mesh(options: argparse.Namespace) -> Iterator[Row]:
+    for name in LAMPS:
+        yield from equal_error(f"room:{name}", "60", options)
+
+
 def sun_and_sky(options: argparse.Namespace) -> Iterator[Row]:
     for name in OPEN:
         yield from equal_error(name, "10", options)
@@ -278,7 +288,7 @@ def others(options: argparse.Namespace) -> Iterator[Row]:
 
 PARTS: dict[str, Callable[[argparse.Namespace], Iterator[Row]]] = {
     "micro": micro, "warm": warm, "relight": relight, "threads": threads, "equal": equal,
-    "open": sun_and_sky, "others": others, "slope": slope, "million": million}
+    "lamps": lamps_of_mesh, "open": sun_and_sky, "others": others, "slope": slope, "million": million}
 
 
 def main(arguments: Sequence[str]) -> None:
