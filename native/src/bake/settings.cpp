@@ -157,9 +157,9 @@ const std::string& Settings::get(const std::string& name) const {
 
 bool Settings::hasIndependentDirections() const {
     const auto& kinds = directionKinds();
-    return std::find_if(kinds.begin(), kinds.end(), [&](const DirectionKind& kind) {
-               return directions == kind.name;
-           })->isIndependent;
+    return std::find_if(kinds.begin(), kinds.end(),
+                        [&](const DirectionKind& kind) { return directions == kind.name; })
+        ->isIndependent;
 }
 
 }  // namespace raybundle

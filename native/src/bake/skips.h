@@ -9,14 +9,14 @@ namespace raybundle {
 
 struct Skips {
     // Proofs: the result is the same to rounding.
-    int skipDarkness = 1;    // bundles and solve, if no light reaches any surface
-    int skipReflection = 1;  // the same, if no surface reflects and lines carry nothing else
-    int skipGeometry = 1;    // patches and lines, if geometry is as in the last bake
-    int skipLights = 1;      // the first shot, if lights too are as in the last bake
-    int skipFacing = 1;      // shadow rays to a source that the receiver cannot face
-    int skipSheets = 1;      // projection of faces that lie in a plane with others of their kind
-    int skipOccluders = 1;   // reconstruction of objects that only occlude
-    int skipLampInsides = 1;     // emission inside of closed surfaces with nothing else in them
+    int skipDarkness = 1;     // bundles and solve, if no light reaches any surface
+    int skipReflection = 1;   // the same, if no surface reflects and lines carry nothing else
+    int skipGeometry = 1;     // patches and lines, if geometry is as in the last bake
+    int skipLights = 1;       // the first shot, if lights too are as in the last bake
+    int skipFacing = 1;       // shadow rays to a source that the receiver cannot face
+    int skipSheets = 1;       // projection of faces that lie in a plane with others of their kind
+    int skipOccluders = 1;    // reconstruction of objects that only occlude
+    int skipLampInsides = 1;  // emission inside of closed surfaces with nothing else in them
     // Within the stated error.
     int skipLit = 1;        // noise of a source wholly visible: its closed form
     int skipWeak = 1;       // most shadow rays to a source that gives little of the light

@@ -202,8 +202,8 @@ std::vector<std::vector<glm::vec3>> leastSquares(
             const double least = seen[c].least[v], most = seen[c].most[v];
             if (!(least <= most)) continue;
             const double below = kBeyond * freedom[size_t(v)] * (wide.most[v] - least);
-            const double above = std::min(kBeyond * freedom[size_t(v)] * (most - wide.least[v]),
-                                          kMostAbove * most);
+            const double above =
+                std::min(kBeyond * freedom[size_t(v)] * (most - wide.least[v]), kMostAbove * most);
             low[v] = std::min(std::max(least - below, 0.0), mean[v]);
             high[v] = std::max(most + above, mean[v]);
         }

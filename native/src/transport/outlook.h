@@ -59,7 +59,7 @@ struct Outlook {
     // Per part of the source: how many samples it should get for its light; above 0. Empty: all
     // alike.
     std::vector<float> seen;
-    float mean = 0;      // share of the samples that were visible
+    float mean = 0;  // share of the samples that were visible
     size_t receivers = 1;
     bool isDark = true;  // none was
 };

@@ -42,8 +42,7 @@ std::vector<bool> besideShadows(const std::vector<Gathered>& results,
                                 const std::vector<float>& tolerance) {
     std::vector<bool> beside(results.size(), false);
     for (const auto& [a, b] : neighbours) {
-        const bool isStep =
-            std::abs(results[a].visibleShare() - results[b].visibleShare()) > kStep;
+        const bool isStep = std::abs(results[a].visibleShare() - results[b].visibleShare()) > kStep;
         const float edge = results[b].contrast - results[a].contrast;
         if (isStep || edge > kEdge * tolerance[a]) beside[a] = true;
         if (isStep || -edge > kEdge * tolerance[b]) beside[b] = true;

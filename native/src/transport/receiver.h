@@ -92,9 +92,7 @@ struct Gathered {
         incoming.weight = all / brightness;
     }
     // Share of the light that nothing stops on its way; 1 where there is none.
-    float visibleShare() const {
-        return unblockedLight > 0 ? brightness / unblockedLight : 1.0f;
-    }
+    float visibleShare() const { return unblockedLight > 0 ? brightness / unblockedLight : 1.0f; }
     // Means of angleTerms.
     glm::vec4 meanAngles() const { return brightness > 0 ? angles / brightness : kEverywhere; }
 };
