@@ -12,8 +12,9 @@ Raybundle's time is the least over several targets that meets the error. Cycles'
 without samples and what the samples take that bring its noise to the error: how far it is off
 beside emissive faces is forgiven.
 
-Rows: equal (rooms), lamps (rooms whose lamp is a mesh), open (sun and sky), others (the scenes that remain), million (patches), slope
-(10k to 1M patches), relight, warm (a scripted bake of cornell_box), threads, micro.
+Rows: equal (rooms), lamps (rooms whose lamp is a mesh), open (sun and sky), others (the scenes that
+remain), million (patches), slope (10k to 1M patches), relight, warm (a scripted bake of
+cornell_box), threads, micro.
 """
 
 from __future__ import annotations
@@ -288,7 +289,8 @@ def others(options: argparse.Namespace) -> Iterator[Row]:
 
 PARTS: dict[str, Callable[[argparse.Namespace], Iterator[Row]]] = {
     "micro": micro, "warm": warm, "relight": relight, "threads": threads, "equal": equal,
-    "lamps": lamps_of_mesh, "open": sun_and_sky, "others": others, "slope": slope, "million": million}
+    "lamps": lamps_of_mesh, "open": sun_and_sky, "others": others, "slope": slope,
+    "million": million}
 
 
 def main(arguments: Sequence[str]) -> None:

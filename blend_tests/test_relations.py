@@ -24,8 +24,7 @@ CHOSEN = {
     "room:sun": ["an object far away"],
 }
 TURN = "turned by (0.4, 0.7, 1.1)"
-CASES = [pytest.param(scene, relation, id=f"{scene}, {relation.name}")
-         for scene, names in CHOSEN.items()
+CASES = [(scene, relation) for scene, names in CHOSEN.items()
          for relation in relations.RELATIONS if relation.name in (TURN, *names)]
 
 
@@ -35,7 +34,8 @@ def scenes():
     return {name: relations.Scene(name, lamp_rooms.COARSE) for name in CHOSEN}
 
 
-@pytest.mark.parametrize("scene, relation", CASES)
+@pytest.mark.parametrize("scene, relation", CASES,
+                         ids=[f"{scene}, {relation.name}" for scene, relation in CASES])
 def test_relation(scenes, scene, relation):
     result = scenes[scene].measure(relation)
     if result.skipped:

@@ -23,6 +23,9 @@ pytestmark = pytest.mark.needs_library
 
 SCENES = Path(__file__).parent.parent / "scenes"
 NAMES = sorted(path.stem for path in SCENES.glob("*.blend"))
+CLOSED = ("furnace", "sphere_interior", "big_room", "office", "two_rooms", "thin_wall",
+          "laid_table")
+
 REPORT_KEYS = {"seconds", "patches", "bundles", "lines", "exchanges", "estimated_error", "energy",
                "peak_memory_bytes", "objects", "warnings", "skipped"}
 SECONDS_KEYS = {"total", "export", "patches", "first_shot", "bundles", "solve", "reconstruction",
@@ -79,7 +82,7 @@ def baked(name: str) -> BakedScene:
 
 
 def test_there_are_scenes():
-    assert len(NAMES) >= 12
+    assert set(CLOSED) < set(NAMES) and len(NAMES) >= 12
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -134,9 +137,8 @@ def test_light_is_finite_and_not_negative(name):
 def test_energy(name):
     energy = baked(name).report["energy"]
     assert energy["emitted"] > 0.0 and energy["absorbed"] > 0.0 and energy["escaped"] >= 0.0
-    # What escapes, and what surfaces exchange beside lamps that hang from them, has the lines' noise
-    # (office: 1.4e-3 at the default, 5e-4 at a quarter of its noise).
-    assert energy["balance_error"] < 2e-3
+    # In open scenes what escapes is sampled too, with the noise of the lines.
+    assert energy["balance_error"] < (1e-3 if name in CLOSED else 2e-3)
     arrived = energy["absorbed"] + energy["escaped"]
     assert abs(arrived / energy["emitted"] - 1.0) == pytest.approx(energy["balance_error"],
                                                                    abs=1e-5)

@@ -170,8 +170,8 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         const Tiles tiles(patches);
         warnOfVisibility(scene, lights, settings, report);
         warnOfTranslucence(scene, settings, report);
-        if (!patches.byAngle.empty()) warnOfAngles(settings, report);
-        if (trace->uncutGaps > 0) warnOfGaps(trace->uncutGaps, report);
+        warnOfAngles(patches, settings, report);
+        warnOfGaps(trace->uncutGaps, report);
         SideNoise noise(tiles.sideCount());
         exposed.assign(patches.sideCount(), 1.0f);
         const bool dark = isDark(scene, lights, report);
@@ -196,9 +196,8 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                 balanceEnergy(patches, light, exposed, transports.front()->openShare(), report);
             warnOfImbalance(report);
             report.bundles = transports.front()->bundleCount();
-            if (settings.solver != "LINE_REUSE" && settings.solver != "RANDOM_WALK")
-                warnOfFewLines(scene, patches, trace->density.pixelSize, uint32_t(report.bundles),
-                               settings, report);
+            warnOfFewLines(scene, patches, trace->density.pixelSize, uint32_t(report.bundles),
+                           settings, report);
         }
         irradiance = sumOf(lights);
 
@@ -244,21 +243,18 @@ void Bake::makePatches(const Scene& scene, Report& report) {
 // Cuts the patches where that pays. Returns the coarse shot of each light set, for the first shot
 // to go on with; empty if it is to make its own.
 std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
-    // Other solvers follow the lines of single patches and other first shots meet them with rays:
-    // smaller ones are noisier.
     Patches& patches = trace->patches;
-    if (settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER") {
-        if (settings.contacts)
-            trace->uncutGaps = contactCuts(patches, trace->visibility, trace->touchDistance,
-                                           size_t(settings.maxPatches))
-                                   .contacts;
-        return {};
-    }
     Cuts cuts;
     if (settings.contacts) {
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
         cuts = contactCuts(patches, trace->visibility, trace->touchDistance,
                            size_t(settings.maxPatches));
+    }
+    // Other solvers follow the lines of single patches and other first shots meet them with rays:
+    // smaller ones are noisier.
+    if (settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER") {
+        trace->uncutGaps = cuts.contacts;
+        return {};
     }
     std::vector<CoarseShot> shots;
     if (settings.refine) {

@@ -52,7 +52,8 @@ void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& re
                                       "LINE_REUSE does");
 }
 
-void warnOfAngles(const Settings& settings, Report& report) {
+void warnOfAngles(const Patches& patches, const Settings& settings, Report& report) {
+    if (patches.byAngle.empty()) return;
     auto warn = [&](const std::string& what, const std::string& remedy) {
         report.warnings.push_back(
             what +
@@ -66,6 +67,7 @@ void warnOfAngles(const Settings& settings, Report& report) {
 }
 
 void warnOfGaps(size_t patches, Report& report) {
+    if (patches == 0) return;
     report.warnings.push_back(
         std::to_string(patches) +
         " patches lie beside gaps much narrower than they are, as below cutlery on a table: what "
@@ -75,6 +77,8 @@ void warnOfGaps(size_t patches, Report& report) {
 
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
                     const Settings& settings, Report& report) {
+    // The first has windows, the second no bundles.
+    if (settings.solver == "LINE_REUSE" || settings.solver == "RANDOM_WALK") return;
     std::vector<double> area(scene.instances.size(), 0.0), count(area.size(), 0.0);
     for (const Parent& parent : patches.parents) {
         area[parent.instance] += double(parent.area());

@@ -24,9 +24,9 @@ void warnOfVisibility(const Scene& scene, const SetLights& lights, const Setting
 void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& report);
 
 // Where materials reflect by angle: names the first shot and the solver that do not.
-void warnOfAngles(const Settings& settings, Report& report);
+void warnOfAngles(const Patches& patches, const Settings& settings, Report& report);
 
-// Of so many patches beside gaps that are left whole.
+// Of so many patches beside narrow gaps that are left whole.
 void warnOfGaps(size_t patches, Report& report);
 
 // Names the objects whose patches about so few lines meet that nobody knows their noise. pixelSize:

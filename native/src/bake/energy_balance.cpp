@@ -25,7 +25,9 @@ void balanceEnergy(const Patches& patches, const SetLight& light,
     const FirstShot& shot = light.shot;
     const Irradiance& irradiance = light.irradiance;
     const glm::vec3 worldExitance = glm::pi<float>() * light.worldRadiance;
-    glm::dvec3 emitted = shot.emitted, absorbed(0.0), escaped = shot.escaped;
+    // What the insides of lamps emit they absorb.
+    glm::dvec3 emitted = shot.emitted + light.direct.unseenPower();
+    glm::dvec3 absorbed = light.direct.unseenPower(), escaped = shot.escaped;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         const double exposed = double(exposedShare[side]);
         const float open = openShare[side];

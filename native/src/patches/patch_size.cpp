@@ -107,17 +107,12 @@ bool areOneIsland(const Extent& a, const Extent& b) {
     return both.diagonal() <= std::max(one, other) + kMostOfSmaller * std::min(one, other);
 }
 
-bool areNear(const Extent& a, const Extent& b, double distance) {
-    return glm::all(glm::lessThanEqual(a.low - distance, b.high)) &&
-           glm::all(glm::lessThanEqual(b.low, a.high + distance));
-}
-
 bool areTogether(const Extent& a, const Extent& b) {
-    return areNear(a, b, kTogether * std::max(a.diagonal(), b.diagonal()));
+    return a.isNear(b, kTogether * std::max(a.diagonal(), b.diagonal()));
 }
 
 bool doTouch(const Extent& a, const Extent& b) {
-    return areNear(a, b, kTouch * std::min(a.diagonal(), b.diagonal()));
+    return a.isNear(b, kTouch * std::min(a.diagonal(), b.diagonal()));
 }
 
 class Sizing {

@@ -17,7 +17,7 @@
 
 namespace raybundle {
 
-// A bounding box along the scene's own axes (Placement::ownAxes), metres.
+// A bounding box, metres.
 struct Extent {
     glm::dvec3 low{INFINITY}, high{-INFINITY};
 
@@ -32,12 +32,19 @@ struct Extent {
     bool isEmpty() const { return !(low.x <= high.x); }
     double diagonal() const { return isEmpty() ? 0 : glm::length(high - low); }
     glm::dvec3 middle() const { return 0.5 * (low + high); }
+    double distance(const glm::dvec3& point) const {
+        return glm::length(glm::max(glm::max(low - point, point - high), glm::dvec3(0.0)));
+    }
+    // Whether they are no further apart along any axis, or for less than 0 have so much in common.
+    bool isNear(const Extent& other, double away) const {
+        return glm::all(glm::lessThanEqual(low - away, other.high)) &&
+               glm::all(glm::lessThanEqual(other.low, high + away));
+    }
 };
 
-// A connected surface.
 // A connected surface, or what one object has of it.
 struct Surface {
-    Extent extent;
+    Extent extent;    // along the scene's own axes (Placement::ownAxes)
     double area = 0;  // m^2
     size_t faces = 0;
     uint32_t object = 0;  // that it is of

@@ -67,44 +67,59 @@ class SymmetricSum {
 
 void FitTerms::addPatches(const std::array<uint32_t, 4>& node,
                           const std::array<std::array<double, 4>, 4>& square) {
+    CellTerm& term = ofPatches.emplace_back();
+    term.node = node;
     for (size_t a = 0; a < 4; ++a)
-        for (size_t b = 0; b < 4; ++b) mass[node[a]] += square[a][b];
-    ofPatches.push_back({node, square});
+        for (size_t b = 0; b < 4; ++b) {
+            term.square[a][b] = float(square[a][b]);
+            mass[node[a]] += double(term.square[a][b]);
+        }
 }
 
 void FitTerms::addSquare(const std::array<uint32_t, 8>& node, const std::array<double, 8>& stencil,
                          double weight) {
-    if (weight > 0) squares.push_back({node, stencil, weight});
+    if (!(weight > 0)) return;
+    Square& term = squares.emplace_back();
+    term.node = node;
+    std::copy(stencil.begin(), stencil.end(), term.stencil.begin());
+    term.weight = weight;
 }
 
 Eigen::SparseMatrix<double> FitTerms::matrix() const {
     SymmetricSum sum(nodeCount);
     for (const CellTerm& term : ofPatches)
-        sum.add(term.node, [&](size_t a, size_t b) { return term.square[a][b]; });
+        sum.add(term.node, [&](size_t a, size_t b) { return double(term.square[a][b]); });
     for (const Square& term : squares)
         sum.add(term.node, [&](size_t a, size_t b) {
-            return term.weight * term.stencil[a] * term.stencil[b];
+            return term.weight * double(term.stencil[a]) * double(term.stencil[b]);
         });
     return sum.matrix();
 }
 
-template <class Visit>
-void FitTerms::forEachFlux(const Eigen::VectorXd& values, const Visit& visit) const {
+template <class IsWanted, class Visit>
+void FitTerms::forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWanted,
+                           const Visit& visit) const {
     size_t index = 0;
     for (const CellTerm& term : ofPatches) {
-        for (size_t a = 0; a < 4; ++a) {
-            double amount = 0;
-            for (size_t b = 0; b < 4; ++b)
-                amount += term.square[a][b] * (values[term.node[a]] - values[term.node[b]]);
-            visit(index, term.node[a], amount);
+        if (isWanted(term.node)) {
+            std::array<double, 4> amount{};
+            for (size_t a = 0; a < 4; ++a)
+                for (size_t b = 0; b < 4; ++b)
+                    amount[a] +=
+                        double(term.square[a][b]) * (values[term.node[a]] - values[term.node[b]]);
+            visit(index, term.node, amount);
         }
         ++index;
     }
     for (const Square& term : squares) {
-        double slope = 0;
-        for (size_t a = 0; a < 8; ++a) slope += term.stencil[a] * values[term.node[a]];
-        for (size_t a = 0; a < 8; ++a)
-            visit(index, term.node[a], -term.weight * term.stencil[a] * slope);
+        if (isWanted(term.node)) {
+            double slope = 0;
+            for (size_t a = 0; a < 8; ++a) slope += double(term.stencil[a]) * values[term.node[a]];
+            std::array<double, 8> amount;
+            for (size_t a = 0; a < 8; ++a)
+                amount[a] = -term.weight * double(term.stencil[a]) * slope;
+            visit(index, term.node, amount);
+        }
         ++index;
     }
 }
@@ -125,50 +140,70 @@ Eigen::VectorXd FitTerms::within(const Eigen::VectorXd& low, const Eigen::Vector
         isWithin = isWithin && !isOut(v, solution[v]);
     if (isWithin) return bounded(solution);
 
-    std::vector<double> share(ofPatches.size() + squares.size(), 1);  // kept, per term
-    auto withShares = [&] {
-        Eigen::VectorXd added = Eigen::VectorXd::Zero(mean.size());
-        forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
-            added[v] += share[term] * amount;
-        });
-        for (Eigen::Index v = 0; v < mean.size(); ++v)
-            added[v] = mass[v] > 0 ? mean[v] + added[v] / mass[v] : solution[v];
-        return added;
+    auto isAny = [](const auto&) { return true; };
+    Eigen::VectorXd added = Eigen::VectorXd::Zero(mean.size());
+    forEachFlux(solution, isAny, [&](size_t, const auto& node, const auto& amount) {
+        for (size_t a = 0; a < node.size(); ++a) added[node[a]] += amount[a];
+    });
+    auto valueAt = [&](Eigen::Index v) {
+        return mass[v] > 0 ? mean[v] + added[v] / mass[v] : solution[v];
     };
+    std::vector<float> share(ofPatches.size() + squares.size(), 1.0f);  // kept, per term
+    // Keeps of each term what its nodes keep of all that they get, at most.
+    auto keep = [&](const auto& keptOf, const auto& isWanted) {
+        forEachFlux(solution, isWanted, [&](size_t term, const auto& node, const auto& amount) {
+            double least = 1;
+            for (size_t a = 0; a < node.size(); ++a)
+                if (amount[a] != 0) least = std::min(least, keptOf(node[a], amount[a]));
+            const double before = double(share[term]);
+            share[term] = float(before * least);
+            for (size_t a = 0; a < node.size(); ++a)
+                added[node[a]] -= (before - double(share[term])) * amount[a];
+        });
+    };
+
     // Per node the share of what all its terms add that keeps it within bounds, for as long as that
     // settles.
-    Eigen::VectorXd values = withShares();
+    Eigen::VectorXd kept(mean.size());
     for (int pass = 0; pass < kMaxPasses; ++pass) {
-        Eigen::VectorXd kept = Eigen::VectorXd::Ones(mean.size());
+        kept.setOnes();
         bool isSettled = true;
         for (Eigen::Index v = 0; v < mean.size(); ++v)
-            if (mass[v] > 0 && isOut(v, values[v])) {
-                const double bound = values[v] < low[v] ? low[v] : high[v];
-                kept[v] = std::clamp((bound - mean[v]) / (values[v] - mean[v]), 0.0, 1.0);
+            if (const double value = valueAt(v); mass[v] > 0 && isOut(v, value)) {
+                const double bound = value < low[v] ? low[v] : high[v];
+                kept[v] = std::clamp((bound - mean[v]) / (value - mean[v]), 0.0, 1.0);
                 isSettled = false;
             }
-        if (isSettled) return bounded(values);
-        std::vector<double> least(share.size(), 1);
-        forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
-            if (amount != 0) least[term] = std::min(least[term], kept[v]);
-        });
-        for (size_t term = 0; term < share.size(); ++term) share[term] *= least[term];
-        values = withShares();
+        if (isSettled) break;
+        keep([&](uint32_t v, double) { return kept[v]; },
+             [&](const auto& node) {
+                 return std::any_of(node.begin(), node.end(),
+                                    [&](uint32_t v) { return kept[v] < 1; });
+             });
     }
 
+    // Zalesak's limiter, which leaves nothing out of bounds, for what has not settled.
+    Eigen::VectorXd values(mean.size());
+    for (Eigen::Index v = 0; v < mean.size(); ++v) values[v] = valueAt(v);
+    bool isLeft = false;
+    for (Eigen::Index v = 0; v < mean.size(); ++v)
+        isLeft = isLeft || (mass[v] > 0 && isOut(v, values[v]));
+    if (!isLeft) return bounded(values);
     Eigen::VectorXd more = Eigen::VectorXd::Zero(mean.size()), less = more;
-    forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
-        (amount > 0 ? more : less)[v] += share[term] * amount;
+    forEachFlux(solution, isAny, [&](size_t term, const auto& node, const auto& amount) {
+        for (size_t a = 0; a < node.size(); ++a)
+            (amount[a] > 0 ? more : less)[node[a]] += double(share[term]) * amount[a];
     });
-    std::vector<double> least(share.size(), 1);
-    forEachFlux(solution, [&](size_t term, uint32_t v, double amount) {
-        if (amount == 0 || mass[v] <= 0) return;
-        const double room = mass[v] * ((amount > 0 ? high : low)[v] - mean[v]);
-        const double wanted = (amount > 0 ? more : less)[v];
-        if (wanted != 0) least[term] = std::min(least[term], std::clamp(room / wanted, 0.0, 1.0));
-    });
-    for (size_t term = 0; term < share.size(); ++term) share[term] *= least[term];
-    return bounded(withShares());
+    keep(
+        [&](uint32_t v, double amount) {
+            const double wanted = (amount > 0 ? more : less)[v];
+            if (mass[v] <= 0 || wanted == 0) return 1.0;
+            const double room = mass[v] * ((amount > 0 ? high : low)[v] - mean[v]);
+            return std::clamp(room / wanted, 0.0, 1.0);
+        },
+        isAny);
+    for (Eigen::Index v = 0; v < mean.size(); ++v) values[v] = valueAt(v);
+    return bounded(values);
 }
 
 }  // namespace raybundle

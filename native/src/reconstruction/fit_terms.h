@@ -49,18 +49,19 @@ class FitTerms {
   private:
     struct CellTerm {
         std::array<uint32_t, 4> node;
-        std::array<std::array<double, 4>, 4> square;
+        std::array<std::array<float, 4>, 4> square;  // m^2
     };
     struct Square {
         std::array<uint32_t, 8> node;
-        std::array<double, 8> stencil;
-        double weight;
+        std::array<float, 8> stencil;
+        double weight;  // m^2
     };
 
-    // Calls visit(term, node, amount) for what each term moves to each of its nodes, m^2 times the
-    // values; the amounts of a term sum to zero.
-    template <class Visit>
-    void forEachFlux(const Eigen::VectorXd& values, const Visit& visit) const;
+    // Calls visit(term, nodes, amounts) for what each term moves to each of its nodes, m^2 times the
+    // values, of those whose nodes are wanted; the amounts of a term sum to zero.
+    template <class IsWanted, class Visit>
+    void forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWanted,
+                     const Visit& visit) const;
 
     uint32_t nodeCount;
     std::vector<CellTerm> ofPatches;

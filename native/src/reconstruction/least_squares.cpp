@@ -16,6 +16,8 @@ namespace {
 // Of patches more covered than this, the light of the exposed share is too uncertain to bound
 // others.
 constexpr float kHalfCovered = 0.5f;
+// A face with more than this share exposed touches nothing.
+constexpr double kOpen = 0.99;
 constexpr double kTolerance = 1e-6;
 constexpr Eigen::Index kMaxIterations = 2000;
 // A face is at least so high over its edge, as a share of the edge, and its far corners lie at most
@@ -180,14 +182,15 @@ std::vector<std::vector<glm::vec3>> leastSquares(
     addRegularization(patches, range, regions, openness, double(regularization), terms);
     const Eigen::SparseMatrix<double> matrix = terms.matrix();
 
-    // At a contact the exposed part of a face is small, and its slope uncertain: the more is covered,
-    // the nearer to what is seen around it stays the value there.
-    std::vector<double> freedom(size_t(nodes), 1.0);
+    // Least exposed share of the faces at each node. At a contact the exposed part of a face is small,
+    // and its slope uncertain: no value is above what is seen around it, and the more is covered, the
+    // less it is below.
+    std::vector<double> openAt(size_t(nodes), 1.0);
     std::vector<std::array<uint32_t, 4>> cells;
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
         cells.push_back(nodesOf(patches.cells[c], regions));
-        const double free = std::max(0.0, 2 * openness[c - range.firstCell] - 1);
-        for (uint32_t v : cells.back()) freedom[v] = std::min(freedom[v], free);
+        for (uint32_t v : cells.back())
+            openAt[v] = std::min(openAt[v], openness[c - range.firstCell]);
     }
 
     std::vector<std::vector<glm::vec3>> result(fields.size(),
@@ -201,9 +204,10 @@ std::vector<std::vector<glm::vec3>> leastSquares(
             if (terms.areas()[v] > 0) mean[v] = rhs(v, Eigen::Index(c)) / terms.areas()[v];
             const double least = seen[c].least[v], most = seen[c].most[v];
             if (!(least <= most)) continue;
-            const double below = kBeyond * freedom[size_t(v)] * (wide.most[v] - least);
+            const double open = openAt[size_t(v)];
+            const double below = kBeyond * std::max(0.0, 2 * open - 1) * (wide.most[v] - least);
             const double above =
-                std::min(kBeyond * freedom[size_t(v)] * (most - wide.least[v]), kMostAbove * most);
+                open < kOpen ? 0.0 : std::min(kBeyond * (most - wide.least[v]), kMostAbove * most);
             low[v] = std::min(std::max(least - below, 0.0), mean[v]);
             high[v] = std::max(most + above, mean[v]);
         }

@@ -57,8 +57,9 @@ class DirectLight {
 
     // Per side: all emission of the set, W/m^2.
     const std::vector<glm::vec3>& emission() const { return split->emitted; }
-    // Sides whose emission is left out: nobody ever sees it.
+    // Of emission that is left out, for nobody ever sees it: sides, and power, W.
     size_t unseenSides() const { return split->unseen; }
+    const glm::dvec3& unseenPower() const { return split->unseenPower; }
 
     // Per side: emission that is no source here, for the bundles to carry, W/m^2.
     const std::vector<glm::vec3>& bundledEmission() const { return split->bundled; }

@@ -134,10 +134,12 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
     }
     if (skips.skipLampInsides) {
         const std::vector<bool> isEmpty = emptyInsides(scene, patches, split.emitted);
-        for (size_t side = 1; side < sides; side += 2) {
-            if (!isEmpty[patches.parentAt(uint32_t(side)).surface]) continue;
-            split.unseen += split.emitted[side] != glm::vec3(0.0f);
-            split.emitted[side] = glm::vec3(0.0f);
+        for (uint32_t side = 1; side < sides && !isEmpty.empty(); side += 2) {
+            glm::vec3& emitted = split.emitted[side];
+            if (!isEmpty[patches.parentAt(side).surface] || emitted == glm::vec3(0.0f)) continue;
+            ++split.unseen;
+            split.unseenPower += double(patches.area[side / 2]) * glm::dvec3(emitted);
+            emitted = glm::vec3(0.0f);
         }
     }
     const std::vector<MeanLight> means = meanLights(scene, patches, split.emitted, lightSet);

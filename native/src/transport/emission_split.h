@@ -22,7 +22,9 @@ struct EmissionSplit {
     std::vector<glm::vec3> gathered;  // of sources, of the whole patch
     std::vector<glm::vec3> bundled;
     std::vector<bool> isSource;
-    size_t unseen = 0;  // sides whose emission nobody ever sees, and which is left out
+    // Emission that nobody ever sees is in none of these: its sides, and its power, W.
+    size_t unseen = 0;
+    glm::dvec3 unseenPower{0.0};
 };
 
 EmissionSplit splitEmission(const Scene& scene, const Patches& patches,

@@ -64,14 +64,14 @@ std::optional<FaceDirection> directionTo(const LightFace& face, const glm::vec3&
 
 MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                        const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission,
-                       const Enclosure& whole, bool isEnclosed)
+                       const Extent& whole, bool isEnclosed)
     : patches(patches),
       emission(emission),
       sideEmission(sideEmission),
       whole(whole),
       isEnclosed(isEnclosed) {
     boundSource(parents);
-    wholeExtent = double(std::max(extent, whole.radius()));
+    wholeExtent = std::max(double(extent), 0.5 * whole.diagonal());
     collectFaces(parents, back);
     tree = LightTree(faces);
     if (!sideEmission) outline = MeshOutline(patches, parents, back == 1, wholeExtent);
@@ -79,14 +79,10 @@ MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& pare
 
 // Sphere around the source.
 void MeshSource::boundSource(const std::vector<uint32_t>& parents) {
-    Enclosure box;
-    for (uint32_t index : parents) {
-        const Parent& parent = patches.parents[index];
-        for (size_t k = 0; k < (parent.isTriangle ? 3 : 4); ++k)
-            box.add(patches.vertices[parent.vertex[k]]);
-    }
-    centre = 0.5f * (box.low + box.high);
-    extent = 0.5f * glm::length(box.high - box.low);
+    Extent box;
+    for (uint32_t index : parents) box.add(boxOf(patches, patches.parents[index]));
+    centre = glm::vec3(box.middle());
+    extent = float(0.5 * box.diagonal());
 }
 
 void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t back) {
@@ -155,7 +151,7 @@ std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
 bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
                               float radius) const {
     if (glm::dot(receiver, centre - point) < -(radius + extent)) return true;
-    if (isEnclosed && whole.distance(point) > radius) return true;
+    if (isEnclosed && whole.distance(glm::dvec3(point)) > double(radius)) return true;
     return outline.plane() && outline.plane()->height(point) < -double(radius);
 }
 

@@ -23,7 +23,7 @@ class MeshSource : public LightSource {
     // closed form. whole: what the faces are part of; isEnclosed: the light does not get out of that.
     MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission = nullptr,
-               const Enclosure& whole = {}, bool isEnclosed = false);
+               const Extent& whole = {}, bool isEnclosed = false);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override;
@@ -49,7 +49,7 @@ class MeshSource : public LightSource {
     const Patches& patches;
     const glm::vec3 emission;                          // W/m^2
     const std::vector<glm::vec3>* const sideEmission;  // where it varies
-    const Enclosure whole;
+    const Extent whole;
     const bool isEnclosed;
     glm::vec3 totalPower{0.0f};  // W
     glm::vec3 centre{0.0f};
