@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "visibility/embree_device.h"
 
-#include <embree3/rtcore.h>
-
 #include <cstddef>
+#include <cstdlib>
 #include <memory>
 #include <mutex>
 #include <new>
+#include <string>
 #include <system_error>
 #include <thread>
+
+#include "visibility/embree3.h"
 
 namespace raybundle {
 namespace {
@@ -16,8 +18,8 @@ namespace {
 // Builds a tree of one box, which Embree does in the thread that asks. Returns whether it is built.
 // Throws std::bad_alloc too, where Embree has no memory for its error.
 bool buildLeastTree(RTCDevice device) {
-    const std::unique_ptr<RTCBVHTy, decltype(&rtcReleaseBVH)> tree(rtcNewBVH(device),
-                                                                   &rtcReleaseBVH);
+    const std::unique_ptr<RTCBVHTy, decltype(&rtcReleaseBVH)> tree(embree3.newBVH(device),
+                                                                   embree3.releaseBVH);
     if (!tree) return false;
     RTCBuildPrimitive box = {};
     box.upper_x = box.upper_y = box.upper_z = 1;
@@ -26,18 +28,23 @@ bool buildLeastTree(RTCDevice device) {
     arguments.primitives = &box;
     arguments.primitiveCount = arguments.primitiveArrayCapacity = 1;
     arguments.createNode = [](RTCThreadLocalAllocator memory, unsigned, void*) {
-        return rtcThreadLocalAlloc(memory, 16, 16);
+        return embree3.threadLocalAlloc(memory, 16, 16);
     };
     arguments.setNodeChildren = [](void*, void**, unsigned, void*) {};
     arguments.setNodeBounds = [](void*, const RTCBounds**, unsigned, void*) {};
     arguments.createLeaf = [](RTCThreadLocalAllocator memory, const RTCBuildPrimitive*, size_t,
-                              void*) { return rtcThreadLocalAlloc(memory, 16, 16); };
-    return rtcBuildBVH(&arguments) != nullptr;
+                              void*) { return embree3.threadLocalAlloc(memory, 16, 16); };
+    return embree3.buildBVH(&arguments) != nullptr;
 }
 
 }  // namespace
 
-RTCDeviceTy* newEmbreeDevice() { return rtcNewDevice("tessellation_cache_size=0"); }
+RTCDeviceTy* newEmbreeDevice() {
+    std::string configuration = "tessellation_cache_size=0";
+    if (const char* more = std::getenv("RAYBUNDLE_EMBREE"))
+        configuration += std::string(",") + more;
+    return embree3.newDevice(configuration.c_str());
+}
 
 void makeRoomForTreeBuilders() {
     static std::mutex mutex;
@@ -55,7 +62,7 @@ void makeRoomForTreeBuilders() {
     while (room <= builders) room *= 2;
     if (ended > room) return;
     const std::unique_ptr<RTCDeviceTy, decltype(&rtcReleaseDevice)> device(newEmbreeDevice(),
-                                                                           &rtcReleaseDevice);
+                                                                           embree3.releaseDevice);
     for (; ended <= room; ++ended) {
         bool isBuilt = false;
         try {

@@ -8,6 +8,9 @@ namespace raybundle {
 // A device for triangles and quads, which the caller releases; null if it fails. Embree 3 else maps
 // 128 MB for surfaces that it subdivides, of which there are none here; and where that fails it waits
 // forever when the device is released (3.13.5, SharedLazyTessellationCache).
+// What the variable RAYBUNDLE_EMBREE of the environment says is added to Embree's configuration:
+// "isa=sse4.2" takes the kernels of the oldest processors that this library runs on. Throws
+// std::bad_alloc.
 RTCDeviceTy* newEmbreeDevice();
 
 // Embree keeps a list of the threads that ever built a tree. Where it cannot grow for one of them,

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "visibility/visibility.h"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +11,7 @@
 #include "bake/error.h"
 #include "patches/coincidence.h"
 #include "patches/opacity.h"
+#include "visibility/embree3.h"
 #include "visibility/embree_device.h"
 
 namespace raybundle {
@@ -40,8 +39,8 @@ struct Visibility::Embree {
     std::vector<uint32_t> parentOf;
 
     ~Embree() {
-        if (scene) rtcReleaseScene(scene);
-        if (device) rtcReleaseDevice(device);
+        if (scene) embree3.releaseScene(scene);
+        if (device) embree3.releaseDevice(device);
     }
 };
 
@@ -50,11 +49,12 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
       surfaceOffset(kRelativeOffset * patches.radius),
       embree(std::make_unique<Embree>()) {
     embree->device = newEmbreeDevice();
-    if (!embree->device) fail(rtcGetDeviceError(nullptr), "no device");
-    embree->scene = rtcNewScene(embree->device);
-    if (!embree->scene) fail(rtcGetDeviceError(embree->device), "no scene");
+    if (!embree->device) fail(embree3.getDeviceError(nullptr), "no device");
+    embree->scene = embree3.newScene(embree->device);
+    if (!embree->scene) fail(embree3.getDeviceError(embree->device), "no scene");
     // Robust: rays must not slip between neighbouring triangles.
-    rtcSetSceneFlags(embree->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    embree3.setSceneFlags(embree->scene,
+                          RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
 
     auto blocks = [&](const Parent& parent) {
         return blockers == Blockers::EXCHANGING ? parent.exchanges : parent.stopsDirect;
@@ -64,15 +64,15 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     const size_t quads = embree->parentOf.size();
     if (quads > 0) {
         const std::unique_ptr<RTCGeometryTy, decltype(&rtcReleaseGeometry)> made(
-            rtcNewGeometry(embree->device, RTC_GEOMETRY_TYPE_QUAD), &rtcReleaseGeometry);
+            embree3.newGeometry(embree->device, RTC_GEOMETRY_TYPE_QUAD), embree3.releaseGeometry);
         const RTCGeometry geometry = made.get();
-        if (!geometry) fail(rtcGetDeviceError(embree->device), "no geometry");
+        if (!geometry) fail(embree3.getDeviceError(embree->device), "no geometry");
         float* vertices = static_cast<float*>(
-            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                    3 * sizeof(float), patches.vertices.size()));
-        uint32_t* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
+            embree3.setNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                         3 * sizeof(float), patches.vertices.size()));
+        uint32_t* indices = static_cast<uint32_t*>(embree3.setNewGeometryBuffer(
             geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(uint32_t), quads));
-        if (!vertices || !indices) fail(rtcGetDeviceError(embree->device), "no buffers");
+        if (!vertices || !indices) fail(embree3.getDeviceError(embree->device), "no buffers");
         std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
         for (const Parent& parent : patches.parents) {
             if (!blocks(parent)) continue;
@@ -80,11 +80,11 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
             for (int k = 0; k < 4; ++k)
                 *indices++ = parent.vertex[parent.isTriangle && k == 3 ? 2 : k];
         }
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometry(embree->scene, geometry);
+        embree3.commitGeometry(geometry);
+        embree3.attachGeometry(embree->scene, geometry);
     }
-    rtcCommitScene(embree->scene);
-    const RTCError error = rtcGetDeviceError(embree->device);
+    embree3.commitScene(embree->scene);
+    const RTCError error = embree3.getDeviceError(embree->device);
     if (error != RTC_ERROR_NONE) fail(error, "building its tree");
 }
 
@@ -271,7 +271,7 @@ float Visibility::visibleShare(uint32_t side, const ShadowRay& shadow) const {
     FromSide start(*this, side);
     RTCRay ray{};
     if (!start.setShadowRay(ray, shadow)) return 1;
-    rtcOccluded1(embree->scene, &start.context, &ray);
+    embree3.occluded1(embree->scene, &start.context, &ray);
     return ray.tfar < 0 ? 0.0f : start.passage.share;
 }
 
@@ -284,14 +284,17 @@ void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
     }
     FromSide start(*this, side);
     start.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    // Embree without kernels for eight rays, on a processor without AVX, looks at all of them: those
+    // that are not there end before they start.
     alignas(32) int valid[kPacket] = {};
-    RTCRay8 packet;
+    RTCRay8 packet{};
+    std::fill_n(packet.dir_z, kPacket, 1.0f);
+    std::fill_n(packet.tfar, kPacket, -1.0f);
+    std::array<bool, kPacket> isShort{};
     for (int k = 0; k < count; ++k) {
         RTCRay ray{};
-        if (!start.setShadowRay(ray, rays[k], size_t(k))) {
-            packet.tfar[k] = 0;
-            continue;
-        }
+        isShort[size_t(k)] = !start.setShadowRay(ray, rays[k], size_t(k));
+        if (isShort[size_t(k)]) continue;
         valid[k] = -1;
         packet.org_x[k] = ray.org_x;
         packet.org_y[k] = ray.org_y;
@@ -306,8 +309,9 @@ void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
         packet.id[k] = ray.id;
         packet.flags[k] = 0;
     }
-    rtcOccluded8(valid, embree->scene, &start.context, &packet);
-    for (int k = 0; k < count; ++k) shares[k] = packet.tfar[k] < 0 ? 0.0f : 1.0f;
+    embree3.occluded8(valid, embree->scene, &start.context, &packet);
+    for (int k = 0; k < count; ++k)
+        shares[k] = isShort[size_t(k)] || packet.tfar[k] >= 0 ? 1.0f : 0.0f;
 }
 
 namespace {
@@ -361,7 +365,7 @@ uint32_t Visibility::firstCoinciding(uint32_t parent, const glm::vec3& origin,
     RTCRay ray{};
     setRay(ray, origin, direction, distance + zone);
     ray.tnear = std::max(0.0f, distance - zone);
-    rtcOccluded1(embree->scene, &meeting.context, &ray);
+    embree3.occluded1(embree->scene, &meeting.context, &ray);
     return meeting.first;
 }
 
@@ -381,7 +385,7 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
     RTCRayHit query{};
     setRay(query.ray, origin, direction, farthest + start.behind[0]);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(embree->scene, &start.context, &query);
+    embree3.intersect1(embree->scene, &start.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     if (distance) *distance = std::max(0.0f, query.ray.tfar - glm::length(point - origin));
     uint32_t parent = embree->parentOf[query.hit.primID];
@@ -398,7 +402,7 @@ std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm:
     RTCRayHit query{};
     setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(embree->scene, &passing.context, &query);
+    embree3.intersect1(embree->scene, &passing.context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     if (distance) *distance = query.ray.tfar;
     const uint32_t parent =
@@ -444,7 +448,7 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
     setRay(query.ray, glm::vec3(point - 2.5 * double(patches.radius) * direction),
            glm::vec3(direction), std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(embree->scene, &crossed.context, &query);
+    embree3.intersect1(embree->scene, &crossed.context, &query);
 
     hits.clear();
     const uint64_t name = lineName(glm::vec3(point), glm::vec3(direction));

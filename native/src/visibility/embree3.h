@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <embree3/rtcore.h>
+
+namespace raybundle {
+
+// The functions of Embree 3, each found in that very library. Embree 4 has functions of the same names,
+// without versions: in a process that loaded it first, such as official Blender, a plain call would
+// reach those, and end the process.
+struct Embree3 {
+    Embree3();
+
+    decltype(&rtcNewDevice) newDevice;
+    decltype(&rtcReleaseDevice) releaseDevice;
+    decltype(&rtcGetDeviceError) getDeviceError;
+    decltype(&rtcNewBVH) newBVH;
+    decltype(&rtcReleaseBVH) releaseBVH;
+    decltype(&rtcBuildBVH) buildBVH;
+    decltype(&rtcThreadLocalAlloc) threadLocalAlloc;
+    decltype(&rtcNewScene) newScene;
+    decltype(&rtcReleaseScene) releaseScene;
+    decltype(&rtcSetSceneFlags) setSceneFlags;
+    decltype(&rtcCommitScene) commitScene;
+    decltype(&rtcNewGeometry) newGeometry;
+    decltype(&rtcReleaseGeometry) releaseGeometry;
+    decltype(&rtcSetNewGeometryBuffer) setNewGeometryBuffer;
+    decltype(&rtcCommitGeometry) commitGeometry;
+    decltype(&rtcAttachGeometry) attachGeometry;
+    decltype(&rtcIntersect1) intersect1;
+    decltype(&rtcOccluded1) occluded1;
+    decltype(&rtcOccluded8) occluded8;
+};
+
+// Found when this library is loaded.
+extern const Embree3 embree3;
+
+}  // namespace raybundle
