@@ -210,6 +210,20 @@ def test_a_material_of_a_volume_alone_is_air(floor):
 # --------------------------------------------------------------------------------------------------
 
 
+def test_what_renders_hide_is_listed_and_named_where_nothing_is_left(new_object, floor):
+    box = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    cutter = new_object("Cutter", CUBE_VERTICES, CUBE_FACES)
+    box.hide_render = cutter.hide_render = True
+    cutter.display_type = 'WIRE'
+    bpy.context.view_layer.update()
+    export = export_scene(bpy.context)
+    assert export.statuses == {"Box": "hidden in renders", "Cutter": "hidden in renders"}
+    assert [text for text in export.warnings if '"Box"' in text] == list(export.warnings)
+    floor.hide_render = True
+    with pytest.raises(raybundle.BakeError, match='"Box" hidden in renders'):
+        raybundle.bake(bpy.context)
+
+
 def collection_of(item):
     scene = bpy.context.scene
     collection = bpy.data.collections.new("Lamps")

@@ -97,11 +97,29 @@ def test_modifiers_are_applied_and_leave_no_trace(new_object):
     assert area(result.scene) == pytest.approx(3.0)
     assert [attribute.name for attribute in item.data.attributes
             if attribute.name in (VERTEX_CODE, CORNER_CODE)] == []
-    # Each of the four corners is the mean of its three copies.
+    # Each of the four corners has the value of the copy in its place.
     corner_map = result.targets[0].corner_map
-    assert corner_map.filled == 0
+    assert (corner_map.copied, corner_map.untraced) == (4, 0)
     values = np.repeat([[1.0], [2.0], [6.0]], 4, axis=0) * np.ones(3)
-    assert corner_map.to_original(values) == pytest.approx(np.full((4, 3), 3.0))
+    assert corner_map.to_original(values) == pytest.approx(np.full((4, 3), 1.0))
+    assert any("several faces of one" in text and '"Square"' in text for text in result.warnings)
+
+
+@pytest.mark.parametrize("offset", [-1.0, 0.0, 1.0])
+@pytest.mark.parametrize("flips", [False, True])
+def test_of_solidify_the_shell_that_looks_as_the_face_does(new_object, offset, flips):
+    item = new_object("Deck", SQUARE, [(0, 1, 2, 3)])
+    solidify = item.modifiers.new("Solidify", 'SOLIDIFY')
+    solidify.thickness, solidify.offset, solidify.use_flip_normals = 0.05, offset, flips
+    result = export()
+    mesh, corner_map = result.scene.meshes[0], result.targets[0].corner_map
+    faces = np.searchsorted(mesh.face_offsets, corner_map.evaluated, side='right') - 1
+    assert len(set(faces)) == 1 and len(faces) == 4
+    corners = mesh.vertices[mesh.corner_vertices[mesh.face_offsets[faces[0]]:][:4]]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
+    assert normal[2] > 0
+    places = corner_map.to_original(mesh.vertices[mesh.corner_vertices])
+    assert places[:, :2] == pytest.approx(np.array(SQUARE, float)[:, :2], abs=1e-6)
 
 
 def test_subdivision_surface_maps_back_to_the_corners(new_object):
@@ -110,9 +128,9 @@ def test_subdivision_surface_maps_back_to_the_corners(new_object):
     result = export()
     mesh, corner_map = result.scene.meshes[0], result.targets[0].corner_map
     assert mesh.face_count == 6 * 16
-    assert (corner_map.original_count, corner_map.filled) == (24, 0)
+    assert (corner_map.original_count, corner_map.untraced) == (24, 0)
     # Exactly one evaluated corner belongs to each original one: positions go the same way.
-    assert sorted(corner_map.original) == list(range(24))
+    assert sorted(corner_map.original) == list(range(24)) and corner_map.copied == 0
     positions = corner_map.to_original(mesh.vertices[mesh.corner_vertices])
     original = np.array(CUBE_VERTICES, float)[[index for face in CUBE_FACES for index in face]]
     assert np.array_equal(np.sign(positions), np.sign(original))
@@ -132,17 +150,28 @@ def test_every_corner_gets_the_light_of_its_place(new_object, modifier, settings
     positions = corner_map.to_original(mesh.vertices[mesh.corner_vertices])
     original = np.array(CUBE_VERTICES, float)[[index for face in CUBE_FACES for index in face]]
     if modifier == 'MIRROR':
-        # Each corner is the mean of itself and its mirror image.
-        assert positions == pytest.approx(original * [0, 1, 1], abs=1e-6)
+        assert positions == pytest.approx(original, abs=1e-6)
     elif modifier == 'DECIMATE':
         # Vertices are gone; what remains is somewhere on the box.
         assert np.abs(positions).max() <= 1.0 + 1e-6
     else:
         # The bevel's width is the largest shift; a voxel is not larger.
         assert np.linalg.norm(positions - original, axis=1).max() < 0.3
-    filled = [text for text in result.warnings if "no trace" in text and '"Box"' in text]
-    assert len(filled) == (1 if corner_map.filled else 0)
-    assert bool(corner_map.filled) == (modifier in ('BEVEL', 'REMESH', 'DECIMATE'))
+    for count, text in ((corner_map.untraced, "no trace"), (corner_map.copied, "several faces")):
+        lines = [line for line in result.warnings if text in line and '"Box"' in line]
+        assert len(lines) == (1 if count else 0)
+    assert bool(corner_map.untraced) == (modifier in ('BEVEL', 'REMESH', 'DECIMATE'))
+    assert bool(corner_map.copied) == (modifier in ('SOLIDIFY', 'MIRROR'))
+    if modifier not in ('DECIMATE', 'REMESH'):
+        # On the face that the corner is of, or what is left of it.
+        faces = np.searchsorted(mesh.face_offsets, corner_map.evaluated, side='right') - 1
+        for corner, face in zip(corner_map.original, faces):
+            ring = mesh.vertices[mesh.corner_vertices[mesh.face_offsets[face]:][:3]]
+            ring = np.asarray(ring, float)
+            normal = np.cross(ring[1] - ring[0], ring[2] - ring[1])
+            box = np.array(CUBE_VERTICES, float)[list(CUBE_FACES[corner // 4])]
+            wanted = np.cross(box[1] - box[0], box[2] - box[1])
+            assert normal @ wanted > 0.9 * np.linalg.norm(normal) * np.linalg.norm(wanted)
 
 
 def test_interpolated_codes_are_not_mistaken_for_corners(new_object):
@@ -157,7 +186,7 @@ def test_interpolated_codes_are_not_mistaken_for_corners(new_object):
     modifier.levels = 1
     result = export()
     mesh, corner_map = result.scene.meshes[0], result.targets[0].corner_map
-    assert (mesh.face_count, corner_map.filled) == (4 * size ** 2, 0)
+    assert (mesh.face_count, corner_map.untraced) == (4 * size ** 2, 0)
     positions = mesh.vertices[mesh.corner_vertices][corner_map.evaluated]
     expected = np.array(vertices, float)[np.array(faces).ravel()][corner_map.original]
     assert positions == pytest.approx(expected, abs=1e-4)

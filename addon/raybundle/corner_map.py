@@ -29,6 +29,9 @@ _CODE_BITS = 24
 # is less rare on meshes of more than 4096 elements, for which the limit above is what counts.
 _CODES_PER_ELEMENT = 4096
 
+# Faces look the same way if the cosine between their normals is larger.
+_SAME_WAY = 0.7
+
 
 @dataclass(frozen=True)
 class CornerMap:
@@ -37,14 +40,15 @@ class CornerMap:
     original_count: int
     evaluated: np.ndarray | None = None  # (k,) evaluated corner of each pair; None: one to one
     original: np.ndarray | None = None  # (k,) original corner of each pair
-    filled: int = 0  # original corners whose value is that of a neighbour
+    copied: int = 0  # original corners of which the modifiers made several, in other places
+    untraced: int = 0  # original corners that the modifiers kept no trace of
 
     @property
     def is_identity(self) -> bool:
         return self.evaluated is None
 
     def to_original(self, values: np.ndarray) -> np.ndarray:
-        """values: (evaluated corners, 3) -> (original corners, 3)."""
+        """values: (evaluated corners, 3) -> (original corners, 3); 0 where there is none."""
         if self.is_identity:
             return values
         return grouped_mean(values[self.evaluated], self.original, self.original_count)
@@ -79,7 +83,12 @@ def same_topology(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> bool:
 
 
 def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> CornerMap:
-    """Both meshes in object space; codes must have been there when the mesh was evaluated."""
+    """Both meshes in object space; codes must have been there when the mesh was evaluated.
+
+    Of several corners that modifiers made of one it takes that whose face looks the same way, then
+    the one nearest to the original, then the first: of Solidify the shell with the original's
+    normals, of Mirror and Array the copy in its place.
+    """
     count = len(original.loops)
     if same_topology(original, evaluated):
         return CornerMap(count)
@@ -88,31 +97,31 @@ def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> Cor
     corners = _decoded(evaluated, CORNER_CODE, len(evaluated.loops), count)
     vertices = _decoded(evaluated, VERTEX_CODE, len(evaluated.vertices), len(original.vertices))
     corner_origin_vertices = vertices[evaluated_vertices]
+    before, after = _Corners(original), _Corners(evaluated)
+    missing = np.ones(count, bool)
 
-    # Pair the corners that came through; a corner and its vertex must agree.
+    # The corners that came through; a corner and its vertex must agree.
     exact = corners >= 0
     exact[exact] = original_vertices[corners[exact]] == corner_origin_vertices[exact]
-    pairs_evaluated = [np.flatnonzero(exact)]
-    pairs_original = [corners[exact]]
-    missing = np.ones(count, bool)
-    missing[corners[exact]] = False
-    filled = int(missing.sum())
+    candidates = np.flatnonzero(exact)
+    is_best = _are_best(candidates, corners[candidates], before, after)
+    pairs = [(candidates[is_best], corners[candidates][is_best])]
+    missing[corners[candidates]] = False
+    copied = len(np.unique(corners[candidates][~is_best]))
 
-    # Give the others the corners of their vertex, if that came through.
-    if filled:
-        by_vertex, to_missing = _pairs_with_equal_keys(
-            corner_origin_vertices, original_vertices, np.flatnonzero(missing))
-        pairs_evaluated.append(by_vertex)
-        pairs_original.append(to_missing)
-        missing[to_missing] = False
+    # For the others those of their vertex, if that came through.
+    if missing.any():
+        candidates, targets = _pairs_with_equal_keys(corner_origin_vertices, original_vertices,
+                                                     np.flatnonzero(missing))
+        is_best = _are_best(candidates, targets, before, after)
+        pairs.append((candidates[is_best], targets[is_best]))
+        missing[targets] = False
 
-    # Give what remains the nearest corner.
+    # For the rest what lies nearest and looks the same way.
     rest = np.flatnonzero(missing)
     if len(rest) and len(evaluated.loops):
-        pairs_evaluated.append(_nearest_corners(original, evaluated, rest))
-        pairs_original.append(rest)
-    return CornerMap(count, np.concatenate(pairs_evaluated), np.concatenate(pairs_original),
-                     filled)
+        pairs.append((_nearest_corners(before, after, rest), rest))
+    return CornerMap(count, *map(np.concatenate, zip(*pairs)), copied, len(rest))
 
 
 def grouped_mean(values: np.ndarray, groups: np.ndarray, group_count: int) -> np.ndarray:
@@ -162,25 +171,46 @@ def _pairs_with_equal_keys(source_keys: np.ndarray, target_keys: np.ndarray, tar
     return order[np.repeat(first, counts) + offsets], np.repeat(targets, counts)
 
 
-def _nearest_corners(original: bpy.types.Mesh, evaluated: bpy.types.Mesh, corners: np.ndarray
-                     ) -> np.ndarray:
-    """(k,) the evaluated corner nearest to each of these original corners."""
-    points = _points_inside_faces(evaluated)
-    tree = KDTree(len(points))
-    for index, point in enumerate(points.tolist()):
+class _Corners:
+    """Places of a mesh's corners, object space, and the normals of their faces."""
+
+    def __init__(self, mesh: bpy.types.Mesh) -> None:
+        self.places = vertex_positions(mesh)[corner_vertices(mesh)]
+        sizes = read(mesh.polygons, 'loop_total', np.int32)
+        faces = np.repeat(np.arange(len(sizes)), sizes)
+        self.normals = read(mesh.polygons, 'normal', np.float32, 3)[faces]
+        # Drawn a little into their faces: corners of one vertex differ by face.
+        centres = grouped_mean(self.places, faces, len(sizes))[faces]
+        self.inner_places = self.places + 0.1 * (centres - self.places)
+        areas = read(mesh.polygons, 'area', np.float32)
+        self.face_width = float(np.sqrt(areas.mean())) if len(areas) else 0.0
+
+
+def _are_best(candidates: np.ndarray, targets: np.ndarray, before: _Corners, after: _Corners
+              ) -> np.ndarray:
+    """(k,) whether an evaluated corner is the best for its target, an original one, or lies where
+    that does, as those of the two triangles of a quad."""
+    cosines = np.einsum('ij,ij->i', after.normals[candidates], before.normals[targets])
+    turn = np.searchsorted((-_SAME_WAY, 0.0), -cosines)  # 0: the same way, 1: sideways, 2: away
+    distances = np.linalg.norm(after.places[candidates] - before.places[targets], axis=1)
+    # Copies as far away but for rounding are alike.
+    rounding = 1e-4 * before.face_width or 1.0
+    order = np.lexsort((candidates, np.round(distances / rounding), turn, targets))
+    groups, first = np.unique(targets[order], return_index=True)
+    best = order[first][np.searchsorted(groups, targets)]
+    apart = after.places[candidates] - after.places[candidates[best]]
+    return (turn == turn[best]) & (np.linalg.norm(apart, axis=1) <= rounding)
+
+
+def _nearest_corners(before: _Corners, after: _Corners, corners: np.ndarray) -> np.ndarray:
+    """(k,) for each of these original corners the evaluated one nearest in place and normal."""
+    width = before.face_width  # so far apart in space is as bad as facing away by 60 degrees
+    tree = KDTree(len(after.places))
+    for index, point in enumerate((after.inner_places + width * after.normals).tolist()):
         tree.insert(point, index)
     tree.balance()
-    wanted = _points_inside_faces(original)[corners]
+    wanted = (before.inner_places + width * before.normals)[corners]
     return np.array([tree.find(point)[1] for point in wanted.tolist()], np.int64)
-
-
-def _points_inside_faces(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(c, 3), each corner drawn a little into its face: corners of one vertex differ by face."""
-    positions = vertex_positions(mesh)[corner_vertices(mesh)]
-    sizes = read(mesh.polygons, 'loop_total', np.int32)
-    faces = np.repeat(np.arange(len(sizes)), sizes)
-    centres = grouped_mean(positions, faces, len(sizes))[faces]
-    return positions + 0.1 * (centres - positions)
 
 
 def _remove_codes(mesh: bpy.types.Mesh) -> None:

@@ -214,6 +214,28 @@ def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str], types: 
                f"{_listed(names)}: show it, or disable it in renders as well")
 
 
+def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
+    """unrendered: shown in the viewport but not in renders, original. What is drawn as wires or
+    bounds, as those that cut others are, is not missed."""
+    names = [f'"{item.name}"' for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')]
+    if names:
+        yield (f"what is hidden in renders is left out, as by Cycles: {_listed(names)}: enable it "
+               f"in renders to bake it")
+
+
+def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str]:
+    """Names of objects whose modifiers make several corners of one, and of those whose modifiers
+    keep no trace of some corners."""
+    names = [f'"{name}"' for name in copied]
+    if names:
+        yield (f"modifiers make several faces of one, and all show the light of that in its place: "
+               f"{_listed(names)}: apply the modifiers to light each by itself")
+    names = [f'"{name}"' for name in untraced]
+    if names:
+        yield (f"modifiers keep no trace of some corners, which have the light of what lies "
+               f"nearest: {_listed(names)}: apply the modifiers for their own")
+
+
 def _listed(names: list[str]) -> str:
     text = ", ".join(names[:_MOST_NAMES])
     return text if len(names) <= _MOST_NAMES else f"{text} and {len(names) - _MOST_NAMES} more"

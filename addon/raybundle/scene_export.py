@@ -152,6 +152,8 @@ class _Exporter:
         self._alike: dict[tuple[int, int, int], dict[bytes | None, int]] = {}
         self._instance_counts: Counter[tuple[str, str]] = Counter()
         self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
+        self._copied: list[str] = []  # objects whose modifiers make several corners of one
+        self._untraced: list[str] = []  # objects whose modifiers keep no trace of some corners
         self._placed: set[tuple[str, int, bytes]] = set()
         self._drawn: dict[bpy.types.Object, None] = {}  # originals that take part
 
@@ -222,12 +224,16 @@ class _Exporter:
                 self._add_geometry(instance)
             elif item.type in left_out.UNREAD_TYPES:
                 self._refuse(item.name, left_out.UNREAD_TYPES[item.type])
-        hidden = self._hidden()
+        hidden, unrendered = self._hidden(), self._unrendered()
+        for items, where in ((hidden, "the viewport"), (unrendered, "renders")):
+            for item in items:
+                if item.type in GEOMETRY_TYPES and _role(item, None) != 'IGNORE':
+                    self.result.statuses.setdefault(item.name, f"hidden in {where}")
         lights = self.result.scene.lights
         shown = len(lights)
         for instance in hidden_light_instances(self.context, hidden):
             self._add_light(instance)
-        self._name_what_is_left_out(hidden, [light.name for light in lights[shown:]])
+        self._name_what_is_left_out(hidden, [light.name for light in lights[shown:]], unrendered)
         scene = self.result.scene
         world = export_world(self.context, self.materials.images, self.result.warnings)
         scene.world, scene.world_image = world.radiance, world.image
@@ -248,14 +254,25 @@ class _Exporter:
                                         key=lambda item: item.name_full)
                 if item not in shown and not item.hide_render]
 
-    def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str]) -> None:
+    def _unrendered(self) -> list[bpy.types.Object]:
+        """Objects that the viewport shows and renders do not, original."""
+        rendered = _objects_in_rendered_collections(self.context.view_layer)
+        return [item for item in sorted(self.context.view_layer.objects,
+                                        key=lambda item: item.name_full)
+                if item.type in GEOMETRY_TYPES and _role(item, None) != 'IGNORE'
+                and (item.hide_render or item not in rendered) and item.visible_get()]
+
+    def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str],
+                               unrendered: list[bpy.types.Object]) -> None:
         """lights: names of the hidden ones, which are not."""
         scene = self.context.scene
         for text in (
                 *left_out.of_render_settings(scene, self.context.view_layer),
                 *left_out.of_world(scene.world), *left_out.of_objects(self._drawn),
                 *left_out.of_materials(scene, self.materials.exported()),
-                *left_out.of_hidden(hidden, lights, GEOMETRY_TYPES)):
+                *left_out.of_hidden(hidden, lights, GEOMETRY_TYPES),
+                *left_out.of_unrendered(unrendered),
+                *left_out.of_modifiers(self._copied, self._untraced)):
             self.result.warnings.add(text)
 
     def _name_showing_materials(self) -> None:
@@ -402,8 +419,8 @@ class _Exporter:
                                                       len(mesh.polygons)):
             return CornerMap(len(mesh.loops))
         corner_map = build_corner_map(mesh, evaluated)
-        if corner_map.filled:
-            self.result.warnings.add(
-                f'"{original.name}": its modifiers keep no trace of {corner_map.filled} of its '
-                f'{corner_map.original_count} corners: they have the light of their neighbours')
+        if corner_map.untraced:
+            self._untraced.append(original.name)
+        if corner_map.copied:
+            self._copied.append(original.name)
         return corner_map
