@@ -248,11 +248,13 @@ TEST(Shoot, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(Shoot, OfSurfacesThatCoincideTheFirstGetsTheLight) {
-    // A sheet on the floor, twice, and a floor that is one side of a solid.
+    // A sheet on the floor, twice, and a floor that is one side of a solid; of other faces each, or
+    // one would stand for all.
     Scene scene;
     place(scene, box("floor", {-1, -1, -1}, {1, 1, 0}, false), grey("", 0.5f));
     for (int k = 0; k < 2; ++k)
-        place(scene, rectangle("sheet", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0.5f));
+        place(scene, grid("sheet", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 1 + k, 2 - k),
+              grey("", 0.5f));
     scene.addLight(pointLight({0.2, 0.1, 1}, glm::dvec3(1)));
     const ShotScene room(scene);
     const FirstShot shot = room.shoot("SHOOT", 1 << 14), gathered = room.shoot("GATHER", 0);

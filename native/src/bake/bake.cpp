@@ -23,6 +23,7 @@
 #include "patches/contacts.h"
 #include "patches/refinement.h"
 #include "patches/reflectance.h"
+#include "reconstruction/left_out_corners.h"
 #include "reconstruction/reconstruction.h"
 #include "reconstruction/shown_light.h"
 #include "reconstruction/stated_error.h"
@@ -209,6 +210,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                     meanOver(tiles, shown.of(lights, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
                     settings.targetError, settings.hasIndependentDirections(), made, report);
+        fillLeftOutCorners(patches, instanceRanges(scene, patches), made, report);
         checkFinite(made);
     }
     report.patches = trace->patches.count();
@@ -223,15 +225,16 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
 void Bake::makePatches(const Scene& scene, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
     progress.report(RB_STAGE_PATCHES, 0);
-    const uint64_t hash = geometryHash(scene, settings);
-    if (settings.skipGeometry && trace && trace->hash == hash && trace->isWhole()) {
+    const uint64_t hash = geometryHash(scene, settings), likeness = likenessHash(scene);
+    if (settings.skipGeometry && trace && trace->isOf(hash, likeness) && trace->isWhole()) {
         assignMaterials(scene, trace->patches);
         report.skipped.push_back({"patches and lines", "geometry unchanged since the last bake",
                                   trace->tracer->bundleCount()});
     } else {
         trace.reset();
         trace = std::make_unique<Trace>(
-            hash, subdivide(scene, settings.patchSize, size_t(settings.maxPatches)), settings);
+            hash, likeness, subdivide(scene, settings.patchSize, size_t(settings.maxPatches)),
+            settings);
     }
     const Patches& patches = trace->patches;
     report.warnings.insert(report.warnings.end(), patches.warnings.begin(), patches.warnings.end());

@@ -51,4 +51,14 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
     return hasher.value();
 }
 
+uint64_t likenessHash(const Scene& scene) {
+    Hasher hasher;
+    for (const Mesh& mesh : scene.meshes) hasher.add(mesh.faceMaterials);
+    for (const Material& material : scene.materials)
+        hasher.add(material.isOpaque(), material.emits());
+    for (const Instance& instance : scene.instances)
+        hasher.add(instance.role, instance.side, instance.lightSet);
+    return hasher.value();
+}
+
 }  // namespace raybundle

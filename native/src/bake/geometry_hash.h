@@ -13,4 +13,8 @@ namespace raybundle {
 // equal hashes are taken to have equal geometry (64 bits).
 uint64_t geometryHash(const Scene& scene, const Settings& settings);
 
+// A hash of what decides beside geometry which faces stand for others in the same place
+// (patches/doubled_faces.h).
+uint64_t likenessHash(const Scene& scene);
+
 }  // namespace raybundle

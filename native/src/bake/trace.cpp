@@ -48,8 +48,8 @@ LineDensity densityOf(const Patches& patches) {
 
 }  // namespace
 
-Trace::Trace(uint64_t hash, Patches made, const Settings& settings)
-    : hash(hash), patches(std::move(made)), visibility(patches), counts(0) {
+Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Settings& settings)
+    : hash(hash), likeness(likeness), patches(std::move(made)), visibility(patches), counts(0) {
     for (const Parent& parent : patches.parents)
         if (parent.stopsDirect != parent.exchanges && !directVisibility)
             directVisibility =

@@ -23,7 +23,7 @@ namespace raybundle {
 // Patches and traced lines, which stay valid as long as the geometry does, and what later bakes
 // with them can go on with.
 struct Trace {
-    Trace(uint64_t hash, Patches made, const Settings& settings);
+    Trace(uint64_t hash, uint64_t likeness, Patches made, const Settings& settings);
 
     // When the patches are as they stay: from here on lines are traced.
     void startLines(const Settings& settings);
@@ -41,6 +41,11 @@ struct Trace {
     // transport uses lines without counting them.
     bool isWhole() const { return tracer && tracer->bundleCount() == counts.bundles; }
 
+    // Whether it is of a scene with these hashes.
+    bool isOf(uint64_t geometry, uint64_t alike) const {
+        return hash == geometry && (likeness == alike || !patches.anyCoincide);
+    }
+
     // Per side: the share that nothing covers.
     std::vector<float> exposedShare() const {
         return surrounding.exposed.empty() ? counts.exposedShare() : surrounding.exposed;
@@ -53,7 +58,8 @@ struct Trace {
     // Through the bounding sphere.
     double linesPerBundle() const;
 
-    const uint64_t hash;  // geometryHash
+    const uint64_t hash;      // geometryHash
+    const uint64_t likeness;  // likenessHash
     Patches patches;
     float touchDistance = 0;  // the largest of all islands, metres
     const Visibility visibility;

@@ -146,11 +146,19 @@ class Subdivision {
         const std::vector<Shell> shells =
             shellsOfFaces(faces, placed.closed(), patches.vertices,
                           [&](uint32_t vertex) { return kThinnest * reachOf[vertex]; });
+        DoubledFaces doubled =
+            findDoubledFaces(scene, faces, placed.firstVertices(), patches.vertices);
+        patches.doubledCorners = std::move(doubled.corners);
+        patches.anyCoincide = doubled.anyCoincide;
         for (size_t i = 0; i < scene.instances.size(); ++i) {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
-            size_t degenerate = 0;
+            size_t degenerate = 0, doubles = 0;
             for (size_t f = 0; f < mesh.faceCount(); ++f) {
                 const size_t firstParent = patches.parents.size(), face = faces.firstFace[i] + f;
+                if (doubled.isDouble[face]) {
+                    ++doubles;
+                    continue;
+                }
                 const uint32_t surface = faces.surface[face];
                 double size = patchSize > 0 ? double(patchSize) : sizes.size[faces.piece[face]];
                 if (!(size > 0)) size = 1;
@@ -175,6 +183,11 @@ class Subdivision {
                 patches.warnings.push_back("object \"" + scene.instances[i].name +
                                            "\": " + std::to_string(degenerate) +
                                            " faces of zero area were left out");
+            if (doubles)
+                patches.warnings.push_back(
+                    "object \"" + scene.instances[i].name + "\": " + std::to_string(doubles) +
+                    " faces lie on others that look the same way, whose light they get; merge such "
+                    "faces (Merge by Distance), or remove the object if it lies on another");
         }
         measureSurfaces(faces.surfaceCount);
         patches.finest = INFINITY;

@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "patches/doubled_faces.h"
 #include "patches/sheets.h"
 #include "scene/scene.h"
 
@@ -146,6 +147,9 @@ struct Patches {
     size_t tileCount = 0;
     std::vector<std::string> warnings;
     size_t degenerateFaces = 0;  // left out
+    // Of faces that are left out since others stand for them.
+    std::vector<DoubledCorner> doubledCorners;
+    bool anyCoincide = false;  // whether there are faces that might stand for others
 
     size_t count() const { return area.size(); }
     // Share of the light that a patch stops.

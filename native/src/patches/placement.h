@@ -32,6 +32,8 @@ class Placement {
         return welded[firstVertex[instance] + size_t(ofMesh)];
     }
     const WeldedFaces& faces() const { return allFaces; }
+    // Of each instance, into Patches::vertices.
+    const std::vector<size_t>& firstVertices() const { return firstVertex; }
     // Per surface of them.
     const std::vector<bool>& closed() const { return closedOnes; }
     const PatchSizes& sizes() const { return patchSizes; }

@@ -90,6 +90,10 @@ struct Material {
     std::array<glm::vec3, 2> translucenceImageWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
 
     bool isOpaque() const { return opacity >= 1 && opacityImage < 0; }
+    bool emits() const {
+        return emissionImage >= 0 || emissionUsesCornerColors || emission[0] != glm::vec3(0.0f) ||
+               emission[1] != glm::vec3(0.0f);
+    }
     bool isTranslucent() const {
         return translucenceImage >= 0 || translucence[0] != glm::vec3(0.0f) ||
                translucence[1] != glm::vec3(0.0f);
