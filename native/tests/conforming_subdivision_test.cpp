@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 
 #include "scene/triangulation.h"
 #include "test_scenes.h"
@@ -122,6 +123,87 @@ TEST(ConformingSubdivision, NonManifoldMeshesSurvive) {
     const Mesh bow = polygons("bow", {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 0, 0}, {-1, -1, 0}},
                               {{0, 1, 2}, {0, 3, 4}});
     expectGoodSubdivision(bow, subdivideConforming(bow, 0.2f), 0.2, 1);
+}
+
+// A wall of n x n squares, every other column cut in half, with triangles in the T-junctions whose
+// height is a share of their edge.
+Mesh filledWall(int n, float height) {
+    std::vector<glm::vec3> vertices;
+    std::vector<std::vector<int32_t>> faces;
+    std::map<std::pair<int, int>, int32_t> corners;
+    auto corner = [&](int i, int j) {
+        const auto [found, isNew] = corners.try_emplace({i, j}, int32_t(vertices.size()));
+        if (isNew) vertices.push_back({i, j, 0});
+        return found->second;
+    };
+    auto middle = [&](float x, float y) {
+        vertices.push_back({x, y, 0});
+        return int32_t(vertices.size()) - 1;
+    };
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+            const int32_t a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
+                          d = corner(i, j + 1);
+            if (i % 2 == 0) {
+                faces.push_back({a, b, c, d});
+                continue;
+            }
+            const int32_t left = middle(float(i) + height, float(j) + 0.5f),
+                          right = middle(float(i + 1) - height, float(j) + 0.5f);
+            faces.insert(faces.end(),
+                         {{a, b, right, left}, {left, right, c, d}, {a, left, d}, {b, c, right}});
+        }
+    return polygons("wall", vertices, faces);
+}
+
+TEST(ConformingSubdivision, SliversAreTakenOutAndTJunctionsConform) {
+    for (const float height : {0.0f, 1e-9f, 1e-7f, 1e-6f}) {
+        const Mesh mesh = filledWall(8, height);
+        const ConformingSubdivision s = subdivideConforming(mesh, 0.3f);
+        EXPECT_NEAR(meshArea(s), 64, 1e-3) << height;
+        double border = 0;
+        for (const auto& [edge, count] : edgeUse(s)) {
+            ASSERT_LE(count, 2) << height;
+            if (count == 1)
+                border +=
+                    glm::distance(s.vertices[size_t(edge.first)], s.vertices[size_t(edge.second)]);
+        }
+        EXPECT_NEAR(border, 32, 1e-2) << height << ": a T-junction makes the border longer";
+        for (size_t t = 0; t < s.triangles.size(); ++t) {
+            const glm::dvec3 a = corner(s, t, 0), b = corner(s, t, 1), c = corner(s, t, 2);
+            const double longest =
+                std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+            ASSERT_GT(glm::length(glm::cross(b - a, c - a)), 1e-2 * longest * longest) << height;
+            ASSERT_LE(longest, 0.30001) << height;
+        }
+    }
+}
+
+TEST(ConformingSubdivision, AnyMeshOfSliversIsCutToFiniteTriangles) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> place(0, 1);
+    for (int round = 0; round < 200; ++round) {
+        // Triangles between few points of a line, doubled points and the corners of a square.
+        std::vector<glm::vec3> vertices{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+        for (int k = 0; k < 8; ++k) vertices.push_back({place(random), 0, 0});
+        for (int k = 0; k < 4; ++k)
+            vertices.push_back(vertices[random() % 12] + glm::vec3(0, 0, 1e-7f * place(random)));
+        std::vector<std::vector<int32_t>> faces;
+        for (int k = 0; k < 20; ++k) {
+            const int32_t a = int32_t(random() % 16), b = int32_t(random() % 16),
+                          c = int32_t(random() % 16);
+            if (a != b && b != c && c != a) faces.push_back({a, b, c});
+        }
+        const ConformingSubdivision s =
+            subdivideConforming(polygons("slivers", vertices, faces), 0.25f);
+        ASSERT_LT(s.triangles.size(), 20000u) << round;
+        for (size_t t = 0; t < s.triangles.size(); ++t)
+            for (size_t k = 0; k < 3; ++k) {
+                ASSERT_LE(glm::distance(corner(s, t, k), corner(s, t, (k + 1) % 3)), 0.25001)
+                    << round;
+                for (float weight : s.sourceWeights[3 * t + k]) ASSERT_TRUE(weight >= 0) << round;
+            }
+    }
 }
 
 }  // namespace

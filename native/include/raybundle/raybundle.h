@@ -205,7 +205,8 @@ RB_API rb_error rb_set_material_translucence(rb_scene scene, int32_t material,
  *   face_offsets     face_count + 1 ascending positions in corner_vertices, of 3 corners or more
  *   face_materials   face_count material ids, or NULL for a grey (0.8) default material
  *
- * Faces of zero area are left out with a warning in the report. Id in *mesh. */
+ * Faces without area, or with none but by rounding, are left out with a warning in the report; their
+ * corners get the light of the other corners at their vertices. Id in *mesh. */
 RB_API rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices,
                             size_t vertex_count, const int32_t* corner_vertices,
                             size_t corner_count, const int32_t* face_offsets, size_t face_count,

@@ -25,6 +25,8 @@ constexpr double kMostPixelsEach = 64;
 // An object of less than this share of the surface of its box is dust or wires: nearly all lines of
 // a window would pass it by. It gathers with local rays.
 constexpr double kLeastFilled = 1e-3;
+// Starved patches that are less than this share of their object's area have no windows.
+constexpr double kCrumbs = 1e-3;
 // What a window costs besides its pixels, in pixels: looking whether the parents meet it.
 constexpr double kWindowCost = 500, kParentCost = 1.0 / 32;
 constexpr double kWorthSplitting = 0.97;  // share of the cost that splitting must come below
@@ -289,12 +291,38 @@ struct IslandDensity {
     }
 };
 
+// Without the starved patches of objects that hardly have any by area: slivers between large faces,
+// whose light is that of what lies beside them.
+Members withoutCrumbs(const Patches& patches, const Members& members, double starvedArea) {
+    auto isStarved = [&](const Parent& parent) {
+        return double(patches.area[parent.firstPatch]) < starvedArea;
+    };
+    std::vector<double> area, starved;  // per instance
+    for (uint32_t m : members) {
+        const Parent& parent = patches.parents[m];
+        if (parent.instance >= area.size()) {
+            area.resize(parent.instance + 1, 0.0);
+            starved.resize(parent.instance + 1, 0.0);
+        }
+        area[parent.instance] += double(parent.area());
+        if (isStarved(parent)) starved[parent.instance] += double(parent.area());
+    }
+    Members rest;
+    for (uint32_t m : members) {
+        const Parent& parent = patches.parents[m];
+        if (!isStarved(parent) || starved[parent.instance] > kCrumbs * area[parent.instance])
+            rest.push_back(m);
+    }
+    return rest;
+}
+
 void findWindows(const Patches& patches, const Clustering& clustering, float pixelsPerPatch,
                  float leastPixelSize, IslandDensity& island) {
     LineDensity& density = island.density;
-    const Members members = clustering.withoutDust(island.members);
     const double starvedArea =
         kStarvedPixels * double(density.pixelSize) * double(density.pixelSize);
+    const Members members =
+        withoutCrumbs(patches, clustering.withoutDust(island.members), starvedArea);
     size_t starved = 0;
     double logSum = 0;
     for (uint32_t m : members) {

@@ -3,7 +3,10 @@
 // Longest-edge bisection on OpenMesh's half-edges (the rule of its
 // Subdivider::Uniform::LongestEdgeT). Differs: faces keep their source triangle through the splits;
 // edges with more than two faces, which OpenMesh cannot hold, are cut open, and may then be
-// bisected differently on their sides.
+// bisected differently on their sides. Slivers, triangles that are flat but for a rounding error, as
+// booleans leave them and as T-junctions are filled with, are taken out before: a short edge is
+// collapsed, else the longest edge is flipped, so that the triangle beyond it gets the sliver's
+// third vertex.
 #include "patches/conforming_subdivision.h"
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
@@ -25,6 +28,11 @@ struct Traits : OpenMesh::DefaultTraits {
 using TriMesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 
 constexpr size_t kMaxTriangles = size_t(1) << 26;
+// A triangle is a sliver where its height is less than this share of its longest edge, some times the
+// rounding of what lies ten edges from the origin.
+constexpr double kFlat = 1e-5;
+// Flips and collapses, for each sliver: those that hang together may turn into each other.
+constexpr size_t kMostSteps = 16;
 
 // A triangle of the source mesh before any bisection.
 struct SourceTriangle {
@@ -51,12 +59,74 @@ std::array<float, 3> barycentric(const OpenMesh::Vec3d& p,
     return {float(first / sum), float(second / sum), float(third / sum)};
 }
 
+using SourceOf = OpenMesh::FProp<int>;  // index of a face's SourceTriangle
+
+// Halfedges of a face: the one of its longest edge and the one of its shortest, and whether it is a
+// sliver.
+struct Shape {
+    TriMesh::HalfedgeHandle longest, shortest;
+    bool isSliver, hasPoint;  // hasPoint: the shortest edge is no longer than a sliver is high
+
+    Shape(const TriMesh& mesh, TriMesh::FaceHandle face) {
+        double most = -1, least = INFINITY, area = 0;
+        std::vector<OpenMesh::Vec3d> corners;
+        for (const auto edge : mesh.fh_range(face)) {
+            const double length = mesh.calc_edge_length(edge);
+            if (length > most) {
+                most = length;
+                longest = edge;
+            }
+            if (length < least) {
+                least = length;
+                shortest = edge;
+            }
+            corners.push_back(mesh.point(mesh.from_vertex_handle(edge)));
+        }
+        area = ((corners[1] - corners[0]) % (corners[2] - corners[0])).norm();
+        isSliver = area <= kFlat * most * most;
+        hasPoint = least <= kFlat * most;
+    }
+};
+
+void takeOutSlivers(TriMesh& mesh, SourceOf& sourceTriangle) {
+    std::vector<TriMesh::FaceHandle> pending;
+    for (const auto face : mesh.faces())
+        if (Shape(mesh, face).isSliver) pending.push_back(face);
+    if (pending.empty()) return;
+    mesh.request_face_status();
+    mesh.request_edge_status();
+    mesh.request_vertex_status();
+    mesh.request_halfedge_status();
+    size_t steps = kMostSteps * pending.size();
+    while (!pending.empty()) {
+        const TriMesh::FaceHandle face = pending.back();
+        pending.pop_back();
+        if (mesh.status(face).deleted()) continue;
+        const Shape shape(mesh, face);
+        if (!shape.isSliver) continue;
+        const TriMesh::EdgeHandle edge = mesh.edge_handle(shape.longest);
+        const bool mayTurn = steps > 0;
+        steps -= mayTurn;
+        if (mayTurn && shape.hasPoint && mesh.is_collapse_ok(shape.shortest)) {
+            mesh.collapse(shape.shortest);
+        } else if (mayTurn && !shape.hasPoint && mesh.is_flip_ok(edge)) {
+            const TriMesh::FaceHandle beyond = mesh.opposite_face_handle(shape.longest);
+            sourceTriangle[face] = sourceTriangle[beyond];
+            mesh.flip(edge);
+            pending.insert(pending.end(), {face, beyond});
+        } else {
+            mesh.delete_face(face, true);
+        }
+    }
+    mesh.garbage_collection();
+}
+
 }  // namespace
 
 ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
     omerr().disable();  // what it would print is handled below
     TriMesh mesh;
-    OpenMesh::FProp<int> sourceTriangle(mesh);
+    SourceOf sourceTriangle(mesh);
     std::vector<SourceTriangle> sourceTriangles;
     std::vector<TriMesh::VertexHandle> handles;
     for (const glm::vec3& v : source.vertices) handles.push_back(mesh.add_vertex({v.x, v.y, v.z}));
@@ -87,6 +157,8 @@ ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
             sourceTriangles.push_back(triangle);
         }
     }
+
+    takeOutSlivers(mesh, sourceTriangle);
 
     // Bisect the longest edge until all are short enough.
     using Entry = std::pair<double, int>;  // squared length, edge index

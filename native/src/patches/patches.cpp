@@ -118,6 +118,11 @@ constexpr double kMaxElongation = 4.0;
 // More elongated still, it is cut across, into as many pieces as it is long: bisections would end in
 // the power 1.6 of that, one above the other.
 constexpr double kNeedle = 16.0;
+// Faces are left out whose height is less than this share of their longest edge; and those that are
+// less high than what rounding makes of their coordinates, by this many epsilons, and so much longer
+// that they are no small faces of a large scene: their normals would be rounding alone.
+constexpr double kFlat = 1e-7;
+constexpr double kFlatEpsilons = 4, kSliver = 1e-2;
 // Share of the edge by which the fourth corner of a parallelogram may be off.
 constexpr double kParallelogramTolerance = 1e-4;
 constexpr int kMaxGrid = 4096;
@@ -180,9 +185,9 @@ class Subdivision {
             }
             patches.degenerateFaces += degenerate;
             if (degenerate)
-                patches.warnings.push_back("object \"" + scene.instances[i].name +
-                                           "\": " + std::to_string(degenerate) +
-                                           " faces of zero area were left out");
+                patches.warnings.push_back(
+                    "object \"" + scene.instances[i].name + "\": " + std::to_string(degenerate) +
+                    " faces without area, or with none but by rounding, were left out");
             if (doubles)
                 patches.warnings.push_back(
                     "object \"" + scene.instances[i].name + "\": " + std::to_string(doubles) +
@@ -244,13 +249,16 @@ class Subdivision {
             const Triangle triangle{worldVertex(instance, corners[t[0]]),
                                     worldVertex(instance, corners[t[1]]),
                                     worldVertex(instance, corners[t[2]])};
-            if (isDegenerate(triangle)) continue;
-            any = true;
-            const uint32_t cell = addCell(instance, face, points[t[0]], points[t[1]], points[t[2]],
-                                          {corners[t[0]], corners[t[1]], corners[t[2]], -1});
             const double longest = std::max({glm::length(points[t[1]] - points[t[0]]),
                                              glm::length(points[t[2]] - points[t[1]]),
                                              glm::length(points[t[0]] - points[t[2]])});
+            const uint32_t cell = addCell(instance, face, points[t[0]], points[t[1]], points[t[2]],
+                                          {corners[t[0]], corners[t[1]], corners[t[2]], -1});
+            if (isFlat(points[t[0]], points[t[1]], points[t[2]])) {
+                patches.cells[cell].hasPatches = false;
+                continue;
+            }
+            any = true;
             const glm::dvec3 normal =
                 glm::cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]);
             cutTriangle({instance, face, cell, glm::vec3(glm::normalize(normal))}, triangle,
@@ -267,16 +275,18 @@ class Subdivision {
     static bool isParallelogram(const std::vector<glm::dvec3>& p) {
         const double longest = std::max(glm::length(p[1] - p[0]), glm::length(p[3] - p[0]));
         const double off = glm::length(p[0] - p[1] + p[2] - p[3]);
-        const double area = glm::length(glm::cross(p[1] - p[0], p[3] - p[0]));
-        return off <= kParallelogramTolerance * longest && area > 1e-6 * longest * longest;
+        return off <= kParallelogramTolerance * longest && !isFlat(p[0], p[1], p[3]);
     }
 
-    bool isDegenerate(const Triangle& v) const {
-        const glm::dvec3 p0 = patches.vertices[v[0]], p1 = patches.vertices[v[1]],
-                         p2 = patches.vertices[v[2]];
+    // Whether a triangle, or the parallelogram that it is half of, has no area but for rounding.
+    static bool isFlat(const glm::dvec3& p0, const glm::dvec3& p1, const glm::dvec3& p2) {
         const double longest =
             std::max({glm::length(p1 - p0), glm::length(p2 - p1), glm::length(p0 - p2)});
-        return glm::length(glm::cross(p1 - p0, p2 - p0)) <= 1e-7 * longest * longest;
+        const double height = glm::length(glm::cross(p1 - p0, p2 - p0)) / longest;
+        const glm::dvec3 most = glm::max(glm::abs(p0), glm::max(glm::abs(p1), glm::abs(p2)));
+        const double rounding =
+            kFlatEpsilons * double(FLT_EPSILON) * std::max({most.x, most.y, most.z});
+        return !(height > std::max(kFlat * longest, std::min(rounding, kSliver * longest)));
     }
 
     static uint16_t gridCount(double length, double size) {

@@ -93,6 +93,7 @@ struct Cell {
     std::array<int32_t, 4> corner;  // of the mesh; [3] is -1 for a triangle
     uint32_t instance = 0;
     int32_t face = 0;
+    bool hasPatches = true;  // slivers have none, but join what lies beside them
 
     bool isTriangle() const { return corner[3] < 0; }
     // Of corner k, relative to Patches::centre.

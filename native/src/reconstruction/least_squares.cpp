@@ -179,6 +179,8 @@ std::vector<std::vector<glm::vec3>> leastSquares(
         }
         terms.addPatches(node, square);
     }
+    // Slivers have no patches: nothing covers them.
+    std::replace(openness.begin(), openness.end(), 0.0, 1.0);
     addRegularization(patches, range, regions, openness, double(regularization), terms);
     const Eigen::SparseMatrix<double> matrix = terms.matrix();
 

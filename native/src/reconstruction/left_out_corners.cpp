@@ -44,8 +44,8 @@ void fillLeftOutCorners(const Patches& patches, const std::vector<InstanceRange>
     for (size_t i = 0; i < light.size(); ++i) {
         if (light[i].direct.empty()) continue;
         known[i].assign(light[i].direct.size(), false);
-        for (uint32_t c = ranges[i].firstCell; c < ranges[i].lastCell; ++c)
-            for (int32_t corner : patches.cells[c].corner)
+        for (uint32_t p = ranges[i].firstParent; p < ranges[i].lastParent; ++p)
+            for (int32_t corner : patches.cells[patches.parents[p].cell].corner)
                 if (corner >= 0) known[i][size_t(corner)] = true;
     }
     for (const DoubledCorner& corner : patches.doubledCorners) {
@@ -59,7 +59,7 @@ void fillLeftOutCorners(const Patches& patches, const std::vector<InstanceRange>
             to, [&](Values& field) { field[corner.corner] = (*values[next++])[corner.ofCorner]; });
         to.error[corner.corner] = from.error[corner.ofCorner];
         known[corner.instance][corner.corner] = true;
-        if (ranges[corner.instance].lastCell == 0)
+        if (ranges[corner.instance].lastParent == 0)
             report.objects[corner.instance].error = report.objects[corner.ofInstance].error;
     }
     for (size_t i = 0; i < light.size(); ++i)

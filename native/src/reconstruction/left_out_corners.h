@@ -14,7 +14,7 @@
 
 namespace raybundle {
 
-// ranges: of the cells of each instance. Sets the light and the errors of such corners, and the stated
+// ranges: of the parents of each instance. Sets the light and the errors of such corners, and the stated
 // error of objects of which they are all.
 void fillLeftOutCorners(const Patches& patches, const std::vector<InstanceRange>& ranges,
                         std::vector<InstanceLight>& light, Report& report);

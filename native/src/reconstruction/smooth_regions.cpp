@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 namespace raybundle {
@@ -18,6 +19,12 @@ struct HalfEdge {
     int32_t from, to;  // corners
     bool ascending;    // from the smaller vertex to the larger
 };
+
+glm::vec3 placeOf(const Cell& cell, int32_t corner) {
+    int k = 0;
+    while (cell.corner[size_t(k)] != corner) ++k;
+    return cell.position(k);
+}
 
 uint32_t root(std::vector<uint32_t>& parent, uint32_t i) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
@@ -45,8 +52,29 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
         if (!mesh.cornerNormals.empty()) return glm::vec3(mesh.cornerNormals[corner]);
         return glm::normalize(glm::cross(cells[cell].a, cells[cell].b));
     };
+    // The normal of a sliver is rounding alone: that of what lies beyond its longest edge stands for
+    // it, by its corners.
+    auto isLongest = [&](const HalfEdge& e) {
+        const Cell& cell = cells[e.cell];
+        const float length = glm::distance(placeOf(cell, e.from), placeOf(cell, e.to));
+        return length >=
+               std::max({glm::length(cell.a), glm::length(cell.b), glm::distance(cell.a, cell.b)});
+    };
+    std::map<uint32_t, glm::vec3> beyond;  // of slivers
+    for (size_t i = 0; i + 1 < halfEdges.size(); ++i)
+        for (size_t k : {i, i + 1}) {
+            const HalfEdge &e = halfEdges[k], &f = halfEdges[2 * i + 1 - k];
+            if (!cells[e.cell].hasPatches && cells[f.cell].hasPatches && e.key == f.key &&
+                isLongest(e))
+                beyond[e.cell] = normalAt(f.cell, f.from);
+        }
     auto joins = [&](const HalfEdge& e, int32_t corner, const HalfEdge& f, int32_t other) {
-        return glm::dot(normalAt(e.cell, corner), normalAt(f.cell, other)) >= kSameNormal;
+        auto normalOf = [&](const HalfEdge& edge, int32_t at) {
+            const auto found = beyond.find(edge.cell);
+            return found != beyond.end() ? found->second : normalAt(edge.cell, at);
+        };
+        return glm::dot(normalAt(e.cell, corner), normalAt(f.cell, other)) >= kSameNormal ||
+               glm::dot(normalOf(e, corner), normalOf(f, other)) >= kSameNormal;
     };
 
     SmoothRegions regions;

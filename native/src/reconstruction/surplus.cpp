@@ -12,6 +12,9 @@ namespace {
 
 // The light of a patch more covered than this is too uncertain to compare.
 constexpr float kHalfCovered = 0.5f;
+// Patches less high than this share of their longest edge say nothing: their neighbours lie at no
+// distance, or far away.
+constexpr float kThin = 0.02f;
 // Mean squares of second derivatives times edges to mean squares of distance. Two of four
 // neighbours lie along each axis, and both see the mixed derivative.
 constexpr float kStraight = 1.0f / 360, kMixed = 1.0f / 144;
@@ -82,13 +85,17 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
         const glm::vec3 axisA = glm::normalize(parent.a);
         const glm::vec3 axisB = glm::cross(parent.normal, axisA);
         const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
+        const float longest =
+            std::max({glm::length(parent.a), glm::length(parent.b),
+                      parent.isTriangle ? glm::distance(parent.a, parent.b) : 0.0f});
+        const bool isThin = glm::length(glm::cross(parent.a, parent.b)) < kThin * longest * longest;
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t patch = parent.firstPatch + k;
             Site& site = sites[patch - first];
             site.centre = parent.position(parent.pointOn(k, middle));
             site.axisA = axisA;
             site.axisB = axisB;
-            site.isUsed = exposed[2 * patch + uint32_t(side)] > kHalfCovered;
+            site.isUsed = !isThin && exposed[2 * patch + uint32_t(side)] > kHalfCovered;
             site.wanted = parent.isTriangle ? 3 : 4;
         }
     }
