@@ -26,6 +26,7 @@ from .scene_data import MeshData
 from .scene_export import BakeTarget, SceneExport, export_scene
 from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
                               subdivide)
+from .warning_lines import grouped
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
             entry['attribute'] = light_set.attribute
         report.objects = objects + [ObjectReport(name, 0, status)
                                     for name, status in export.statuses.items()]
-        report.warnings = list(dict.fromkeys([*export.warnings, *report.warnings]))
+        report.warnings = grouped([*export.warnings, *report.warnings])
         finished = time.perf_counter()
         report.seconds.update(export=export_seconds, write_back=finished - write_started,
                               total=finished - started)
