@@ -3,6 +3,8 @@
 
 import inspect
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import bpy
@@ -28,6 +30,13 @@ def test_register_unregister_register():
     assert bpy.context.scene.raybundle.attribute == "Radiosity"
     for name in OPERATORS:
         assert getattr(bpy.ops.raybundle, name).get_rna_type().description
+
+
+@pytest.mark.skipif(bool(bpy.app.binary_path), reason="of Blender as a module")
+def test_python_ends_well_after_it_was_registered():
+    addon = Path(raybundle.__file__).parent.parent
+    code = f"import sys; sys.path.insert(0, {str(addon)!r}); import bpy, raybundle; raybundle.register()"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_names_that_scripts_use():

@@ -671,8 +671,9 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
     shader = shader_of(principled)
     base = np.array([0.8, 0.4, 0.0])
     shader.inputs['Base Color'].default_value = (*base, 1.0)
-    albedo = principled_albedo(0.5, 0.5, shader.inputs['IOR'].default_value, 0.0,
-                               shader.distribution == 'MULTI_GGX', base, 1.0)
+    albedo, alone = (principled_albedo(0.5, 0.5, shader.inputs['IOR'].default_value, 0.0,
+                                       shader.distribution == 'MULTI_GGX', base, filter_glossy)
+                     for filter_glossy in (1.0, None))
     material, result = exported_material(principled)
     assert result.warnings == []
     # Of F0 = 0.04 or a little less.
@@ -680,7 +681,7 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
     assert material.reflectance[0] == pytest.approx(albedo.diffuse * base + albedo.specular)
     assert diffuse_of(material) == pytest.approx(albedo.shown * base)
     bpy.context.scene.cycles.caustics_reflective = False
-    assert exported_material(principled)[0].reflectance[0] == pytest.approx(albedo.diffuse * base)
+    assert exported_material(principled)[0].reflectance[0] == pytest.approx(alone.diffuse * base)
 
 
 def test_gloss_beside_an_image(principled):

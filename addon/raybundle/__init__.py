@@ -4,6 +4,10 @@
 From Python: raybundle.bake(bpy.context, ...) -> BakeReport.
 """
 
+import atexit
+
+import bpy
+
 from . import bake_cache, operators, panels, properties
 from .bake import bake
 from .bake_report import BakeError, BakeReport
@@ -27,9 +31,13 @@ def register() -> None:
     bake_cache.register()
     operators.register()
     panels.register()
+    # Blender as a module frees the classes of panels when Python has ended, and crashes by it (4.2).
+    if not bpy.app.binary_path:
+        atexit.register(unregister)
 
 
 def unregister() -> None:
+    atexit.unregister(unregister)
     panels.unregister()
     operators.unregister()
     bake_cache.unregister()
