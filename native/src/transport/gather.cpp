@@ -6,6 +6,7 @@
 // Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error).
 // Differs: the thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer
 // it is. Gathering spends its rays where the light is to be known (transport/direct_light.h).
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -20,6 +21,8 @@ namespace {
 // So many times the error of a result may be that of light on other sides: what it lights gets it
 // from many of them.
 constexpr float kOthersError = 2;
+// At most so many times: of sides that reflect nothing, whose light only the energy balance has.
+constexpr float kMostError = 10;
 
 }  // namespace
 
@@ -45,6 +48,18 @@ std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
 }
 
 namespace {
+
+// So many times the error of a result may be that of a side whose light is not shown. What it lights
+// gets it from many such sides, whose errors even out: the variance of their sum goes with the area
+// of each, beside that of all.
+float othersError(const Patches& patches, uint32_t side) {
+    if (patches.reflectance[side] == glm::vec3(0.0f) &&
+        patches.translucenceOf(side ^ 1) == glm::vec3(0.0f))
+        return kMostError;
+    const float edge = patches.islandAt(side).size;
+    return kOthersError *
+           std::max(1.0f, edge / std::sqrt(std::max(patches.area[side / 2], 1e-30f)));
+}
 
 // By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
 CoarseShot coarseOfPatches(const FirstShotInput& input,
@@ -90,7 +105,8 @@ FirstShot gather(const FirstShotInput& input) {
             receiver.errorFactor = std::ldexp(1.0f, level);
         if (input.isShown && !(*input.isShown)[side]) {
             receiver.isShown = false;
-            receiver.errorFactor *= kOthersError;
+            receiver.errorFactor =
+                std::min(receiver.errorFactor * othersError(patches, uint32_t(side)), kMostError);
         }
         return receiver;
     };
