@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 import bpy
 
 from .node_reader import output_node
+from .warning_lines import listed
 
 # Whatever a mesh is not made of.
 UNREAD_TYPES = {
@@ -31,7 +32,6 @@ _DATA_DETAIL = {'CURVE': ('resolution_u', 'render_resolution_u'),
                 'SURFACE': ('resolution_u', 'render_resolution_u'),
                 'FONT': ('resolution_u', 'render_resolution_u'),
                 'META': ('resolution', 'render_resolution')}
-_MOST_NAMES = 3
 NO_CAUSTICS = "its Shadow Caustics are not read: light goes straight on through glass"
 
 
@@ -97,10 +97,10 @@ def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Mat
             glassy.append(f'"{material.name}"')
     if turned:
         yield (f"normal maps are not read, light is that of the surfaces without them: "
-               f"{_listed(turned)}: unlink them to compare with Cycles")
+               f"{listed(turned)}: unlink them to compare with Cycles")
     if glassy and not getattr(getattr(scene, 'cycles', None), 'caustics_refractive', True):
         yield (f"Refractive Caustics are off, by which glass stops reflected light in Cycles; here "
-               f"it passes: {_listed(glassy)}: switch them on to compare")
+               f"it passes: {listed(glassy)}: switch them on to compare")
 
 
 def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
@@ -153,7 +153,7 @@ def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
         differing += [f'"{item.name}" ({how})' for how in _differences(item)]
     if differing:
         yield (f"geometry is as the viewport shows it, and not as renders do: "
-               f"{_listed(differing)}: make both alike")
+               f"{listed(differing)}: make both alike")
 
 
 def _of_hair(item: bpy.types.Object) -> Iterator[str]:
@@ -199,19 +199,17 @@ def has_light_linking(item: bpy.types.Object) -> bool:
     return bool(linking and (linking.receiver_collection or linking.blocker_collection))
 
 
-def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str], types: Iterable[str]
-              ) -> Iterator[str]:
-    """hidden: in the viewport but not in renders, original; lights: names of the lamps among them,
-    which shine; types: those of objects that would take part."""
+def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iterator[str]:
+    """hidden: surfaces that the viewport hides and renders do not, original; lights: names of such
+    lamps, which shine."""
     shining = [f'"{name}"' for name in dict.fromkeys(lights)]
     if shining:
-        yield (f"lights that are hidden in the viewport shine, as in Cycles: {_listed(shining)}: "
+        yield (f"lights that are hidden in the viewport shine, as in Cycles: {listed(shining)}: "
                f"disable them in renders to switch them off")
-    names = [f'"{item.name}"' for item in hidden
-             if item.type in types and item.raybundle.role != 'IGNORE']
+    names = [f'"{item.name}"' for item in hidden]
     if names:
         yield (f"what is hidden in the viewport is left out, though Cycles renders it: "
-               f"{_listed(names)}: show it, or disable it in renders as well")
+               f"{listed(names)}: show it, or disable it in renders as well")
 
 
 def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
@@ -219,7 +217,7 @@ def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
     bounds, as those that cut others are, is not missed."""
     names = [f'"{item.name}"' for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')]
     if names:
-        yield (f"what is hidden in renders is left out, as by Cycles: {_listed(names)}: enable it "
+        yield (f"what is hidden in renders is left out, as by Cycles: {listed(names)}: enable it "
                f"in renders to bake it")
 
 
@@ -229,13 +227,8 @@ def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str
     names = [f'"{name}"' for name in copied]
     if names:
         yield (f"modifiers make several faces of one, and all show the light of that in its place: "
-               f"{_listed(names)}: apply the modifiers to light each by itself")
+               f"{listed(names)}: apply the modifiers to light each by itself")
     names = [f'"{name}"' for name in untraced]
     if names:
         yield (f"modifiers keep no trace of some corners, which have the light of what lies "
-               f"nearest: {_listed(names)}: apply the modifiers for their own")
-
-
-def _listed(names: list[str]) -> str:
-    text = ", ".join(names[:_MOST_NAMES])
-    return text if len(names) <= _MOST_NAMES else f"{text} and {len(names) - _MOST_NAMES} more"
+               f"nearest: {listed(names)}: apply the modifiers for their own")

@@ -224,16 +224,12 @@ class _Exporter:
                 self._add_geometry(instance)
             elif item.type in left_out.UNREAD_TYPES:
                 self._refuse(item.name, left_out.UNREAD_TYPES[item.type])
-        hidden, unrendered = self._hidden(), self._unrendered()
-        for items, where in ((hidden, "the viewport"), (unrendered, "renders")):
-            for item in items:
-                if item.type in GEOMETRY_TYPES and _role(item, None) != 'IGNORE':
-                    self.result.statuses.setdefault(item.name, f"hidden in {where}")
+        hidden = self._hidden()
         lights = self.result.scene.lights
         shown = len(lights)
         for instance in hidden_light_instances(self.context, hidden):
             self._add_light(instance)
-        self._name_what_is_left_out(hidden, [light.name for light in lights[shown:]], unrendered)
+        self._name_what_is_left_out(hidden, [light.name for light in lights[shown:]])
         scene = self.result.scene
         world = export_world(self.context, self.materials.images, self.result.warnings)
         scene.world, scene.world_image = world.radiance, world.image
@@ -259,18 +255,23 @@ class _Exporter:
         rendered = _objects_in_rendered_collections(self.context.view_layer)
         return [item for item in sorted(self.context.view_layer.objects,
                                         key=lambda item: item.name_full)
-                if item.type in GEOMETRY_TYPES and _role(item, None) != 'IGNORE'
-                and (item.hide_render or item not in rendered) and item.visible_get()]
+                if (item.hide_render or item not in rendered) and item.visible_get()]
 
-    def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str],
-                               unrendered: list[bpy.types.Object]) -> None:
+    def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str]) -> None:
         """lights: names of the hidden ones, which are not."""
         scene = self.context.scene
+        hidden, unrendered = (
+            [item for item in items
+             if item.type in GEOMETRY_TYPES and _role(item, None) != 'IGNORE']
+            for items in (hidden, self._unrendered()))
+        for items, where in ((hidden, "the viewport"), (unrendered, "renders")):
+            for item in items:
+                self.result.statuses.setdefault(item.name, f"hidden in {where}")
         for text in (
                 *left_out.of_render_settings(scene, self.context.view_layer),
                 *left_out.of_world(scene.world), *left_out.of_objects(self._drawn),
                 *left_out.of_materials(scene, self.materials.exported()),
-                *left_out.of_hidden(hidden, lights, GEOMETRY_TYPES),
+                *left_out.of_hidden(hidden, lights),
                 *left_out.of_unrendered(unrendered),
                 *left_out.of_modifiers(self._copied, self._untraced)):
             self.result.warnings.add(text)

@@ -37,10 +37,12 @@ def grouped(lines: Iterable[str]) -> list[str]:
             if counts[0] is not None:
                 total = sum(int(count['count']) for count in counts)
                 said = f": {total} {counts[0]['counted']}"
-            result.append(f"{kind}{listed([match['name'] for match in matches])}{said}")
+            names = listed([f'"{match["name"]}"' for match in matches], _MOST_NAMES)
+            result.append(f"{kind}{names}{said}")
     return result
 
 
-def listed(names: list[str], most: int = _MOST_NAMES) -> str:
-    text = ", ".join(f'"{name}"' for name in names[:most])
-    return text if len(names) <= most else f"{text} and {len(names) - most} more"
+def listed(items: list[str], most: int = 3) -> str:
+    """The first of them, and how many more there are."""
+    text = ", ".join(items[:most])
+    return text if len(items) <= most else f"{text} and {len(items) - most} more"

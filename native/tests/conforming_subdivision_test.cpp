@@ -125,40 +125,9 @@ TEST(ConformingSubdivision, NonManifoldMeshesSurvive) {
     expectGoodSubdivision(bow, subdivideConforming(bow, 0.2f), 0.2, 1);
 }
 
-// A wall of n x n squares, every other column cut in half, with triangles in the T-junctions whose
-// height is a share of their edge.
-Mesh filledWall(int n, float height) {
-    std::vector<glm::vec3> vertices;
-    std::vector<std::vector<int32_t>> faces;
-    std::map<std::pair<int, int>, int32_t> corners;
-    auto corner = [&](int i, int j) {
-        const auto [found, isNew] = corners.try_emplace({i, j}, int32_t(vertices.size()));
-        if (isNew) vertices.push_back({i, j, 0});
-        return found->second;
-    };
-    auto middle = [&](float x, float y) {
-        vertices.push_back({x, y, 0});
-        return int32_t(vertices.size()) - 1;
-    };
-    for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) {
-            const int32_t a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
-                          d = corner(i, j + 1);
-            if (i % 2 == 0) {
-                faces.push_back({a, b, c, d});
-                continue;
-            }
-            const int32_t left = middle(float(i) + height, float(j) + 0.5f),
-                          right = middle(float(i + 1) - height, float(j) + 0.5f);
-            faces.insert(faces.end(),
-                         {{a, b, right, left}, {left, right, c, d}, {a, left, d}, {b, c, right}});
-        }
-    return polygons("wall", vertices, faces);
-}
-
 TEST(ConformingSubdivision, SliversAreTakenOutAndTJunctionsConform) {
     for (const float height : {0.0f, 1e-9f, 1e-7f, 1e-6f}) {
-        const Mesh mesh = filledWall(8, height);
+        const Mesh mesh = floorWithSlivers(8, height);
         const ConformingSubdivision s = subdivideConforming(mesh, 0.3f);
         EXPECT_NEAR(meshArea(s), 64, 1e-3) << height;
         double border = 0;

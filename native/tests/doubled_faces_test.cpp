@@ -62,6 +62,22 @@ TEST(DoubledFaces, BothHaveTheLightOfOne) {
     }
 }
 
+// Whichever of many stands for the others, none is left dark.
+TEST(DoubledFaces, ManyCopiesHaveTheLightOfOne) {
+    const std::vector<glm::vec3> one = lightOf(tableScene(kTable), 1);
+    Scene scene = tableScene(twice(kTable, 1e-6f));
+    const Mesh moved = twice(twice(kTable, 1e-6f), 1e-6f);
+    place(scene, moved, grey("", 0.5f));
+    Bake bake;
+    lightOf(scene, 1, &bake);
+    for (int32_t instance : {1, 2}) {
+        const std::vector<glm::vec3> all = cornerLight(bake, instance, RB_OUTPUT_LIGHTING);
+        for (size_t c = 0; c < all.size(); ++c)
+            EXPECT_NEAR(all[c].x, one[c % one.size()].x, 1e-3f * one[c % one.size()].x)
+                << instance << ", corner " << c;
+    }
+}
+
 TEST(DoubledFaces, AnObjectOnAnotherHasItsLightAlsoTurnedAndMirrored) {
     const std::vector<glm::vec3> one = lightOf(tableScene(kTable), 1);
     // A quarter turn, and a mirror image: the same place, other corners.

@@ -304,31 +304,7 @@ TEST(Reconstruction, FacesWithoutHeightChangeNothing) {
     // T-junctions: the light is that of triangles of 1e-2 of the edge, up to a tenth of its step,
     // since the faces beside them are cut in another way.
     auto floorOf = [](float ratio) {
-        constexpr int kCells = 12;
-        std::vector<glm::vec3> vertices;
-        std::vector<std::vector<int32_t>> faces;
-        auto vertex = [&](float x, float y) {
-            const glm::vec3 at(x, y, 0);
-            for (size_t v = 0; v < vertices.size(); ++v)
-                if (vertices[v] == at) return int32_t(v);
-            vertices.push_back(at);
-            return int32_t(vertices.size() - 1);
-        };
-        for (int i = 0; i < kCells; ++i)
-            for (int j = 0; j < kCells; ++j) {
-                const float x0 = float(i), x1 = x0 + 1, y0 = float(j), y1 = y0 + 1, y = y0 + 0.5f;
-                const int32_t a = vertex(x0, y0), b = vertex(x1, y0), c = vertex(x1, y1),
-                              d = vertex(x0, y1);
-                if (i % 2 == 0) {
-                    faces.push_back({a, b, c, d});
-                    continue;
-                }
-                const int32_t left = vertex(x0 + ratio, y), right = vertex(x1 - ratio, y);
-                faces.insert(
-                    faces.end(),
-                    {{a, b, right, left}, {left, right, c, d}, {a, left, d}, {b, c, right}});
-            }
-        Mesh mesh = polygons("floor", vertices, faces);
+        Mesh mesh = floorWithSlivers(12, ratio);
         mesh.cornerNormals.assign(mesh.cornerVertices.size(), glm::vec3(0, 0, 1));
         return Surface(mesh, 0.3f);
     };

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <glm/gtc/matrix_transform.hpp>
-#include <map>
 
 #include "bake/bake.h"
 #include "patches/conforming_subdivision.h"
@@ -18,53 +17,18 @@ namespace {
 
 using namespace test;
 
-// A floor of n x n squares, metres, every other column cut in half, with triangles of some height in
-// the T-junctions. Quads come first: their corners are the first `quadCorners`.
-struct Floor {
-    Mesh mesh;
-    size_t quadCorners = 0;
-
-    Floor(int n, float height) {
-        std::vector<glm::vec3> vertices;
-        std::vector<std::vector<int32_t>> quads, slivers;
-        std::map<std::pair<int, int>, int32_t> corners;
-        auto corner = [&](int i, int j) {
-            const auto [found, isNew] = corners.try_emplace({i, j}, int32_t(vertices.size()));
-            if (isNew) vertices.push_back({i - n / 2, j - n / 2, 0});
-            return found->second;
-        };
-        auto middle = [&](float x, float y) {
-            vertices.push_back({x - float(n / 2), y - float(n / 2), 0});
-            return int32_t(vertices.size()) - 1;
-        };
-        for (int i = 0; i < n; ++i)
-            for (int j = 0; j < n; ++j) {
-                const int32_t a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
-                              d = corner(i, j + 1);
-                if (i % 2 == 0) {
-                    quads.push_back({a, b, c, d});
-                    continue;
-                }
-                const int32_t left = middle(float(i) + height, float(j) + 0.5f),
-                              right = middle(float(i + 1) - height, float(j) + 0.5f);
-                quads.insert(quads.end(), {{a, b, right, left}, {left, right, c, d}});
-                slivers.insert(slivers.end(), {{a, left, d}, {b, c, right}});
-            }
-        quadCorners = 4 * quads.size();
-        quads.insert(quads.end(), slivers.begin(), slivers.end());
-        mesh = polygons("floor", vertices, quads);
-    }
-};
+constexpr size_t kQuadCorners = 4 * (4 * 8 + 2 * 4 * 8);  // of 8 x 8 squares, half of them cut
 
 struct Result {
     std::vector<glm::vec3> light;
     double bundles = 0, error = 0, balance = 0;
 };
 
-// The floor under a box, lit by a lamp, all turned by a matrix or in the meshes.
+// A floor of 8 m under a box, lit by a lamp, all turned by a matrix or in the meshes.
 Result bakeFloor(Mesh floor, const std::string& reconstruction, const glm::dmat4& turn,
                  bool inMeshes) {
     Scene scene;
+    for (glm::vec3& v : floor.vertices) v -= glm::vec3(4, 4, 0);
     Mesh above = box("box", {-1, -1, 1}, {1, 1, 2}, false);
     if (inMeshes)
         for (Mesh* mesh : {&floor, &above})
@@ -90,13 +54,13 @@ TEST(Slivers, CostAndChangeNothing) {
     const glm::dmat4 turn = glm::rotate(glm::dmat4(1), 0.7, glm::dvec3(0.3, 0.5, 0.8));
     for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
         for (bool inMeshes : {false, true}) {
-            const Floor clean(8, 1e-2f);
-            const Result wanted = bakeFloor(clean.mesh, reconstruction, turn, inMeshes);
+            const Result wanted =
+                bakeFloor(floorWithSlivers(8, 1e-2f), reconstruction, turn, inMeshes);
             for (const float height : {1e-3f, 1e-4f, 1e-5f, 1e-6f, 1e-7f, 1e-12f, 1e-18f, 0.0f}) {
-                const Floor thin(8, height);
-                const Result found = bakeFloor(thin.mesh, reconstruction, turn, inMeshes);
+                const Result found =
+                    bakeFloor(floorWithSlivers(8, height), reconstruction, turn, inMeshes);
                 double square = 0, all = 0;
-                for (size_t c = 0; c < thin.quadCorners; ++c) {
+                for (size_t c = 0; c < kQuadCorners; ++c) {
                     const glm::vec3 off = found.light[c] - wanted.light[c];
                     square += double(glm::dot(off, off));
                     all += double(glm::dot(wanted.light[c], wanted.light[c]));
@@ -107,16 +71,17 @@ TEST(Slivers, CostAndChangeNothing) {
                 EXPECT_LE(found.bundles, 2 * wanted.bundles) << what;
                 EXPECT_LT(found.error, 1.5 * wanted.error + 0.01) << what;
                 EXPECT_LT(found.balance, 5e-3) << what;
-                for (size_t c = thin.quadCorners; c < found.light.size(); ++c)
+                for (size_t c = kQuadCorners; c < found.light.size(); ++c)
                     ASSERT_TRUE(found.light[c].x > 0) << what << ": a corner without light";
             }
         }
 }
 
 TEST(Slivers, SubdividedMeshesHaveNone) {
-    const Result wanted = bakeFloor(Floor(8, 1e-2f).mesh, "LEAST_SQUARES", glm::dmat4(1), false);
+    const Result wanted =
+        bakeFloor(floorWithSlivers(8, 1e-2f), "LEAST_SQUARES", glm::dmat4(1), false);
     for (const float height : {1e-5f, 1e-6f, 1e-9f, 0.0f}) {
-        const ConformingSubdivision cut = subdivideConforming(Floor(8, height).mesh, 0.5f);
+        const ConformingSubdivision cut = subdivideConforming(floorWithSlivers(8, height), 0.5f);
         std::vector<std::vector<int32_t>> faces;
         for (const auto& t : cut.triangles) faces.push_back({t[0], t[1], t[2]});
         const Result found = bakeFloor(polygons("floor", cut.vertices, faces), "LEAST_SQUARES",

@@ -53,6 +53,31 @@ Mesh box(const std::string& name, const glm::vec3& low, const glm::vec3& high, b
     return polygons(name, std::move(vertices), faces);
 }
 
+Mesh floorWithSlivers(int n, float height) {
+    std::vector<glm::vec3> vertices;
+    std::vector<std::vector<int32_t>> faces, slivers;
+    auto vertex = [&](float x, float y) {
+        vertices.push_back({x, y, 0});
+        return int32_t(vertices.size()) - 1;
+    };
+    for (int j = 0; j <= n; ++j)
+        for (int i = 0; i <= n; ++i) vertex(float(i), float(j));
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+            const int32_t a = j * (n + 1) + i, b = a + 1, d = a + n + 1, c = d + 1;
+            if (i % 2 == 0) {
+                faces.push_back({a, b, c, d});
+                continue;
+            }
+            const int32_t left = vertex(float(i) + height, float(j) + 0.5f),
+                          right = vertex(float(i + 1) - height, float(j) + 0.5f);
+            faces.insert(faces.end(), {{a, b, right, left}, {left, right, c, d}});
+            slivers.insert(slivers.end(), {{a, left, d}, {b, c, right}});
+        }
+    faces.insert(faces.end(), slivers.begin(), slivers.end());
+    return polygons("floor", vertices, faces);
+}
+
 Mesh icosphere(const std::string& name, float radius, int levels, bool inward) {
     const double g = 0.5 * (1 + std::sqrt(5.0));
     std::vector<glm::dvec3> points = {{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0},

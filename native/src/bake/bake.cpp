@@ -206,11 +206,11 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         made = reconstruct(scene, patches, trace->visibility, trace->touchDistance, lights, shown,
                            exposed, settings, progress, report);
         const std::vector<float> weight = exposedArea(patches, exposed);
-        stateErrors(scene, tiles, instanceRanges(scene, patches),
-                    meanOver(tiles, shown.of(lights, exposed), weight),
+        const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
+        stateErrors(scene, tiles, ranges, meanOver(tiles, shown.of(lights, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
                     settings.targetError, settings.hasIndependentDirections(), made, report);
-        fillLeftOutCorners(patches, instanceRanges(scene, patches), made, report);
+        fillLeftOutCorners(patches, ranges, made, report);
         checkFinite(made);
     }
     report.patches = trace->patches.count();
@@ -239,7 +239,7 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     const Patches& patches = trace->patches;
     report.warnings.insert(report.warnings.end(), patches.warnings.begin(), patches.warnings.end());
     if (patches.degenerateFaces)
-        report.skipped.push_back({"faces", "zero area", patches.degenerateFaces});
+        report.skipped.push_back({"faces", "no area but for rounding", patches.degenerateFaces});
     progress.report(RB_STAGE_PATCHES, 1);
 }
 

@@ -68,8 +68,9 @@ struct Shape {
     bool isSliver, hasPoint;  // hasPoint: the shortest edge is no longer than a sliver is high
 
     Shape(const TriMesh& mesh, TriMesh::FaceHandle face) {
-        double most = -1, least = INFINITY, area = 0;
-        std::vector<OpenMesh::Vec3d> corners;
+        double most = -1, least = INFINITY;
+        std::array<OpenMesh::Vec3d, 3> corners;
+        size_t k = 0;
         for (const auto edge : mesh.fh_range(face)) {
             const double length = mesh.calc_edge_length(edge);
             if (length > most) {
@@ -80,10 +81,10 @@ struct Shape {
                 least = length;
                 shortest = edge;
             }
-            corners.push_back(mesh.point(mesh.from_vertex_handle(edge)));
+            corners[k++] = mesh.point(mesh.from_vertex_handle(edge));
         }
-        area = ((corners[1] - corners[0]) % (corners[2] - corners[0])).norm();
-        isSliver = area <= kFlat * most * most;
+        const double across = ((corners[1] - corners[0]) % (corners[2] - corners[0])).norm();
+        isSliver = across <= kFlat * most * most;
         hasPoint = least <= kFlat * most;
     }
 };

@@ -22,6 +22,7 @@ struct DoubledCorner {
 
 struct DoubledFaces {
     std::vector<bool> isDouble;  // per face: another stands for it
+    // Those that a corner's light comes from may be doubles themselves, which come later.
     std::vector<DoubledCorner> corners;
     bool anyCoincide = false;  // also of those that do not do alike
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/left_out_corners.h"
 
+#include <algorithm>
+
 namespace raybundle {
 namespace {
 
@@ -48,7 +50,8 @@ void fillLeftOutCorners(const Patches& patches, const std::vector<InstanceRange>
             for (int32_t corner : patches.cells[patches.parents[p].cell].corner)
                 if (corner >= 0) known[i][size_t(corner)] = true;
     }
-    for (const DoubledCorner& corner : patches.doubledCorners) {
+    for (auto it = patches.doubledCorners.rbegin(); it != patches.doubledCorners.rend(); ++it) {
+        const DoubledCorner& corner = *it;
         if (known[corner.instance].empty() || known[corner.ofInstance].empty()) continue;
         const InstanceLight& from = light[corner.ofInstance];
         InstanceLight& to = light[corner.instance];
@@ -63,7 +66,8 @@ void fillLeftOutCorners(const Patches& patches, const std::vector<InstanceRange>
             report.objects[corner.instance].error = report.objects[corner.ofInstance].error;
     }
     for (size_t i = 0; i < light.size(); ++i)
-        if (!known[i].empty()) spreadAtVertices(known[i], light[i]);
+        if (std::find(known[i].begin(), known[i].end(), false) != known[i].end())
+            spreadAtVertices(known[i], light[i]);
 }
 
 }  // namespace raybundle

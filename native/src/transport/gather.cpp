@@ -21,7 +21,8 @@ namespace {
 // So many times the error of a result may be that of light on other sides: what it lights gets it
 // from many of them.
 constexpr float kOthersError = 2;
-// At most so many times: of sides that reflect nothing, whose light only the energy balance has.
+// It may be so many times at most, as that of sides that reflect nothing: their light counts in the
+// energy balance alone.
 constexpr float kMostError = 10;
 
 }  // namespace

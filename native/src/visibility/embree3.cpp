@@ -3,44 +3,40 @@
 
 #include <dlfcn.h>
 
-#include <stdexcept>
-#include <string>
-
 namespace raybundle {
 namespace {
 
+// Of Embree 3's own library, which is loaded with this one; where it is linked in statically, the one
+// that was linked.
 template <class Function>
-void find(void* library, const char* name, Function& function) {
-    function = reinterpret_cast<Function>(dlsym(library, name));
-    if (!function) throw std::runtime_error(std::string("Embree 3 has no function ") + name);
+Function find(const char* name, Function linked) {
+    static void* const library = dlopen("libembree3.so.3", RTLD_LAZY | RTLD_NOLOAD);
+    void* found = library ? dlsym(library, name) : nullptr;
+    return found ? reinterpret_cast<Function>(found) : linked;
 }
 
 }  // namespace
 
-Embree3::Embree3() {
-    // This library is linked with it, so that it is there already.
-    void* library = dlopen("libembree3.so.3", RTLD_LAZY | RTLD_NOLOAD);
-    if (!library) library = RTLD_DEFAULT;  // linked in statically
-    find(library, "rtcNewDevice", newDevice);
-    find(library, "rtcReleaseDevice", releaseDevice);
-    find(library, "rtcGetDeviceError", getDeviceError);
-    find(library, "rtcNewBVH", newBVH);
-    find(library, "rtcReleaseBVH", releaseBVH);
-    find(library, "rtcBuildBVH", buildBVH);
-    find(library, "rtcThreadLocalAlloc", threadLocalAlloc);
-    find(library, "rtcNewScene", newScene);
-    find(library, "rtcReleaseScene", releaseScene);
-    find(library, "rtcSetSceneFlags", setSceneFlags);
-    find(library, "rtcCommitScene", commitScene);
-    find(library, "rtcNewGeometry", newGeometry);
-    find(library, "rtcReleaseGeometry", releaseGeometry);
-    find(library, "rtcSetNewGeometryBuffer", setNewGeometryBuffer);
-    find(library, "rtcCommitGeometry", commitGeometry);
-    find(library, "rtcAttachGeometry", attachGeometry);
-    find(library, "rtcIntersect1", intersect1);
-    find(library, "rtcOccluded1", occluded1);
-    find(library, "rtcOccluded8", occluded8);
-}
+Embree3::Embree3()
+    : newDevice(find("rtcNewDevice", &rtcNewDevice)),
+      releaseDevice(find("rtcReleaseDevice", &rtcReleaseDevice)),
+      getDeviceError(find("rtcGetDeviceError", &rtcGetDeviceError)),
+      newBVH(find("rtcNewBVH", &rtcNewBVH)),
+      releaseBVH(find("rtcReleaseBVH", &rtcReleaseBVH)),
+      buildBVH(find("rtcBuildBVH", &rtcBuildBVH)),
+      threadLocalAlloc(find("rtcThreadLocalAlloc", &rtcThreadLocalAlloc)),
+      newScene(find("rtcNewScene", &rtcNewScene)),
+      releaseScene(find("rtcReleaseScene", &rtcReleaseScene)),
+      setSceneFlags(find("rtcSetSceneFlags", &rtcSetSceneFlags)),
+      commitScene(find("rtcCommitScene", &rtcCommitScene)),
+      newGeometry(find("rtcNewGeometry", &rtcNewGeometry)),
+      releaseGeometry(find("rtcReleaseGeometry", &rtcReleaseGeometry)),
+      setNewGeometryBuffer(find("rtcSetNewGeometryBuffer", &rtcSetNewGeometryBuffer)),
+      commitGeometry(find("rtcCommitGeometry", &rtcCommitGeometry)),
+      attachGeometry(find("rtcAttachGeometry", &rtcAttachGeometry)),
+      intersect1(find("rtcIntersect1", &rtcIntersect1)),
+      occluded1(find("rtcOccluded1", &rtcOccluded1)),
+      occluded8(find("rtcOccluded8", &rtcOccluded8)) {}
 
 const Embree3 embree3;
 
