@@ -6,10 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
 #include "bake/bake.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
+#include "test_shots.h"
 
 namespace raybundle {
 namespace {
@@ -128,6 +130,37 @@ TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
         EXPECT_LT(reportOf(bake)["estimated_error"].get<double>(), 1e-3);
         EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 1e-4);
     }
+}
+
+// A lamp 2 cm above a patch of 20 cm: its light comes at all angles, and most of it from few of the
+// points where it is looked at. The closed form alone would have no error. Over 64 seeds the RMS of
+// the difference is good to 10 %.
+TEST(ShownByAngle, TheStatedErrorHasThatOfTheAngles) {
+    Scene scene;
+    Material white = grey("white", 0.5f);
+    white.shownByAngle[0][0] = glm::vec3(0.8f);
+    place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), white);
+    scene.addLight(pointLight({0.003, 0.004, 0.02}, glm::dvec3(1)));
+    const ShotScene shots(scene, 0.2f);
+    auto shown = [&](const FirstShot& shot, size_t side) {
+        return double((white.shown(0, shot.angles[side]) * shot.irradiance[side]).x);
+    };
+    const FirstShot exact = shots.shoot("GATHER", 0, 0, 1e-5f);
+    double found = 0, stated = 0, light = 0;
+    for (int seed = 1; seed <= 64; ++seed) {
+        const FirstShot shot = shots.shoot("GATHER", 0, seed);
+        for (size_t side = 0; side < shots.patches.sideCount(); side += 2) {
+            const double error = double(white.shown(0, shot.angles[side]).x * shot.error[side]);
+            found += std::pow(shown(shot, side) - shown(exact, side), 2);
+            stated += std::pow(error, 2);
+            light += std::pow(shown(exact, side), 2);
+        }
+    }
+    EXPECT_LT(std::sqrt(found / light), 0.02);
+    EXPECT_LT(std::sqrt(found / stated), 1.5);
+    EXPECT_GT(std::sqrt(found / stated), 0.4);
+    std::printf("[ figures  ] angles near a lamp: found over stated %.2f, of the light %.4f\n",
+                std::sqrt(found / stated), std::sqrt(found / light));
 }
 
 Scene paintedRoom(float grazing) {

@@ -304,7 +304,7 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
     Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
     const Patches& patches = trace->patches;
     const Visibility& visibility = trace->visibilityOfLights();
-    const uint64_t aims = shotHash(settings, shown.sides(), !patches.scattering.empty());
+    const uint64_t aims = shotHash(scene, settings, shown.sides(), !patches.scattering.empty());
     SetLights lights;
     const int32_t count = int32_t(scene.lightSets.size());
     for (int32_t set = kNoLightSet; set < count; ++set) {

@@ -5,8 +5,11 @@
 
 namespace raybundle {
 
-uint64_t shotHash(const Settings& settings, const std::vector<bool>& isShown, bool hasDirections) {
+uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vector<bool>& isShown,
+                  bool hasDirections) {
     Hasher hasher;
+    for (const Material& material : scene.materials)
+        hasher.add(material.shownFromAbove, material.shownByAngle);
     hasher.add(hasDirections);
     hasher.add(std::vector<uint8_t>(isShown.begin(), isShown.end()));
     hasher.add(settings.targetError, settings.seed, settings.skipFacing, settings.skipLit,

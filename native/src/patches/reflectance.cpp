@@ -129,7 +129,7 @@ void assignOpacity(const Scene& scene, Patches& patches) {
     // Keeps areas above zero, by which much is divided.
     constexpr float kLeastArea = 1e-4f;
     auto materialOf = [&](const Parent& parent) -> const Material& {
-        return scene.materialOf(scene.meshes[scene.instances[parent.instance].mesh], parent.face);
+        return scene.materialOf(parent.instance, size_t(parent.face));
     };
     if (std::all_of(patches.parents.begin(), patches.parents.end(),
                     [&](const Parent& parent) { return materialOf(parent).isOpaque(); }))
@@ -223,8 +223,7 @@ std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& pa
     std::vector<glm::vec3> diffuse(patches.sideCount());
     tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
         const Parent& parent = patches.parents[i];
-        const Material& material =
-            scene.materialOf(scene.meshes[scene.instances[parent.instance].mesh], parent.face);
+        const Material& material = scene.materialOf(parent.instance, size_t(parent.face));
         const uint32_t first = 2 * parent.firstPatch;
         for (uint32_t side = first; side < first + 2 * parent.patchCount(); ++side) {
             const glm::vec3 all = patches.opacityOf(side / 2) * patches.reflectance[side];

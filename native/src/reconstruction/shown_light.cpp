@@ -8,9 +8,6 @@
 namespace raybundle {
 namespace {
 
-// Far above what any shader shows; keeps results finite.
-constexpr float kMostShown = 16;
-
 std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
     bool anyBaked = false;
     for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
@@ -23,12 +20,6 @@ std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
     return isResult;
 }
 
-glm::vec3 shareOf(const Material& material, size_t side, const glm::vec4& angles) {
-    return glm::clamp(
-        material.shownFromAbove[side % 2] + sumOfTerms(material.shownByAngle[side % 2], angles),
-        0.0f, kMostShown);
-}
-
 }  // namespace
 
 ShownLight::ShownLight(const Scene& scene, const Patches& patches)
@@ -37,13 +28,10 @@ ShownLight::ShownLight(const Scene& scene, const Patches& patches)
       results(resultSides(scene, patches)),
       shown(results),
       colors(diffuseReflectances(scene, patches)) {
-    const Material plain;
-    if (std::any_of(scene.materials.begin(), scene.materials.end(), [&](const Material& material) {
-            return material.shownFromAbove != plain.shownFromAbove ||
-                   material.shownByAngle != plain.shownByAngle;
-        }))
+    if (std::any_of(scene.materials.begin(), scene.materials.end(),
+                    [](const Material& material) { return material.showsByAngle(); }))
         for (size_t side = 0; side < shown.size(); ++side)
-            fromEverywhere.push_back(shareOf(materialOf(side), side, kEverywhere));
+            fromEverywhere.push_back(materialOf(side).shown(side % 2, kEverywhere));
     if (isOwnAlone()) return;
     for (size_t side = 0; side < shown.size(); ++side)
         if (results[side ^ 1] && !isOwnAlone(side ^ 1)) shown[side] = true;
@@ -59,12 +47,12 @@ ShownLight::ShownLight(const Scene& scene, const Patches& patches)
 
 const Material& ShownLight::materialOf(size_t side) const {
     const Parent& parent = patches.parentAt(uint32_t(side));
-    return scene.materialOf(scene.meshes[scene.instances[parent.instance].mesh], parent.face);
+    return scene.materialOf(parent.instance, size_t(parent.face));
 }
 
 glm::vec3 ShownLight::byAngle(size_t side, const glm::vec4& angles) const {
     if (fromEverywhere.empty()) return glm::vec3(1.0f);
-    return shareOf(materialOf(side), side, angles);
+    return materialOf(side).shown(side % 2, angles);
 }
 
 glm::vec3 ShownLight::of(size_t side, const glm::vec3& own, const glm::vec3& others,

@@ -205,6 +205,17 @@ void Scene::checkLightSet(int32_t id) const {
         throw invalidArgument("there is no light set " + std::to_string(id));
 }
 
+bool Material::showsByAngle() const {
+    static const Material kPlain;
+    return shownFromAbove != kPlain.shownFromAbove || shownByAngle != kPlain.shownByAngle;
+}
+
+glm::vec3 Material::shown(size_t side, const glm::vec4& angles) const {
+    constexpr float kMostShown = 16;  // far above what any shader shows; keeps results finite
+    return glm::clamp(shownFromAbove[side] + sumOfTerms(shownByAngle[side], angles), 0.0f,
+                      kMostShown);
+}
+
 const Material& Scene::materialOf(const Mesh& mesh, size_t face) const {
     static const Material kDefault;
     const int32_t id = mesh.faceMaterials[face];

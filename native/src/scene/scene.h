@@ -77,6 +77,9 @@ struct Material {
     std::array<AngleFactors, 2> reflectanceByAngle{};
     std::array<glm::vec3, 2> shownFromAbove{glm::vec3(1.0f), glm::vec3(1.0f)};
     std::array<AngleFactors, 2> shownByAngle{};
+    bool showsByAngle() const;  // whether they do not show all light alike
+    // What outputs show of light at a side, by the means of its angleTerms.
+    glm::vec3 shown(size_t side, const glm::vec4& angles) const;
     std::array<Scattering, 2> scattering{};
     // Share of the light that does not pass straight through, and an image (its mean channel) that
     // multiplies it. Reflectance and emission are those of the whole, what passes through included.
@@ -212,6 +215,9 @@ class Scene {
         return worldLightSet == lightSet ? worldRadiance : glm::vec3(0.0f);
     }
     const Material& materialOf(const Mesh& mesh, size_t face) const;
+    const Material& materialOf(size_t instance, size_t face) const {
+        return materialOf(meshes[instances[instance].mesh], face);
+    }
 
     std::vector<Image> images;
     std::vector<Material> materials;

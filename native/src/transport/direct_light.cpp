@@ -27,14 +27,21 @@ constexpr uint32_t kSlopeSamples = 32;
 // For the power balance: rays of all sources together, and of each at least.
 constexpr uint32_t kPowerRays = 16384, kLeastPowerRays = 1024;
 
+bool showAnyByAngle(const Scene& scene) {
+    return std::any_of(scene.materials.begin(), scene.materials.end(),
+                       [](const Material& material) { return material.showsByAngle(); });
+}
+
 }  // namespace
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                          uint32_t seed, int32_t lightSet, const Skips& skips)
-    : patches(patches),
+    : scene(scene),
+      patches(patches),
       visibility(visibility),
       seed(seed),
       skips(skips),
+      showsByAngle(showAnyByAngle(scene)),
       split(std::make_unique<const EmissionSplit>(
           splitEmission(scene, patches, visibility, lightSet, seed, skips))),
       sources(raybundle::lightSources(scene, patches, split->isSource, split->gathered, lightSet)) {
@@ -42,10 +49,12 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                          uint32_t seed, const Skips& skips, EmissionSplit reflected)
-    : patches(patches),
+    : scene(scene),
+      patches(patches),
       visibility(visibility),
       seed(seed),
       skips(skips),
+      showsByAngle(showAnyByAngle(scene)),
       split(std::make_unique<const EmissionSplit>(std::move(reflected))),
       sources(meshSources(scene, patches, split->isSource, split->gathered)) {}
 

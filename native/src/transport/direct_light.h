@@ -149,11 +149,16 @@ class DirectLight {
                                         glm::vec3& low, glm::vec3& high) const;
     std::vector<float> unblockedWeights(const Place& place) const;
     bool isOutOfSight(const LightSource& source, const Place& place) const;
+    // By a side and the means of the angleTerms of its light: what is shown of more of each term,
+    // by channel, over all that is shown.
+    AngleFactors shownByAngle(uint32_t side, const glm::vec4& angles) const;
 
+    const Scene& scene;
     const Patches& patches;
     const Visibility& visibility;
     const uint32_t seed;
     const Skips skips;
+    bool showsByAngle;                           // whether any material does
     std::unique_ptr<const EmissionSplit> split;  // sources refer to it
     std::vector<std::unique_ptr<LightSource>> sources;
 };

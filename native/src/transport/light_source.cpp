@@ -26,6 +26,9 @@ namespace {
 
 constexpr ptrdiff_t kMostOfObject = 32;
 
+// A patch larger than this share of its distance from a point lamp gets light that varies over it.
+constexpr float kNear = 0.3f;
+
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class PointSource : public LightSource {
@@ -89,15 +92,30 @@ class PointSource : public LightSource {
 
     // What leaves towards the patch: its solid angle times the intensity, however near it is.
     std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& patch) const override {
-        if (cone || isDisk()) return std::nullopt;
-        const Plane plane(patch.origin, patch.a, patch.b, patch.normal, double(patch.radius));
-        const double height = plane.height(position);
-        if (height < std::max(double(light.radius), plane.thickness)) return std::nullopt;
-        const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
-        double angle = SphericalTriangle(o, o + a, o + b).area();
-        if (!patch.isTriangle) angle += SphericalTriangle(o + a, o + b, o + a + b).area();
-        const double area = glm::length(glm::cross(a, b)) * (patch.isTriangle ? 0.5 : 1.0);
-        return intensity * float(angle / area);
+        if (cone || isDisk() || !isBefore(patch)) return std::nullopt;
+        const std::array<SphericalTriangle, 2> halves = seen(patch);
+        return intensity * float((halves[0].area() + halves[1].area()) / areaOf(patch));
+    }
+
+    // Uniform by the angle at which the source sees them, as its light is.
+    PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const override {
+        if (patch.radius == 0 || patch.radius < kNear * distance(patch.middle) || !isBefore(patch))
+            return LightSource::placeOn(patch, uv);
+        const std::array<SphericalTriangle, 2> halves = seen(patch);
+        const double all = halves[0].area() + halves[1].area();
+        const float first = float(halves[0].area() / all);
+        const bool isFirst = uv.x < first;
+        const SphericalTriangle& half = halves[isFirst ? 0 : 1];
+        if (!half.isSampled()) return LightSource::placeOn(patch, uv);
+        uv.x = isFirst ? uv.x / first : (uv.x - first) / (1 - first);
+        const glm::dvec3 d = half.sample({std::min(uv.x, 0.9999999f), uv.y});
+        const glm::dvec3 n(patch.normal);
+        const double height = glm::dot(glm::dvec3(position - patch.origin), n);
+        const double cosine = -glm::dot(d, n), along = height / cosine;
+        if (!(cosine > 0)) return LightSource::placeOn(patch, uv);
+        // Over the density at which an equal area of the patch is seen.
+        return {position + glm::vec3(along * d),
+                float(all * along * along / (cosine * areaOf(patch)))};
     }
 
     bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal,
@@ -145,6 +163,24 @@ class PointSource : public LightSource {
   private:
     bool isPoint() const { return light.radius == 0; }
     bool isDisk() const { return light.radius > 0 && light.pointShape == RB_POINT_DISK; }
+
+    // Whether the source is wholly in front of a patch, and not in its plane.
+    bool isBefore(const ReceiverPlace& patch) const {
+        const Plane plane(patch.origin, patch.a, patch.b, patch.normal, double(patch.radius));
+        return plane.height(position) >= std::max(double(light.radius), plane.thickness);
+    }
+
+    // A patch as it is seen from the centre; a triangle has no second half.
+    std::array<SphericalTriangle, 2> seen(const ReceiverPlace& patch) const {
+        const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
+        const glm::dvec3 end = o + (patch.isTriangle ? b : a + b);
+        return {SphericalTriangle(o, o + a, o + b), SphericalTriangle(end, o + b, o + a)};
+    }
+
+    static double areaOf(const ReceiverPlace& patch) {
+        return glm::length(glm::cross(glm::dvec3(patch.a), glm::dvec3(patch.b))) *
+               (patch.isTriangle ? 0.5 : 1.0);
+    }
 
     const Light& light;
     const glm::vec3 position;
@@ -391,6 +427,10 @@ void joinMany(Groups& groups) {
 }
 
 }  // namespace
+
+PatchPoint LightSource::placeOn(const ReceiverPlace& patch, glm::vec2 uv) const {
+    return {patch.at(uv)};
+}
 
 std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
                                                       const std::vector<bool>& gatheredSides,

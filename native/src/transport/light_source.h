@@ -56,6 +56,11 @@ struct EmittedRay {
     glm::vec3 start(float offset) const { return origin + offset * (direction + normal); }
 };
 
+struct PatchPoint {
+    glm::vec3 point;
+    float weight = 1;
+};
+
 // What becomes of the power of a source, as shares of it by channel.
 struct PowerShares {
     glm::dvec3 escaped{0.0};  // meets no surface
@@ -119,6 +124,10 @@ class LightSource {
     virtual std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& /*patch*/) const {
         return std::nullopt;
     }
+
+    // A point of a patch to look at its light from, by uv uniform in [0, 1)^2, and what it counts for
+    // in the mean over the patch: most of the light of a source close by arrives at few points of it.
+    virtual PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const;
 
     // Whether no point within `radius` of a point with a unit normal can get any of its light,
     // occluders aside. False where that is not certain.

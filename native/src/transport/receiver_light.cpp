@@ -62,6 +62,11 @@ struct DirectLight::Block {
         const float n = float(blocks.size());
         return glm::clamp(n * mean - (n - 1) / n * sum, 0.0f, 1.0f);
     }
+    // What a block's angleTerms add to the means of all blocks.
+    glm::vec4 surplusAngles(const Block& block) const {
+        const float all = brightest(visible);
+        return float(kBlocks) * (block.angles - angles / all * brightest(block.visible)) / all;
+    }
     // The closed form times the visible share; the plain mean where there is no closed form.
     glm::vec3 estimate(const std::optional<glm::vec3>& closed) const {
         if (count == 0) return glm::vec3(0.0f);
@@ -99,6 +104,18 @@ std::vector<float> DirectLight::unblockedWeights(const Place& place) const {
                 sources[k]->sample(place.at(kAt[i]), place.normal, kAt[1 - i]).irradiance);
     }
     return weights;
+}
+
+AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) const {
+    AngleFactors factors{};
+    if (!showsByAngle) return factors;
+    constexpr float kLeastShown = 0.05f;  // less shows too little of the light to be clean
+    const Parent& parent = patches.parentAt(side);
+    const Material& material = scene.materialOf(parent.instance, size_t(parent.face));
+    const glm::vec3 all = glm::max(material.shown(side % 2, angles), kLeastShown);
+    for (size_t term = 0; term < factors.size(); ++term)
+        factors[term] = material.shownByAngle[side % 2][term] / all;
+    return factors;
 }
 
 // Each source takes samples until its standard error is below `tolerance`.
@@ -211,8 +228,9 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
     };
     for (int i = 0; i < int(kBlocks) * each; ++i) {
         const glm::vec4 u = points[uint32_t(first + i)];
-        const glm::vec3 point = place.at({u.x, u.y});
-        const LightSample sample = sampleAt(point, glm::vec2(u.z, u.w));
+        const auto [point, weight] = source.placeOn(place, {u.x, u.y});
+        LightSample sample = sampleAt(point, glm::vec2(u.z, u.w));
+        sample.irradiance *= weight;
         Block& block = blocks[size_t(i / each)];
         ++block.count;
         if (brightest(sample.irradiance) <= 0) continue;
@@ -299,8 +317,11 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
         const glm::vec3 mean = all.estimate(closed);
         variance = missed * missed / alike;
         float wanted = missed * missed;
+        const AngleFactors byAngle =
+            shownByAngle(receiver.side, all.angles / brightest(all.visible));
         for (const Block& block : blocks) {
-            const float d = brightest(glm::abs(block.estimate(closed) - mean));
+            const glm::vec3 shown = mean * sumOfTerms(byAngle, all.surplusAngles(block));
+            const float d = brightest(glm::abs(block.estimate(closed) - mean + shown));
             variance += d * d / (kBlocks * (kBlocks - 1));
             wanted += d * d / (kBlocks * (kBlocks - 1));
         }
