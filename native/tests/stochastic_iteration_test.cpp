@@ -150,7 +150,7 @@ TEST(StochasticIteration, CoveredPartsGetNoLight) {
             exact.indirect[i] = glm::vec3(0);
         }
         EXPECT_GT(dark, 8u) << "the bottoms of the boxes";
-        EXPECT_LT(dark, 40u);
+        EXPECT_LT(dark, 60u);
         const double stated = reportOf(bake)["estimated_error"];
         const double found = frontNoise(bake.patches(), bake.patchIrradiance(), exact);
         std::printf("[ figures  ] standing boxes, %s: stated %.4f, found %.4f\n",

@@ -14,6 +14,7 @@
 // Differs from the thesis (section 4.2), which projects each patch by itself.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -62,6 +63,8 @@ struct Parent {
     // The mesh triangle or quad that the parent is part of, for interpolation between its corners:
     // one of Patches::cells.
     uint32_t cell = 0;
+    // Bit k: no wall stands between the parent and corner k of the cell (patches/crossings.h).
+    uint8_t seenCorners = 15;
     std::shared_ptr<const CutTiles> cut;  // null: each tile is a patch
 
     uint32_t tileCount() const { return isTriangle ? countA * countA : countA * countB; }
@@ -94,6 +97,7 @@ struct Cell {
     uint32_t instance = 0;
     int32_t face = 0;
     bool hasPatches = true;  // slivers have none, but join what lies beside them
+    uint8_t parted = 0;      // bit k: a wall stands on the edge from corner k on (crossings.h)
 
     bool isTriangle() const { return corner[3] < 0; }
     // Of corner k, relative to Patches::centre.
@@ -101,6 +105,12 @@ struct Cell {
         if (k == 0) return origin;
         if (k == 1) return origin + a;
         return isTriangle() || k == 3 ? origin + b : origin + a + b;
+    }
+    // Unit, along cross(a, b).
+    glm::dvec3 normal() const { return glm::normalize(glm::cross(glm::dvec3(a), glm::dvec3(b))); }
+    double longestEdge() const {
+        return double(
+            std::max({glm::length(a), glm::length(b), isTriangle() ? glm::distance(a, b) : 0.0f}));
     }
     // Weight of each corner at a point: barycentric in a triangle, bilinear in a parallelogram.
     std::array<float, 4> weights(const glm::vec3& point) const;
@@ -168,6 +178,9 @@ struct Patches {
         return islands[parents[parentOf[side / 2]].island];
     }
     const Parent& parentAt(uint32_t side) const { return parents[parentOf[side / 2]]; }
+    // What the light of a patch, by its number in the parent, counts at each corner of its cell: by its
+    // middle, and nothing behind a wall. All are 0 if it has no corner.
+    std::array<float, 4> cornerWeights(const Parent& parent, uint32_t patchInParent) const;
     // The point (u, v) in [0, 1]^2 of a patch, relative to centre.
     glm::vec3 point(uint32_t patch, glm::vec2 uv) const;
     // The patch of a parent at a point in its plane.

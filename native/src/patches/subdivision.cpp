@@ -7,6 +7,7 @@
 #include <map>
 
 #include "patches/coincidence.h"
+#include "patches/crossings.h"
 #include "scene/triangulation.h"
 
 namespace raybundle {
@@ -52,33 +53,24 @@ class Subdivision {
             findDoubledFaces(scene, faces, placed.firstVertices(), patches.vertices);
         patches.doubledCorners = std::move(doubled.corners);
         patches.anyCoincide = doubled.anyCoincide;
+        std::vector<double> cellSizes;  // per cell: edge of its patches, metres
         for (size_t i = 0; i < scene.instances.size(); ++i) {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
             size_t degenerate = 0, doubles = 0;
             for (size_t f = 0; f < mesh.faceCount(); ++f) {
-                const size_t firstParent = patches.parents.size(), face = faces.firstFace[i] + f;
+                const size_t face = faces.firstFace[i] + f;
                 if (doubled.isDouble[face]) {
                     ++doubles;
                     continue;
                 }
-                const uint32_t surface = faces.surface[face];
                 double size = patchSize > 0 ? double(patchSize) : sizes.size[faces.piece[face]];
                 if (!(size > 0)) size = 1;
                 Island& island = patches.islands[sizes.island[faces.piece[face]]];
                 island.size = std::max(island.size, float(size));
                 island.finest =
                     island.finest > 0 ? std::min(island.finest, float(size)) : float(size);
-                if (!cutFace(uint32_t(i), int32_t(f), size)) ++degenerate;
-                for (size_t p = firstParent; p < patches.parents.size(); ++p) {
-                    Parent& parent = patches.parents[p];
-                    parent.isSolid = shells[face] != Shell::OPEN &&
-                                     !scene.materialOf(mesh, size_t(parent.face)).isTranslucent();
-                    parent.isInward = shells[face] == Shell::INWARD;
-                    parent.stopsDirect = scene.instances[i].stopsDirect;
-                    parent.exchanges = scene.instances[i].exchanges;
-                    parent.island = sizes.island[faces.piece[face]];
-                    parent.surface = surface;
-                }
+                if (!addCells(uint32_t(i), int32_t(f))) ++degenerate;
+                cellSizes.resize(patches.cells.size(), size);
             }
             patches.degenerateFaces += degenerate;
             if (degenerate)
@@ -91,6 +83,40 @@ class Subdivision {
                     " faces lie on others that look the same way, whose light they get; merge such "
                     "faces (Merge by Distance), or remove the object if it lies on another");
         }
+        auto vertexOf = [&](const Cell& cell, int k) {
+            return worldVertex(cell.instance, cell.corner[size_t(k)]);
+        };
+        const Crossings crossings = findCrossings(patches.cells, cellSizes, vertexOf);
+        if (!crossings.isAll)
+            patches.warnings.push_back(
+                "faces go through each other in so many places that the smaller ones are not cut "
+                "there: they may let some light through walls; delete or hide what nobody sees of "
+                "objects that go through each other");
+        for (uint32_t c = 0; c < patches.cells.size(); ++c) {
+            if (!patches.cells[c].hasPatches) continue;
+            const size_t firstParent = patches.parents.size();
+            const auto crossing = crossings.ofCell.find(c);
+            if (crossing != crossings.ofCell.end())
+                patches.cells[c].parted = crossing->second.parted;
+            if (crossing != crossings.ofCell.end() && !crossing->second.pieces.empty())
+                for (const CellPiece& piece : crossing->second.pieces)
+                    cutPiece(c, piece, cellSizes[c]);
+            else
+                cutCell(c, cellSizes[c]);
+            const Cell& cell = patches.cells[c];
+            const size_t face = faces.firstFace[cell.instance] + size_t(cell.face);
+            for (size_t p = firstParent; p < patches.parents.size(); ++p) {
+                Parent& parent = patches.parents[p];
+                parent.isSolid =
+                    shells[face] != Shell::OPEN &&
+                    !scene.materialOf(cell.instance, size_t(cell.face)).isTranslucent();
+                parent.isInward = shells[face] == Shell::INWARD;
+                parent.stopsDirect = scene.instances[cell.instance].stopsDirect;
+                parent.exchanges = scene.instances[cell.instance].exchanges;
+                parent.island = sizes.island[faces.piece[face]];
+                parent.surface = faces.surface[face];
+            }
+        }
         measureSurfaces(faces.surfaceCount);
         patches.finest = INFINITY;
         for (const Island& island : patches.islands) {
@@ -102,6 +128,14 @@ class Subdivision {
 
   private:
     using Triangle = std::array<uint32_t, 3>;  // into Patches::vertices
+
+    // What a parent is cut from.
+    struct Origin {
+        uint32_t instance;
+        int32_t face;
+        uint32_t cell;
+        glm::vec3 normal;  // of the cell: that of a tiny piece would be rounding alone
+    };
 
     void measureSurfaces(size_t surfaceCount) {
         std::vector<double> ofSurface(surfaceCount, 0.0), ofInstance(scene.instances.size(), 0.0);
@@ -119,7 +153,8 @@ class Subdivision {
                 steps(ofInstance[parent.instance]) << 16 | steps(ofSurface[parent.surface]);
     }
 
-    bool cutFace(uint32_t instance, int32_t face, double size) {
+    // Adds the triangles of a face, or the parallelogram that it is; returns whether any has an area.
+    bool addCells(uint32_t instance, int32_t face) {
         const Mesh& mesh = scene.meshes[scene.instances[instance].mesh];
         const int32_t begin = mesh.faceOffsets[face], end = mesh.faceOffsets[face + 1];
         std::vector<int32_t> corners;
@@ -129,39 +164,74 @@ class Subdivision {
         for (int32_t c : corners) points.push_back(patches.vertices[worldVertex(instance, c)]);
 
         if (corners.size() == 4 && isParallelogram(points)) {
-            const uint32_t cell = addCell(instance, face, points[0], points[1], points[3],
-                                          {corners[0], corners[1], corners[2], corners[3]});
-            const glm::dvec3 normal = glm::cross(points[1] - points[0], points[3] - points[0]);
-            Parent parent = makeParent({instance, face, cell, glm::vec3(glm::normalize(normal))},
-                                       points[0], points[1], points[3]);
-            for (int k = 0; k < 4; ++k) parent.vertex[k] = worldVertex(instance, corners[k]);
-            parent.isTriangle = false;
-            parent.countA = gridCount(glm::length(parent.a), size);
-            parent.countB = gridCount(glm::length(parent.b), size);
-            patches.parents.push_back(parent);
+            addCell(instance, face, points[0], points[1], points[3],
+                    {corners[0], corners[1], corners[2], corners[3]});
             return true;
         }
         bool any = false;
         for (const std::array<int, 3>& t : triangulate(points)) {
-            const Triangle triangle{worldVertex(instance, corners[t[0]]),
-                                    worldVertex(instance, corners[t[1]]),
-                                    worldVertex(instance, corners[t[2]])};
-            const double longest = std::max({glm::length(points[t[1]] - points[t[0]]),
-                                             glm::length(points[t[2]] - points[t[1]]),
-                                             glm::length(points[t[0]] - points[t[2]])});
-            const uint32_t cell = addCell(instance, face, points[t[0]], points[t[1]], points[t[2]],
-                                          {corners[t[0]], corners[t[1]], corners[t[2]], -1});
-            if (isFlat(points[t[0]], points[t[1]], points[t[2]])) {
-                patches.cells[cell].hasPatches = false;
-                continue;
-            }
-            any = true;
-            const glm::dvec3 normal =
-                glm::cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]);
-            cutTriangle({instance, face, cell, glm::vec3(glm::normalize(normal))}, triangle,
-                        std::max(size, longest / kMaxGrid));
+            addCell(instance, face, points[t[0]], points[t[1]], points[t[2]],
+                    {corners[t[0]], corners[t[1]], corners[t[2]], -1});
+            const bool hasArea = !isFlat(points[t[0]], points[t[1]], points[t[2]]);
+            patches.cells.back().hasPatches = hasArea;
+            any = any || hasArea;
         }
         return any;
+    }
+
+    void cutCell(uint32_t index, double size) {
+        const Cell& cell = patches.cells[index];
+        std::vector<uint32_t> vertices;
+        for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k)
+            vertices.push_back(worldVertex(cell.instance, cell.corner[size_t(k)]));
+        const Origin of = originOf(index);
+        if (cell.isTriangle())
+            addPolygon(of, vertices, size);
+        else
+            addParallelogram(of, vertices, size);
+    }
+
+    void cutPiece(uint32_t index, const CellPiece& piece, double size) {
+        const Cell& cell = patches.cells[index];
+        std::vector<uint32_t> vertices;
+        for (const glm::dvec3& place : piece.corners) {
+            uint32_t vertex = uint32_t(patches.vertices.size());
+            for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k)
+                if (glm::vec3(place) == cell.position(k))
+                    vertex = worldVertex(cell.instance, cell.corner[size_t(k)]);
+            if (vertex == patches.vertices.size()) patches.vertices.push_back(glm::vec3(place));
+            vertices.push_back(vertex);
+        }
+        const size_t firstParent = patches.parents.size();
+        if (piece.corners.size() == 4 && isParallelogram(piece.corners))
+            addParallelogram(originOf(index), vertices, size);
+        else
+            addPolygon(originOf(index), vertices, size);
+        for (size_t p = firstParent; p < patches.parents.size(); ++p)
+            patches.parents[p].seenCorners = piece.seenCorners;
+    }
+
+    void addParallelogram(const Origin& of, const std::vector<uint32_t>& v, double size) {
+        Parent parent =
+            makeParent(of, patches.vertices[v[0]], patches.vertices[v[1]], patches.vertices[v[3]]);
+        std::copy(v.begin(), v.end(), parent.vertex.begin());
+        parent.isTriangle = false;
+        parent.countA = gridCount(glm::length(parent.a), size);
+        parent.countB = gridCount(glm::length(parent.b), size);
+        patches.parents.push_back(parent);
+    }
+
+    void addPolygon(const Origin& of, const std::vector<uint32_t>& v, double size) {
+        std::vector<glm::dvec3> points;
+        for (uint32_t vertex : v) points.push_back(patches.vertices[vertex]);
+        for (const std::array<int, 3>& t : triangulate(points)) {
+            double longest = 0;
+            for (size_t k = 0; k < 3; ++k)
+                longest = std::max(
+                    longest, glm::distance(points[size_t(t[k])], points[size_t(t[(k + 1) % 3])]));
+            cutTriangle(of, {v[size_t(t[0])], v[size_t(t[1])], v[size_t(t[2])]},
+                        std::max(size, longest / kMaxGrid));
+        }
     }
 
     uint32_t worldVertex(uint32_t instance, int32_t corner) const {
@@ -191,8 +261,8 @@ class Subdivision {
         return uint16_t(std::clamp(int(std::ceil(length / size - 0.01)), 1, kMaxGrid));
     }
 
-    uint32_t addCell(uint32_t instance, int32_t face, const glm::dvec3& p0, const glm::dvec3& pa,
-                     const glm::dvec3& pb, const std::array<int32_t, 4>& corner) {
+    void addCell(uint32_t instance, int32_t face, const glm::dvec3& p0, const glm::dvec3& pa,
+                 const glm::dvec3& pb, const std::array<int32_t, 4>& corner) {
         Cell cell;
         cell.origin = glm::vec3(p0);
         cell.a = glm::vec3(pa - p0);
@@ -201,16 +271,13 @@ class Subdivision {
         cell.instance = instance;
         cell.face = face;
         patches.cells.push_back(cell);
-        return uint32_t(patches.cells.size()) - 1;
     }
 
-    // What a parent is cut from.
-    struct Origin {
-        uint32_t instance;
-        int32_t face;
-        uint32_t cell;
-        glm::vec3 normal;  // of the cell: that of a tiny piece would be rounding alone
-    };
+    Origin originOf(uint32_t index) const {
+        const Cell& cell = patches.cells[index];
+        const glm::dvec3 normal = glm::cross(glm::dvec3(cell.a), glm::dvec3(cell.b));
+        return {cell.instance, cell.face, index, glm::vec3(glm::normalize(normal))};
+    }
 
     static Parent makeParent(const Origin& of, const glm::dvec3& p0, const glm::dvec3& pa,
                              const glm::dvec3& pb) {

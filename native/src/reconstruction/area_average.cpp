@@ -14,11 +14,9 @@ std::vector<std::vector<glm::vec3>> areaAverage(
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
-        const glm::vec2 centroid = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> shares =
-                cell.weights(parent.position(parent.pointOn(k, centroid)));
+            const std::array<float, 4> shares = patches.cornerWeights(parent, k);
             const double area =
                 double(patches.area[index / 2]) * double(std::max(exposed[index], kLeastExposure));
             for (size_t a = 0; a < 4; ++a) {

@@ -160,11 +160,9 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
         // What comes from behind is not gathered.
         if (patches.translucenceOf(2 * parent.firstPatch + uint32_t(side)) != glm::vec3(0.0f))
             continue;
-        const glm::vec2 centroid = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t at = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> shares =
-                cell.weights(parent.position(parent.pointOn(k, centroid)));
+            const std::array<float, 4> shares = patches.cornerWeights(parent, k);
             const Irradiance& h = light.irradiance;
             glm::vec3 difference = -(h.direct[at] - h.gathered[at] + h.indirect[at]);
             for (size_t a = 0; a < 4; ++a) {

@@ -74,8 +74,9 @@ EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
     return slope;
 }
 
-// openness: per cell from range.firstCell on, the share of its area that is exposed. Light on the
-// two sides of a covered strip (a wall on a floor) has nothing to do with each other.
+// openness: per cell from range.firstCell on, the share of its area that is exposed, and not parted
+// from the rest by a wall. Light on the two sides of a covered strip (a wall on a floor) has nothing to
+// do with each other.
 void addRegularization(const Patches& patches, const InstanceRange& range,
                        const SmoothRegions& regions, const std::vector<double>& openness,
                        double weight, FitTerms& terms) {
@@ -151,22 +152,23 @@ std::vector<std::vector<glm::vec3>> leastSquares(
     Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));
     // Of the well exposed patches of the cells at each node.
     std::vector<Range> seen(columns, Range(nodes));
-    std::vector<double> openness(range.lastCell - range.firstCell, 0);
+    std::vector<double> openness;
+    for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+        openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);  // nothing covers slivers
 
     // Add up the patches of each parent in a 4 x 4 matrix over the corners of its cell.
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
         const std::array<uint32_t, 4> node = nodesOf(cell, regions);
-        const glm::vec2 centroid = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
         std::array<std::array<double, 4>, 4> square{};
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> w =
-                cell.weights(parent.position(parent.pointOn(k, centroid)));
+            const std::array<float, 4> w = patches.cornerWeights(parent, k);
             const float open = std::max(exposed[index], kLeastExposure);
             const double weight = double(patches.area[index / 2]) * open;
-            openness[parent.cell - range.firstCell] += weight / areaOf(cell);
+            if (parent.seenCorners == 15)
+                openness[parent.cell - range.firstCell] += weight / areaOf(cell);
             for (int a = 0; a < 4; ++a) {
                 for (int b = 0; b < 4; ++b) square[a][b] += weight * w[a] * w[b];
                 if (w[a] == 0) continue;
@@ -179,8 +181,6 @@ std::vector<std::vector<glm::vec3>> leastSquares(
         }
         terms.addPatches(node, square);
     }
-    // Slivers have no patches: nothing covers them.
-    std::replace(openness.begin(), openness.end(), 0.0, 1.0);
     addRegularization(patches, range, regions, openness, double(regularization), terms);
     const Eigen::SparseMatrix<double> matrix = terms.matrix();
 

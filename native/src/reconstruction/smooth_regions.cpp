@@ -18,6 +18,7 @@ struct HalfEdge {
     uint32_t cell;
     int32_t from, to;  // corners
     bool ascending;    // from the smaller vertex to the larger
+    bool isParted;     // a wall stands on it
 };
 
 glm::vec3 placeOf(const Cell& cell, int32_t corner) {
@@ -41,7 +42,8 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
         for (int k = 0; k < n; ++k) {
             const int32_t from = cells[c].corner[k], to = cells[c].corner[(k + 1) % n];
             const int32_t a = mesh.cornerVertices[from], b = mesh.cornerVertices[to];
-            halfEdges.push_back({edgeKey(a, b), c, from, to, a < b});
+            halfEdges.push_back(
+                {edgeKey(a, b), c, from, to, a < b, (cells[c].parted >> k & 1) != 0});
         }
     }
     std::sort(halfEdges.begin(), halfEdges.end(), [](const HalfEdge& a, const HalfEdge& b) {
@@ -86,7 +88,7 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
         const HalfEdge& e = halfEdges[i];
         const HalfEdge& f = halfEdges[end - 1];
         const bool joinable =
-            end - i == 2 &&
+            end - i == 2 && !e.isParted && !f.isParted &&
             !std::binary_search(mesh.sharpEdges.begin(), mesh.sharpEdges.end(), e.key) &&
             e.ascending != f.ascending &&
             mesh.faceMaterials[cells[e.cell].face] == mesh.faceMaterials[cells[f.cell].face];
