@@ -3,6 +3,11 @@
 // A bake that runs again: relighting, cancelling, the last result.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <random>
+
 #include <array>
 #include <glm/gtc/matrix_transform.hpp>
 #include <string>
@@ -204,6 +209,57 @@ TEST(Cancel, AnyStageCanBeCancelledAndRunAgain) {
             EXPECT_LT(difference(everything(bake), wanted), 1e-5)
                 << "stage " << stage << " at " << fraction;
         }
+}
+
+// Cancels at one call and tells what the process has computed since then, in seconds of its threads.
+struct CancelAndCount {
+    int call = 0, calls = 0;  // from 0; the calls so far
+    double at = NAN;
+
+    static double computed() {
+        timespec time;
+        clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+        return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
+    }
+    static bool tell(void* user, rb_stage, double) {
+        CancelAndCount& own = *static_cast<CancelAndCount*>(user);
+        if (own.calls++ != own.call) return true;
+        own.at = computed();
+        return false;
+    }
+};
+
+// Land of 14 400 faces. The calls come every 20 ms, and where a stage reports by itself: so a cancel
+// comes anywhere.
+TEST(Cancel, ComesAnywhereAndSoon) {
+    Scene scene;
+    scene.worldRadiance = glm::vec3(0.5f);
+    Mesh land = grid("land", {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, 120, 120);
+    for (glm::vec3& v : land.vertices) v.z = 0.3f * std::sin(3 * v.x) * std::cos(2 * v.y);
+    place(scene, land, grey("", 0.5f));
+    place(scene, box("box", {-0.5f, -0.5f, 0.5f}, {0.5f, 0.5f, 1.5f}, false), grey("", 0.5f));
+    scene.addLight(pointLight({2, 1, 3}, glm::dvec3(30)));
+    CancelAndCount whole{INT32_MAX};
+    Bake bake;
+    bake.settings.targetError = 0.05f;
+    bake.progress = Progress(CancelAndCount::tell, &whole);
+    bake.run(scene);
+    ASSERT_GT(whole.calls, 12);
+    const std::vector<glm::vec3> light = cornerLight(bake, 0, RB_OUTPUT_LIGHTING);
+    std::mt19937 random(1);
+    double most = 0;
+    for (int k = 0; k < 12; ++k) {
+        CancelAndCount cancel{int(random() % uint32_t(whole.calls - 4))};
+        bake.progress = Progress(CancelAndCount::tell, &cancel);
+        bake.settings.skipGeometry = 0;
+        EXPECT_THROW(bake.run(scene), Error) << cancel.call << " of " << whole.calls;
+        most = std::max(most, CancelAndCount::computed() - cancel.at);
+        EXPECT_EQ(cornerLight(bake, 0, RB_OUTPUT_LIGHTING), light) << "the last result stays";
+    }
+    std::printf("[ figures  ] after a cancel the threads compute for %.3f s at most\n", most);
+    bake.progress = Progress();
+    bake.run(scene);
+    EXPECT_LT(difference(cornerLight(bake, 0, RB_OUTPUT_LIGHTING), light), 1e-5);
 }
 
 // Cancels at one call of the callback.

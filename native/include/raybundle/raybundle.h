@@ -377,7 +377,8 @@ typedef enum rb_stage RB_INT {
 } rb_stage;
 
 /* Called from the thread that runs rb_execute_bake, with the share of the stage that is done (0 to
- * 1). Return false to cancel. */
+ * 1), whenever that changes and every 20 ms. Return false to cancel: the bake then ends within some
+ * 10 ms, and for 300,000 faces some 100 ms, wherever it is. */
 typedef bool (*rb_progress_function)(void* user, rb_stage stage, double fraction);
 
 /* Sets (or with NULL removes) the progress function of a bake. */

@@ -13,6 +13,7 @@
 #include <numeric>
 
 #include "bake/bake_warnings.h"
+#include "bake/cancellation.h"
 #include "bake/combination.h"
 #include "bake/energy_balance.h"
 #include "bake/geometry_hash.h"
@@ -126,22 +127,35 @@ void checkFinite(const std::vector<InstanceLight>& instances) {
 Bake::Bake() = default;
 Bake::~Bake() = default;
 
-// Where memory runs out, patches, lines and solutions may be left half-made, and none of them goes
-// to the next bake. A cancel comes between two steps, after which Trace::isWhole tells.
+// Where memory runs out or a cancel comes anywhere, patches, lines and solutions may be left half-made,
+// and none of them goes to the next bake. After a cancel between two steps Trace::isWhole tells.
 void Bake::run(const Scene& scene) {
     checkCombination(settings, scene.lightSets.size());
-    const Threads threads(settings.threads);
     makeRoomForTreeBuilders();
-    tbb::task_arena arena(threads.count);
+    const Progress callers = progress;
+    Cancelled cancelled = Cancelled::NO;
+    bool isDone = false;
     try {
-        arena.execute([&] { runStages(scene, threads); });
-    } catch (const Error& error) {
-        if (error.code != RB_ERROR_CANCELLED) trace.reset();
-        throw;
+        cancelled =
+            runCancellable(callers, [&](const Progress& watched, tbb::task_group_context& context) {
+                progress = watched;
+                const Threads threads(settings.threads);
+                tbb::task_arena(threads.count).execute([&] {
+                    tbb::task_group(context).run_and_wait([&] {
+                        runStages(scene, threads);
+                        isDone = true;
+                    });
+                });
+            });
     } catch (...) {
+        progress = callers;
         trace.reset();
         throw;
     }
+    progress = callers;
+    if (isDone) return;
+    if (cancelled == Cancelled::ANYWHERE) trace.reset();
+    throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
 }
 
 void Bake::runStages(const Scene& scene, const Threads& threads) {
@@ -213,6 +227,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         fillLeftOutCorners(patches, ranges, made, report);
         checkFinite(made);
     }
+    throwIfCancelled();
     report.patches = trace->patches.count();
     report.cuts = trace->cuts;
     report.lines = trace->tracer->lineCount();

@@ -18,9 +18,14 @@ class Progress {
     // Reports the share (0 to 1) of a stage that is done. Throws Error(CANCELLED) if the caller
     // wants to stop.
     void report(rb_stage stage, double fraction) const {
-        if (function && !function(user, stage, begin + share * fraction))
-            throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
+        if (!tell(stage, fraction)) throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
     }
+    // The same; returns whether the caller wants to go on.
+    bool tell(rb_stage stage, double fraction) const {
+        return !function || function(user, stage, begin + share * fraction);
+    }
+    // Whether there is anyone to report to.
+    bool isHeard() const { return function != nullptr; }
 
     // For the k-th of n equal parts of what a stage does.
     Progress part(size_t k, size_t n) const {

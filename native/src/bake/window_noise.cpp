@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 // A window darker than this share of its island, and of the first one, may have the noise of one that
@@ -32,6 +34,7 @@ double windowNoise(const Patches& patches, const std::vector<int32_t>& windowOf,
     std::vector<Sums> windows, islands(islandCount);
     std::vector<uint32_t> islandOf;  // per window
     for (size_t side = 0; side < weight.size(); ++side) {
+        throwIfCancelledAt(side);
         if (!(weight[side] > 0)) continue;
         glm::dvec3 a(0.0), b(0.0);
         for (const std::array<Irradiance, 2>& half : halves) {

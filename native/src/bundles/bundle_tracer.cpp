@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bundles/bundle_tracer.h"
 
-#include <tbb/parallel_for.h>
-
 #include <numeric>
+
+#include "bake/cancellation.h"
 
 namespace raybundle {
 
@@ -21,7 +21,7 @@ std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
     const std::vector<Bundle> sequence = directions.next(count);
     std::vector<TracedBundle> traced(sequence.size());
     std::vector<uint64_t> joined(sequence.size());  // lines of the exchanges, per bundle
-    tbb::parallel_for(size_t(0), sequence.size(), [&](size_t k) {
+    parallelFor(size_t(0), sequence.size(), [&](size_t k) {
         traced[k].bundle = sequence[k];
         projectors.local()->project(sequence[k], traced[k].lines);
         for (const Exchange& e : traced[k].lines.exchanges) joined[k] += e.lines;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bundles/line_counts.h"
 
-#include <tbb/parallel_for.h>
-
 #include <map>
+
+#include "bake/cancellation.h"
 
 namespace raybundle {
 
@@ -79,7 +79,7 @@ void LineCounts::add(const std::vector<TracedBundle>& traced) {
         t.lines.forEachTouching([&](uint32_t side, uint32_t weight) { touching[side] += weight; });
     countMet(traced);
     bundles += uint32_t(traced.size());
-    tbb::parallel_for(size_t(0), halves.size(), [&](size_t half) {
+    parallelFor(size_t(0), halves.size(), [&](size_t half) {
         std::vector<const BundleLines*> ofHalf;
         for (const TracedBundle& t : traced)
             if (t.bundle.half == half) ofHalf.push_back(&t.lines);

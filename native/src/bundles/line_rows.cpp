@@ -2,11 +2,12 @@
 #include "bundles/line_rows.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <numeric>
 #include <random>
+
+#include "bake/cancellation.h"
 
 namespace raybundle {
 namespace {
@@ -65,7 +66,7 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
     // Bring the entries to their blocks, in the order of the bundles.
     const size_t n = sideCount(), blocks = (n >> kBlockBits) + 1;
     std::vector<std::vector<size_t>> places(bundles.size(), std::vector<size_t>(blocks, 0));
-    tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
+    parallelFor(size_t(0), bundles.size(), [&](size_t b) {
         forEachEntry(*bundles[b], [&](uint32_t row, uint32_t) { ++places[b][row >> kBlockBits]; });
     });
     std::vector<size_t> blockBegin(blocks + 1, 0);
@@ -81,7 +82,7 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
     blockBegin[blocks] = place;
     const auto entryOf = uninitialised<uint32_t>(place);
     const auto rowOf = uninitialised<uint8_t>(place);  // within the block
-    tbb::parallel_for(size_t(0), bundles.size(), [&](size_t b) {
+    parallelFor(size_t(0), bundles.size(), [&](size_t b) {
         forEachEntry(*bundles[b], [&](uint32_t row, uint32_t entry) {
             const size_t at = places[b][row >> kBlockBits]++;
             entryOf[at] = entry;
@@ -89,7 +90,7 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
         });
     });
     auto forEachBlock = [&](const auto& body) {
-        tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+        parallelFor(size_t(0), blocks, [&](size_t block) {
             body(blockBegin[block], blockBegin[block + 1], block << kBlockBits,
                  std::min(n, (block + 1) << kBlockBits));
         });
@@ -152,7 +153,7 @@ void LineRows::joinRepeated() {
     tbb::enumerable_thread_specific<std::vector<uint32_t>> places(std::vector<uint32_t>(n, 0));
     std::vector<std::vector<uint32_t>> joinedOf(blocks);
     std::vector<size_t> ends(n + 1, 0);
-    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+    parallelFor(size_t(0), blocks, [&](size_t block) {
         std::vector<uint32_t>& place = places.local();
         std::vector<uint32_t>& joined = joinedOf[block];
         std::vector<std::pair<uint32_t, uint64_t>> row;  // side, lines
@@ -176,7 +177,7 @@ void LineRows::joinRepeated() {
     });
     std::partial_sum(ends.begin(), ends.end(), ends.begin());
     entries = uninitialised<uint32_t>(ends[n]);
-    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+    parallelFor(size_t(0), blocks, [&](size_t block) {
         if (!joinedOf[block].empty())
             std::copy(joinedOf[block].begin(), joinedOf[block].end(),
                       entries.get() + ends[block << kBlockBits]);

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 
@@ -370,6 +372,7 @@ LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pi
     const Clustering clustering(patches);
     std::vector<IslandDensity> islands(patches.islands.size());
     for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+        throwIfCancelledAt(i);
         const Parent& parent = patches.parents[i];
         IslandDensity& island = islands[parent.island];
         island.members.push_back(i);

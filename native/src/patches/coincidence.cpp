@@ -5,6 +5,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "bake/cancellation.h"
 #include "patches/plane.h"
 
 namespace raybundle {
@@ -36,6 +37,7 @@ std::vector<Part> measured(const WeldedFaces& faces, const std::vector<glm::vec3
                            const std::vector<bool>& closed) {
     std::vector<Part> parts(faces.surfaceCount);
     for (size_t f = 0; f < faces.count(); ++f) {
+        throwIfCancelledAt(f);
         if (!closed[faces.surface[f]]) continue;
         Part& part = parts[faces.surface[f]];
         const size_t begin = faces.offsets[f], end = faces.offsets[f + 1];
@@ -71,6 +73,7 @@ std::vector<bool> closedSurfaces(const WeldedFaces& faces) {
     std::vector<Edge> edges;
     edges.reserve(faces.vertices.size());
     for (size_t f = 0; f < faces.count(); ++f) {
+        throwIfCancelledAt(f);
         const size_t begin = faces.offsets[f], end = faces.offsets[f + 1];
         for (size_t c = begin; c < end; ++c) {
             const uint32_t a = faces.vertices[c], b = faces.vertices[c + 1 < end ? c + 1 : begin];

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patches/contacts.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <optional>
 #include <vector>
 
+#include "bake/cancellation.h"
 #include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
 
@@ -37,7 +36,7 @@ class Gaps {
 
     // Looks from each side which gaps are narrow beside it or beside what it meets.
     void find() {
-        tbb::parallel_for(uint32_t(0), uint32_t(patches.sideCount()), [&](uint32_t side) {
+        parallelFor(uint32_t(0), uint32_t(patches.sideCount()), [&](uint32_t side) {
             if (!counts(side)) return;
             for (uint32_t i = 0; i < kFirstRays; ++i) {
                 const glm::vec4 u = sobolPoint(i, hash(side, 0));
@@ -98,7 +97,7 @@ Cuts contactCuts(const Patches& patches, const Visibility& visibility, float tou
     gaps.find();
     Cuts cuts;
     cuts.levels.assign(tiles, 0);
-    tbb::parallel_for(uint32_t(0), uint32_t(tiles), [&](uint32_t tile) {
+    parallelFor(uint32_t(0), uint32_t(tiles), [&](uint32_t tile) {
         if (gaps.isContact(2 * tile) || gaps.isContact(2 * tile + 1)) cuts.levels[tile] = kLevel;
     });
     const size_t most = std::min(maxPatches - tiles, std::max(tiles, kMostMore));

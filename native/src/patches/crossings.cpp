@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patches/crossings.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -11,6 +9,8 @@
 #include <numeric>
 #include <tuple>
 #include <unsupported/Eigen/BVH>
+
+#include "bake/cancellation.h"
 
 namespace raybundle {
 namespace {
@@ -55,6 +55,7 @@ struct CellEdge {
 std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const VertexOf& vertexOf) {
     std::vector<CellEdge> edges;
     for (uint32_t c = 0; c < cells.size(); ++c) {
+        throwIfCancelledAt(c);
         if (!cells[c].hasPatches) continue;
         const int n = cells[c].isTriangle() ? 3 : 4;
         for (int k = 0; k < n; ++k) {
@@ -126,6 +127,7 @@ Walls findWalls(const std::vector<Cell>& cells, const std::vector<CellEdge>& edg
     Walls walls;
     std::vector<uint32_t> numberOf(cells.size(), UINT32_MAX);
     for (uint32_t c = 0; c < cells.size(); ++c) {
+        throwIfCancelledAt(c);
         uint32_t& number = numberOf[root(c)];
         if (number == UINT32_MAX) {
             number = uint32_t(walls.area.size());
@@ -165,7 +167,7 @@ class CellsByPlace {
     CellsByPlace(const Walls& all, const std::vector<std::vector<uint32_t>>& cellsOf,
                  const std::vector<Box>& boxes)
         : trees(cellsOf.size()) {
-        tbb::parallel_for(size_t(0), cellsOf.size(), [&](size_t wall) {
+        parallelFor(size_t(0), cellsOf.size(), [&](size_t wall) {
             std::vector<Box> own;
             for (uint32_t c : cellsOf[wall]) own.push_back(boxes[c]);
             trees[wall].init(cellsOf[wall].begin(), cellsOf[wall].end(), own.begin(), own.end());
@@ -237,6 +239,7 @@ Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double
     std::vector<double> length(cells.size());  // of the longest edge over that of a patch
     std::vector<uint32_t> order;
     for (uint32_t c = 0; c < cells.size(); ++c) {
+        throwIfCancelledAt(c);
         if (!cells[c].hasPatches || !isWide(walls.of[c], sizes[c])) continue;
         order.push_back(c);
         cellsOf[walls.of[c]].push_back(c);
@@ -253,7 +256,7 @@ Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double
     for (size_t first = 0; first < order.size() && result.isAll; first += kTogether) {
         const size_t end = std::min(first + kTogether, order.size());
         std::vector<std::optional<Crossing>> found(end - first);
-        tbb::parallel_for(first, end, [&](size_t k) {
+        parallelFor(first, end, [&](size_t k) {
             const uint32_t c = order[k];
             const double size = sizes[c], ofPatch = size * std::min(length[c], 1.0);
             Box box = boxes[c];

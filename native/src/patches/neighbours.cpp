@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <tuple>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 
@@ -78,6 +80,7 @@ std::vector<TilePair> neighbouringTiles(const Patches& patches, uint32_t firstPa
     std::vector<TilePair> pairs;
     std::vector<BorderEdge> border;
     for (uint32_t p = firstParent; p < lastParent; ++p) {
+        throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         if (parent.isTriangle)
             pairTriangle(parent, pairs, border);

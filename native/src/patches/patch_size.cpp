@@ -7,6 +7,8 @@
 #include <numeric>
 #include <tuple>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 
@@ -229,6 +231,7 @@ PatchSizes automaticPatchSizes(const std::vector<Surface>& surfaces) {
     const double factor = std::sqrt(std::max(1.0, others / (kMostOfOthers * first)));
     const double largest = kLargest * islands[order[0]].extent.diagonal();
     for (size_t k = important; k < order.size(); ++k) {
+        throwIfCancelledAt(k);
         const Group& island = islands[order[k]];
         const double own = island.extent.diagonal(),
                      few = std::sqrt(count[order[k]] / (kMostOfVast * first));
@@ -237,6 +240,7 @@ PatchSizes automaticPatchSizes(const std::vector<Surface>& surfaces) {
 
     result.size = sizing.take();
     for (size_t k = 0; k < order.size(); ++k) {
+        throwIfCancelledAt(k);
         for (size_t m : islands[order[k]].members) result.island[m] = uint32_t(k);
         result.extent.push_back(islands[order[k]].extent);
     }

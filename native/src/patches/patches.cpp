@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/cancellation.h"
 #include "bake/error.h"
 #include "patches/placement.h"
 #include "patches/reflectance.h"
@@ -152,6 +153,7 @@ void fillPatches(const Scene& scene, Patches& patches) {
     patches.parentOf.clear();
     patches.area.clear();
     for (size_t i = 0; i < patches.parents.size(); ++i) {
+        throwIfCancelledAt(i);
         const Parent& parent = patches.parents[i];
         patches.parentOf.resize(parent.firstPatch + parent.patchCount(), uint32_t(i));
         const float tileArea = parent.area() / float(parent.tileCount());

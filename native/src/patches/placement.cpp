@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "bake/cancellation.h"
 #include "bake/error.h"
 #include "patches/coincidence.h"
 
@@ -77,6 +78,7 @@ glm::dmat3 Placement::ownAxes() const {
     glm::dvec3 y = commonest(walls, &x);
     if (y == glm::dvec3(0.0)) {
         for (size_t f = 0; f < allFaces.count(); f += step) {
+            throwIfCancelledAt(f);
             const size_t begin = allFaces.offsets[f], end = allFaces.offsets[f + 1];
             for (size_t c = begin; c < end; ++c) {
                 const glm::dvec3 edge = world[allFaces.vertices[c + 1 < end ? c + 1 : begin]] -
@@ -133,6 +135,7 @@ std::vector<Surface> Placement::surfaces() const {
     std::vector<bool> isClosed(result.size());
     std::vector<std::vector<uint32_t>> facesOf(result.size());
     for (size_t f = 0; f < allFaces.count(); ++f) {
+        throwIfCancelledAt(f);
         Surface& surface = result[allFaces.piece[f]];
         for (size_t c = allFaces.offsets[f]; c < allFaces.offsets[f + 1]; ++c)
             surface.extent.add(axes * world[allFaces.vertices[c]]);

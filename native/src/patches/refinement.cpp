@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patches/refinement.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "bake/cancellation.h"
 #include "reconstruction/reconstruction.h"
 #include "reconstruction/surplus.h"
 #include "scene/channels.h"
@@ -39,6 +38,7 @@ bool isWanted(const Scene& scene, const Patches& patches, uint32_t side) {
 double meanSquareLight(const Patches& patches, const CoarseShot& shot) {
     double sum = 0, squares = 0, area = 0, reflected = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
+        throwIfCancelledAt(side);
         const double h = double(brightest(shot.gathered[side].irradiance));
         if (!(h > 0)) continue;
         const double a = double(patches.area[side / 2]);
@@ -76,7 +76,7 @@ void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, do
     }
     const std::vector<float> exposed(patches.sideCount(), 1.0f);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
-    tbb::parallel_for(size_t(0), 2 * ranges.size(), [&](size_t k) {
+    parallelFor(size_t(0), 2 * ranges.size(), [&](size_t k) {
         const InstanceRange& range = ranges[k / 2];
         if (range.firstParent >= range.lastParent) return;
         const Parent& last = patches.parents[range.lastParent - 1];

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patches/reflectance.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "bake/cancellation.h"
 
 namespace raybundle {
 namespace {
@@ -135,7 +135,7 @@ void assignOpacity(const Scene& scene, Patches& patches) {
                     [&](const Parent& parent) { return materialOf(parent).isOpaque(); }))
         return;
     patches.opacity.assign(patches.count(), 1.0f);
-    tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
+    parallelFor(size_t(0), patches.parents.size(), [&](size_t i) {
         Parent& parent = patches.parents[i];
         const Material& material = materialOf(parent);
         if (material.isOpaque()) return;
@@ -188,7 +188,7 @@ void assignMaterials(const Scene& scene, Patches& patches) {
                     [](const Material& material) { return material.isTranslucent(); });
     patches.translucence.assign(hasTranslucence ? patches.sideCount() : 0, glm::vec3(0.0f));
     assignScattering(scene, patches);
-    tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
+    parallelFor(size_t(0), patches.parents.size(), [&](size_t i) {
         const Parent& parent = patches.parents[i];
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
         const Material& material = scene.materialOf(mesh, parent.face);
@@ -221,7 +221,7 @@ void assignMaterials(const Scene& scene, Patches& patches) {
 
 std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& patches) {
     std::vector<glm::vec3> diffuse(patches.sideCount());
-    tbb::parallel_for(size_t(0), patches.parents.size(), [&](size_t i) {
+    parallelFor(size_t(0), patches.parents.size(), [&](size_t i) {
         const Parent& parent = patches.parents[i];
         const Material& material = scene.materialOf(parent.instance, size_t(parent.face));
         const uint32_t first = 2 * parent.firstPatch;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "bake/cancellation.h"
 #include "patches/patches.h"
 
 namespace raybundle {
@@ -63,6 +64,7 @@ class SheetSearch {
         listEdges();
         isPlaced.assign(patches.parents.size(), false);
         for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+            throwIfCancelledAt(i);
             if (!patches.parents[i].exchanges) continue;
             if (!mayJoin(i))
                 result.loose.push_back(i);
@@ -93,6 +95,7 @@ class SheetSearch {
 
     void listEdges() {
         for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+            throwIfCancelledAt(i);
             if (!mayJoin(i)) continue;
             const auto& v = patches.parents[i].vertex;
             for (int k = 0; k < 4; ++k)

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "bake/cancellation.h"
 #include "patches/coincidence.h"
 #include "patches/crossings.h"
 #include "scene/triangulation.h"
@@ -58,6 +59,7 @@ class Subdivision {
             const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
             size_t degenerate = 0, doubles = 0;
             for (size_t f = 0; f < mesh.faceCount(); ++f) {
+                throwIfCancelledAt(f);
                 const size_t face = faces.firstFace[i] + f;
                 if (doubled.isDouble[face]) {
                     ++doubles;
@@ -93,6 +95,7 @@ class Subdivision {
                 "there: they may let some light through walls; delete or hide what nobody sees of "
                 "objects that go through each other");
         for (uint32_t c = 0; c < patches.cells.size(); ++c) {
+            throwIfCancelledAt(c);
             if (!patches.cells[c].hasPatches) continue;
             const size_t firstParent = patches.parents.size();
             const auto crossing = crossings.ofCell.find(c);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 
 Tiles::Tiles(const Patches& cut) : original(cut) {
@@ -17,6 +19,7 @@ Tiles::Tiles(const Patches& cut) : original(cut) {
     uncut->emission.clear();
     uncut->parentOf.clear();
     for (size_t i = 0; i < cut.parents.size(); ++i) {
+        throwIfCancelledAt(i);
         const Parent& parent = cut.parents[i];
         for (uint32_t tile = 0; tile < parent.tileCount(); ++tile) {
             first.push_back(parent.firstPatch + parent.firstOf(tile));
@@ -48,6 +51,7 @@ std::vector<Value> Tiles::meanOf(const std::vector<Value>& values,
     const std::vector<float> total = sum(weight);
     std::vector<Value> result(sideCount(), Value(0.0f));
     for (size_t side = 0; side < result.size(); ++side) {
+        throwIfCancelledAt(side);
         const size_t tile = side / 2;
         if (levels[tile] == 0) {
             result[side] = values[2 * first[tile] + side % 2];
@@ -77,6 +81,7 @@ std::vector<float> Tiles::errorOfMean(const std::vector<float>& errors) const {
     if (!uncut) return errors;
     std::vector<float> result(sideCount(), 0.0f);
     for (size_t side = 0; side < result.size(); ++side) {
+        throwIfCancelledAt(side);
         const size_t tile = side / 2;
         float variance = 0;
         for (size_t p = first[tile]; p < first[tile + 1]; ++p) {

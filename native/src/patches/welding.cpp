@@ -7,6 +7,8 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 
@@ -19,6 +21,7 @@ std::vector<uint64_t> openEdges(const Mesh& mesh) {
     std::vector<uint64_t> edges;
     edges.reserve(mesh.cornerCount());
     for (size_t f = 0; f < mesh.faceCount(); ++f) {
+        throwIfCancelledAt(f);
         const int32_t begin = mesh.faceOffsets[f], end = mesh.faceOffsets[f + 1];
         for (int32_t c = begin; c < end; ++c)
             edges.push_back(edgeKey(mesh.cornerVertices[size_t(c)],
@@ -123,6 +126,7 @@ WeldedFaces weldedFaces(const Scene& scene, const std::vector<uint32_t>& welded,
         const bool mirrored = instance.isMirrored();
         faces.firstFace.push_back(faces.count());
         for (size_t f = 0; f < mesh.faceCount(); ++f) {
+            throwIfCancelledAt(f);
             const size_t first = faces.vertices.size();
             for (int32_t c = mesh.faceOffsets[f]; c < mesh.faceOffsets[f + 1]; ++c)
                 faces.vertices.push_back(
@@ -151,6 +155,7 @@ WeldedFaces weldedFaces(const Scene& scene, const std::vector<uint32_t>& welded,
     };
     std::vector<Piece> last;  // per surface; faces are in the order of their instances
     for (size_t f = 0; f < faces.count(); ++f) {
+        throwIfCancelledAt(f);
         uint32_t& surface = number[root(faces.vertices[faces.offsets[f]])];
         if (surface == UINT32_MAX) {
             surface = faces.surfaceCount++;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 
 std::vector<std::vector<glm::vec3>> areaAverage(
@@ -12,6 +14,7 @@ std::vector<std::vector<glm::vec3>> areaAverage(
         fields.size(), std::vector<glm::dvec3>(regions.nodeCount, glm::dvec3(0.0)));
     std::vector<double> weights(regions.nodeCount, 0.0);
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+        throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {

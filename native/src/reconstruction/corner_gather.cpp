@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/corner_gather.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "bake/cancellation.h"
 #include "transport/local_lines.h"
 
 namespace raybundle {
@@ -58,7 +57,7 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
         if (scene.instances[i].role != RB_ROLE_BAKE) continue;
         std::vector<CornerReceiver> all = cornerReceivers(scene, patches, uint32_t(i), ranges[i]);
         std::vector<uint8_t> isFree(all.size());
-        tbb::parallel_for(size_t(0), all.size(), [&](size_t c) {
+        parallelFor(size_t(0), all.size(), [&](size_t c) {
             const Receiver& receiver = all[c].receiver;
             leaveGap(all[c], patches, visibility);
             isFree[c] = exposed[receiver.side] > kHalfCovered && !isTouched(receiver);
@@ -109,7 +108,7 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
             gather.isWanted(ranges[instance], regions, scene.instances[instance].side, exposed,
                             light.carried, light.indirect);
         std::vector<uint8_t> isNear(end - begin);
-        tbb::parallel_for(begin, end, [&](size_t c) {
+        parallelFor(begin, end, [&](size_t c) {
             isNear[c - begin] = showsOwnAlone(c) && !wanted[regions.nodeOf[corners[c].corner]] &&
                                 (corners[c].isBesideGap || gather.isNear(corners[c].receiver));
         });
@@ -125,7 +124,7 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
             const float angle = cornerAngles[corners[c].corner];
             if (wanted[node] && angle > 0) receivers[node].push_back({&corners[c].receiver, angle});
         }
-        tbb::parallel_for(size_t(0), receivers.size(), [&](size_t node) {
+        parallelFor(size_t(0), receivers.size(), [&](size_t node) {
             if (receivers[node].empty()) return;
             float sum = 0;
             for (const FinalGather::Share& share : receivers[node]) sum += share.share;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/cancellation.h"
 #include "transport/sobol.h"
 
 namespace raybundle {
@@ -44,6 +45,7 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
     std::vector<float> nearest(mesh.cornerCount(), INFINITY);
     std::vector<CornerReceiver> receivers(mesh.cornerCount());
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+        throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
         const int n = cell.isTriangle() ? 3 : 4;

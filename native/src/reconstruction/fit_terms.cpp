@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 
@@ -48,10 +50,13 @@ class SymmetricSum {
             for (const Entry& entry : row) ++counts[entry.column];
         lower.reserve(counts);
         // In the order of rows, so that columns are.
-        for (Eigen::Index i = 0; i < n; ++i)
+        for (Eigen::Index i = 0; i < n; ++i) {
+            throwIfCancelledAt(size_t(i));
             for (const Entry& entry : rows[size_t(i)])
                 lower.insertBackUncompressed(i, entry.column) = entry.value;
+        }
         lower.makeCompressed();
+        throwIfCancelled();
         return lower.selfadjointView<Eigen::Lower>();
     }
 
@@ -87,12 +92,17 @@ void FitTerms::addSquare(const std::array<uint32_t, 8>& node, const std::array<d
 
 Eigen::SparseMatrix<double> FitTerms::matrix() const {
     SymmetricSum sum(nodeCount);
-    for (const CellTerm& term : ofPatches)
+    size_t step = 0;
+    for (const CellTerm& term : ofPatches) {
+        throwIfCancelledAt(step++);
         sum.add(term.node, [&](size_t a, size_t b) { return double(term.square[a][b]); });
-    for (const Square& term : squares)
+    }
+    for (const Square& term : squares) {
+        throwIfCancelledAt(step++);
         sum.add(term.node, [&](size_t a, size_t b) {
             return term.weight * double(term.stencil[a]) * double(term.stencil[b]);
         });
+    }
     return sum.matrix();
 }
 
@@ -101,6 +111,7 @@ void FitTerms::forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWant
                            const Visit& visit) const {
     size_t index = 0;
     for (const CellTerm& term : ofPatches) {
+        throwIfCancelledAt(index);
         if (isWanted(term.node)) {
             std::array<double, 4> amount{};
             for (size_t a = 0; a < 4; ++a)
@@ -112,6 +123,7 @@ void FitTerms::forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWant
         ++index;
     }
     for (const Square& term : squares) {
+        throwIfCancelledAt(index);
         if (isWanted(term.node)) {
             double slope = 0;
             for (size_t a = 0; a < 8; ++a) slope += double(term.stencil[a]) * values[term.node[a]];

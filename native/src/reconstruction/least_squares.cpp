@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/least_squares.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/IterativeLinearSolvers>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 
+#include "bake/cancellation.h"
 #include "reconstruction/fit_terms.h"
 
 namespace raybundle {
@@ -20,6 +20,8 @@ constexpr float kHalfCovered = 0.5f;
 constexpr double kOpen = 0.99;
 constexpr double kTolerance = 1e-6;
 constexpr Eigen::Index kMaxIterations = 2000;
+// Relative residual of a fit that is shown.
+constexpr double kMostResidual = 1e-3;
 // A face is at least so high over its edge, as a share of the edge, and its far corners lie at most
 // so many edges beside it: what the slopes of thinner ones were would follow rounding errors.
 constexpr double kLeastHeight = 0.02;
@@ -29,6 +31,16 @@ constexpr double kMostAlong = 3;
 // share.
 constexpr double kBeyond = 0.5;
 constexpr double kMostAbove = 0.2;
+
+// Looks at each iteration whether the bake is to stop.
+class CancellableJacobi : public Eigen::DiagonalPreconditioner<double> {
+  public:
+    template <class Rhs>
+    auto solve(const Eigen::MatrixBase<Rhs>& b) const {
+        throwIfCancelled();
+        return Eigen::DiagonalPreconditioner<double>::solve(b);
+    }
+};
 
 // The nodes of a cell; a triangle repeats its first, with weight 0 wherever it is used.
 std::array<uint32_t, 4> nodesOf(const Cell& cell, const SmoothRegions& regions) {
@@ -82,7 +94,9 @@ void addRegularization(const Patches& patches, const InstanceRange& range,
                        double weight, FitTerms& terms) {
     std::array<uint32_t, 8> node;
     std::array<double, 8> stencil;
+    size_t step = 0;
     for (const SmoothEdge& edge : regions.edges) {
+        throwIfCancelledAt(step++);
         const Cell& cell0 = patches.cells[edge.cell[0]];
         const Cell& cell1 = patches.cells[edge.cell[1]];
         const EdgeSlope s0 = slopeAcross(cell0, edge.corner[0], edge.corner[1]);
@@ -141,13 +155,13 @@ Range around(const Range& range, const std::vector<std::array<uint32_t, 4>>& cel
 
 }  // namespace
 
-std::vector<std::vector<glm::vec3>> leastSquares(
-    const Patches& patches, const InstanceRange& range, const SmoothRegions& regions, rb_side side,
-    const std::vector<float>& exposed, float regularization,
-    const std::vector<const std::vector<glm::vec3>*>& fields) {
+LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
+                             const SmoothRegions& regions, rb_side side,
+                             const std::vector<float>& exposed, float regularization,
+                             const std::vector<const std::vector<glm::vec3>*>& fields) {
     const size_t columns = 3 * fields.size();
     const Eigen::Index nodes = regions.nodeCount;
-    if (nodes == 0) return std::vector<std::vector<glm::vec3>>(fields.size());
+    if (nodes == 0) return {std::vector<std::vector<glm::vec3>>(fields.size())};
     FitTerms terms(regions.nodeCount);
     Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));
     // Of the well exposed patches of the cells at each node.
@@ -158,6 +172,7 @@ std::vector<std::vector<glm::vec3>> leastSquares(
 
     // Add up the patches of each parent in a 4 x 4 matrix over the corners of its cell.
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+        throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
         const std::array<uint32_t, 4> node = nodesOf(cell, regions);
@@ -183,6 +198,7 @@ std::vector<std::vector<glm::vec3>> leastSquares(
     }
     addRegularization(patches, range, regions, openness, double(regularization), terms);
     const Eigen::SparseMatrix<double> matrix = terms.matrix();
+    throwIfCancelled();
 
     // Least exposed share of the faces at each node. At a contact the exposed part of a face is small,
     // and its slope uncertain: no value is above what is seen around it, and the more is covered, the
@@ -190,6 +206,7 @@ std::vector<std::vector<glm::vec3>> leastSquares(
     std::vector<double> openAt(size_t(nodes), 1.0);
     std::vector<std::array<uint32_t, 4>> cells;
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
+        throwIfCancelledAt(c);
         cells.push_back(nodesOf(patches.cells[c], regions));
         for (uint32_t v : cells.back())
             openAt[v] = std::min(openAt[v], openness[c - range.firstCell]);
@@ -197,8 +214,11 @@ std::vector<std::vector<glm::vec3>> leastSquares(
 
     std::vector<std::vector<glm::vec3>> result(fields.size(),
                                                std::vector<glm::vec3>(size_t(nodes)));
-    tbb::parallel_for(size_t(0), columns, [&](size_t c) {
+    std::atomic<bool> isSolved = true;
+    parallelFor(size_t(0), columns, [&](size_t c) {
+        throwIfCancelled();
         const Range wide = around(seen[c], cells);
+        throwIfCancelled();
         // Start from the area-weighted mean; nodes without a patch (degenerate faces) keep zero.
         Eigen::VectorXd mean = Eigen::VectorXd::Zero(nodes), low = mean;
         Eigen::VectorXd high = Eigen::VectorXd::Constant(nodes, INFINITY);
@@ -214,16 +234,23 @@ std::vector<std::vector<glm::vec3>> leastSquares(
             high[v] = std::max(most + above, mean[v]);
         }
         if (mean.maxCoeff() <= 0) return;
-        Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper> solver;
+        Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper,
+                                 CancellableJacobi>
+            solver;
         solver.setTolerance(kTolerance);
         solver.setMaxIterations(kMaxIterations);
         solver.compute(matrix);
-        const Eigen::VectorXd solution =
-            terms.within(low, high, mean, solver.solveWithGuess(rhs.col(Eigen::Index(c)), mean));
+        Eigen::VectorXd fit = solver.solveWithGuess(rhs.col(Eigen::Index(c)), mean);
+        // What does not come near to a solution could be anything.
+        if (!(solver.error() <= kMostResidual)) {
+            fit = mean;
+            isSolved = false;
+        }
+        const Eigen::VectorXd solution = terms.within(low, high, mean, fit);
         for (Eigen::Index v = 0; v < nodes; ++v)
             result[c / 3][size_t(v)][int(c % 3)] = float(std::max(solution[v], 0.0));
     });
-    return result;
+    return {std::move(result), isSolved};
 }
 
 }  // namespace raybundle

@@ -37,11 +37,17 @@ struct InstanceRange {
 // Weight that even a wholly covered patch keeps, so that every node has a value.
 constexpr float kLeastExposure = 1e-5f;
 
+struct LeastSquaresFit {
+    std::vector<std::vector<glm::vec3>> fields;  // each per node of the regions, none negative
+    // Else the iteration came to no solution, and what it was for has the means at the nodes.
+    bool isSolved = true;
+};
+
 // exposed: per side, the share of it that counts. Reconstructs several fields (each per side) on
-// one side of an instance. Returns for each field one value per node of the regions, none negative.
-std::vector<std::vector<glm::vec3>> leastSquares(
-    const Patches& patches, const InstanceRange& range, const SmoothRegions& regions, rb_side side,
-    const std::vector<float>& exposed, float regularization,
-    const std::vector<const std::vector<glm::vec3>*>& fields);
+// one side of an instance.
+LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
+                             const SmoothRegions& regions, rb_side side,
+                             const std::vector<float>& exposed, float regularization,
+                             const std::vector<const std::vector<glm::vec3>*>& fields);
 
 }  // namespace raybundle

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 
@@ -25,11 +27,13 @@ void spreadAtVertices(const std::vector<bool>& known, InstanceLight& light) {
         std::vector<Value> sum(light.vertexCount, Value(0));
         std::vector<float> weight(light.vertexCount, 0.0f);
         for (size_t c = 0; c < values.size(); ++c) {
+            throwIfCancelledAt(c);
             if (!known[c]) continue;
             sum[size_t(light.cornerVertices[c])] += light.cornerAngles[c] * values[c];
             weight[size_t(light.cornerVertices[c])] += light.cornerAngles[c];
         }
         for (size_t c = 0; c < values.size(); ++c) {
+            throwIfCancelledAt(c);
             const size_t v = size_t(light.cornerVertices[c]);
             if (!known[c] && weight[v] > 0) values[c] = sum[v] / weight[v];
         }
@@ -44,6 +48,7 @@ void fillLeftOutCorners(const Patches& patches, const std::vector<InstanceRange>
                         std::vector<InstanceLight>& light, Report& report) {
     std::vector<std::vector<bool>> known(light.size());
     for (size_t i = 0; i < light.size(); ++i) {
+        throwIfCancelledAt(i);
         if (light[i].direct.empty()) continue;
         known[i].assign(light[i].direct.size(), false);
         for (uint32_t p = ranges[i].firstParent; p < ranges[i].lastParent; ++p)

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/reconstruction.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <optional>
 
+#include "bake/cancellation.h"
 #include "reconstruction/area_average.h"
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/face_slopes.h"
@@ -93,11 +92,13 @@ CornerLight cornerLight(const SmoothRegions& regions, const Field& direct, const
 std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches) {
     std::vector<InstanceRange> ranges(scene.instances.size());
     for (uint32_t c = 0; c < patches.cells.size(); ++c) {
+        throwIfCancelledAt(c);
         InstanceRange& range = ranges[patches.cells[c].instance];
         if (range.lastCell == 0) range.firstCell = c;
         range.lastCell = c + 1;
     }
     for (uint32_t p = 0; p < patches.parents.size(); ++p) {
+        throwIfCancelledAt(p);
         InstanceRange& range = ranges[patches.parents[p].instance];
         if (range.lastParent == 0) range.firstParent = p;
         range.lastParent = p + 1;
@@ -153,11 +154,20 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
             if (isPoint) fields.push_back(&light.emission);
         if (isPoint) fields.push_back(&shown.color());
         if (isPoint && !shown.everywhere().empty()) fields.push_back(&shown.everywhere());
-        std::vector<Field> nodes =
-            settings.reconstruction == "AREA_AVERAGE"
-                ? areaAverage(patches, ranges[i], regions, instance.side, exposed, fields)
-                : leastSquares(patches, ranges[i], regions, instance.side, exposed,
-                               settings.regularization, fields);
+        std::vector<Field> nodes;
+        if (settings.reconstruction == "AREA_AVERAGE") {
+            nodes = areaAverage(patches, ranges[i], regions, instance.side, exposed, fields);
+        } else {
+            LeastSquaresFit fit = leastSquares(patches, ranges[i], regions, instance.side, exposed,
+                                               settings.regularization, fields);
+            nodes = std::move(fit.fields);
+            if (!fit.isSolved)
+                warnings[i] =
+                    "object \"" + instance.name +
+                    "\": the least squares came to no solution, and its vertices have the "
+                    "mean of the light around them; merge vertices by distance, or choose "
+                    "the reconstruction AREA_AVERAGE";
+        }
         for (size_t k = 0; k < lights.size(); ++k) {
             Field &direct = nodes[3 * k], &indirect = nodes[3 * k + 1];
             Field& exitance = nodes[3 * k + 2];
@@ -196,7 +206,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
     for (size_t i = 0; i < scene.instances.size(); i += kTogether) {
         const double share = double(i) / double(scene.instances.size());
         progress.report(RB_STAGE_RECONSTRUCTION, isPoint ? 0.5 + 0.5 * share : share);
-        tbb::parallel_for(i, std::min(i + kTogether, scene.instances.size()), reconstructInstance);
+        parallelFor(i, std::min(i + kTogether, scene.instances.size()), reconstructInstance);
     }
     for (const std::string& warning : warnings)
         if (!warning.empty()) report.warnings.push_back(warning);

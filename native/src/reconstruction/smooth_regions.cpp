@@ -6,6 +6,8 @@
 #include <map>
 #include <numeric>
 
+#include "bake/cancellation.h"
+
 namespace raybundle {
 namespace {
 
@@ -38,6 +40,7 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
                             uint32_t last) {
     std::vector<HalfEdge> halfEdges;
     for (uint32_t c = first; c < last; ++c) {
+        throwIfCancelledAt(c);
         const int n = cells[c].isTriangle() ? 3 : 4;
         for (int k = 0; k < n; ++k) {
             const int32_t from = cells[c].corner[k], to = cells[c].corner[(k + 1) % n];

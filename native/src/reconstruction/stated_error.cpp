@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/stated_error.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
@@ -10,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "bake/cancellation.h"
 #include "patches/neighbours.h"
 #include "reconstruction/surplus.h"
 
@@ -101,6 +100,7 @@ class InstanceErrors {
             // Of the parallelogram of which a triangle is half: the square of about an edge.
             sum.cellArea += double(glm::length(glm::cross(patches.cells[c].a, patches.cells[c].b)));
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
+            throwIfCancelledAt(c);
             const Cell& cell = patches.cells[c];
             const double share = exposed[c - range.firstCell] / (cell.isTriangle() ? 3 : 4);
             for (int32_t corner : cell.corner)
@@ -173,6 +173,7 @@ class InstanceErrors {
                                    ? patches.parents[range.firstParent].firstPatch
                                    : 0;
         for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+            throwIfCancelledAt(p);
             const Parent& parent = patches.parents[p];
             const Cell& cell = patches.cells[parent.cell];
             const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
@@ -269,7 +270,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
                  const Irradiance& irradiance, const SideErrors& sides, float targetError,
                  bool errsAlike, std::vector<InstanceLight>& light, Report& report) {
     std::vector<std::optional<InstanceErrors>> errors(light.size());
-    tbb::parallel_for(size_t(0), light.size(), [&](size_t i) {
+    parallelFor(size_t(0), light.size(), [&](size_t i) {
         if (light[i].isBaked)
             errors[i].emplace(tiles, ranges[i], scene.instances[i].side, irradiance, sides,
                               light[i]);
@@ -292,6 +293,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;
     for (size_t i = 0; i < light.size(); ++i) {
+        throwIfCancelledAt(i);
         if (!errors[i]) continue;
         const Squares& own = errors[i]->squares();
         const Squares& known = own.knownArea >= kKnownShare * own.area ? own : all;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "bake/cancellation.h"
 #include "patches/neighbours.h"
 
 namespace raybundle {
@@ -81,6 +82,7 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
     const Parent& last = patches.parents[lastParent - 1];
     std::vector<Site> sites(last.firstPatch + last.patchCount() - first);
     for (uint32_t p = firstParent; p < lastParent; ++p) {
+        throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         const glm::vec3 axisA = glm::normalize(parent.a);
         const glm::vec3 axisB = glm::cross(parent.normal, axisA);
@@ -112,7 +114,9 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
                                           !sites[pair.second - first].isUsed;
                                }),
                 pairs.end());
-    for (const TilePair& pair : pairs)
+    size_t looked = 0;
+    for (const TilePair& pair : pairs) {
+        throwIfCancelledAt(looked++);
         for (const auto& [a, b] :
              {std::make_pair(pair.first, pair.second), std::make_pair(pair.second, pair.first)}) {
             Site& site = sites[a - first];
@@ -129,9 +133,11 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
                 site.rb[f] += weight * d.y * change;
             }
         }
+    }
     for (Site& site : sites) site.solve();
 
     for (const TilePair& pair : pairs) {
+        throwIfCancelledAt(looked++);
         Site& a = sites[pair.first - first];
         Site& b = sites[pair.second - first];
         // A gradient at the border looks to one side only: beside another one it says nothing.

@@ -2,13 +2,13 @@
 #include "transport/direct_light.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 #include <numeric>
 
+#include "bake/cancellation.h"
 #include "transport/local_lines.h"
 #include "transport/receiver_place.h"
 
@@ -66,7 +66,7 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<
     constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
     for (size_t from = 0; from < these.size(); from += kSlice) {
         progress(0.5 * double(from) / double(these.size()));
-        tbb::parallel_for(from, std::min(from + kSlice, these.size()), [&](size_t k) {
+        parallelFor(from, std::min(from + kSlice, these.size()), [&](size_t k) {
             Gathered& result = results[these[k]];
             const uint64_t before = result.rays;
             result = gather(receiverAt(these[k]), aims[k], seen,
@@ -143,7 +143,7 @@ std::array<Outlooks, 2> DirectLight::lookAround(Aims& further, std::vector<Gathe
         aims[count++] = aims[k];
     }
     these.resize(count);
-    tbb::parallel_for(size_t(0), count, [&](size_t k) {
+    parallelFor(size_t(0), count, [&](size_t k) {
         Gathered& result = results[these[k]];
         sightings[these[k]] = {};
         look(source, receiverAt(these[k]), *aims[k]->outlook, sightings[these[k]], result);
@@ -252,7 +252,7 @@ std::vector<PowerShares> DirectLight::powerShares(float touchDistance) const {
         if (brightest(sources[k]->power()) <= 0 || !sources[k]->castsShadows) continue;
         const uint32_t own = hash(seed, uint32_t(k));
         tbb::enumerable_thread_specific<PowerShares> sums;
-        tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
+        parallelFor(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
                 glm::vec4 u = sobolPoint(i, own);
                 // Of a mesh of 2^n faces all points could lie alike in their faces' shares, as on

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/directed_light.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 
+#include "bake/cancellation.h"
 #include "bake/noise.h"
 #include "scene/channels.h"
 #include "transport/side_reflectance.h"
@@ -41,7 +40,7 @@ DirectedLight::DirectedLight(const Patches& patches, const FirstShot& shot) : pa
     const size_t n = patches.sideCount(), blocks = (n + kBlock - 1) / kBlock;
     std::vector<std::vector<Part>> ofBlock(blocks);
     first.assign(n + 1, 0);
-    tbb::parallel_for(size_t(0), blocks, [&](size_t block) {
+    parallelFor(size_t(0), blocks, [&](size_t block) {
         std::vector<Part>& parts = ofBlock[block];
         for (size_t side = block * kBlock; side < std::min(n, (block + 1) * kBlock); ++side) {
             const size_t before = parts.size();
@@ -59,7 +58,7 @@ DirectedLight::DirectedLight(const Patches& patches, const FirstShot& shot) : pa
 
 void DirectedLight::findMiddles() {
     middles.resize(patches.count());
-    tbb::parallel_for(size_t(0), middles.size(), [&](size_t p) {
+    parallelFor(size_t(0), middles.size(), [&](size_t p) {
         const bool isTriangle = patches.parents[patches.parentOf[p]].isTriangle;
         middles[p] = {patches.point(uint32_t(p), glm::vec2(isTriangle ? 1.0f / 3 : 0.5f)),
                       std::sqrt(patches.area[p])};

@@ -5,6 +5,7 @@
 #include <glm/gtc/constants.hpp>
 #include <random>
 
+#include "bake/cancellation.h"
 #include "bundles/directions.h"
 #include "transport/enclosing.h"
 #include "transport/local_lines.h"
@@ -57,6 +58,7 @@ std::vector<MeanLight> meanLights(const Scene& scene, const Patches& patches,
         for (const Parent& parent : patches.parents)
             means[parent.island].area += double(parent.area());
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        throwIfCancelledAt(side);
         MeanLight& mean = means[patches.parentAt(side).island];
         mean.emitted += patches.area[side / 2] * brightest(emission[side]);
         if (side % 2 == 0)
@@ -107,6 +109,7 @@ double metShare(const Patches& patches, const Visibility& visibility,
     uint32_t lit = 0, met = 0, path = 0;
     double sum = 0, start = uniform(random);  // of all, and of the next path: power / kPaths
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        throwIfCancelledAt(side);
         if (patches.parentAt(side).island != island) continue;
         sum += patches.area[side / 2] * brightest(emission[side]) / power * kPaths;
         for (; path < kPaths && start < sum; start = ++path + uniform(random)) {
@@ -129,12 +132,14 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
     EmissionSplit split{patches.emission, std::vector<glm::vec3>(sides),
                         std::vector<glm::vec3>(sides), std::vector<bool>(sides, false)};
     for (size_t side = 0; side < sides; ++side) {
+        throwIfCancelledAt(side);
         const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
         if (scene.instances[instance].lightSet != lightSet) split.emitted[side] = glm::vec3(0.0f);
     }
     if (skips.skipLampInsides) {
         const std::vector<bool> isEmpty = emptyInsides(scene, patches, split.emitted);
         for (uint32_t side = 1; side < sides && !isEmpty.empty(); side += 2) {
+            throwIfCancelledAt(side);
             glm::vec3& emitted = split.emitted[side];
             if (!isEmpty[patches.parentAt(side).surface] || emitted == glm::vec3(0.0f)) continue;
             ++split.unseen;
@@ -147,6 +152,7 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
     for (const MeanLight& mean : means) limits.push_back(kBundledEmission * mean.mostExitance());
     std::vector<bool> isNear(limits.size(), false);  // whether the share of the sky may matter
     for (uint32_t side = 0; side < sides; ++side) {
+        throwIfCancelledAt(side);
         const uint32_t island = patches.parentAt(side).island;
         const double emission = brightest(split.emitted[side]);
         if (emission > 0 && emission <= limits[island]) isNear[island] = true;
@@ -157,6 +163,7 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
                         means[k].exitance(metShare(patches, visibility, split.emitted, k,
                                                    means[k].emitted * means[k].area, seed));
     for (uint32_t side = 0; side < sides; ++side) {
+        throwIfCancelledAt(side);
         if (!patches.parentAt(side).exchanges) continue;
         if (brightest(split.emitted[side]) > limits[patches.parentAt(side).island]) {
             split.isSource[side] = true;

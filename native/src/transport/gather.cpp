@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 
+#include "bake/cancellation.h"
 #include "patches/neighbours.h"
 #include "transport/first_shot.h"
 
@@ -73,6 +74,7 @@ CoarseShot coarseOfPatches(const FirstShotInput& input,
     coarse.gathered.resize(patches.sideCount());
     std::vector<uint32_t> cut;
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        throwIfCancelledAt(side);
         if (patches.level(side / 2) > 0)
             cut.push_back(side);
         else

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/line_reuse.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <Eigen/Core>
@@ -11,6 +10,7 @@
 #include <functional>
 #include <glm/gtc/constants.hpp>
 
+#include "bake/cancellation.h"
 #include "transport/local_lines.h"
 #include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
@@ -52,7 +52,7 @@ constexpr float kMaxLineWeight =
 
 template <class Body>
 void forEachSide(size_t n, const Body& body) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
+    parallelFor(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
         for (size_t i = range.begin(); i < range.end(); ++i) body(i);
     });
 }
@@ -362,6 +362,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
     std::vector<uint32_t> starved;
     std::vector<bool> isOther(counts.sideCount());  // starved, not in hand yet
     for (uint32_t i = 0; i < counts.sideCount(); ++i) {
+        throwIfCancelledAt(i);
         // The patches of a cut tile do with the lines of the tile.
         const uint32_t enough = std::max(1u, minLines >> (2 * patches.level(i / 2)));
         const bool isStarved = counts.linesMetInAll(i) < enough;
@@ -388,7 +389,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
         hits.resize(last * rays, kNone);
         weights.resize(last);
         known.resize(last);
-        tbb::parallel_for(first, last, [&](size_t k) {
+        parallelFor(first, last, [&](size_t k) {
             const uint32_t side = starved[k];
             const glm::vec3 normal = patches.normal(side);
             const float m = linesAt(side);
@@ -430,7 +431,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
         for (size_t i = 0; i < sent.size(); ++i)
             sent[i] += passedOn(patches, exposed, i, irradiance.all(i ^ 1));
     for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
-        tbb::parallel_for(size_t(0), starved.size(), [&](size_t k) {
+        parallelFor(size_t(0), starved.size(), [&](size_t k) {
             const uint32_t side = starved[k];
             glm::vec3 sum = known[k];
             for (size_t i = 0; i < rays; ++i)

@@ -11,11 +11,11 @@
 //
 // A few lines are enough for what is little of the light, or changes slowly from side to side: some
 // of those of each side stand for all.
-#include <tbb/parallel_for.h>
 
 #include <Eigen/Core>
 #include <algorithm>
 
+#include "bake/cancellation.h"
 #include "scene/channels.h"
 #include "transport/line_reuse.h"
 #include "transport/sobol.h"
@@ -33,7 +33,7 @@ constexpr size_t kGrain = 256;  // sides per task
 
 template <class Body>
 void forEachSide(size_t n, const Body& body) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
+    parallelFor(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
         for (size_t i = range.begin(); i < range.end(); ++i) body(uint32_t(i));
     });
 }

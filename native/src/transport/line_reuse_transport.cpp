@@ -5,13 +5,13 @@
 // memory limit, they are dropped, and further bundles improve the solution one by one
 // (transport/streaming_reuse.h). Light sets share the lines: the transport of one traces them, the
 // others follow.
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
 #include <glm/gtc/constants.hpp>
 #include <optional>
 
+#include "bake/cancellation.h"
 #include "transport/line_reuse.h"
 #include "transport/streaming_reuse.h"
 #include "transport/translucence.h"
@@ -174,7 +174,7 @@ class LineReuseTransport : public Transport {
             for (const TracedBundle& t : traced)
                 if (t.bundle.half == half) streaming[half]->add(t.lines);
         };
-        tbb::parallel_invoke([&] { advanceHalf(0); }, [&] { advanceHalf(1); });
+        parallelInvoke([&] { advanceHalf(0); }, [&] { advanceHalf(1); });
     }
 
     Irradiance streamed(Half half) {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/local_lines.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "bake/cancellation.h"
 #include "bake/error.h"
 
 namespace raybundle {
@@ -93,7 +92,7 @@ void LocalLines::cast(const std::vector<uint64_t>& counts, const std::vector<glm
     for (uint64_t slice = 0; slice < total; slice += kSlice) {
         checkCancel();
         const uint64_t sliceEnd = std::min(slice + kSlice, total);
-        tbb::parallel_for(uint64_t(0), (sliceEnd - slice + kBatch - 1) / kBatch, [&](uint64_t b) {
+        parallelFor(uint64_t(0), (sliceEnd - slice + kBatch - 1) / kBatch, [&](uint64_t b) {
             const uint64_t first = slice + b * kBatch, last = std::min(first + kBatch, sliceEnd);
             std::seed_seq seeds{stream[0], stream[1], stream[2], uint32_t(first / kBatch)};
             std::mt19937_64 random(seeds);

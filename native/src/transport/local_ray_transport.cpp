@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/local_ray_transport.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <cassert>
 #include <glm/gtc/constants.hpp>
+
+#include "bake/cancellation.h"
 
 namespace raybundle {
 namespace {
@@ -39,7 +38,7 @@ void LocalRayTransport::advance(uint32_t count, const Progress& progress) {
             const uint64_t before = std::min(wanted, done + batch * mostPerBatch);
             return uint32_t(std::min<uint64_t>(mostPerBatch, wanted - before));
         };
-        tbb::parallel_for(size_t(0), logs.size(), [&](size_t k) {
+        parallelFor(size_t(0), logs.size(), [&](size_t k) {
             const size_t half = k / kHeld, batch = k % kHeld;
             logs[k].scores.clear();
             logs[k].rays.clear();
@@ -60,7 +59,7 @@ void LocalRayTransport::advance(uint32_t count, const Progress& progress) {
             }
             sums.batches += kHeld;
         };
-        tbb::parallel_invoke([&] { addHalf(0); }, [&] { addHalf(1); });
+        parallelInvoke([&] { addHalf(0); }, [&] { addHalf(1); });
         done = std::min(wanted, done + kHeld * mostPerBatch);
     }
     bundles += count;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "bake/cancellation.h"
 #include "transport/sphere_sampling.h"
 #include "transport/spherical_triangle.h"
 
@@ -108,6 +109,7 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
             continue;
         }
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
+            throwIfCancelledAt(p);
             face.origin = patches.point(p, {0, 0});
             face.a = patches.point(p, {1, 0}) - face.origin;
             face.b = patches.point(p, {0, 1}) - face.origin;

@@ -23,13 +23,13 @@
 //   took more than all sends a smaller fraction from then on: fractions follow what was met before
 //   and not the bundle in hand, so that the mean stays right.
 // thesis_literal does what figure 2.8 says, line by line; only the first shot's light is kept.
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "bake/cancellation.h"
 #include "transport/transport.h"
 
 namespace raybundle {
@@ -115,7 +115,7 @@ class Multipath : public Transport {
                                        ? exchangeLiterally(halves[half], traced[k])
                                        : exchange(halves[half], traced[k]);
             };
-            tbb::parallel_invoke([&] { advanceHalf(0); }, [&] { advanceHalf(1); });
+            parallelInvoke([&] { advanceHalf(0); }, [&] { advanceHalf(1); });
             for (size_t k = 0; k < traced.size(); ++k)
                 input.tracer.learn(traced[k].bundle, power[k]);
             done += step;

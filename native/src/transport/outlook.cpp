@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/outlook.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
+
+#include "bake/cancellation.h"
 
 namespace raybundle {
 namespace {
@@ -60,8 +59,8 @@ class Clustering {
                              const float x = keys[a][axis], y = keys[b][axis];
                              return x != y ? x < y : a < b;  // the same everywhere
                          });
-        tbb::parallel_invoke([&] { split(first, middle, own.seen); },
-                             [&] { split(middle, last, own.seen); });
+        parallelInvoke([&] { split(first, middle, own.seen); },
+                       [&] { split(middle, last, own.seen); });
     }
 
     Outlook look(size_t first, size_t last, const std::vector<float>& around) const {
@@ -122,7 +121,7 @@ Outlooks::Outlooks(const PartNeighbours& parts, const std::vector<uint32_t>& the
                    const std::vector<Sightings>& sightings, size_t clusterSize, float power)
     : clusterOf(these.size()) {
     std::vector<Key> keys(these.size());
-    tbb::parallel_for(size_t(0), these.size(), [&](size_t k) {
+    parallelFor(size_t(0), these.size(), [&](size_t k) {
         const Receiver receiver = receiverAt(these[k]);
         const glm::vec3 at =
             receiver.point ? *receiver.point : patches.point(receiver.side / 2, {0.5f, 0.5f});

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/scattered_light.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_for_each.h>
 
 #include <Eigen/Cholesky>
@@ -12,6 +11,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "bake/cancellation.h"
 #include "scene/channels.h"
 #include "transport/lobe.h"
 #include "transport/side_reflectance.h"
@@ -208,7 +208,7 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
     findTransfers();
     if (seesSky) open.resize(sent.size());
     if (shot.incoming.empty()) return;
-    tbb::parallel_for(uint32_t(0), uint32_t(indices.size()), [&](uint32_t side) {
+    parallelFor(uint32_t(0), uint32_t(indices.size()), [&](uint32_t side) {
         if (isNone(side)) return;
         Cells arriving{};
         for (size_t k = 0; k < Incoming::kCount; ++k)

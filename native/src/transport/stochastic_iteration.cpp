@@ -20,8 +20,6 @@
 //   (mean_square_growth.cpp); the thesis gives no condition.
 #include "transport/stochastic_iteration.h"
 
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -29,6 +27,7 @@
 #include <cstdio>
 #include <glm/gtc/constants.hpp>
 
+#include "bake/cancellation.h"
 #include "bake/error.h"
 
 namespace raybundle {
@@ -140,7 +139,7 @@ class BundleIteration : public Transport {
                 for (uint32_t k = 0; k < steps; ++k)
                     halves[half].step(waiting[half][next + k].lines, done + k >= warmUp);
             };
-            tbb::parallel_invoke([&] { go(0); }, [&] { go(1); });
+            parallelInvoke([&] { go(0); }, [&] { go(1); });
             next += steps;
             done += steps;
             left -= steps;
