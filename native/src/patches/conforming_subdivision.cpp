@@ -6,14 +6,16 @@
 // bisected differently on their sides. Slivers, triangles that are flat but for a rounding error, as
 // booleans leave them and as T-junctions are filled with, are taken out before: a short edge is
 // collapsed, else the longest edge is flipped, so that the triangle beyond it gets the sliver's
-// third vertex.
+// third vertex. Of faces with the same corners one is left.
 #include "patches/conforming_subdivision.h"
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Core/Utils/PropertyManager.hh>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <queue>
+#include <set>
 
 #include "bake/error.h"
 #include "scene/triangulation.h"
@@ -122,6 +124,33 @@ void takeOutSlivers(TriMesh& mesh, SourceOf& sourceTriangle) {
     mesh.garbage_collection();
 }
 
+// Faces that have met others with the same corners, in the same order around, as copies of a face and
+// split edges do: they would be cut differently, and lie on each other in pieces.
+class Doubles {
+  public:
+    explicit Doubles(const Mesh& mesh) : mesh(mesh) {
+        std::map<std::array<float, 3>, int32_t> firstAt;
+        for (const glm::vec3& v : mesh.vertices)
+            place.push_back(
+                firstAt.emplace(std::array<float, 3>{v.x, v.y, v.z}, int32_t(place.size()))
+                    .first->second);
+    }
+
+    // Whether a face is the first of its kind.
+    bool isFirst(size_t face) {
+        std::vector<int32_t> around;
+        for (int32_t c = mesh.faceOffsets[face]; c < mesh.faceOffsets[face + 1]; ++c)
+            around.push_back(place[size_t(mesh.cornerVertices[size_t(c)])]);
+        std::rotate(around.begin(), std::min_element(around.begin(), around.end()), around.end());
+        return met.insert(std::move(around)).second;
+    }
+
+  private:
+    const Mesh& mesh;
+    std::vector<int32_t> place;  // per vertex: the first that lies there
+    std::set<std::vector<int32_t>> met;
+};
+
 }  // namespace
 
 ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
@@ -132,7 +161,9 @@ ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
     std::vector<TriMesh::VertexHandle> handles;
     for (const glm::vec3& v : source.vertices) handles.push_back(mesh.add_vertex({v.x, v.y, v.z}));
 
+    Doubles doubles(source);
     for (size_t f = 0; f < source.faceCount(); ++f) {
+        if (!doubles.isFirst(f)) continue;
         std::vector<glm::dvec3> points;
         for (int32_t c = source.faceOffsets[f]; c < source.faceOffsets[f + 1]; ++c)
             points.push_back(source.vertices[size_t(source.cornerVertices[size_t(c)])]);
