@@ -343,3 +343,19 @@ def test_glass_without_refractive_caustics(floor, new_material):
     assert not any("Refractive Caustics" in text for text in warnings())
     bpy.context.scene.cycles.caustics_refractive = False
     assert any("Refractive Caustics" in text and '"Grey"' in text for text in warnings())
+
+
+def set_normals(item, normal):
+    mesh = item.data
+    for polygon in mesh.polygons:
+        polygon.use_smooth = True
+    if bpy.app.version < (4, 1, 0):
+        mesh.use_auto_smooth = True
+    mesh.normals_split_custom_set([normal] * len(mesh.loops))
+
+
+def test_custom_normals_that_turn_faces(floor):
+    set_normals(floor, (0, 0, 1))
+    assert warnings() == []
+    set_normals(floor, (0.5, 0, 0.8660254))
+    assert ['"Floor"' in text and "custom normals" in text for text in warnings()] == [True]

@@ -232,3 +232,11 @@ def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str
     if names:
         yield (f"modifiers keep no trace of some corners, which have the light of what lies "
                f"nearest: {listed(names)}: apply the modifiers for their own")
+
+
+def of_normals(turned: Iterable[str]) -> Iterator[str]:
+    """Names of objects whose custom normals turn their faces."""
+    names = [f'"{name}"' for name in turned]
+    if names:
+        yield (f"custom normals that turn faces are not followed, light falls on the faces as they "
+               f"lie: {listed(names)}: clear the custom split normals to compare with Cycles")

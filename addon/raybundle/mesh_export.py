@@ -26,6 +26,10 @@ COORDINATE_LIMIT = 1e15
 # Whether corners' vertices, slots and sharpness are attributes.
 _HAS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
 
+# Normals turn by no more than about 10 degrees if the cosine is larger; more than this share of
+# corners makes a mesh one whose normals are turned.
+_SAME_WAY, _TURNED_SHARE = 0.985, 0.02
+
 
 class MeshError(ValueError):
     """A mesh that cannot take part; the message says why, without naming it."""
@@ -110,6 +114,19 @@ def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExp
         _corner_normals(mesh, vertices_of_corners, sizes, smooth), _sharp_edges(mesh), smooth,
         _uvs(mesh, materials, corner_slots, baked_uvs),
         _corner_colors(mesh, materials, corner_slots))
+
+
+def has_turned_normals(mesh: bpy.types.Mesh, data: MeshData) -> bool:
+    """Whether custom normals turn the shading of faces, away from both their own normals and those
+    of their vertices; data: exported from the mesh."""
+    if not mesh.has_custom_normals:
+        return False
+    usual = (np.repeat(read(mesh.polygon_normals, 'vector', np.float32, 3),
+                       np.diff(data.face_offsets), axis=0),
+             read(mesh.vertex_normals, 'vector', np.float32, 3)[data.corner_vertices])
+    is_usual = np.any([np.einsum('ck,ck->c', data.corner_normals, normals) > _SAME_WAY
+                       for normals in usual], axis=0)
+    return bool(np.mean(~is_usual) > _TURNED_SHARE)
 
 
 def _face_slots(mesh: bpy.types.Mesh, count: int) -> np.ndarray:

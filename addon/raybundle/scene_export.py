@@ -22,7 +22,7 @@ from .last_surfaces import LastSurfaces
 from .light_export import export_light, is_portal
 from .light_sets import LightSet, LightSetMembers
 from .material_export import MaterialExporter, SlotMaterial
-from .mesh_export import MeshError, export_mesh
+from .mesh_export import MeshError, export_mesh, has_turned_normals
 from .scene_data import InstanceData, MeshData, SceneData, Warnings
 from .shown_results import RENDERED, renders_result, result_names
 from .surface_bake import BakedSurface, Wanted, bake_surfaces
@@ -154,6 +154,7 @@ class _Exporter:
         self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
         self._copied: list[str] = []  # objects whose modifiers make several corners of one
         self._untraced: list[str] = []  # objects whose modifiers keep no trace of some corners
+        self._turned: dict[int, str] = {}  # by mesh: an object whose custom normals turn faces
         self._placed: set[tuple[str, int, bytes]] = set()
         self._drawn: dict[bpy.types.Object, None] = {}  # originals that take part
 
@@ -273,7 +274,8 @@ class _Exporter:
                 *left_out.of_materials(scene, self.materials.exported()),
                 *left_out.of_hidden(hidden, lights),
                 *left_out.of_unrendered(unrendered),
-                *left_out.of_modifiers(self._copied, self._untraced)):
+                *left_out.of_modifiers(self._copied, self._untraced),
+                *left_out.of_normals(self._turned.values())):
             self.result.warnings.add(text)
 
     def _name_showing_materials(self) -> None:
@@ -394,7 +396,10 @@ class _Exporter:
                                baked.uvs if baked is not None else None)
         except MeshError as error:
             return error
-        return self._unique(data)
+        index = self._unique(data)
+        if has_turned_normals(mesh, data):
+            self._turned.setdefault(index, item.original.name)
+        return index
 
     def _unique(self, data: MeshData) -> int:
         """Copies of a mesh count as the same one, such as those that an earlier bake made."""
