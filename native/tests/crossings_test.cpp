@@ -11,6 +11,7 @@
 #include <string>
 
 #include "bake/bake.h"
+#include "reconstruction/corner_weights.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 
@@ -158,12 +159,15 @@ TEST(Crossings, PatchesLieOnOneSideAndCoverTheFace) {
 
 TEST(Crossings, WhatAPatchCountsAtCornersIsWhole) {
     const Patches patches = subdivide(sceneOf({"turned", 5, 12, 0.37}), 0, kMany);
+    const InstanceRange all{0, uint32_t(patches.cells.size()), 0, uint32_t(patches.parents.size())};
+    const std::vector<float> exposed(patches.sideCount(), 1.0f);
+    const CornerWeights weights(patches, all, RB_SIDE_FRONT, exposed);
     size_t parted = 0;
-    for (const Parent& parent : patches.parents) {
-        parted += parent.seenCorners != 15;
-        for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+    for (uint32_t p = 0; p < patches.parents.size(); ++p) {
+        parted += weights.isParted(p);
+        for (uint32_t k = 0; k < patches.parents[p].patchCount(); ++k) {
             float sum = 0;
-            for (float weight : patches.cornerWeights(parent, k)) {
+            for (float weight : weights.of(p, k)) {
                 EXPECT_GE(weight, -1e-4f);
                 sum += weight;
             }
@@ -172,6 +176,28 @@ TEST(Crossings, WhatAPatchCountsAtCornersIsWhole) {
         }
     }
     EXPECT_GT(parted, 8u);
+}
+
+// In a white furnace everything that is seen has an irradiance of 1. A box covers a corner of the floor,
+// and what lies under it or inside of it, where it is dark, has no say in the light of that corner.
+TEST(Crossings, ACornerUnderABoxHasTheLightOfWhatIsSeen) {
+    for (float low : {0.0f, -0.1f})
+        for (double turn : {0.0, 0.3})
+            for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
+                SCOPED_TRACE(std::string(reconstruction) + (low < 0 ? ", sunk" : ", standing"));
+                const glm::dmat4 pose = glm::rotate(glm::dmat4(1), turn, glm::dvec3(1, 2, 3));
+                Scene scene = closedCube(0.6f, 0.4f);
+                scene.instances.front().transform = pose;
+                place(scene, box("box", {-0.05f, -0.05f, low}, {0.4f, 0.45f, 0.5f}, false),
+                      grey("", 0.6f, 0.4f), pose);
+                Bake bake;
+                setQuick(bake);
+                bake.settings.patchSize = 0.1f;
+                bake.settings.reconstruction = reconstruction;
+                bake.run(scene);
+                for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
+                    EXPECT_NEAR(double(light.x) * kPi, 1, 1e-3);
+            }
 }
 
 size_t patchesOf(const Patches& patches, uint32_t instance) {

@@ -97,21 +97,6 @@ std::array<float, 4> Cell::weights(const glm::vec3& point) const {
     return {(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t};
 }
 
-std::array<float, 4> Patches::cornerWeights(const Parent& parent, uint32_t patchInParent) const {
-    const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
-    std::array<float, 4> weights =
-        cells[parent.cell].weights(parent.position(parent.pointOn(patchInParent, middle)));
-    if (parent.seenCorners == 15) return weights;
-    float sum = 0;
-    for (size_t k = 0; k < 4; ++k) {
-        if (!(parent.seenCorners >> k & 1)) weights[k] = 0;
-        sum += weights[k];
-    }
-    if (sum > 0)
-        for (float& weight : weights) weight /= sum;
-    return weights;
-}
-
 glm::vec3 Patches::point(uint32_t patch, glm::vec2 uv) const {
     const Parent& parent = parents[parentOf[patch]];
     return parent.position(parent.pointOn(patch - parent.firstPatch, uv));

@@ -178,9 +178,6 @@ struct Patches {
         return islands[parents[parentOf[side / 2]].island];
     }
     const Parent& parentAt(uint32_t side) const { return parents[parentOf[side / 2]]; }
-    // What the light of a patch, by its number in the parent, counts at each corner of its cell: by its
-    // middle, and nothing behind a wall. All are 0 if it has no corner.
-    std::array<float, 4> cornerWeights(const Parent& parent, uint32_t patchInParent) const;
     // The point (u, v) in [0, 1]^2 of a patch, relative to centre.
     glm::vec3 point(uint32_t patch, glm::vec2 uv) const;
     // The patch of a parent at a point in its plane.

@@ -13,13 +13,14 @@ std::vector<std::vector<glm::vec3>> areaAverage(
     std::vector<std::vector<glm::dvec3>> sums(
         fields.size(), std::vector<glm::dvec3>(regions.nodeCount, glm::dvec3(0.0)));
     std::vector<double> weights(regions.nodeCount, 0.0);
+    const CornerWeights cornerWeights(patches, range, side, exposed);
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> shares = patches.cornerWeights(parent, k);
+            const std::array<float, 4> shares = cornerWeights.of(p, k);
             const double area =
                 double(patches.area[index / 2]) * double(std::max(exposed[index], kLeastExposure));
             for (size_t a = 0; a < 4; ++a) {

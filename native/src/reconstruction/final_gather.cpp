@@ -154,6 +154,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
                                         const std::vector<glm::vec3>& carriedAt,
                                         const std::vector<glm::vec3>& reflectedAt) const {
     std::vector<double> squares(regions.nodeCount, 0.0), weights(regions.nodeCount, 0.0);
+    const CornerWeights cornerWeights(patches, range, side, exposed);
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
@@ -162,7 +163,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
             continue;
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t at = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> shares = patches.cornerWeights(parent, k);
+            const std::array<float, 4> shares = cornerWeights.of(p, k);
             const Irradiance& h = light.irradiance;
             glm::vec3 difference = -(h.direct[at] - h.gathered[at] + h.indirect[at]);
             for (size_t a = 0; a < 4; ++a) {

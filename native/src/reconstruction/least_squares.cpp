@@ -170,6 +170,7 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
         openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);  // nothing covers slivers
 
+    const CornerWeights weights(patches, range, side, exposed);
     // Add up the patches of each parent in a 4 x 4 matrix over the corners of its cell.
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         throwIfCancelledAt(p);
@@ -179,10 +180,10 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
         std::array<std::array<double, 4>, 4> square{};
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> w = patches.cornerWeights(parent, k);
+            const std::array<float, 4> w = weights.of(p, k);
             const float open = std::max(exposed[index], kLeastExposure);
             const double weight = double(patches.area[index / 2]) * open;
-            if (parent.seenCorners == 15)
+            if (!weights.isParted(p))
                 openness[parent.cell - range.firstCell] += weight / areaOf(cell);
             for (int a = 0; a < 4; ++a) {
                 for (int b = 0; b < 4; ++b) square[a][b] += weight * w[a] * w[b];

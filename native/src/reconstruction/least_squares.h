@@ -23,16 +23,11 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "reconstruction/corner_weights.h"
 #include "reconstruction/smooth_regions.h"
 #include "scene/scene.h"
 
 namespace raybundle {
-
-// Where an instance's cells and parents lie in Patches.
-struct InstanceRange {
-    uint32_t firstCell = 0, lastCell = 0;      // [first, last)
-    uint32_t firstParent = 0, lastParent = 0;  // [first, last)
-};
 
 // Weight that even a wholly covered patch keeps, so that every node has a value.
 constexpr float kLeastExposure = 1e-5f;

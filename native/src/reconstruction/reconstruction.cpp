@@ -114,9 +114,10 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
     const bool isPoint = settings.reconstruction == "POINT";
     const std::vector<SideLight> onSides = sideLights(patches, shown, exposed, lights, isPoint);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
+    const std::vector<float> outside = exposedOutside(patches, visibility, exposed);
     std::optional<CornerGather> atCorners;
     if (isPoint)
-        atCorners.emplace(scene, patches, visibility, touchDistance, lights, shown, ranges, exposed,
+        atCorners.emplace(scene, patches, visibility, touchDistance, lights, shown, ranges, outside,
                           settings, progress.part(0, 2));
 
     std::vector<InstanceLight> result(scene.instances.size());
@@ -156,9 +157,9 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         if (isPoint && !shown.everywhere().empty()) fields.push_back(&shown.everywhere());
         std::vector<Field> nodes;
         if (settings.reconstruction == "AREA_AVERAGE") {
-            nodes = areaAverage(patches, ranges[i], regions, instance.side, exposed, fields);
+            nodes = areaAverage(patches, ranges[i], regions, instance.side, outside, fields);
         } else {
-            LeastSquaresFit fit = leastSquares(patches, ranges[i], regions, instance.side, exposed,
+            LeastSquaresFit fit = leastSquares(patches, ranges[i], regions, instance.side, outside,
                                                settings.regularization, fields);
             nodes = std::move(fit.fields);
             if (!fit.isSolved)

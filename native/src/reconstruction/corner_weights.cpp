@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/corner_weights.h"
+
+#include <algorithm>
+#include <map>
+
+#include "bake/cancellation.h"
+
+namespace raybundle {
+namespace {
+
+// A corner's own side of a wall tells nothing if less than this share of it is exposed.
+constexpr float kLeastExposed = 0.1f;
+
+glm::vec2 middleOf(const Parent& parent) {
+    return parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
+}
+
+}  // namespace
+
+CornerWeights::CornerWeights(const Patches& patches, const InstanceRange& range, rb_side side,
+                             const std::vector<float>& exposed)
+    : patches(patches), first(range.firstParent), seen(range.lastParent - range.firstParent, 15) {
+    // Per cell that walls cut, and corner: what of its own side there is, and is exposed, m^2.
+    struct Support {
+        std::array<float, 4> all{}, exposed{};
+    };
+    std::map<uint32_t, Support> supports;
+    for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+        throwIfCancelledAt(p);
+        const Parent& parent = patches.parents[p];
+        if (parent.seenCorners == 15) continue;
+        seen[p - first] = parent.seenCorners;
+        Support& support = supports[parent.cell];
+        for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+            const uint32_t patch = parent.firstPatch + k;
+            const auto weights = patches.cells[parent.cell].weights(
+                parent.position(parent.pointOn(k, middleOf(parent))));
+            for (size_t a = 0; a < 4; ++a) {
+                if (!(parent.seenCorners >> a & 1)) continue;
+                const float own = patches.area[patch] * std::max(weights[a], 0.0f);
+                support.all[a] += own;
+                support.exposed[a] += own * exposed[2 * patch + uint32_t(side)];
+            }
+        }
+    }
+    if (supports.empty()) return;
+    for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+        const auto support = supports.find(patches.parents[p].cell);
+        if (support == supports.end()) continue;
+        for (size_t a = 0; a < 4; ++a)
+            if (!(support->second.exposed[a] > kLeastExposed * support->second.all[a]))
+                seen[p - first] |= uint8_t(1u << a);
+    }
+}
+
+std::array<float, 4> CornerWeights::of(uint32_t index, uint32_t patchInParent) const {
+    const Parent& parent = patches.parents[index];
+    std::array<float, 4> weights = patches.cells[parent.cell].weights(
+        parent.position(parent.pointOn(patchInParent, middleOf(parent))));
+    if (!isParted(index)) return weights;
+    float sum = 0;
+    for (size_t k = 0; k < 4; ++k) {
+        if (!(seen[index - first] >> k & 1)) weights[k] = 0;
+        sum += weights[k];
+    }
+    if (sum > 0)
+        for (float& weight : weights) weight /= sum;
+    return weights;
+}
+
+std::vector<float> exposedOutside(const Patches& patches, const Visibility& visibility,
+                                  std::vector<float> exposed) {
+    parallelFor(size_t(0), patches.parents.size(), [&](size_t p) {
+        const Parent& parent = patches.parents[p];
+        if (parent.seenCorners == 15) return;
+        for (uint32_t k = 0; k < 2 * parent.patchCount(); ++k) {
+            const uint32_t side = 2 * parent.firstPatch + k;
+            float distance = 0;
+            const auto met = visibility.firstHit(side, patches.point(side / 2, {0.35f, 0.3f}),
+                                                 patches.normal(side), &distance);
+            if (!met) continue;
+            const Parent& other = patches.parentAt(*met);
+            if (other.isSolid && !other.isInward && *met % 2 == 1) exposed[side] = 0;
+        }
+    });
+    return exposed;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What the light of a patch counts at the corners of its face: as much as the interpolation between
+// them has there, but nothing at a corner that a wall hides from it (patches/crossings.h). Where the
+// corner's own side of the wall is covered or inside of something, as below the back of a chair, nobody
+// sees that: the corner then has the light of what is seen of its face.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "patches/patches.h"
+#include "scene/scene.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+
+// Where an instance's cells and parents lie in Patches.
+struct InstanceRange {
+    uint32_t firstCell = 0, lastCell = 0;      // [first, last)
+    uint32_t firstParent = 0, lastParent = 0;  // [first, last)
+};
+
+class CornerWeights {
+  public:
+    // For one side of an instance; exposed: per side, the share of it that counts. `patches` must
+    // outlive the object.
+    CornerWeights(const Patches& patches, const InstanceRange& range, rb_side side,
+                  const std::vector<float>& exposed);
+
+    // Of a patch by its number in the parent, by its middle. Their sum is 1, or 0 if it counts at no
+    // corner.
+    std::array<float, 4> of(uint32_t parent, uint32_t patchInParent) const;
+    // Whether a wall hides some corner from a parent.
+    bool isParted(uint32_t parent) const { return seen[parent - first] != 15; }
+
+  private:
+    const Patches& patches;
+    const uint32_t first;
+    std::vector<uint8_t> seen;  // per parent of the instance: bit k, whether it counts at corner k
+};
+
+// exposed, but 0 for the sides of faces that walls cut which lie inside of a solid.
+std::vector<float> exposedOutside(const Patches& patches, const Visibility& visibility,
+                                  std::vector<float> exposed);
+
+}  // namespace raybundle
