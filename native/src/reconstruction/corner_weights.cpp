@@ -11,6 +11,10 @@ namespace {
 
 // A corner's own side of a wall tells nothing if less than this share of it is exposed.
 constexpr float kLeastExposed = 0.1f;
+// A face more of which is inside of a solid has the dark of that at its corners there.
+constexpr float kMostInside = 0.5f;
+// A place in a patch, off its edges and its diagonal.
+constexpr glm::vec2 kInside{0.35f, 0.3f};
 
 glm::vec2 middleOf(const Parent& parent) {
     return parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
@@ -71,18 +75,36 @@ std::array<float, 4> CornerWeights::of(uint32_t index, uint32_t patchInParent) c
 
 std::vector<float> exposedOutside(const Patches& patches, const Visibility& visibility,
                                   std::vector<float> exposed) {
+    std::vector<uint8_t> isInside(patches.sideCount(), false);
     parallelFor(size_t(0), patches.parents.size(), [&](size_t p) {
         const Parent& parent = patches.parents[p];
         if (parent.seenCorners == 15) return;
         for (uint32_t k = 0; k < 2 * parent.patchCount(); ++k) {
             const uint32_t side = 2 * parent.firstPatch + k;
             float distance = 0;
-            const auto met = visibility.firstHit(side, patches.point(side / 2, {0.35f, 0.3f}),
+            const auto met = visibility.firstHit(side, patches.point(side / 2, kInside),
                                                  patches.normal(side), &distance);
             if (!met) continue;
             const Parent& other = patches.parentAt(*met);
-            if (other.isSolid && !other.isInward && *met % 2 == 1) exposed[side] = 0;
+            isInside[side] = other.isSolid && !other.isInward && *met % 2 == 1;
         }
+    });
+    // Per cell and side, m^2.
+    std::map<uint32_t, std::array<float, 2>> inside, all;
+    auto forEach = [&](const auto& visit) {
+        for (size_t side = 0; side < patches.sideCount(); ++side) {
+            throwIfCancelledAt(side);
+            const Parent& parent = patches.parentAt(uint32_t(side));
+            if (parent.seenCorners != 15) visit(side, parent.cell);
+        }
+    };
+    forEach([&](size_t side, uint32_t cell) {
+        all[cell][side % 2] += patches.area[side / 2];
+        if (isInside[side]) inside[cell][side % 2] += patches.area[side / 2];
+    });
+    forEach([&](size_t side, uint32_t cell) {
+        if (isInside[side] && inside[cell][side % 2] < kMostInside * all[cell][side % 2])
+            exposed[side] = 0;
     });
     return exposed;
 }

@@ -41,7 +41,8 @@ class CornerWeights {
     std::vector<uint8_t> seen;  // per parent of the instance: bit k, whether it counts at corner k
 };
 
-// exposed, but 0 for the sides of faces that walls cut which lie inside of a solid.
+// exposed, but 0 for what lies inside of a solid of the sides of faces that walls cut, if that is the
+// smaller part of a face.
 std::vector<float> exposedOutside(const Patches& patches, const Visibility& visibility,
                                   std::vector<float> exposed);
 
