@@ -16,6 +16,8 @@
 // - The first iterates lack the later bounces. Some are left out of the mean, a quarter of the
 //   first call's at most; what the others lack is stated (bias).
 // - Each half of the bundles has iterates of its own.
+// - The mean light of a side is divided by the lines that met it in all bundles, not by how many
+//   there are in the mean: T_n itself stays as it is.
 // - Scenes on which the mean square of the iterates would grow without bound are refused
 //   (mean_square_growth.cpp); the thesis gives no condition.
 #include "transport/stochastic_iteration.h"
@@ -54,6 +56,7 @@ class Iterates {
           exitance(emission.size()),
           received(emission.size()),
           totals(emission.size()),
+          met(emission.size()),
           sky(emission.size()) {
         for (size_t i = 0; i < exitance.size(); ++i) exitance[i] = {emission[i], sides.unshot[i]};
     }
@@ -69,7 +72,9 @@ class Iterates {
     uint32_t counted() const { return count; }
     const glm::dvec3& direct(size_t side) const { return totals[side].direct; }
     const glm::dvec3& indirect(size_t side) const { return totals[side].indirect; }
-    uint32_t skyLines(size_t side) const { return sky[side]; }
+    // Of the bundles that count.
+    uint64_t lines(size_t side) const { return met[side]; }
+    uint64_t skyLines(size_t side) const { return sky[side]; }
 
   private:
     struct Exitance {
@@ -94,7 +99,14 @@ class Iterates {
         if (kHasDirect)
             for (uint32_t side : lines.sky) received[side].direct += sides.worldExitance;
         if (counts) {
-            for (uint32_t side : lines.sky) ++sky[side];
+            for (const Exchange& e : lines.exchanges) {
+                met[e.i] += e.lines;
+                met[e.j] += e.lines;
+            }
+            for (uint32_t side : lines.sky) {
+                ++met[side];
+                ++sky[side];
+            }
             ++count;
         }
         for (size_t i = 0; i < received.size(); ++i) {
@@ -113,7 +125,7 @@ class Iterates {
     std::vector<Exitance> exitance;          // W/m^2
     std::vector<Light<glm::vec3>> received;  // exitance times lines, W/m^2
     std::vector<Light<glm::dvec3>> totals;   // of the irradiances that count, W/m^2
-    std::vector<uint32_t> sky;               // lines that left the scene, of bundles that count
+    std::vector<uint64_t> met, sky;          // lines of bundles that count; that left the scene
     uint32_t count = 0;                      // bundles that count
 };
 
@@ -185,15 +197,12 @@ class BundleIteration : public Transport {
                (n * (1 - rho));
     }
 
-    // Per true area, as the light is: so the world's light in it is what the lines brought in.
-    // Noise can bring it above 1.
     std::vector<float> openShare() const override {
         std::vector<float> share(sides.perLine.size(), 0.0f);
-        const float counted = float(halves[0].counted() + halves[1].counted());
         for (size_t i = 0; i < share.size(); ++i)
-            if (counted > 0)
-                share[i] = sides.perLine[i] * float(halves[0].skyLines(i) + halves[1].skyLines(i)) /
-                           counted;
+            if (const uint64_t met = halves[0].lines(i) + halves[1].lines(i); met > 0)
+                share[i] =
+                    float(double(halves[0].skyLines(i) + halves[1].skyLines(i)) / double(met));
         return share;
     }
 
@@ -234,7 +243,8 @@ class BundleIteration : public Transport {
         next = 0;
     }
 
-    // Mean irradiance by the lines, direct and indirect.
+    // Mean irradiance, direct and indirect: by the lines that met the side and not by those that were to
+    // in the mean, so that even light is right however many came.
     std::pair<glm::dvec3, glm::dvec3> mean(Half half, size_t side) const {
         glm::dvec3 direct(0.0), indirect(0.0);
         double count = 0;
@@ -242,9 +252,10 @@ class BundleIteration : public Transport {
             if (half != Half::BOTH && h != size_t(half)) continue;
             direct += halves[h].direct(side);
             indirect += halves[h].indirect(side);
-            count += halves[h].counted();
+            count += double(sides.perLine[side]) * double(halves[h].lines(side));
         }
-        return {direct / std::max(1.0, count), indirect / std::max(1.0, count)};
+        if (!(count > 0)) return {glm::dvec3(0.0), glm::dvec3(0.0)};
+        return {direct / count, indirect / count};
     }
 
     const TransportInput input;
