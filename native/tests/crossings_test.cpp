@@ -167,7 +167,7 @@ TEST(Crossings, WhatAPatchCountsAtCornersIsWhole) {
         parted += weights.isParted(p);
         for (uint32_t k = 0; k < patches.parents[p].patchCount(); ++k) {
             float sum = 0;
-            for (float weight : weights.of(p, k)) {
+            for (float weight : weights.of(p, k).corner) {
                 EXPECT_GE(weight, -1e-4f);
                 sum += weight;
             }

@@ -20,9 +20,9 @@ std::vector<std::vector<glm::vec3>> areaAverage(
         const Cell& cell = patches.cells[parent.cell];
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> shares = cornerWeights.of(p, k);
-            const double area =
-                double(patches.area[index / 2]) * double(std::max(exposed[index], kLeastExposure));
+            const auto [shares, all] = cornerWeights.of(p, k);
+            const double area = double(patches.area[index / 2]) *
+                                double(std::max(exposed[index], kLeastExposure)) * double(all);
             for (size_t a = 0; a < 4; ++a) {
                 if (cell.corner[a] < 0 || shares[a] <= 0) continue;
                 const uint32_t node = regions.nodeOf[size_t(cell.corner[a])];

@@ -58,18 +58,19 @@ CornerWeights::CornerWeights(const Patches& patches, const InstanceRange& range,
     }
 }
 
-std::array<float, 4> CornerWeights::of(uint32_t index, uint32_t patchInParent) const {
+CornerWeights::OfPatch CornerWeights::of(uint32_t index, uint32_t patchInParent) const {
     const Parent& parent = patches.parents[index];
-    std::array<float, 4> weights = patches.cells[parent.cell].weights(
-        parent.position(parent.pointOn(patchInParent, middleOf(parent))));
+    OfPatch weights{patches.cells[parent.cell].weights(
+                        parent.position(parent.pointOn(patchInParent, middleOf(parent)))),
+                    1};
     if (!isParted(index)) return weights;
-    float sum = 0;
+    weights.all = 0;
     for (size_t k = 0; k < 4; ++k) {
-        if (!(seen[index - first] >> k & 1)) weights[k] = 0;
-        sum += weights[k];
+        if (!(seen[index - first] >> k & 1)) weights.corner[k] = 0;
+        weights.all += weights.corner[k];
     }
-    if (sum > 0)
-        for (float& weight : weights) weight /= sum;
+    if (weights.all > 0)
+        for (float& weight : weights.corner) weight /= weights.all;
     return weights;
 }
 

@@ -29,9 +29,14 @@ class CornerWeights {
     CornerWeights(const Patches& patches, const InstanceRange& range, rb_side side,
                   const std::vector<float>& exposed);
 
-    // Of a patch by its number in the parent, by its middle. Their sum is 1, or 0 if it counts at no
-    // corner.
-    std::array<float, 4> of(uint32_t parent, uint32_t patchInParent) const;
+    // Of a patch by its number in the parent, by its middle. The sum of the corners' is 1, or 0 if it
+    // counts at none; all: what the patch counts by, the less the nearer it is to corners that a wall
+    // hides.
+    struct OfPatch {
+        std::array<float, 4> corner;
+        float all;
+    };
+    OfPatch of(uint32_t parent, uint32_t patchInParent) const;
     // Whether a wall hides some corner from a parent.
     bool isParted(uint32_t parent) const { return seen[parent - first] != 15; }
 

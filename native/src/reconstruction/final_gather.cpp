@@ -163,7 +163,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
             continue;
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t at = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> shares = cornerWeights.of(p, k);
+            const std::array<float, 4> shares = cornerWeights.of(p, k).corner;
             const Irradiance& h = light.irradiance;
             glm::vec3 difference = -(h.direct[at] - h.gathered[at] + h.indirect[at]);
             for (size_t a = 0; a < 4; ++a) {

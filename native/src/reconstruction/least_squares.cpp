@@ -180,9 +180,9 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
         std::array<std::array<double, 4>, 4> square{};
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
-            const std::array<float, 4> w = weights.of(p, k);
+            const auto [w, all] = weights.of(p, k);
             const float open = std::max(exposed[index], kLeastExposure);
-            const double weight = double(patches.area[index / 2]) * open;
+            const double weight = double(patches.area[index / 2]) * open * double(all);
             if (!weights.isParted(p))
                 openness[parent.cell - range.firstCell] += weight / areaOf(cell);
             for (int a = 0; a < 4; ++a) {
