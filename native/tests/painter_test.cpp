@@ -200,13 +200,12 @@ TEST(PainterNewell, ABakeReportsBrokenCycles) {
 TEST(PainterNewell, CountsIntersectingPatchesAsACycle) {
     Scene scene;
     place(scene, rectangle("one", {-1, -1, -1}, {2, 0, 2}, {0, 2, 0}), grey("", 0.5f));
-    // So near to an edge that they are not cut there (patches/crossings.h).
-    place(scene, rectangle("other", {-1, -1, 2.92f}, {2, 0, -2}, {0, 2, 0}), grey("", 0.5f));
+    place(scene, rectangle("other", {-1, -1, 1}, {2, 0, -2}, {0, 2, 0}), grey("", 0.5f));
     const PaintedScene projection(scene, 100, 0.05f);
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
     const BundleLines lines = projection.along("PAINTER_NEWELL", upwards);
     EXPECT_EQ(lines.cycles, 1u);
-    EXPECT_NEAR(double(lines.disordered), 0.02 * double(lines.lines), 41) << "one side of the cut";
+    EXPECT_NEAR(double(lines.disordered), 0.5 * double(lines.lines), 41) << "one side of the cut";
 }
 
 TEST(PainterNewell, OrdersPatchesThatCutEachOthersPlanesApart) {

@@ -6,11 +6,12 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <numeric>
+#include <optional>
 #include <tuple>
 #include <unsupported/Eigen/BVH>
 
 #include "bake/cancellation.h"
+#include "scene/disjoint_sets.h"
 
 namespace raybundle {
 namespace {
@@ -35,13 +36,8 @@ Eigen::Vector3d eigen(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
 Box boxOf(const Cell& cell) {
     Box box;
-    for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k) box.extend(eigen(cell.position(k)));
+    for (int k = 0; k < cell.cornerCount(); ++k) box.extend(eigen(cell.position(k)));
     return box;
-}
-
-double areaOf(const Cell& cell) {
-    return glm::length(glm::cross(glm::dvec3(cell.a), glm::dvec3(cell.b))) *
-           (cell.isTriangle() ? 0.5 : 1.0);
 }
 
 // Edge k of a cell.
@@ -57,7 +53,7 @@ std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const VertexOf
     for (uint32_t c = 0; c < cells.size(); ++c) {
         throwIfCancelledAt(c);
         if (!cells[c].hasPatches) continue;
-        const int n = cells[c].isTriangle() ? 3 : 4;
+        const int n = cells[c].cornerCount();
         for (int k = 0; k < n; ++k) {
             const uint32_t from = vertexOf(cells[c], k), to = vertexOf(cells[c], (k + 1) % n);
             edges.push_back({std::min(from, to), std::max(from, to), c, k});
@@ -69,36 +65,25 @@ std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const VertexOf
     return edges;
 }
 
-template <class Visit>
-void forEachEdge(const std::vector<CellEdge>& edges, const Visit& visit) {
-    for (size_t i = 0; i < edges.size();) {
-        size_t end = i;
-        while (end < edges.size() && edges[end].low == edges[i].low &&
-               edges[end].high == edges[i].high)
-            ++end;
-        visit(i, end);
-        i = end;
-    }
-}
-
-bool isTurned(const Cell& a, const Cell& b) {
-    return glm::length(glm::cross(a.normal(), b.normal())) > kLeastTurn;
-}
-
-// Parts the edges at which cells of two planes or more stand beside those of a third, by common
-// vertices.
-void partAtJunctions(const std::vector<Cell>& cells, const std::vector<CellEdge>& edges,
-                     std::map<uint32_t, Crossing>& crossings) {
-    forEachEdge(edges, [&](size_t first, size_t end) {
-        if (end - first <= 2) return;
-        for (size_t k = first; k < end; ++k) {
-            size_t turned = 0;
-            for (size_t m = first; m < end; ++m)
-                turned += isTurned(cells[edges[k].cell], cells[edges[m].cell]);
-            if (turned > 0 && turned < end - first - 1)
-                crossings[edges[k].cell].parted |= uint8_t(1u << edges[k].k);
+// Of the cells at an edge: which lie in one plane, by a number of the plane for each. In few planes: of
+// an edge at which many meet those that come late have one each.
+std::vector<size_t> planesOf(const std::vector<Cell>& cells, const CellEdge* edges, size_t count) {
+    constexpr size_t kMostCompared = 64;
+    std::vector<size_t> planes;
+    std::vector<glm::dvec3> normals;  // per plane
+    for (size_t k = 0; k < count; ++k) {
+        const glm::dvec3 normal = cells[edges[k].cell].normal();
+        const size_t most = std::min(normals.size(), kMostCompared);
+        size_t plane = 0;
+        while (plane < most && glm::length(glm::cross(normal, normals[plane])) > kLeastTurn)
+            ++plane;
+        if (plane == most) {
+            plane = normals.size();
+            normals.push_back(normal);
         }
-    });
+        planes.push_back(plane);
+    }
+    return planes;
 }
 
 // Cells that go on into each other without a bend.
@@ -111,32 +96,41 @@ struct Walls {
     double width(uint32_t wall) const { return area[wall] / box[wall].diagonal().norm(); }
 };
 
-Walls findWalls(const std::vector<Cell>& cells, const std::vector<CellEdge>& edges) {
-    std::vector<uint32_t> parent(cells.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    auto root = [&](uint32_t c) {
-        while (parent[c] != c) c = parent[c] = parent[parent[c]];
-        return c;
-    };
-    forEachEdge(edges, [&](size_t first, size_t end) {
-        for (size_t k = first; k < end; ++k)
-            for (size_t m = k + 1; m < end; ++m)
-                if (!isTurned(cells[edges[k].cell], cells[edges[m].cell]))
-                    parent[root(edges[m].cell)] = root(edges[k].cell);
-    });
+// The walls; boxes: per cell. And parts the edges at which cells of one plane meet others that stand on
+// them there, by common vertices.
+Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
+                const VertexOf& vertexOf, std::map<uint32_t, Crossing>& crossings) {
+    const std::vector<CellEdge> edges = sortedEdges(cells, vertexOf);
+    DisjointSets joined(cells.size());
+    for (size_t first = 0; first < edges.size();) {
+        size_t end = first;
+        while (end < edges.size() && edges[end].low == edges[first].low &&
+               edges[end].high == edges[first].high)
+            ++end;
+        const std::vector<size_t> planes = planesOf(cells, &edges[first], end - first);
+        std::map<size_t, std::vector<uint32_t>> inPlane;  // positions from `first` on
+        for (uint32_t k = 0; k < planes.size(); ++k) inPlane[planes[k]].push_back(k);
+        for (const auto& [plane, members] : inPlane)
+            for (uint32_t k : members) {
+                joined.join(edges[first + k].cell, edges[first + members[0]].cell);
+                if (members.size() > 1 && inPlane.size() > 1)
+                    crossings[edges[first + k].cell].parted |= uint8_t(1u << edges[first + k].k);
+            }
+        first = end;
+    }
     Walls walls;
     std::vector<uint32_t> numberOf(cells.size(), UINT32_MAX);
     for (uint32_t c = 0; c < cells.size(); ++c) {
         throwIfCancelledAt(c);
-        uint32_t& number = numberOf[root(c)];
+        uint32_t& number = numberOf[joined.root(c)];
         if (number == UINT32_MAX) {
             number = uint32_t(walls.area.size());
             walls.area.push_back(0);
             walls.box.push_back({});
         }
         walls.of.push_back(number);
-        walls.area[number] += areaOf(cells[c]);
-        walls.box[number].extend(boxOf(cells[c]));
+        walls.area[number] += cells[c].area();
+        walls.box[number].extend(boxes[c]);
     }
     return walls;
 }
@@ -199,7 +193,7 @@ class CellsByPlace {
 
 bool haveCommonEdge(const Cell& a, const Cell& b, const VertexOf& vertexOf) {
     std::array<uint32_t, 4> ofB;
-    const int nA = a.isTriangle() ? 3 : 4, nB = b.isTriangle() ? 3 : 4;
+    const int nA = a.cornerCount(), nB = b.cornerCount();
     for (int k = 0; k < nB; ++k) ofB[size_t(k)] = vertexOf(b, k);
     auto placeInB = [&](uint32_t vertex) {
         for (int k = 0; k < nB; ++k)
@@ -227,15 +221,13 @@ bool isHigh(const Box& box, const Plane& plane, double least) {
 Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double>& sizes,
                         const VertexOf& vertexOf) {
     Crossings result;
-    const std::vector<CellEdge> edges = sortedEdges(cells, vertexOf);
-    partAtJunctions(cells, edges, result.ofCell);
-
-    const Walls walls = findWalls(cells, edges);
+    std::vector<Box> boxes;
+    for (const Cell& cell : cells) boxes.push_back(boxOf(cell));
+    const Walls walls = findWalls(cells, boxes, vertexOf, result.ofCell);
     auto isWide = [&](uint32_t wall, double size) {
         return walls.width(wall) >= kLeastWidth * size;
     };
     std::vector<std::vector<uint32_t>> cellsOf(walls.area.size());
-    std::vector<Box> boxes(cells.size());
     std::vector<double> length(cells.size());  // of the longest edge over that of a patch
     std::vector<uint32_t> order;
     for (uint32_t c = 0; c < cells.size(); ++c) {
@@ -243,7 +235,6 @@ Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double
         if (!cells[c].hasPatches || !isWide(walls.of[c], sizes[c])) continue;
         order.push_back(c);
         cellsOf[walls.of[c]].push_back(c);
-        boxes[c] = boxOf(cells[c]);
         length[c] = cells[c].longestEdge() / sizes[c];
     }
     std::stable_sort(order.begin(), order.end(),
@@ -262,20 +253,20 @@ Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double
             Box box = boxes[c];
             box.min().array() -= kMargin * ofPatch;
             box.max().array() += kMargin * ofPatch;
-            CutCell crossed(cells[c], ofPatch);
+            std::optional<CutCell> crossed;
             size_t own = 0;
             places.forEachWall(box, [&](uint32_t wall) {
                 ++own;
-                if (wall == walls.of[c] || !isWide(wall, size) ||
-                    !isHigh(walls.box[wall], crossed.ownPlane(), kLeastHeight * size))
-                    return;
+                if (wall == walls.of[c] || !isWide(wall, size)) return;
+                if (!crossed) crossed.emplace(cells[c], ofPatch);
+                if (!isHigh(walls.box[wall], crossed->ownPlane(), kLeastHeight * size)) return;
                 places.forEachCell(wall, box, [&](uint32_t other) {
                     ++own;
                     if (!haveCommonEdge(cells[c], cells[other], vertexOf))
-                        crossed.meet(cells[other]);
+                        crossed->meet(cells[other]);
                 });
             });
-            found[k - first] = crossed.crossing();
+            if (crossed) found[k - first] = crossed->crossing();
             tests += own;
         });
         for (size_t k = first; k < end; ++k) {

@@ -27,7 +27,7 @@ double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y 
 
 std::vector<glm::dvec3> cornersOf(const Cell& cell) {
     std::vector<glm::dvec3> corners;
-    for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k) corners.push_back(cell.position(k));
+    for (int k = 0; k < cell.cornerCount(); ++k) corners.push_back(cell.position(k));
     return corners;
 }
 

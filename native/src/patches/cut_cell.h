@@ -74,7 +74,7 @@ class CutCell {
     using Piece = std::vector<Corner>;
 
     glm::dvec2 inPlane(const glm::dvec3& place) const;
-    // Edge k of the outline, with the walls on it.
+    // The line of edge k of the outline.
     Line edge(size_t k) const;
     double lengthOf(size_t edge) const;
     void add(const Segment& segment);

@@ -100,6 +100,7 @@ struct Cell {
     uint8_t parted = 0;      // bit k: a wall stands on the edge from corner k on (crossings.h)
 
     bool isTriangle() const { return corner[3] < 0; }
+    int cornerCount() const { return isTriangle() ? 3 : 4; }
     // Of corner k, relative to Patches::centre.
     glm::vec3 position(int k) const {
         if (k == 0) return origin;
@@ -108,7 +109,11 @@ struct Cell {
     }
     // Unit, along cross(a, b).
     glm::dvec3 normal() const { return glm::normalize(glm::cross(glm::dvec3(a), glm::dvec3(b))); }
-    double longestEdge() const {
+    // m^2.
+    double area() const {
+        return glm::length(glm::cross(glm::dvec3(a), glm::dvec3(b))) * (isTriangle() ? 0.5 : 1.0);
+    }
+    double longestEdge() const {  // metres
         return double(
             std::max({glm::length(a), glm::length(b), isTriangle() ? glm::distance(a, b) : 0.0f}));
     }

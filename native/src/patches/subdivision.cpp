@@ -185,7 +185,7 @@ class Subdivision {
     void cutCell(uint32_t index, double size) {
         const Cell& cell = patches.cells[index];
         std::vector<uint32_t> vertices;
-        for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k)
+        for (int k = 0; k < cell.cornerCount(); ++k)
             vertices.push_back(worldVertex(cell.instance, cell.corner[size_t(k)]));
         const Origin of = originOf(index);
         if (cell.isTriangle())
@@ -199,7 +199,7 @@ class Subdivision {
         std::vector<uint32_t> vertices;
         for (const glm::dvec3& place : piece.corners) {
             uint32_t vertex = uint32_t(patches.vertices.size());
-            for (int k = 0; k < (cell.isTriangle() ? 3 : 4); ++k)
+            for (int k = 0; k < cell.cornerCount(); ++k)
                 if (glm::vec3(place) == cell.position(k))
                     vertex = worldVertex(cell.instance, cell.corner[size_t(k)]);
             if (vertex == patches.vertices.size()) patches.vertices.push_back(glm::vec3(place));
@@ -278,8 +278,7 @@ class Subdivision {
 
     Origin originOf(uint32_t index) const {
         const Cell& cell = patches.cells[index];
-        const glm::dvec3 normal = glm::cross(glm::dvec3(cell.a), glm::dvec3(cell.b));
-        return {cell.instance, cell.face, index, glm::vec3(glm::normalize(normal))};
+        return {cell.instance, cell.face, index, glm::vec3(cell.normal())};
     }
 
     static Parent makeParent(const Origin& of, const glm::dvec3& p0, const glm::dvec3& pa,

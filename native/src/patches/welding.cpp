@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "bake/cancellation.h"
+#include "scene/disjoint_sets.h"
 
 namespace raybundle {
 namespace {
@@ -138,17 +139,10 @@ WeldedFaces weldedFaces(const Scene& scene, const std::vector<uint32_t>& welded,
         }
     }
     // Surfaces are sets of vertices joined by faces.
-    std::vector<uint32_t> above(welded.size());
-    std::iota(above.begin(), above.end(), 0u);
-    auto root = [&](uint32_t v) {
-        while (above[v] != v) v = above[v] = above[above[v]];
-        return v;
-    };
+    DisjointSets joined(welded.size());
     for (size_t f = 0; f < faces.count(); ++f)
-        for (size_t c = faces.offsets[f] + 1; c < faces.offsets[f + 1]; ++c) {
-            const uint32_t a = root(faces.vertices[c - 1]), b = root(faces.vertices[c]);
-            above[std::max(a, b)] = std::min(a, b);
-        }
+        for (size_t c = faces.offsets[f] + 1; c < faces.offsets[f + 1]; ++c)
+            joined.join(faces.vertices[c - 1], faces.vertices[c]);
     std::vector<uint32_t> number(welded.size(), UINT32_MAX);
     struct Piece {
         uint32_t instance, piece;
@@ -156,7 +150,7 @@ WeldedFaces weldedFaces(const Scene& scene, const std::vector<uint32_t>& welded,
     std::vector<Piece> last;  // per surface; faces are in the order of their instances
     for (size_t f = 0; f < faces.count(); ++f) {
         throwIfCancelledAt(f);
-        uint32_t& surface = number[root(faces.vertices[faces.offsets[f]])];
+        uint32_t& surface = number[joined.root(faces.vertices[faces.offsets[f]])];
         if (surface == UINT32_MAX) {
             surface = faces.surfaceCount++;
             last.push_back({UINT32_MAX, 0});

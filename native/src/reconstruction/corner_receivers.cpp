@@ -48,7 +48,7 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
         throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
-        const int n = cell.isTriangle() ? 3 : 4;
+        const int n = cell.cornerCount();
         glm::vec3 centre(0.0f);
         for (int k = 0; k < n; ++k) centre += cell.position(k) / float(n);
         for (int k = 0; k < n; ++k) {

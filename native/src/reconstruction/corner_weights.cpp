@@ -93,17 +93,17 @@ std::vector<float> exposedOutside(const Patches& patches, const Visibility& visi
     // Per cell and side, m^2.
     std::map<uint32_t, std::array<float, 2>> inside, all;
     auto forEach = [&](const auto& visit) {
-        for (size_t side = 0; side < patches.sideCount(); ++side) {
-            throwIfCancelledAt(side);
-            const Parent& parent = patches.parentAt(uint32_t(side));
-            if (parent.seenCorners != 15) visit(side, parent.cell);
+        for (const Parent& parent : patches.parents) {
+            if (parent.seenCorners == 15) continue;
+            for (uint32_t k = 0; k < 2 * parent.patchCount(); ++k)
+                visit(2 * parent.firstPatch + k, parent.cell);
         }
     };
-    forEach([&](size_t side, uint32_t cell) {
+    forEach([&](uint32_t side, uint32_t cell) {
         all[cell][side % 2] += patches.area[side / 2];
         if (isInside[side]) inside[cell][side % 2] += patches.area[side / 2];
     });
-    forEach([&](size_t side, uint32_t cell) {
+    forEach([&](uint32_t side, uint32_t cell) {
         if (isInside[side] && inside[cell][side % 2] < kMostInside * all[cell][side % 2])
             exposed[side] = 0;
     });

@@ -49,11 +49,6 @@ std::array<uint32_t, 4> nodesOf(const Cell& cell, const SmoothRegions& regions) 
     return node;
 }
 
-double areaOf(const Cell& cell) {
-    return glm::length(glm::cross(glm::dvec3(cell.a), glm::dvec3(cell.b))) *
-           (cell.isTriangle() ? 0.5 : 1.0);
-}
-
 // Slope of the interpolation across an edge of a cell, away from the edge, times the height of the
 // cell over the edge: a stencil over the cell's nodes, and that height, m.
 struct EdgeSlope {
@@ -63,7 +58,7 @@ struct EdgeSlope {
 
 EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
     EdgeSlope slope;
-    const int n = cell.isTriangle() ? 3 : 4;
+    const int n = cell.cornerCount();
     int start = 0, finish = 0;
     for (int k = 0; k < n; ++k) {
         if (cell.corner[k] == from) start = k;
@@ -114,7 +109,7 @@ void addRegularization(const Patches& patches, const InstanceRange& range,
         }
         const double open = std::min(openness[edge.cell[0] - range.firstCell],
                                      openness[edge.cell[1] - range.firstCell]);
-        terms.addSquare(node, stencil, weight * open * (areaOf(cell0) + areaOf(cell1)));
+        terms.addSquare(node, stencil, weight * open * (cell0.area() + cell1.area()));
     }
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
         if (!patches.cells[c].isTriangle()) {
@@ -122,7 +117,7 @@ void addRegularization(const Patches& patches, const InstanceRange& range,
             std::copy(n.begin(), n.end(), node.begin());
             std::fill(node.begin() + 4, node.end(), n[0]);
             terms.addSquare(node, {1, -1, 1, -1, 0, 0, 0, 0},
-                            weight * openness[c - range.firstCell] * areaOf(patches.cells[c]));
+                            weight * openness[c - range.firstCell] * patches.cells[c].area());
         }
 }
 
@@ -184,7 +179,7 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
             const float open = std::max(exposed[index], kLeastExposure);
             const double weight = double(patches.area[index / 2]) * open * double(all);
             if (!weights.isParted(p))
-                openness[parent.cell - range.firstCell] += weight / areaOf(cell);
+                openness[parent.cell - range.firstCell] += weight / cell.area();
             for (int a = 0; a < 4; ++a) {
                 for (int b = 0; b < 4; ++b) square[a][b] += weight * w[a] * w[b];
                 if (w[a] == 0) continue;

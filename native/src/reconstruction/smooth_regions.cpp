@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "bake/cancellation.h"
+#include "scene/disjoint_sets.h"
 
 namespace raybundle {
 namespace {
@@ -29,11 +29,6 @@ glm::vec3 placeOf(const Cell& cell, int32_t corner) {
     return cell.position(k);
 }
 
-uint32_t root(std::vector<uint32_t>& parent, uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 }  // namespace
 
 SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, uint32_t first,
@@ -41,7 +36,7 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
     std::vector<HalfEdge> halfEdges;
     for (uint32_t c = first; c < last; ++c) {
         throwIfCancelledAt(c);
-        const int n = cells[c].isTriangle() ? 3 : 4;
+        const int n = cells[c].cornerCount();
         for (int k = 0; k < n; ++k) {
             const int32_t from = cells[c].corner[k], to = cells[c].corner[(k + 1) % n];
             const int32_t a = mesh.cornerVertices[from], b = mesh.cornerVertices[to];
@@ -55,7 +50,7 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
 
     auto normalAt = [&](uint32_t cell, int32_t corner) {
         if (!mesh.cornerNormals.empty()) return glm::vec3(mesh.cornerNormals[corner]);
-        return glm::normalize(glm::cross(cells[cell].a, cells[cell].b));
+        return glm::vec3(cells[cell].normal());
     };
     // The normal of a sliver is rounding alone: that of what lies beyond its longest edge stands for
     // it, by its corners.
@@ -83,8 +78,7 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
     };
 
     SmoothRegions regions;
-    std::vector<uint32_t> parent(mesh.cornerCount());
-    std::iota(parent.begin(), parent.end(), 0u);
+    DisjointSets joined(mesh.cornerCount());
     for (size_t i = 0; i < halfEdges.size();) {
         size_t end = i + 1;
         while (end < halfEdges.size() && halfEdges[end].key == halfEdges[i].key) ++end;
@@ -98,8 +92,8 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
         i = end;
         if (!joinable) continue;
         const bool start = joins(e, e.from, f, f.to), finish = joins(e, e.to, f, f.from);
-        if (start) parent[root(parent, uint32_t(e.from))] = root(parent, uint32_t(f.to));
-        if (finish) parent[root(parent, uint32_t(e.to))] = root(parent, uint32_t(f.from));
+        if (start) joined.join(uint32_t(e.from), uint32_t(f.to));
+        if (finish) joined.join(uint32_t(e.to), uint32_t(f.from));
         if (start && finish)
             regions.edges.push_back({{e.cell, f.cell}, {e.from, e.to, f.to, f.from}});
     }
@@ -107,7 +101,7 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
     regions.nodeOf.resize(mesh.cornerCount());
     std::vector<uint32_t> nodeOfRoot(mesh.cornerCount(), UINT32_MAX);
     for (uint32_t c = 0; c < mesh.cornerCount(); ++c) {
-        uint32_t& node = nodeOfRoot[root(parent, c)];
+        uint32_t& node = nodeOfRoot[joined.root(c)];
         if (node == UINT32_MAX) node = regions.nodeCount++;
         regions.nodeOf[c] = node;
     }

@@ -102,7 +102,7 @@ class InstanceErrors {
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
             throwIfCancelledAt(c);
             const Cell& cell = patches.cells[c];
-            const double share = exposed[c - range.firstCell] / (cell.isTriangle() ? 3 : 4);
+            const double share = exposed[c - range.firstCell] / cell.cornerCount();
             for (int32_t corner : cell.corner)
                 if (corner >= 0)
                     sum.shown += share * square(light.direct[size_t(corner)] +
