@@ -196,12 +196,14 @@ std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, cons
     return finest;
 }
 
-// Samples [first, first + kBlocks * each), `each` to a block: consecutive ones are stratified.
+// Fills blocks that are empty, `each` samples to a block. The blocks have consecutive samples in
+// their order, and each begins at a multiple of its number: so it is stratified like all of them
+// together. Of others the blocks would differ by more than their mean is off.
 template <class SampleAt>
 void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleAt,
                               const SobolPoints& points, uint32_t side, const Place& place,
-                              int first, int each, std::array<Block, kBlocks>& blocks,
-                              Sightings* sightings, Origins* origins, Gathered& sum) const {
+                              int each, std::array<Block, kBlocks>& blocks, Sightings* sightings,
+                              Origins* origins, Gathered& sum) const {
     std::array<ShadowRay, Visibility::kPacket> rays;
     struct Held {
         glm::vec3 irradiance;
@@ -226,8 +228,10 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
         sum.rays += uint64_t(count);
         count = 0;
     };
-    for (int i = 0; i < int(kBlocks) * each; ++i) {
-        const glm::vec4 u = points[uint32_t(first + i)];
+    const int first = std::accumulate(blocks.begin(), blocks.end(), 0,
+                                      [](int n, const Block& block) { return n + block.count; });
+    for (int i = first; i < int(kBlocks) * each; ++i) {
+        const glm::vec4 u = points[uint32_t(i)];
         const auto [point, weight] = source.placeOn(place, {u.x, u.y});
         LightSample sample = sampleAt(point, glm::vec2(u.z, u.w));
         sample.irradiance *= weight;
@@ -284,11 +288,19 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                         : source.sample(point, place.normal, uv);
     };
     for (;;) {
-        takeSamples(source, sampleAt, points, receiver.side, place, all.count,
-                    (next - all.count) / int(kBlocks), blocks, hasParts ? sightings : nullptr,
-                    keepsOrigins ? &origins : nullptr, sum);
-        all = {};
-        for (const Block& block : blocks) all.add(block);
+        do {
+            if (all.count > 0) {
+                blocks[0].add(blocks[1]);
+                blocks[1] = blocks[2];
+                blocks[1].add(blocks[3]);
+                blocks[2] = blocks[3] = {};
+            }
+            takeSamples(source, sampleAt, points, receiver.side, place,
+                        all.count > 0 ? all.count / 2 : next / int(kBlocks), blocks,
+                        hasParts ? sightings : nullptr, keepsOrigins ? &origins : nullptr, sum);
+            all = {};
+            for (const Block& block : blocks) all.add(block);
+        } while (all.count < next);
         if (skips.skipLit && !closed && !isGuided &&
             (brightest(all.open) <= 0 || brightest(all.visible) > 0))
             closed = closedMean(source, place, tolerance, closedError);
@@ -353,7 +365,7 @@ void DirectLight::look(const LightSource& source, const Receiver& receiver, cons
         [&](const glm::vec3&, glm::vec2 uv) {
             return source.sampleSeen(place.normal, uv, sumOfSeen);
         },
-        SobolPoints(hash(seed, ~receiver.seed)), receiver.side, place, 0,
+        SobolPoints(hash(seed, ~receiver.seed)), receiver.side, place,
         Sightings::kMost / int(kBlocks), blocks, &sightings, nullptr, sum);
 }
 
