@@ -125,7 +125,9 @@ RELATIONS = (
     Relation("one thread", settings={'threads': 1}, tolerance=SAME, is_quick=True),
     Relation("three threads", settings={'threads': 3}, tolerance=SAME),
     method("solver MULTIPATH", *LAMBERT, solver='MULTIPATH', **RANDOM),
-    method("solver STOCHASTIC_ITERATION", *LAMBERT, solver='STOCHASTIC_ITERATION', **RANDOM),
+    # Its noise is alike on whole walls: at 0.01 the balance is 3e-3 off in the mean of seeds.
+    method("solver STOCHASTIC_ITERATION", *LAMBERT, solver='STOCHASTIC_ITERATION',
+           target_error=0.006, max_bundles=16384, **RANDOM),
     method("solver RANDOM_WALK", *LAMBERT, solver='RANDOM_WALK', **RANDOM),
     method("first shot SHOOT", *LAMBERT, first_shot='SHOOT'),
     method("first shot EXTENDED", *LAMBERT, first_shot='EXTENDED'),
