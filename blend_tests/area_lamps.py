@@ -21,17 +21,18 @@ GAP = 1e-3  # m, between a light and the face that it stands for
 
 @contextmanager
 def area_lamps() -> Iterator[None]:
-    """Faces whose material has one Emission node, a constant, shine as lights from their fronts.
+    """Faces whose material has one Emission node, a constant, shine as lights.
 
-    A rectangle becomes one of the same size; any other face, which should be a regular polygon, a
-    disk of its area. Backs do not shine: they should be inside closed meshes, or dark.
+    A rectangle becomes one of the same size; any other face, which should be near a regular
+    polygon, a disk of its area. Backs shine where the mesh is open; inside a closed one it is dark.
     """
     nodes = {material: node for material in bpy.data.materials
              if (node := _emission_node(material)) is not None}
-    lights = [_place_light(item, face, nodes[material])
+    lights = [_place_light(item, face, nodes[material], side)
               for item in bpy.context.view_layer.objects if item.type == 'MESH'
               for face in item.data.polygons
-              if (material := _material(item, face)) in nodes]
+              if (material := _material(item, face)) in nodes
+              for side in ((1.0,) if _is_closed(item.data) else (1.0, -1.0))]
     strengths = {node: node.inputs['Strength'].default_value for node in nodes.values()}
     for node in strengths:
         node.inputs['Strength'].default_value = 0.0
@@ -57,11 +58,18 @@ def _material(item: bpy.types.Object, face: bpy.types.MeshPolygon) -> bpy.types.
     return item.material_slots[face.material_index].material if item.material_slots else None
 
 
-def _place_light(item: bpy.types.Object, face: bpy.types.MeshPolygon, node: bpy.types.Node
-                 ) -> bpy.types.Object:
+def _is_closed(mesh: bpy.types.Mesh) -> bool:
+    edges = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get('edge_index', edges)
+    return bool(np.all(np.bincount(edges, minlength=len(mesh.edges)) == 2))
+
+
+def _place_light(item: bpy.types.Object, face: bpy.types.MeshPolygon, node: bpy.types.Node,
+                 side: float) -> bpy.types.Object:
+    """side: 1 for the front, -1 for the back."""
     corners = [item.matrix_world @ item.data.vertices[index].co for index in face.vertices]
     first, second = corners[1] - corners[0], corners[-1] - corners[0]
-    normal = first.cross(second).normalized()
+    normal = side * first.cross(second).normalized()
     area = sum((a - corners[0]).cross(b - corners[0]).length / 2
                for a, b in zip(corners[1:], corners[2:]))
     data = bpy.data.lights.new("lamp", 'AREA')

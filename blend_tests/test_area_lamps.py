@@ -11,12 +11,13 @@ from cycles_reference import bake_objects
 SAMPLES = 1024
 
 
+@pytest.mark.parametrize("looks_down", [True, False])
 @pytest.mark.parametrize("sides", [4, 24])
-def test_far_from_a_lamp(new_object, new_material, sides):
+def test_far_from_a_lamp(new_object, new_material, sides, looks_down):
     floor = new_object("Floor", *square(2.0, 4), new_material("White", (0.8, 0.8, 0.8)))
-    # Clockwise: its front looks down, and nothing looks at its back.
+    # Both sides shine, and one of them on the floor.
     corners = [(0.2 * np.cos(angle), 0.2 * np.sin(angle), 2.0)
-               for angle in -2.0 * np.pi * np.arange(sides) / sides]
+               for angle in 2.0 * np.pi * np.arange(sides) / sides][::-1 if looks_down else 1]
     material = bpy.data.materials.new("Lamp")
     material.use_nodes = True
     tree = material.node_tree
