@@ -24,7 +24,8 @@ def area_lamps() -> Iterator[None]:
     """Faces whose material has one Emission node, a constant, shine as lights.
 
     A rectangle becomes one of the same size; any other face, which should be near a regular
-    polygon, a disk of its area. Backs shine where the mesh is open; inside a closed one it is dark.
+    polygon, a disk of its area. Backs shine where the mesh is open, for inside a closed one it is dark,
+    and the node alone makes the surface: a mix is one by the side that is looked at.
     """
     nodes = {material: node for material in bpy.data.materials
              if (node := _emission_node(material)) is not None}
@@ -32,7 +33,8 @@ def area_lamps() -> Iterator[None]:
               for item in bpy.context.view_layer.objects if item.type == 'MESH'
               for face in item.data.polygons
               if (material := _material(item, face)) in nodes
-              for side in ((1.0,) if _is_closed(item.data) else (1.0, -1.0))]
+              for side in ((1.0,) if _is_closed(item.data) or _is_mixed(nodes[material])
+                           else (1.0, -1.0))]
     strengths = {node: node.inputs['Strength'].default_value for node in nodes.values()}
     for node in strengths:
         node.inputs['Strength'].default_value = 0.0
@@ -62,6 +64,10 @@ def _is_closed(mesh: bpy.types.Mesh) -> bool:
     edges = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get('edge_index', edges)
     return bool(np.all(np.bincount(edges, minlength=len(mesh.edges)) == 2))
+
+
+def _is_mixed(emission: bpy.types.Node) -> bool:
+    return any(link.to_node.type != 'OUTPUT_MATERIAL' for link in emission.outputs[0].links)
 
 
 def _place_light(item: bpy.types.Object, face: bpy.types.MeshPolygon, node: bpy.types.Node,

@@ -39,8 +39,8 @@ struct LightSample {
     }
     // For a plane source of that normal, as thick as `plane` has it.
     void setMargin(const Plane& plane) {
-        margin = float(2 * plane.thickness /
-                       std::max(0.01, -glm::dot(glm::dvec3(direction), plane.normal)));
+        margin = float(2 * plane.thickness) /
+                 std::max(0.01f, -glm::dot(direction, glm::vec3(plane.normal)));
     }
 };
 

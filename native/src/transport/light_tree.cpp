@@ -9,15 +9,24 @@
 namespace raybundle {
 namespace {
 
+// A cluster with a cone of normals narrower than that is flat; it is far at so many times its
+// radius, and then clear of the receiver's horizon, and the receiver of its own, at such cosines.
+constexpr float kFlat = 0.999f, kFar = 3, kClear = 0.4f, kClearOfPlane = 0.1f;
+
 glm::vec3 middleOf(const LightFace& face) {
     return face.origin + (face.isTriangle ? 1 / 3.0f : 0.5f) * (face.a + face.b);
 }
 
 float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
 
-// Cosine of max(x - y, 0) of two angles up to half a turn, by their sines and cosines.
-float cosineOfRest(float cosX, float sinX, float cosY, float sinY) {
-    return cosX >= cosY ? 1.0f : cosX * cosY + sinX * sinY;
+struct Angle {
+    float cosine, sine;
+};
+
+// max(x - y, 0) of two angles up to half a turn.
+Angle rest(const Angle& x, const Angle& y) {
+    if (x.cosine >= y.cosine) return {1, 0};
+    return {x.cosine * y.cosine + x.sine * y.sine, x.sine * y.cosine - x.cosine * y.sine};
 }
 
 }  // namespace
@@ -26,6 +35,9 @@ LightTree::LightTree(const std::vector<LightFace>& faces) : order(faces.size()) 
     std::iota(order.begin(), order.end(), 0u);
     nodes.reserve(2 * faces.size());
     if (!faces.empty()) build(faces, 0, uint32_t(faces.size()));
+    powerBefore.push_back(0);
+    for (const uint32_t k : order)
+        powerBefore.push_back(powerBefore.back() + double(faces[k].strength * faces[k].area()));
 }
 
 uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, uint32_t count) {
@@ -83,40 +95,58 @@ float LightTree::importance(const Node& node, const glm::vec3& point, const glm:
     const float distance = std::sqrt(distance2);
     const glm::vec3 towards = d / distance;
     // Half the angle under which the sphere is seen.
-    const float sinSphere = node.radius / distance, cosSphere = sineOf(sinSphere);
+    const float sinSphere = node.radius / distance;
+    const Angle sphere{sineOf(sinSphere), sinSphere};
     const float c = glm::dot(normal, towards);
-    const float received = cosineOfRest(c, sineOf(c), cosSphere, sinSphere);
+    const float received = rest({c, sineOf(c)}, sphere).cosine;
     if (received <= 0) return 0;
     // From the cone's axis to the receiver, less the cone, less the sphere.
     const float e = -glm::dot(node.axis, towards);
-    float emitted = cosineOfRest(e, sineOf(e), node.cosine, node.sine);
-    emitted = cosineOfRest(emitted, sineOf(emitted), cosSphere, sinSphere);
+    const float emitted = rest(rest({e, sineOf(e)}, {node.cosine, node.sine}), sphere).cosine;
     return emitted <= 0 ? 0 : node.power * emitted * received / distance2;
+}
+
+bool LightTree::isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal) {
+    const glm::vec3 d = node.centre - point;
+    const float distance2 = glm::dot(d, d);
+    if (node.cosine < kFlat || distance2 < kFar * kFar * node.radius * node.radius) return false;
+    const float distance = std::sqrt(distance2);
+    return glm::dot(normal, d) > kClear * distance &&
+           -glm::dot(node.axis, d) > kClearOfPlane * distance;
 }
 
 std::optional<LightTree::Choice> LightTree::choose(const glm::vec3& point, const glm::vec3& normal,
                                                    float u) const {
     if (nodes.empty()) return std::nullopt;
     uint32_t index = 0;
-    double rest = double(u), probability = 1;
+    double left = double(u), probability = 1;
     while (nodes[index].count > 1) {
+        if (const Node& node = nodes[index]; isEven(node, point, normal)) {
+            const auto first = powerBefore.begin() + node.first;
+            const double all = first[node.count] - first[0], at = first[0] + left * all;
+            const auto after = std::upper_bound(first + 1, first + node.count, at);
+            const double power = after[0] - after[-1];
+            return Choice{order[size_t(after - powerBefore.begin()) - 1],
+                          float(probability * power / all),
+                          std::clamp(float((at - after[-1]) / power), 0.0f, 0.9999999f)};
+        }
         const uint32_t first = index + 1, second = nodes[index].second;
         const double a = double(importance(nodes[first], point, normal));
         const double b = double(importance(nodes[second], point, normal));
         if (!(a + b > 0)) return std::nullopt;
         const double share = a / (a + b);
-        if (rest < share) {
+        if (left < share) {
             index = first;
             probability *= share;
-            rest /= share;
+            left /= share;
         } else {
             index = second;
             probability *= 1 - share;
-            rest = (rest - share) / (1 - share);
+            left = (left - share) / (1 - share);
         }
     }
     return Choice{order[nodes[index].first], float(probability),
-                  std::clamp(float(rest), 0.0f, 0.9999999f)};
+                  std::clamp(float(left), 0.0f, 0.9999999f)};
 }
 
 }  // namespace raybundle

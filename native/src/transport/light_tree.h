@@ -7,6 +7,8 @@
 // (2018): the bounds of a cluster's light by its sphere and by the cone of its normals.
 // Differs:
 // - One sample goes to one face: clusters are not split for a receiver.
+// - Of a flat cluster far enough before the receiver a face is chosen by its power alone: its bounds
+//   would hardly say more, and take most of the time.
 // - Clusters are halved at the middle of their longer side instead of where the surface area
 //   orientation heuristic has its least: the faces of one mesh are of a kind.
 #pragma once
@@ -56,7 +58,11 @@ class LightTree {
     uint32_t build(const std::vector<LightFace>& faces, uint32_t first, uint32_t count);
     static float importance(const Node& node, const glm::vec3& point, const glm::vec3& normal);
 
+    // Whether its faces give the plane about what their powers say.
+    static bool isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal);
+
     std::vector<uint32_t> order;
+    std::vector<double> powerBefore;  // per place in `order`, and of all: sum of the channels, W
     std::vector<Node> nodes;
 };
 

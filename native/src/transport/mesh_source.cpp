@@ -16,7 +16,7 @@ float strength(const glm::vec3& emission) { return emission.x + emission.y + emi
 
 // A face that is nearer than so many times its radius is sampled by solid angle: by area, the light of
 // what touches the receiver would have no finite variance.
-constexpr float kNear = 3;
+constexpr float kNear = 1.5f;
 
 // Uniform by area: the unit square is folded onto a triangle.
 glm::vec3 pointOn(const LightFace& face, glm::vec2 uv) {
@@ -31,13 +31,9 @@ struct FaceDirection {
     float solidAngle;  // sr
 };
 
-// Of faces that are near; none: it is sampled by area.
+// None: it is sampled by area.
 std::optional<FaceDirection> directionTo(const LightFace& face, const glm::vec3& point,
                                          glm::vec2 uv) {
-    const glm::vec3 middle = face.origin + (face.isTriangle ? 1 / 3.0f : 0.5f) * (face.a + face.b);
-    const glm::vec3 d = middle - point;
-    const float radius = 0.5f * (glm::length(face.a) + glm::length(face.b));
-    if (glm::dot(d, d) > kNear * kNear * radius * radius) return std::nullopt;
     const glm::dvec3 o = glm::dvec3(face.origin) - glm::dvec3(point), a(face.a), b(face.b);
     const SphericalTriangle first(o, o + a, o + b);
     double solidAngle = first.area();
@@ -88,10 +84,14 @@ void MeshSource::boundSource(const std::vector<uint32_t>& parents) {
 
 void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t back) {
     double sum = 0;
-    auto add = [&](const LightFace& face) {
+    auto add = [&](const LightFace& face, const Plane& plane) {
         const double power = double(face.strength * face.area());
         if (!(power > 0)) return;
         faces.push_back(face);
+        const float near = 0.5f * kNear * (glm::length(face.a) + glm::length(face.b));
+        shapes.push_back({plane,
+                          face.origin + (face.isTriangle ? 1 / 3.0f : 0.5f) * (face.a + face.b),
+                          face.area(), near * near});
         totalPower += face.area() * emissionOf(face.side);
         powerUpTo.push_back(sum += power);
     };
@@ -104,8 +104,9 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
                        parent.isTriangle,
                        strength(emission),
                        2 * parent.firstPatch + back};
+        const Plane plane(parent.origin, parent.a, parent.b, face.normal, wholeExtent);
         if (!sideEmission) {
-            add(face);
+            add(face, plane);
             continue;
         }
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
@@ -115,7 +116,7 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
             face.b = patches.point(p, {0, 1}) - face.origin;
             face.side = 2 * p + back;
             face.strength = strength(emissionOf(face.side));
-            add(face);
+            add(face, plane);
         }
     }
 }
@@ -125,22 +126,26 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     const auto choice = tree.choose(point, receiver, uv.x);
     if (!choice) return {};
     const LightFace& face = faces[choice->face];
-    const Parent& parent = patches.parents[patches.parentOf[face.side / 2]];
-    const Plane plane(parent.origin, parent.a, parent.b, face.normal, wholeExtent);
-    if (plane.side(point) != PlaneSide::FRONT) return {};
+    const FaceShape& shape = shapes[choice->face];
+    if (shape.plane.side(point) != PlaneSide::FRONT) return {};
     const glm::vec3 radiance = emissionOf(face.side) / glm::pi<float>();
+    const glm::vec2 own(choice->u, uv.y);
+    const glm::vec3 d = shape.middle - point;
     LightSample sample;
-    if (const auto seen = directionTo(face, point, {choice->u, uv.y})) {
-        sample.direction = seen->direction;
-        sample.distance = seen->distance;
-        sample.irradiance = radiance * (seen->solidAngle / choice->probability *
-                                        std::max(0.0f, glm::dot(receiver, sample.direction)));
-    } else {
-        sample = surfaceSample(point, receiver, pointOn(face, {choice->u, uv.y}), face.normal,
-                               radiance, face.area() / choice->probability);
-    }
+    bool isSampled = false;
+    if (glm::dot(d, d) <= shape.nearSquare)
+        if (const auto seen = directionTo(face, point, own)) {
+            sample.direction = seen->direction;
+            sample.distance = seen->distance;
+            sample.irradiance = radiance * (seen->solidAngle / choice->probability *
+                                            std::max(0.0f, glm::dot(receiver, sample.direction)));
+            isSampled = true;
+        }
+    if (!isSampled)
+        sample = surfaceSample(point, receiver, pointOn(face, own), face.normal, radiance,
+                               shape.area / choice->probability);
     sample.parent = patches.parentOf[face.side / 2];
-    sample.setMargin(plane);
+    sample.setMargin(shape.plane);
     return sample;
 }
 

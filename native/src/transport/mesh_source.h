@@ -57,6 +57,14 @@ class MeshSource : public LightSource {
     double wholeExtent = 0;  // of one around what it is part of
     // Sides of parents, or of patches where the emission varies.
     std::vector<LightFace> faces;
+    // Per face: what its samples need and its corners give.
+    struct FaceShape {
+        Plane plane;
+        glm::vec3 middle;
+        float area;        // m^2
+        float nearSquare;  // of the distance from the middle below which it is near, m^2
+    };
+    std::vector<FaceShape> shapes;
     std::vector<double> powerUpTo;  // of them, sum of the channels, cumulative, W
     LightTree tree;
     MeshOutline outline;
