@@ -91,16 +91,16 @@ struct DirectLight::Origins {
     }
 };
 
-// About what each source would give without occluders, to share out the samples; empty where
-// there are so few sources that it does not pay.
+// About what each source would give without occluders, to share out the samples: by one sample, or
+// another where that gets nothing. Empty where there are so few sources that it does not pay.
 std::vector<float> DirectLight::unblockedWeights(const Place& place) const {
     if (sources.size() <= kFewSources || !skips.skipWeak) return {};
     static const glm::vec2 kAt[2] = {{0.25f, 0.25f}, {0.5f, 0.75f}};
     std::vector<float> weights(sources.size());
     for (size_t k = 0; k < sources.size(); ++k) {
         if (isOutOfSight(*sources[k], place)) continue;
-        for (int i = 0; i < 2; ++i)
-            weights[k] += brightest(
+        for (int i = 0; i < 2 && !(weights[k] > 0); ++i)
+            weights[k] = brightest(
                 sources[k]->sample(place.at(kAt[i]), place.normal, kAt[1 - i]).irradiance);
     }
     return weights;
