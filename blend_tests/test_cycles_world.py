@@ -249,6 +249,29 @@ def test_the_sun_of_a_sky_is_a_light(elevation):
     assert scene.world_image.max() < brightest * mean_radiance(scene).max()
 
 
+def test_bright_parts_of_a_sky_are_rendered_together(monkeypatch):
+    new_sky(Tree(), 0.26)
+    apart = [((0, 5), (0, 5)), ((5, 10), (0, 5)), ((0, 10), (5, 9)), ((40, 45), (40, 45))]
+    assert sorted(world_panorama._joined(apart)) == [((0, 10), (0, 9)), ((40, 45), (40, 45))]
+    fine = []
+    panorama = world_panorama._Renderer.panorama
+
+    def counted(self, width, part=None):
+        fine.extend([part] if part else [])
+        return panorama(self, width, part)
+
+    monkeypatch.setattr(world_panorama._Renderer, 'panorama', counted)
+    monkeypatch.setattr(world_panorama, '_MAX_TILES', 6)
+    together = world_panorama.evaluate(bpy.context.scene.world, 1).pixels
+    assert 1 <= len(fine) <= 3
+    monkeypatch.setattr(world_panorama, '_joined', lambda parts: parts)
+    tiles = world_panorama.evaluate(bpy.context.scene.world, 1).pixels
+    # What lies between the tiles is rendered finer now: its own noise and no more.
+    assert np.allclose(together, tiles, rtol=0.05)
+    angles = world_panorama.solid_angles(*tiles.shape[:2])[..., None]
+    assert (together * angles).sum() == pytest.approx((tiles * angles).sum(), rel=1e-3)
+
+
 def test_nothing_is_left_behind_and_the_evaluation_is_kept(monkeypatch):
     tree = Tree()
     sky = new_sky(tree, 0.6)

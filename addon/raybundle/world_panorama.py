@@ -38,6 +38,7 @@ _DISC_WIDTH = 128
 # Larger discs stay in the panorama, which has enough pixels for them.
 _LARGEST_DISC = 0.5  # radians
 _SKIES_WITHOUT_DISC = ('PREETHAM', 'HOSEK_WILKIE')
+_Part = tuple[tuple[int, int], tuple[int, int]]  # rows and columns: begin, end
 _HANDLERS = ('render_init', 'render_pre', 'render_post', 'render_write', 'render_stats',
              'render_complete', 'render_cancel')
 
@@ -94,20 +95,44 @@ def _refined(renderer: _Renderer, base: np.ndarray) -> np.ndarray:
     mean = power.sum() / power.size
     # Never more than a small part: in a sky that is bright all over nothing stands out.
     left = np.where(power > max(_BRIGHT * power.sum(), 4.0 * mean), power, 0.0)
-    for _ in range(_MAX_TILES):
+    tiles: list[_Part] = []
+    while len(tiles) < _MAX_TILES and left.max() > 0.0:
         row, column = np.unravel_index(left.argmax(), left.shape)
-        if left[row, column] <= 0.0:
-            break
-        tile = (slice(max(row - _MARGIN, 0), min(row + _MARGIN + 1, height)),
-                slice(max(column - _MARGIN, 0), min(column + _MARGIN + 1, width)))
-        left[tile] = 0.0
+        tile = ((max(row - _MARGIN, 0), min(row + _MARGIN + 1, height)),
+                (max(column - _MARGIN, 0), min(column + _MARGIN + 1, width)))
+        left[tuple(slice(*span) for span in tile)] = 0.0
+        tiles.append(tile)
+    step = _FINER // _KEPT
+    for part in _joined(tiles):
         fine = renderer.panorama(_FINER * width, tuple(
-            (_FINER * part.start, _FINER * part.stop) for part in tile))
-        step = _FINER // _KEPT
+            (_FINER * begin, _FINER * end) for begin, end in part))
         kept = fine.reshape(fine.shape[0] // step, step, fine.shape[1] // step, step, 3)
-        pixels[tuple(slice(_KEPT * part.start, _KEPT * part.stop) for part in tile)] = (
+        pixels[tuple(slice(_KEPT * begin, _KEPT * end) for begin, end in part)] = (
             kept.mean(axis=(1, 3)))
     return pixels
+
+
+def _joined(parts: list[_Part]) -> list[_Part]:
+    """Few rectangles that hold the given ones, with little besides: each is a render of its own."""
+    joined: list[_Part] = []
+    for part in parts:
+        # What it is joined with may reach others then.
+        while other := next((other for other in joined
+                             if _area(_around(part, other)) <= _area(part) + _area(other)), None):
+            joined.remove(other)
+            part = _around(part, other)
+        joined.append(part)
+    return joined
+
+
+def _around(first: _Part, second: _Part) -> _Part:
+    rows, columns = ((min(a[0], b[0]), max(a[1], b[1])) for a, b in zip(first, second))
+    return rows, columns
+
+
+def _area(part: _Part) -> int:
+    (top, bottom), (left, right) = part
+    return (bottom - top) * (right - left)
 
 
 def _sun(renderer: _Renderer, node: bpy.types.Node, base: np.ndarray) -> SunLightData | None:
@@ -173,8 +198,7 @@ class _Renderer:
                 and node.sky_type not in _SKIES_WITHOUT_DISC and not node.mute
                 and node.sun_size <= _LARGEST_DISC and node.outputs[0].is_linked]
 
-    def panorama(self, width: int, part: tuple[tuple[int, int], tuple[int, int]] | None = None
-                 ) -> np.ndarray:
+    def panorama(self, width: int, part: _Part | None = None) -> np.ndarray:
         """(height, width, 3) of all directions, or the rows and columns (begin, end) of a part."""
         camera = self._camera.data
         camera.type = 'PANO'
@@ -256,8 +280,7 @@ class _Renderer:
                 image.user_clear()
                 bpy.data.images.remove(image)
 
-    def _render(self, width: int, height: int,
-                part: tuple[tuple[int, int], tuple[int, int]] | None) -> np.ndarray:
+    def _render(self, width: int, height: int, part: _Part | None) -> np.ndarray:
         render = self._scene.render
         render.resolution_x, render.resolution_y = width, height
         rows, columns = part or ((0, height), (0, width))
