@@ -29,6 +29,9 @@ def srgb_to_linear(values: np.ndarray) -> np.ndarray:
                     ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
+_LINEAR_OF_BYTE = srgb_to_linear(np.arange(256) / 255.0)
+
+
 def sphere_mean(pixels: np.ndarray) -> np.ndarray:
     """(3,), the mean of an equirectangular image over the sphere; rows near the poles are small."""
     height = len(pixels)
@@ -48,7 +51,7 @@ def _read(image: bpy.types.Image) -> np.ndarray | None:
     pixels = pixels[:, :, :3] if channels >= 3 else np.repeat(pixels[:, :, :1], 3, axis=2)
     # The pixels of byte images are as stored; Blender has made those of float images linear.
     if not image.is_float and 'sRGB' in image.colorspace_settings.name:
-        pixels = srgb_to_linear(pixels)
+        pixels = _LINEAR_OF_BYTE[(255.0 * pixels + 0.5).astype(np.uint8)]
     return np.ascontiguousarray(_reduced(pixels))
 
 
