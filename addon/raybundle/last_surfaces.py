@@ -79,8 +79,11 @@ class LastSurfaces:
         rendered = attribute.name if attribute is not None else None
         key = (id(surface), rendered)
         if key not in self._digests:
-            stored = {'material': surface.material,
-                      'sides': [_encoded(side, rendered) for side in surface.sides]}
+            front, back = surface.sides
+            sides = [_encoded(front, rendered)] * 2
+            if back is not front:
+                sides[1] = _encoded(back, rendered)
+            stored = {'material': surface.material, 'sides': sides}
             text = json.dumps(stored, sort_keys=True)
             digest = hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
             self._digests[key] = surface, digest

@@ -210,8 +210,11 @@ class MaterialExporter:
         shown = self._shows(material, slot)
         # What is not used of a material is no warning.
         warnings = Warnings() if shown.only else self.warnings
-        sides = [self._surface(material, backfacing, warnings, results=self._results(slot)
-                               ).limited() for backfacing in (False, True)]
+        reader, front = self._read(material, False, warnings, None, None, self._results(slot))
+        sides = [front.limited()] * 2
+        if reader is not None and reader.has_backfacing:
+            sides[1] = self._surface(material, True, warnings, results=self._results(slot)
+                                     ).limited()
         surface = LastSurface(material.name if material else "(none)", tuple(sides))
         if shown.any:
             self.showing[material.name] = None

@@ -89,6 +89,7 @@ class NodeReader:
         self.images = images
         self.warnings = warnings
         self.backfacing = backfacing
+        self.has_backfacing = False  # whether what was read depends on it
         self.inexact = warnings if inexact is None else inexact
         self.varying_emission = varying_emission
         self.filter_glossy = filter_glossy
@@ -537,6 +538,7 @@ class NodeReader:
         if node.type == 'VALUE':
             return node.outputs[0].default_value
         if node.type == 'NEW_GEOMETRY' and source.output.name == 'Backfacing':
+            self.has_backfacing = True
             return float(self.backfacing)
         if node.type == 'LIGHT_PATH':
             return LIGHT_PATH.get(source.output.name, 0.0)
