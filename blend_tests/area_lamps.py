@@ -24,17 +24,17 @@ def area_lamps() -> Iterator[None]:
     """Faces whose material has one Emission node, a constant, shine as lights.
 
     A rectangle becomes one of the same size; any other face, which should be near a regular
-    polygon, a disk of its area. Backs shine where the mesh is open, for inside a closed one it is dark,
-    and the node alone makes the surface: a mix is one by the side that is looked at.
+    polygon, a disk of its area. Backs shine too, but inside closed meshes, and of materials that
+    mix the node with others, by the side that is looked at.
     """
     nodes = {material: node for material in bpy.data.materials
              if (node := _emission_node(material)) is not None}
     lights = [_place_light(item, face, nodes[material], side)
               for item in bpy.context.view_layer.objects if item.type == 'MESH'
+              for is_closed in (_is_closed(item.data),)
               for face in item.data.polygons
               if (material := _material(item, face)) in nodes
-              for side in ((1.0,) if _is_closed(item.data) or _is_mixed(nodes[material])
-                           else (1.0, -1.0))]
+              for side in ((1.0,) if is_closed or _is_mixed(nodes[material]) else (1.0, -1.0))]
     strengths = {node: node.inputs['Strength'].default_value for node in nodes.values()}
     for node in strengths:
         node.inputs['Strength'].default_value = 0.0

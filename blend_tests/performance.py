@@ -8,8 +8,8 @@ native/bench/performance runs it with the micro-benchmarks' results. Times are m
 those of Cycles and Raybundle interleaved. Equal error: relative RMSE over RGB at vertices off
 contact edges, `reconstruction` POINT, against two independent bakes of Cycles with --samples, whose
 noise is taken out and which have area lights in place of emissive faces (area_lamps.py);
-Raybundle's time is interpolated between the targets whose errors are next to it. Cycles' is what it takes
-without samples and what the samples take that bring its noise to the error: how far it is off
+Raybundle's time is interpolated between the targets whose errors are next to it. Cycles' is what it
+takes without samples and what the samples take that bring its noise to the error: how far it is off
 beside emissive faces is forgiven.
 
 Rows: equal (rooms), lamps (rooms whose lamp is a mesh), open (sun and sky), others (the scenes that

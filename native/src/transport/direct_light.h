@@ -132,7 +132,7 @@ class DirectLight {
     // sampleAt(point, uv): a sample of the source. origins: to be added to; or null.
     template <class SampleAt>
     void takeSamples(const LightSource& source, const SampleAt& sampleAt, const SobolPoints& points,
-                     uint32_t side, const Place& place, int each,
+                     uint32_t side, const Place& place, int count,
                      std::array<Block, kBlocks>& blocks, Sightings* sightings, Origins* origins,
                      Gathered& sum) const;
     const LightSource* surrounding() const;  // the source that has parts, if there is one

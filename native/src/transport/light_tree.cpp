@@ -13,10 +13,6 @@ namespace {
 // radius, and then clear of the receiver's horizon, and the receiver of its own, at such cosines.
 constexpr float kFlat = 0.999f, kFar = 3, kClear = 0.4f, kClearOfPlane = 0.1f;
 
-glm::vec3 middleOf(const LightFace& face) {
-    return face.origin + (face.isTriangle ? 1 / 3.0f : 0.5f) * (face.a + face.b);
-}
-
 float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
 
 struct Angle {
@@ -51,8 +47,8 @@ uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, u
             low = glm::min(low, corner);
             high = glm::max(high, corner);
         }
-        middleLow = glm::min(middleLow, middleOf(face));
-        middleHigh = glm::max(middleHigh, middleOf(face));
+        middleLow = glm::min(middleLow, face.middle());
+        middleHigh = glm::max(middleHigh, face.middle());
         sum += face.normal;
         power += double(face.strength * face.area());
     }
@@ -75,7 +71,7 @@ uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, u
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     // By place, then by normal, so that the order of the faces in the mesh does not matter.
     auto key = [&](uint32_t f) {
-        const glm::vec3 at = middleOf(faces[f]), n = faces[f].normal;
+        const glm::vec3 at = faces[f].middle(), n = faces[f].normal;
         return std::array<float, 6>{at[axis], at.x, at.y, n.x, n.y, n.z};
     };
     const auto begin = order.begin() + first;
@@ -115,21 +111,22 @@ bool LightTree::isEven(const Node& node, const glm::vec3& point, const glm::vec3
            -glm::dot(node.axis, d) > kClearOfPlane * distance;
 }
 
+LightTree::Choice LightTree::byPower(const Node& node, double u, double probability) const {
+    const auto first = powerBefore.begin() + node.first;
+    const double all = first[node.count] - first[0], at = first[0] + u * all;
+    const auto after = std::upper_bound(first + 1, first + node.count, at);
+    const double power = after[0] - after[-1];
+    return {order[size_t(after - powerBefore.begin()) - 1], float(probability * power / all),
+            std::clamp(float((at - after[-1]) / power), 0.0f, 0.9999999f)};
+}
+
 std::optional<LightTree::Choice> LightTree::choose(const glm::vec3& point, const glm::vec3& normal,
                                                    float u) const {
     if (nodes.empty()) return std::nullopt;
     uint32_t index = 0;
     double left = double(u), probability = 1;
     while (nodes[index].count > 1) {
-        if (const Node& node = nodes[index]; isEven(node, point, normal)) {
-            const auto first = powerBefore.begin() + node.first;
-            const double all = first[node.count] - first[0], at = first[0] + left * all;
-            const auto after = std::upper_bound(first + 1, first + node.count, at);
-            const double power = after[0] - after[-1];
-            return Choice{order[size_t(after - powerBefore.begin()) - 1],
-                          float(probability * power / all),
-                          std::clamp(float((at - after[-1]) / power), 0.0f, 0.9999999f)};
-        }
+        if (isEven(nodes[index], point, normal)) return byPower(nodes[index], left, probability);
         const uint32_t first = index + 1, second = nodes[index].second;
         const double a = double(importance(nodes[first], point, normal));
         const double b = double(importance(nodes[second], point, normal));

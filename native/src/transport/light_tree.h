@@ -28,6 +28,7 @@ struct LightFace {
     float strength;  // emission, sum of the channels, W/m^2; above 0
     uint32_t side;   // patch side; where the emission is even on its parent, of its first patch
 
+    glm::vec3 middle() const { return origin + (isTriangle ? 1 / 3.0f : 0.5f) * (a + b); }
     float area() const { return glm::length(glm::cross(a, b)) * (isTriangle ? 0.5f : 1.0f); }
 };
 
@@ -41,6 +42,8 @@ class LightTree {
         float probability;  // above 0
         float u;            // what is left of the random number, uniform in [0, 1)
     };
+    // By the power alone; u uniform in [0, 1). There must be a face.
+    Choice chooseByPower(double u) const { return byPower(nodes.front(), u, 1); }
     // By the bounds of what a plane with that normal at a point gets from each cluster; u uniform in
     // [0, 1). None: it gets nothing.
     std::optional<Choice> choose(const glm::vec3& point, const glm::vec3& normal, float u) const;
@@ -60,6 +63,8 @@ class LightTree {
 
     // Whether its faces give the plane about what their powers say.
     static bool isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal);
+    // Of a cluster that was chosen with that probability.
+    Choice byPower(const Node& node, double u, double probability) const;
 
     std::vector<uint32_t> order;
     std::vector<double> powerBefore;  // per place in `order`, and of all: sum of the channels, W

@@ -83,17 +83,12 @@ void MeshSource::boundSource(const std::vector<uint32_t>& parents) {
 }
 
 void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t back) {
-    double sum = 0;
     auto add = [&](const LightFace& face, const Plane& plane) {
-        const double power = double(face.strength * face.area());
-        if (!(power > 0)) return;
+        if (!(face.strength * face.area() > 0)) return;
         faces.push_back(face);
         const float near = 0.5f * kNear * (glm::length(face.a) + glm::length(face.b));
-        shapes.push_back({plane,
-                          face.origin + (face.isTriangle ? 1 / 3.0f : 0.5f) * (face.a + face.b),
-                          face.area(), near * near});
+        shapes.push_back({plane, face.middle(), face.area(), near * near});
         totalPower += face.area() * emissionOf(face.side);
-        powerUpTo.push_back(sum += power);
     };
     for (uint32_t index : parents) {
         const Parent& parent = patches.parents[index];
@@ -131,19 +126,17 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     const glm::vec3 radiance = emissionOf(face.side) / glm::pi<float>();
     const glm::vec2 own(choice->u, uv.y);
     const glm::vec3 d = shape.middle - point;
+    const bool isNear = glm::dot(d, d) <= shape.nearSquare;
     LightSample sample;
-    bool isSampled = false;
-    if (glm::dot(d, d) <= shape.nearSquare)
-        if (const auto seen = directionTo(face, point, own)) {
-            sample.direction = seen->direction;
-            sample.distance = seen->distance;
-            sample.irradiance = radiance * (seen->solidAngle / choice->probability *
-                                            std::max(0.0f, glm::dot(receiver, sample.direction)));
-            isSampled = true;
-        }
-    if (!isSampled)
+    if (const auto seen = isNear ? directionTo(face, point, own) : std::nullopt) {
+        sample.direction = seen->direction;
+        sample.distance = seen->distance;
+        sample.irradiance = radiance * (seen->solidAngle / choice->probability *
+                                        std::max(0.0f, glm::dot(receiver, sample.direction)));
+    } else {
         sample = surfaceSample(point, receiver, pointOn(face, own), face.normal, radiance,
                                shape.area / choice->probability);
+    }
     sample.parent = patches.parentOf[face.side / 2];
     sample.setMargin(shape.plane);
     return sample;
@@ -165,19 +158,14 @@ bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
 EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     EmittedRay ray;
     if (faces.empty()) return ray;
-    const double at = double(r.x) * powerUpTo.back();
-    const size_t k = std::min<size_t>(
-        size_t(std::upper_bound(powerUpTo.begin(), powerUpTo.end(), at) - powerUpTo.begin()),
-        faces.size() - 1);
-    const double before = k ? powerUpTo[k - 1] : 0;
-    const float within = float(std::clamp((at - before) / (powerUpTo[k] - before), 0.0, 1.0));
-    const LightFace& face = faces[k];
+    const LightTree::Choice choice = tree.chooseByPower(double(r.x));
+    const LightFace& face = faces[choice.face];
     // The side is chosen by the sum of the channels.
     const glm::vec3 own = emissionOf(face.side);
     for (int c = 0; c < 3; ++c)
         if (totalPower[c] > 0)
             ray.weight[c] = own[c] / strength(own) * (strength(totalPower) / totalPower[c]);
-    ray.origin = pointOn(face, {within, r.y});
+    ray.origin = pointOn(face, {choice.u, r.y});
     ray.normal = face.normal;
     ray.direction = cosineDirection(ray.normal, {r.z, r.w});
     const uint32_t patch =

@@ -65,7 +65,6 @@ class MeshSource : public LightSource {
         float nearSquare;  // of the distance from the middle below which it is near, m^2
     };
     std::vector<FaceShape> shapes;
-    std::vector<double> powerUpTo;  // of them, sum of the channels, cumulative, W
     LightTree tree;
     MeshOutline outline;
 };

@@ -196,13 +196,13 @@ std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, cons
     return finest;
 }
 
-// Fills blocks that are empty, `each` samples to a block. The blocks have consecutive samples in
-// their order, and each begins at a multiple of its number: so it is stratified like all of them
-// together. Of others the blocks would differ by more than their mean is off.
+// Takes the first `count` samples, or doubles those in `blocks` until there are so many: powers of two.
+// Each block has consecutive ones, from a multiple of their number on, so that it is stratified like
+// all of them: of others the blocks would differ by more than their mean is off.
 template <class SampleAt>
 void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleAt,
                               const SobolPoints& points, uint32_t side, const Place& place,
-                              int each, std::array<Block, kBlocks>& blocks, Sightings* sightings,
+                              int count, std::array<Block, kBlocks>& blocks, Sightings* sightings,
                               Origins* origins, Gathered& sum) const {
     std::array<ShadowRay, Visibility::kPacket> rays;
     struct Held {
@@ -211,7 +211,7 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
         uint32_t part;
     };
     std::array<Held, Visibility::kPacket> held;
-    int count = 0;
+    int waiting = 0;
     auto see = [&](Block& block, const glm::vec3& irradiance, const glm::vec3& direction) {
         block.visible += irradiance;
         const float brightness = brightest(irradiance);
@@ -220,34 +220,44 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
     };
     auto trace = [&] {
         std::array<float, Visibility::kPacket> shares;
-        visibility.visibleShares(side, rays.data(), count, shares.data());
-        for (size_t k = 0; k < size_t(count); ++k) {
+        visibility.visibleShares(side, rays.data(), waiting, shares.data());
+        for (size_t k = 0; k < size_t(waiting); ++k) {
             see(*held[k].block, shares[k] * held[k].irradiance, rays[k].direction);
             if (sightings) sightings->add(held[k].part, shares[k] > 0);
         }
-        sum.rays += uint64_t(count);
-        count = 0;
+        sum.rays += uint64_t(waiting);
+        waiting = 0;
     };
-    const int first = std::accumulate(blocks.begin(), blocks.end(), 0,
-                                      [](int n, const Block& block) { return n + block.count; });
-    for (int i = first; i < int(kBlocks) * each; ++i) {
+    auto take = [&](int i, Block& block) {
         const glm::vec4 u = points[uint32_t(i)];
         const auto [point, weight] = source.placeOn(place, {u.x, u.y});
         LightSample sample = sampleAt(point, glm::vec2(u.z, u.w));
         sample.irradiance *= weight;
-        Block& block = blocks[size_t(i / each)];
         ++block.count;
-        if (brightest(sample.irradiance) <= 0) continue;
+        if (brightest(sample.irradiance) <= 0) return;
         block.open += sample.irradiance;
         if (!source.castsShadows) {
             see(block, sample.irradiance, sample.direction);
-            continue;
+            return;
         }
-        held[size_t(count)] = {sample.irradiance, &block, sample.part};
-        rays[size_t(count++)] = sample.ray(point);
-        if (count == Visibility::kPacket) trace();
+        held[size_t(waiting)] = {sample.irradiance, &block, sample.part};
+        rays[size_t(waiting++)] = sample.ray(point);
+        if (waiting == Visibility::kPacket) trace();
+    };
+    for (int taken = int(kBlocks) * blocks[0].count; taken < count;) {
+        int each = count / int(kBlocks);
+        if (taken > 0) {
+            each = taken / 2;
+            for (size_t k = 0; k < kBlocks / 2; ++k) {
+                const Block second = blocks[2 * k + 1];
+                blocks[k] = blocks[2 * k];
+                blocks[k].add(second);
+            }
+            std::fill(blocks.begin() + kBlocks / 2, blocks.end(), Block());
+        }
+        for (; taken < int(kBlocks) * each; ++taken) take(taken, blocks[size_t(taken / each)]);
+        if (waiting > 0) trace();
     }
-    if (count > 0) trace();
 }
 
 LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place& place,
@@ -288,19 +298,10 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                         : source.sample(point, place.normal, uv);
     };
     for (;;) {
-        do {
-            if (all.count > 0) {
-                blocks[0].add(blocks[1]);
-                blocks[1] = blocks[2];
-                blocks[1].add(blocks[3]);
-                blocks[2] = blocks[3] = {};
-            }
-            takeSamples(source, sampleAt, points, receiver.side, place,
-                        all.count > 0 ? all.count / 2 : next / int(kBlocks), blocks,
-                        hasParts ? sightings : nullptr, keepsOrigins ? &origins : nullptr, sum);
-            all = {};
-            for (const Block& block : blocks) all.add(block);
-        } while (all.count < next);
+        takeSamples(source, sampleAt, points, receiver.side, place, next, blocks,
+                    hasParts ? sightings : nullptr, keepsOrigins ? &origins : nullptr, sum);
+        all = {};
+        for (const Block& block : blocks) all.add(block);
         if (skips.skipLit && !closed && !isGuided &&
             (brightest(all.open) <= 0 || brightest(all.visible) > 0))
             closed = closedMean(source, place, tolerance, closedError);
@@ -365,8 +366,8 @@ void DirectLight::look(const LightSource& source, const Receiver& receiver, cons
         [&](const glm::vec3&, glm::vec2 uv) {
             return source.sampleSeen(place.normal, uv, sumOfSeen);
         },
-        SobolPoints(hash(seed, ~receiver.seed)), receiver.side, place,
-        Sightings::kMost / int(kBlocks), blocks, &sightings, nullptr, sum);
+        SobolPoints(hash(seed, ~receiver.seed)), receiver.side, place, Sightings::kMost, blocks,
+        &sightings, nullptr, sum);
 }
 
 }  // namespace raybundle
