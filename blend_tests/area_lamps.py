@@ -67,7 +67,7 @@ def _is_closed(mesh: bpy.types.Mesh) -> bool:
 
 
 def _is_mixed(emission: bpy.types.Node) -> bool:
-    return any(link.to_node.type != 'OUTPUT_MATERIAL' for link in emission.outputs[0].links)
+    return any(link.to_node.type == 'MIX_SHADER' for link in emission.outputs[0].links)
 
 
 def _place_light(item: bpy.types.Object, face: bpy.types.MeshPolygon, node: bpy.types.Node,

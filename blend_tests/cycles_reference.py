@@ -136,6 +136,15 @@ def load(path: Path) -> dict[str, np.ndarray]:
                 if key.startswith("object:")}
 
 
+def sample_emissive_meshes(sampled: bool) -> None:
+    """Whether Cycles sends rays to the faces of all emissive materials, or only meets them."""
+    for material in bpy.data.materials:
+        if hasattr(material.cycles, 'emission_sampling'):  # from 3.5 on
+            material.cycles.emission_sampling = 'AUTO' if sampled else 'NONE'
+        else:
+            material.cycles.sample_as_light = sampled
+
+
 def main(argv: Sequence[str]) -> None:
     """The command."""
     parser = argparse.ArgumentParser(prog="cycles_reference.py", description=__doc__,

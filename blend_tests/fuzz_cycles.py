@@ -43,7 +43,7 @@ sys.dont_write_bytecode = True
 
 import fuzz_scenes  # noqa: E402
 import raybundle  # noqa: E402
-from cycles_reference import bake_objects  # noqa: E402
+from cycles_reference import bake_objects, sample_emissive_meshes  # noqa: E402
 from scene_items import edited  # noqa: E402
 from surface_error import (  # noqa: E402
     corner_areas, corner_vertices, face_means, face_sizes, read_colors, world_positions)
@@ -158,11 +158,7 @@ class CyclesLight:
 def cycles_light(items: list[bpy.types.Object], samples: int, lamps_are_sampled: bool = False,
                  cuts: int = 0) -> dict[str, CyclesLight]:
     """By object name; cuts: of the edges of each face, for more points in it."""
-    for material in bpy.data.materials:
-        if hasattr(material.cycles, 'emission_sampling'):  # from 3.5 on
-            material.cycles.emission_sampling = 'AUTO' if lamps_are_sampled else 'NONE'
-        else:
-            material.cycles.sample_as_light = lamps_are_sampled
+    sample_emissive_meshes(lamps_are_sampled)
     copies = [_cut(item, cuts) for item in items]
     areas = [corner_areas(copy) for copy in copies]
     probes = [add_probe(copy) for copy in copies]
