@@ -40,11 +40,17 @@ struct Plane {
         if (!(square > 0)) return;
         alongA = glm::cross(b, n) / square;
         alongB = glm::cross(n, a) / square;
+        tilt += thickness * (mostOf(alongA) + mostOf(alongB));
     }
 
     double height(const glm::dvec3& point) const { return glm::dot(point - origin, normal); }
     PlaneSide side(const glm::dvec3& point) const {
-        const double off = halfThickness(point), h = height(point);
+        const glm::dvec3 d = point - origin;
+        const double h = glm::dot(d, normal);
+        if (std::abs(h) > thickness + tilt * (std::abs(d.x) + std::abs(d.y) + std::abs(d.z)))
+            return h > 0 ? PlaneSide::FRONT
+                         : PlaneSide::BEHIND;  // clear of it wherever it is tilted
+        const double off = halfThickness(point);
         return h > off ? PlaneSide::FRONT : h < -off ? PlaneSide::BEHIND : PlaneSide::WITHIN;
     }
     // At a point, metres: vertices that are off by the thickness tilt the plane, the more the
@@ -57,6 +63,7 @@ struct Plane {
 
   private:
     glm::dvec3 alongA{0.0}, alongB{0.0};  // shares of a and b in a vector, per metre
+    double tilt = kOfCoordinates;         // bound of what the thickness grows by, per metre away
 
     static double mostOf(const glm::dvec3& v) {
         return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});

@@ -10,8 +10,8 @@ namespace raybundle {
 namespace {
 
 // A cluster with a cone of normals narrower than that is flat; it is far at so many times its
-// radius, and then clear of the receiver's horizon, and the receiver of its own, at such cosines.
-constexpr float kFlat = 0.999f, kFar = 3, kClear = 0.4f, kClearOfPlane = 0.1f;
+// radius, and the receiver is clear of its horizon at so many times the sine of the cone.
+constexpr float kFlat = 0.999f, kFar = 3, kClear = 2;
 
 float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
 
@@ -32,8 +32,11 @@ LightTree::LightTree(const std::vector<LightFace>& faces) : order(faces.size()) 
     nodes.reserve(2 * faces.size());
     if (!faces.empty()) build(faces, 0, uint32_t(faces.size()));
     powerBefore.push_back(0);
-    for (const uint32_t k : order)
-        powerBefore.push_back(powerBefore.back() + double(faces[k].strength * faces[k].area()));
+    for (const uint32_t k : order) {
+        const double power = double(faces[k].strength * faces[k].area());
+        powerBefore.push_back(powerBefore.back() + power);
+        perPower.push_back(1 / power);
+    }
 }
 
 uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, uint32_t count) {
@@ -106,44 +109,42 @@ bool LightTree::isEven(const Node& node, const glm::vec3& point, const glm::vec3
     const glm::vec3 d = node.centre - point;
     const float distance2 = glm::dot(d, d);
     if (node.cosine < kFlat || distance2 < kFar * kFar * node.radius * node.radius) return false;
-    const float distance = std::sqrt(distance2);
-    return glm::dot(normal, d) > kClear * distance &&
-           -glm::dot(node.axis, d) > kClearOfPlane * distance;
+    const float height = -glm::dot(node.axis, d), horizon = kClear * node.sine;
+    return glm::dot(normal, d) > node.radius && height > 0 &&
+           height * height > horizon * horizon * distance2;
 }
 
-LightTree::Choice LightTree::byPower(const Node& node, double u, double probability) const {
+LightTree::Choice LightTree::byPower(const Node& node, double u, double weight) const {
     const auto first = powerBefore.begin() + node.first;
     const double all = first[node.count] - first[0], at = first[0] + u * all;
-    const auto after = std::upper_bound(first + 1, first + node.count, at);
-    const double power = after[0] - after[-1];
-    return {order[size_t(after - powerBefore.begin()) - 1], float(probability * power / all),
-            std::clamp(float((at - after[-1]) / power), 0.0f, 0.9999999f)};
+    // Faces of about the same power are where they would be by their number.
+    auto after = first + 1 + std::min(uint32_t(u * double(node.count)), node.count - 1);
+    if (!(after[-1] <= at && at < after[0]))
+        after = std::upper_bound(first + 1, first + node.count, at);
+    const size_t place = size_t(after - powerBefore.begin()) - 1;
+    return {order[place], float(weight * all * perPower[place]),
+            std::clamp(float((at - after[-1]) * perPower[place]), 0.0f, 0.9999999f)};
 }
 
-std::optional<LightTree::Choice> LightTree::choose(const glm::vec3& point, const glm::vec3& normal,
-                                                   float u) const {
-    if (nodes.empty()) return std::nullopt;
+LightTree::Choice LightTree::choose(const glm::vec3& point, const glm::vec3& normal,
+                                    float u) const {
+    if (nodes.empty()) return {0, 0, u};
     uint32_t index = 0;
-    double left = double(u), probability = 1;
+    double left = double(u), weight = 1;
     while (nodes[index].count > 1) {
-        if (isEven(nodes[index], point, normal)) return byPower(nodes[index], left, probability);
+        if (isEven(nodes[index], point, normal)) return byPower(nodes[index], left, weight);
         const uint32_t first = index + 1, second = nodes[index].second;
         const double a = double(importance(nodes[first], point, normal));
         const double b = double(importance(nodes[second], point, normal));
-        if (!(a + b > 0)) return std::nullopt;
-        const double share = a / (a + b);
-        if (left < share) {
-            index = first;
-            probability *= share;
-            left /= share;
-        } else {
-            index = second;
-            probability *= 1 - share;
-            left = (left - share) / (1 - share);
-        }
+        if (!(a + b > 0)) return {0, 0, u};
+        const double at = left * (a + b);
+        const bool isFirst = at < a;
+        const double own = 1 / (isFirst ? a : b);
+        index = isFirst ? first : second;
+        weight *= (a + b) * own;
+        left = (isFirst ? at : at - a) * own;
     }
-    return Choice{order[nodes[index].first], float(probability),
-                  std::clamp(float(left), 0.0f, 0.9999999f)};
+    return {order[nodes[index].first], float(weight), std::clamp(float(left), 0.0f, 0.9999999f)};
 }
 
 }  // namespace raybundle

@@ -15,7 +15,6 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <optional>
 #include <vector>
 
 namespace raybundle {
@@ -38,15 +37,15 @@ class LightTree {
     explicit LightTree(const std::vector<LightFace>& faces);
 
     struct Choice {
-        uint32_t face;      // into the faces
-        float probability;  // above 0
-        float u;            // what is left of the random number, uniform in [0, 1)
+        uint32_t face;  // into the faces
+        float weight;   // one over its probability; 0: none gives anything
+        float u;        // what is left of the random number, uniform in [0, 1)
     };
     // By the power alone; u uniform in [0, 1). There must be a face.
     Choice chooseByPower(double u) const { return byPower(nodes.front(), u, 1); }
     // By the bounds of what a plane with that normal at a point gets from each cluster; u uniform in
-    // [0, 1). None: it gets nothing.
-    std::optional<Choice> choose(const glm::vec3& point, const glm::vec3& normal, float u) const;
+    // [0, 1).
+    Choice choose(const glm::vec3& point, const glm::vec3& normal, float u) const;
 
   private:
     struct Node {
@@ -63,11 +62,12 @@ class LightTree {
 
     // Whether its faces give the plane about what their powers say.
     static bool isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal);
-    // Of a cluster that was chosen with that probability.
-    Choice byPower(const Node& node, double u, double probability) const;
+    // Of a cluster, itself chosen with that weight.
+    Choice byPower(const Node& node, double u, double weight) const;
 
     std::vector<uint32_t> order;
     std::vector<double> powerBefore;  // per place in `order`, and of all: sum of the channels, W
+    std::vector<double> perPower;     // per place in `order`: one over its own, 1/W
     std::vector<Node> nodes;
 };
 

@@ -118,25 +118,22 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
 
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
                                glm::vec2 uv) const {
-    const auto choice = tree.choose(point, receiver, uv.x);
-    if (!choice) return {};
-    const LightFace& face = faces[choice->face];
-    const FaceShape& shape = shapes[choice->face];
+    const LightTree::Choice choice = tree.choose(point, receiver, uv.x);
+    if (!(choice.weight > 0)) return {};
+    const LightFace& face = faces[choice.face];
+    const FaceShape& shape = shapes[choice.face];
     if (shape.plane.side(point) != PlaneSide::FRONT) return {};
-    const glm::vec3 radiance = emissionOf(face.side) / glm::pi<float>();
-    const glm::vec2 own(choice->u, uv.y);
+    const glm::vec3 radiance = emissionOf(face.side) * glm::one_over_pi<float>();
+    const glm::vec2 own(choice.u, uv.y);
     const glm::vec3 d = shape.middle - point;
-    const bool isNear = glm::dot(d, d) <= shape.nearSquare;
-    LightSample sample;
-    if (const auto seen = isNear ? directionTo(face, point, own) : std::nullopt) {
-        sample.direction = seen->direction;
-        sample.distance = seen->distance;
-        sample.irradiance = radiance * (seen->solidAngle / choice->probability *
-                                        std::max(0.0f, glm::dot(receiver, sample.direction)));
-    } else {
-        sample = surfaceSample(point, receiver, pointOn(face, own), face.normal, radiance,
-                               shape.area / choice->probability);
-    }
+    const auto seen =
+        glm::dot(d, d) <= shape.nearSquare ? directionTo(face, point, own) : std::nullopt;
+    LightSample sample =
+        seen ? LightSample{seen->direction, seen->distance,
+                           radiance * (seen->solidAngle * choice.weight *
+                                       std::max(0.0f, glm::dot(receiver, seen->direction)))}
+             : surfaceSample(point, receiver, pointOn(face, own), face.normal, radiance,
+                             shape.area * choice.weight);
     sample.parent = patches.parentOf[face.side / 2];
     sample.setMargin(shape.plane);
     return sample;
