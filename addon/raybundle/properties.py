@@ -213,7 +213,8 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         unit='LENGTH')
     max_patches: IntProperty(
         name="Maximum Patches",
-        description="Most patches that subdivision may make; patches grow to stay below it",
+        description="Most patches that subdivision may make; patches grow to stay below it, but a "
+                    "face is one at least",
         default=100_000, min=1, max=2 ** 23, soft_min=1_000, soft_max=1_000_000)
     refine: BoolProperty(
         name="Refine",

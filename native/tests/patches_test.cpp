@@ -166,6 +166,19 @@ TEST(Patches, MaxPatchesIsAnUpperBound) {
     EXPECT_EQ(fewest.count(), fewest.parents.size()) << "a parent keeps one patch";
 }
 
+// The shadow of a dense prop on a ground of one face is lost if that is one patch.
+TEST(Patches, SmallFacesLeavePatchesToALargeOne) {
+    Scene scene;
+    place(scene, grid("prop", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, 50, 50), grey("grey", 0.5f));
+    place(scene, grid("ground", {-8, -8, 0}, {16, 0, 0}, {0, 16, 0}, 1, 1), grey("grey", 0.5f));
+    for (size_t most : {size_t(800), size_t(2400), size_t(2600)}) {
+        const Patches patches = subdivide(scene, 0.1f, most);
+        const size_t ofGround = patches.count() - 2500;
+        EXPECT_LE(ofGround, most / 8);
+        EXPECT_GT(ofGround, most / 20);
+    }
+}
+
 TEST(Patches, ElongatedTrianglesAreBisected) {
     const float size = 0.5f;
     const Patches patches =

@@ -161,8 +161,10 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     placed.findIslands(patches);
     cutFaces(scene, placed, patchSize, patches);
 
-    // Fit into maxPatches; a parent keeps at least one patch.
-    while (numberPatches(patches) > std::max(maxPatches, patches.parents.size())) {
+    // A parent keeps at least one patch. Where many small ones take most of maxPatches, this part of it
+    // is for the grids of the large ones: a ground under dense props is not to be one patch.
+    const size_t most = std::max(maxPatches, patches.parents.size() + maxPatches / 8);
+    while (numberPatches(patches) > most) {
         coarsen(patches, 1.1);
         patches.size *= 1.1f;
         patches.finest *= 1.1f;
