@@ -78,6 +78,27 @@ def test_furnace_with_a_modifier(closed_box, seed):
     assert len(closed_box.data.attributes) == before + 1
 
 
+@pytest.mark.parametrize("domain", ['CORNER', 'POINT'])
+def test_faces_of_a_modifier_that_no_written_corner_touches_are_spared(floor_and_lamp, domain):
+    modifier = floor_and_lamp.modifiers.new("Subdivision", 'SUBSURF')
+    modifier.subdivision_type, modifier.levels = 'SIMPLE', 4
+    spared = bake(output='LIGHTING', domain=domain)
+    found = read_colors(floor_and_lamp)
+    bpy.context.view_layer.objects.active = floor_and_lamp
+    bpy.ops.object.modifier_apply(modifier=modifier.name)
+    whole = bake(output='LIGHTING', domain=domain)
+    assert spared.patches == whole.patches
+    # Three of the four vertices of each of four faces are not written, and 252 faces.
+    assert {item['why']: item['count'] for item in spared.skipped}[
+        "their light is not asked for"] == 4 * 256 - 4
+    mesh = floor_and_lamp.data
+    vertices = [loop.vertex_index for loop in mesh.loops] if domain == 'CORNER' \
+        else range(len(mesh.vertices))
+    places = np.array([mesh.vertices[vertex].co for vertex in vertices])
+    kept = [int(np.linalg.norm(places - place, axis=1).argmin()) for place in SQUARE]
+    assert found == pytest.approx(read_colors(floor_and_lamp)[kept], rel=1e-4)
+
+
 def test_outward_normals_are_named_and_the_back_side_can_be_baked(closed_box):
     closed_box.data.flip_normals()
     report = bake()

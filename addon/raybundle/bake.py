@@ -157,7 +157,10 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
         what = "selected mesh object" if settings.scope == 'SELECTED' else "visible mesh object"
         raise BakeError(f"Nothing to bake: no {what} with faces and the role Bake"
                         + (f" ({reasons})" if reasons else ""))
-    return export, _refine(export, settings) if refine else {}
+    if refine:
+        return export, _refine(export, settings)
+    _want_written_corners(export)
+    return export, {}
 
 
 def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
@@ -189,6 +192,15 @@ def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, Subdivided
         scene.instances[target.instance] = replace(instance, mesh=len(scene.meshes) - 1)
         result[target.instance] = mesh
     return result
+
+
+def _want_written_corners(export: SceneExport) -> None:
+    """Of meshes that modifiers made finer: the light of the corners that is written, and no more."""
+    instances = export.scene.instances
+    for target in export.targets:
+        if not target.corner_map.is_identity:
+            instances[target.instance] = replace(
+                instances[target.instance], result_corners=np.unique(target.corner_map.evaluated))
 
 
 def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:

@@ -128,6 +128,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_light_spread': (_handle, _int, _float),
     'rb_set_light_shadows': (_handle, _int, ctypes.c_bool),
     'rb_set_instance_visibility': (_handle, _int, ctypes.c_bool, ctypes.c_bool),
+    'rb_set_result_corners': (_handle, _int, _ints, _size),
     'rb_set_world': (_handle, _floats),
     'rb_set_world_image': (_handle, _int, _int, _floats),
     'rb_add_light_set': (_handle, _text, _out(_int)),
@@ -535,6 +536,12 @@ class Scene(_Handle):
     def set_instance_visibility(self, instance: int, stops_direct: bool, exchanges: bool) -> None:
         """Whether it blocks direct light, and whether it takes part in the exchange of light."""
         self._library.rb_set_instance_visibility(self._pointer, instance, stops_direct, exchanges)
+
+    def set_result_corners(self, instance: int, corners: np.ndarray) -> None:
+        """corners: (k,) of its mesh, those whose light is wanted."""
+        corners = np.ascontiguousarray(corners, np.int32)
+        self._library.rb_set_result_corners(self._pointer, instance, _as_ints(corners),
+                                            len(corners))
 
     def set_world(self, radiance: np.ndarray) -> None:
         """radiance: (3,) W/(m^2 sr)."""

@@ -48,6 +48,8 @@ def build_native_scene(data: SceneData) -> native.Scene:
         identifier = scene.add_instance(meshes[instance.mesh], instance.name, instance.transform,
                                         instance.role, instance.side)
         scene.set_instance_visibility(identifier, instance.stops_direct, instance.exchanges)
+        if instance.result_corners is not None:
+            scene.set_result_corners(identifier, instance.result_corners)
     for light in data.lights:
         _add_light(scene, light)
     scene.set_world(data.world)

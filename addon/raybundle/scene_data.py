@@ -115,6 +115,7 @@ class InstanceData:
     side: str  # 'FRONT' or 'BACK'
     stops_direct: bool = True  # blocks the light of lamps
     exchanges: bool = True  # sends light to other objects, and blocks what they send
+    result_corners: np.ndarray | None = None  # (k,) corners whose light is written; None: all
 
 
 @dataclass(frozen=True)

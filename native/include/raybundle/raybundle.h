@@ -254,6 +254,13 @@ RB_API rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name,
 RB_API rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops_direct,
                                            bool exchanges);
 
+/* Optional, for an instance with role RB_ROLE_BAKE: which corners of its mesh have a result, as where
+ * a mesh is finer than the one that the light is written to. The light of faces away from them is
+ * computed no better than what it lights needs it, and counts in no stated error; corners without a
+ * result get what is known there. Without it all have one. */
+RB_API rb_error rb_set_result_corners(rb_scene scene, int32_t instance, const int32_t* corners,
+                                      size_t corner_count);
+
 typedef enum rb_point_shape RB_INT {
     RB_POINT_DISK =
         0, /* a disk of the given radius that faces the receiver (Blender's soft falloff) */
@@ -332,7 +339,9 @@ RB_API void rb_release_bake(rb_bake bake);
  * RB_ERROR_INVALID_ARGUMENT.
  *   float  target_error    relative noise at which bundles stop (0.02)
  *   float  patch_size      edge of a patch in metres, 0 = automatic (0)
- *   int    max_patches     most patches that subdivision may make (100000)
+ *   int    max_patches     most patches that subdivision may make (100000); a face is one at
+ *                          least, and where faces take most of them those that are cut may have
+ *                          an eighth as many beside
  *   int    refine          1: smaller patches at shadow edges where that pays (0)
  *   int    contacts        1: smaller patches beside gaps much narrower than a patch (1)
  *   int    min_bundles, max_bundles   bounds of the number of bundles (64, 65536)

@@ -360,6 +360,15 @@ rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops
     });
 }
 
+rb_error rb_set_result_corners(rb_scene scene, int32_t instance, const int32_t* corners,
+                               size_t corner_count) {
+    return guarded([&] {
+        const HeldScene held(scene, "scene");
+        needArray(corners, corner_count, "corners");
+        held->setResultCorners(instance, corners, corner_count);
+    });
+}
+
 rb_error rb_add_point_light(rb_scene scene, const char* name, const float position[3],
                             const float intensity[3], float radius, rb_point_shape shape,
                             int32_t* light) {

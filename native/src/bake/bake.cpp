@@ -181,6 +181,8 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                                       patches.sheets.joined - patches.sheets.sheets.size()});
         }
         const ShownLight shown(scene, patches);
+        if (const size_t count = scene.cornersWithoutResult())
+            report.skipped.push_back({"corners", "their light is not asked for", count});
         SetLights lights = shootSources(scene, shown, coarse, report);
         const Tiles tiles(patches);
         warnOfVisibility(scene, lights, settings, report);

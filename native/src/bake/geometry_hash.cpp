@@ -56,8 +56,10 @@ uint64_t likenessHash(const Scene& scene) {
     for (const Mesh& mesh : scene.meshes) hasher.add(mesh.faceMaterials);
     for (const Material& material : scene.materials)
         hasher.add(material.isOpaque(), material.emits());
-    for (const Instance& instance : scene.instances)
+    for (const Instance& instance : scene.instances) {
         hasher.add(instance.role, instance.side, instance.lightSet);
+        hasher.add(instance.resultVertices);
+    }
     return hasher.value();
 }
 

@@ -27,11 +27,11 @@ struct Mark {
     bool isShadowEdge = false;
 };
 
-// Not occluders, which have no result, nor the insides of solids.
+// Not where no result is wanted, nor the insides of solids.
 bool isWanted(const Scene& scene, const Patches& patches, uint32_t side) {
     const Parent& parent = patches.parentAt(side);
     const Instance& instance = scene.instances[parent.instance];
-    return instance.role == RB_ROLE_BAKE && !(parent.isSolid && side % 2 == 1);
+    return instance.hasResultOnFace(size_t(parent.face)) && !(parent.isSolid && side % 2 == 1);
 }
 
 // Mean square of the light, as if all but the sources' came from everywhere in a closed room.

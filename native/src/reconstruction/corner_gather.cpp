@@ -56,9 +56,13 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
         first.push_back(corners.size());
         if (scene.instances[i].role != RB_ROLE_BAKE) continue;
         std::vector<CornerReceiver> all = cornerReceivers(scene, patches, uint32_t(i), ranges[i]);
+        const std::vector<int32_t>& vertices =
+            scene.meshes[size_t(scene.instances[i].mesh)].cornerVertices;
         std::vector<uint8_t> isFree(all.size());
         parallelFor(size_t(0), all.size(), [&](size_t c) {
             const Receiver& receiver = all[c].receiver;
+            if (!scene.instances[i].hasResultAtVertex(size_t(vertices[size_t(all[c].corner)])))
+                return;
             leaveGap(all[c], patches, visibility);
             isFree[c] = exposed[receiver.side] > kHalfCovered && !isTouched(receiver);
         });

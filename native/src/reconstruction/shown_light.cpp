@@ -13,9 +13,10 @@ std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
     for (const Instance& instance : scene.instances) anyBaked |= instance.role == RB_ROLE_BAKE;
     std::vector<bool> isResult(patches.sideCount());
     for (size_t side = 0; side < isResult.size(); ++side) {
-        const Instance& instance = scene.instances[patches.parentAt(uint32_t(side)).instance];
-        isResult[side] =
-            !anyBaked || (instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side));
+        const Parent& parent = patches.parentAt(uint32_t(side));
+        const Instance& instance = scene.instances[parent.instance];
+        isResult[side] = !anyBaked || (instance.hasResultOnFace(size_t(parent.face)) &&
+                                       side % 2 == size_t(instance.side));
     }
     return isResult;
 }

@@ -68,17 +68,18 @@ std::string inMetres(double length) {
 // Of one instance: adds up the squares, and notes the square of the error at each corner.
 class InstanceErrors {
   public:
-    InstanceErrors(const Tiles& tiles, const InstanceRange& range, rb_side side,
+    InstanceErrors(const Instance& instance, const Tiles& tiles, const InstanceRange& range,
                    const Irradiance& irradiance, const SideErrors& sides,
                    const InstanceLight& light)
-        : tiles(tiles),
+        : instance(instance),
+          tiles(tiles),
           patches(tiles.patches()),
           range(range),
-          side(uint32_t(side)),
+          side(uint32_t(instance.side)),
           irradiance(irradiance),
           sides(sides),
           light(light),
-          surplus(surplusOf(patches, range.firstParent, range.lastParent, side, irradiance,
+          surplus(surplusOf(patches, range.firstParent, range.lastParent, instance.side, irradiance,
                             sides.exposed, sides.directError)) {
         std::vector<double> exposed(range.lastCell - range.firstCell, 0.0);  // per cell, m^2
         forEachPatch([&](uint32_t at, double weight, const Cell& cell, const auto&, double residual,
@@ -96,9 +97,6 @@ class InstanceErrors {
             sum.known += signal;
             sum.knownArea += weight;
         });
-        for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
-            // Of the parallelogram of which a triangle is half: the square of about an edge.
-            sum.cellArea += double(glm::length(glm::cross(patches.cells[c].a, patches.cells[c].b)));
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
             throwIfCancelledAt(c);
             const Cell& cell = patches.cells[c];
@@ -107,8 +105,12 @@ class InstanceErrors {
                 if (corner >= 0)
                     sum.shown += share * square(light.direct[size_t(corner)] +
                                                 light.indirect[size_t(corner)]);
+            if (!instance.hasResultOnFace(size_t(cell.face))) continue;
+            ++sum.cells;
+            // Of the parallelogram of which a triangle is half: the square of about an edge.
+            sum.cellArea += double(glm::length(glm::cross(cell.a, cell.b)));
+            corners += cell.isTriangle() ? 0.5 : 1.0;
         }
-        sum.cells = range.lastCell - range.firstCell;
         sum.ripple = sum.noise * rippleShare();
     }
 
@@ -142,6 +144,9 @@ class InstanceErrors {
   private:
     static double square(const glm::vec3& v) { return double(glm::dot(v, v)); }
     glm::vec3 lightAt(uint32_t at) const { return irradiance.direct[at] + irradiance.indirect[at]; }
+    bool hasResult(uint32_t at) const {
+        return instance.hasResultOnFace(size_t(patches.parentAt(at).face));
+    }
     double noiseAt(uint32_t at) const {
         if (sides.noise.empty()) return 0;
         return square(sides.noise[at]) + 3 * double(sides.directError[at] * sides.directError[at]);
@@ -154,14 +159,12 @@ class InstanceErrors {
         for (const TilePair& pair :
              neighbouringTiles(patches, range.firstParent, range.lastParent)) {
             const uint32_t a = 2 * pair.first + side, b = 2 * pair.second + side;
+            if (!hasResult(a) || !hasResult(b)) continue;
             const double direct =
                 noiseAt(a) - square(sides.noise[a]) + noiseAt(b) - square(sides.noise[b]);
             rough += 0.5 * (square(sides.noise[a] - sides.noise[b]) + direct);
             all += 0.5 * (noiseAt(a) + noiseAt(b));
         }
-        double corners = 0;
-        for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
-            corners += patches.cells[c].isTriangle() ? 0.5 : 1.0;
         const double unfollowed = std::max(0.0, 1 - corners / std::max(1.0, sum.patches));
         return all > 0 ? std::min(1.0, rough / all) * unfollowed : 0;
     }
@@ -176,6 +179,7 @@ class InstanceErrors {
             throwIfCancelledAt(p);
             const Parent& parent = patches.parents[p];
             const Cell& cell = patches.cells[parent.cell];
+            if (!instance.hasResultOnFace(size_t(parent.face))) continue;
             const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
             for (uint32_t k = 0; k < parent.patchCount(); ++k) {
                 const uint32_t patch = parent.firstPatch + k, at = 2 * patch + side;
@@ -200,6 +204,7 @@ class InstanceErrors {
         }
     }
 
+    const Instance& instance;
     const Tiles& tiles;
     const Patches& patches;  // a tile each
     const InstanceRange& range;
@@ -209,6 +214,7 @@ class InstanceErrors {
     const InstanceLight& light;
     const std::vector<Surplus> surplus;
     Squares sum;
+    double corners = 0;  // about, of the cells with a result
 };
 
 // shownScale: of the shown noise's squares.
@@ -272,8 +278,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     std::vector<std::optional<InstanceErrors>> errors(light.size());
     parallelFor(size_t(0), light.size(), [&](size_t i) {
         if (light[i].isBaked)
-            errors[i].emplace(tiles, ranges[i], scene.instances[i].side, irradiance, sides,
-                              light[i]);
+            errors[i].emplace(scene.instances[i], tiles, ranges[i], irradiance, sides, light[i]);
     });
     Squares all;
     for (const auto& e : errors)

@@ -195,6 +195,33 @@ Mesh& Scene::mesh(int32_t id) { return checked(meshes, id, "mesh"); }
 Light& Scene::light(int32_t id) { return checked(lights, id, "light"); }
 Instance& Scene::instance(int32_t id) { return checked(instances, id, "instance"); }
 
+void Scene::setResultCorners(int32_t id, const int32_t* corners, size_t count) {
+    Instance& target = instance(id);
+    const Mesh& own = meshes[size_t(target.mesh)];
+    std::vector<uint8_t> vertices(own.vertices.size()), faces(own.faceCount());
+    for (size_t k = 0; k < count; ++k) {
+        if (corners[k] < 0 || size_t(corners[k]) >= own.cornerCount())
+            throw invalidArgument(quoted("object", target.name) + " has no corner " +
+                                  std::to_string(corners[k]));
+        vertices[size_t(own.cornerVertices[size_t(corners[k])])] = true;
+    }
+    for (size_t face = 0; face < faces.size(); ++face)
+        for (int32_t c = own.faceOffsets[face]; c < own.faceOffsets[face + 1]; ++c)
+            faces[face] |= vertices[size_t(own.cornerVertices[size_t(c)])];
+    target.resultVertices = std::move(vertices);
+    target.resultFaces = std::move(faces);
+}
+
+size_t Scene::cornersWithoutResult() const {
+    size_t count = 0;
+    for (const Instance& instance : instances) {
+        if (instance.role != RB_ROLE_BAKE || instance.resultVertices.empty()) continue;
+        for (int32_t vertex : meshes[size_t(instance.mesh)].cornerVertices)
+            count += !instance.hasResultAtVertex(size_t(vertex));
+    }
+    return count;
+}
+
 void Scene::checkImage(int32_t id) const {
     if (id < 0 || size_t(id) >= images.size())
         throw invalidArgument("there is no image " + std::to_string(id));

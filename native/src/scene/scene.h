@@ -142,6 +142,16 @@ struct Instance {
     int32_t lightSet = kNoLightSet;  // of its emission
     bool stopsDirect = true;         // blocks the light of the sources
     bool exchanges = true;           // sends light to other surfaces, and blocks what they send
+    // Where only some corners have a result: per vertex of the mesh, whether one of its corners has,
+    // and per face, whether one of its vertices. Empty: all.
+    std::vector<uint8_t> resultVertices{}, resultFaces{};
+
+    bool hasResultAtVertex(size_t vertex) const {
+        return role == RB_ROLE_BAKE && (resultVertices.empty() || resultVertices[vertex]);
+    }
+    bool hasResultOnFace(size_t face) const {
+        return role == RB_ROLE_BAKE && (resultFaces.empty() || resultFaces[face]);
+    }
 
     // A mirroring transform turns the winding of faces, but the front stays outside as in Blender. One
     // that flattens has a determinant of rounding alone, and does not mirror.
@@ -208,6 +218,9 @@ class Scene {
     Light& light(int32_t id);
     void checkImage(int32_t id) const;
     Instance& instance(int32_t id);
+    void setResultCorners(int32_t instance, const int32_t* corners, size_t count);
+    // Of instances whose other corners have one.
+    size_t cornersWithoutResult() const;
     void checkLightSet(int32_t id) const;  // kNoLightSet is one too
 
     // The world's part of the light of a set, W/(m^2 sr): all or nothing.
