@@ -117,6 +117,22 @@ INSTANTIATE_TEST_SUITE_P(Reconstructions, Translucence,
                          ::testing::Values("LEAST_SQUARES", "AREA_AVERAGE", "POINT"),
                          [](const auto& one) { return std::string(one.param); });
 
+// What goes to and fro through a sheet between mirrors of light takes a thousand passes: right, or
+// said.
+TEST(TranslucenceOfMaterials, LightThatDoesNotComeToRestIsSaid) {
+    for (float rho : {0.6f, 0.9f, 0.99f, 0.999f}) {
+        Scene scene = closedCube(rho, 1 - rho);
+        place(scene, rectangle("sheet", {0.5f, 0, 0}, {0, 1, 0}, {0, 0, 1}),
+              translucent(0, rho, 1 - rho));
+        Bake bake;
+        setQuick(bake);
+        bake.run(scene);
+        const std::vector<glm::vec3> light = cornerLight(bake, 0, RB_OUTPUT_COMBINED);
+        const bool isSaid = mentions(reportOf(bake)["warnings"], "come to rest");
+        EXPECT_NE(isSaid, std::abs(light[0].x * kPi - 1) < 0.02) << rho << ' ' << light[0].x * kPi;
+    }
+}
+
 TEST(TranslucenceOfMaterials, EnergyIsBalanced) {
     Bake bake;
     bake.settings.patchSize = 0.1f;

@@ -218,8 +218,9 @@ Irradiance LineReuse::solvePassed(Half half, float tolerance, LineSolution& gues
         const glm::dvec3 sent =
             dot(guess.reflected, guess.reflected, isShown) + dot(passed, passed, isShown);
         const glm::dvec3 enough = sent * double(tolerance) * double(tolerance);
-        if (pass == kMaxPasses || !glm::any(glm::greaterThan(dot(change, change), enough)))
-            return light;
+        const bool isSettled = !glm::any(glm::greaterThan(dot(change, change), enough));
+        light.isSettled = light.isSettled && isSettled;
+        if (isSettled || pass == kMaxPasses) return light;
     }
 }
 
@@ -328,6 +329,7 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, LineSolution& g
         rr = next;
     }
 
+    result.isSettled = isSolved || !glm::any(glm::greaterThan(rr, enough()));
     // A solution that is one already stays as it is, to the last bit.
     forEachSide(n, [&](size_t i) {
         reflected[i] = isSolved && share == glm::vec3(1.0f) ? reflected[i] : scale[i] * z[i];

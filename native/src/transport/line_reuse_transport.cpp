@@ -119,6 +119,11 @@ class LineReuseTransport : public Transport {
             report.skipped.push_back({"bundles on small patches",
                                       "too few lines met them: they gathered with local rays",
                                       starved});
+        if (!result.isSettled)
+            report.warnings.push_back(
+                "the exchange of light did not come to rest: some surfaces reflect or let through "
+                "nearly all of it, over and over; give those that are closed around light a "
+                "reflectance or translucence of 0.9 at most");
         if (streaming[0])
             report.warnings.push_back(
                 "memory_limit was reached at " + std::to_string(input.counts.bundles) +

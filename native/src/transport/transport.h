@@ -40,6 +40,7 @@ struct Irradiance {
     std::shared_ptr<const ScatteredLight> scattered;
     // Power that arrives and would leave the scene if all surfaces were Lambert's, W.
     glm::dvec3 redirected{0.0};
+    bool isSettled = true;  // no more light is to be passed on than the tolerance of the solve
 
     glm::vec3 all(size_t side) const { return direct[side] + indirect[side]; }
     void add(const Irradiance& other) {
@@ -49,6 +50,7 @@ struct Irradiance {
             indirect[side] += other.indirect[side];
         }
         redirected += other.redirected;
+        isSettled = isSettled && other.isSettled;
     }
 };
 
