@@ -115,5 +115,21 @@ TEST(ResultCorners, CountAloneInTheStatedError) {
     EXPECT_LT(reportOf(bake)["objects"][0]["error"]["total"].get<double>(), 0.3 * whole);
 }
 
+TEST(ResultCorners, AreOfTheFaceThatStandsForItsDouble) {
+    // Two squares in one place, of which the second is asked for.
+    Scene scene;
+    place(scene, rectangle("below", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
+    const int32_t asked =
+        place(scene, rectangle("asked for", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
+    scene.addLight(sunLight({0, 0, 1}, glm::dvec3(kPi)));
+    scene.setResultCorners(0, nullptr, 0);
+    Bake bake;
+    setQuick(bake);
+    bake.run(scene);
+    for (const glm::vec3& light : cornerLight(bake, asked, RB_OUTPUT_LIGHTING))
+        EXPECT_NEAR(light.x, 1, 1e-4);
+    EXPECT_EQ(bake.patches().parents.front().instance, uint32_t(asked));
+}
+
 }  // namespace
 }  // namespace raybundle

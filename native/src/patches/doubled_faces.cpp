@@ -73,7 +73,8 @@ class Search {
         return sum / double(size(face));
     }
     std::pair<bool, size_t> rankOf(size_t face) const {
-        return {scene.instances[faces.instance[face]].role != RB_ROLE_BAKE, face};
+        const uint32_t instance = faces.instance[face];
+        return {!scene.instances[instance].hasResultOnFace(face - faces.firstFace[instance]), face};
     }
     // Of the vertices of a face, metres.
     double roundingOf(size_t face) const {

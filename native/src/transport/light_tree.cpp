@@ -138,7 +138,7 @@ LightTree::Choice LightTree::choose(const glm::vec3& point, const glm::vec3& nor
         const double b = double(importance(nodes[second], point, normal));
         if (!(a + b > 0)) return {0, 0, u};
         const double at = left * (a + b);
-        const bool isFirst = at < a;
+        const bool isFirst = at < a || !(b > 0);
         const double own = 1 / (isFirst ? a : b);
         index = isFirst ? first : second;
         weight *= (a + b) * own;
