@@ -115,6 +115,19 @@ TEST(ResultCorners, CountAloneInTheStatedError) {
     EXPECT_LT(reportOf(bake)["objects"][0]["error"]["total"].get<double>(), 0.3 * whole);
 }
 
+TEST(ResultCorners, MayBeNone) {
+    Scene scene = litRoom();
+    for (int32_t instance = 0; instance < int32_t(scene.instances.size()); ++instance)
+        scene.setResultCorners(instance, nullptr, 0);
+    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"}) {
+        Bake bake;
+        setQuick(bake);
+        bake.settings.reconstruction = reconstruction;
+        bake.run(scene);
+        for (const glm::vec3& light : everything(bake)) EXPECT_TRUE(std::isfinite(light.x));
+    }
+}
+
 TEST(ResultCorners, AreOfTheFaceThatStandsForItsDouble) {
     // Two squares in one place, of which the second is asked for.
     Scene scene;
