@@ -50,8 +50,8 @@ OPEN = ("open_court", "instances")
 OTHERS = ("facing_squares", "furnace", "house_on_plain", "laid_table", "sphere_interior",
           "thin_wall")
 LAMPS = ("bulb", "tube", "ring", "box", "wavy_panel")
-# Lights in place of the faces would pierce these: there the references' rays only meet the emission.
-# They are noisy: so many times the samples.
+# Lights in place of the faces would pierce these: there the references' rays only meet the
+# emission. They are noisy: so many times the samples.
 WAVY = ("room:wavy_panel",)
 WAVY_SAMPLES = 8
 ERRORS = (0.02, 0.01)

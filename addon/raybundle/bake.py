@@ -195,7 +195,7 @@ def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, Subdivided
 
 
 def _want_written_corners(export: SceneExport) -> None:
-    """Of meshes that modifiers made finer: the light of the corners that is written, and no more."""
+    """Of meshes that modifiers made finer: the light of the corners that are written alone."""
     instances = export.scene.instances
     for target in export.targets:
         if not target.corner_map.is_identity:
