@@ -69,7 +69,7 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
     part.run(scene);
 
     const std::vector<glm::vec3> right = lightAt(fine, corners);
-    // 40 vertices: their RMS varies by a ninth; of two it differs by 1.5 times once in 500 pairs.
+    // 40 vertices: their RMS varies by a ninth; one of two is 1.5 times the other once in 200 pairs.
     EXPECT_LT(noise(lightAt(part, corners), right),
               1.5 * noise(lightAt(whole, corners), right) + 0.01);
     const Json less = reportOf(part), more = reportOf(whole);

@@ -63,6 +63,7 @@ class Search {
     const Mesh& meshOf(uint32_t instance) const {
         return scene.meshes[size_t(scene.instances[instance].mesh)];
     }
+    size_t faceOfMesh(size_t face) const { return face - faces.firstFace[faces.instance[face]]; }
     size_t size(size_t face) const { return faces.offsets[face + 1] - faces.offsets[face]; }
     glm::dvec3 place(size_t face, size_t k) const {
         return places[faces.vertices[faces.offsets[face] + k]];
@@ -73,8 +74,7 @@ class Search {
         return sum / double(size(face));
     }
     std::pair<bool, size_t> rankOf(size_t face) const {
-        const uint32_t instance = faces.instance[face];
-        return {!scene.instances[instance].hasResultOnFace(face - faces.firstFace[instance]), face};
+        return {!scene.instances[faces.instance[face]].hasResultOnFace(faceOfMesh(face)), face};
     }
     // Of the vertices of a face, metres.
     double roundingOf(size_t face) const {
@@ -90,17 +90,15 @@ class Search {
     // The corner of a face's mesh that is its k-th here, where mirrored ones are reversed.
     uint32_t corner(size_t face, size_t k) const {
         const uint32_t instance = faces.instance[face];
-        const size_t n = size(face), ofMesh = face - faces.firstFace[instance];
-        return uint32_t(meshOf(instance).faceOffsets[ofMesh]) +
+        const size_t n = size(face);
+        return uint32_t(meshOf(instance).faceOffsets[faceOfMesh(face)]) +
                uint32_t(scene.instances[instance].isMirrored() ? n - 1 - k : k);
     }
     int32_t materialIndex(size_t face) const {
-        const uint32_t instance = faces.instance[face];
-        return meshOf(instance).faceMaterials[face - faces.firstFace[instance]];
+        return meshOf(faces.instance[face]).faceMaterials[faceOfMesh(face)];
     }
     const Material& materialOf(size_t face) const {
-        const uint32_t instance = faces.instance[face];
-        return scene.materialOf(meshOf(instance), int32_t(face - faces.firstFace[instance]));
+        return scene.materialOf(meshOf(faces.instance[face]), faceOfMesh(face));
     }
     bool doAlike(size_t first, size_t other) const {
         const Instance& a = scene.instances[faces.instance[first]];

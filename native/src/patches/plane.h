@@ -47,9 +47,9 @@ struct Plane {
     PlaneSide side(const glm::dvec3& point) const {
         const glm::dvec3 d = point - origin;
         const double h = glm::dot(d, normal);
+        // Nearly all points are clear of it, however it is tilted.
         if (std::abs(h) > thickness + tilt * (std::abs(d.x) + std::abs(d.y) + std::abs(d.z)))
-            return h > 0 ? PlaneSide::FRONT
-                         : PlaneSide::BEHIND;  // clear of it wherever it is tilted
+            return h > 0 ? PlaneSide::FRONT : PlaneSide::BEHIND;
         const double off = halfThickness(point);
         return h > off ? PlaneSide::FRONT : h < -off ? PlaneSide::BEHIND : PlaneSide::WITHIN;
     }
