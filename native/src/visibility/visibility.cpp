@@ -20,6 +20,11 @@ namespace {
 // Share of how far an island reaches: some tens of float rounding errors.
 constexpr float kRelativeOffset = 2e-6f;
 
+// Some tens of float rounding errors at a parent, metres.
+float offsetAt(const Patches& patches, uint32_t parent) {
+    return kRelativeOffset * patches.islands[patches.parents[parent].island].reach;
+}
+
 [[noreturn]] void fail(RTCError code, const char* what) {
     // A tree that is built in several threads knows of an allocation that failed in one of them only
     // that it was cancelled, which is RTC_ERROR_UNKNOWN; nothing else can fail in it.
@@ -117,10 +122,84 @@ struct Passage {
     }
 };
 
+struct Hit {
+    explicit Hit(const RTCFilterFunctionNArguments* args, uint32_t k = 0)
+        : direction(RTCRayN_dir_x(args->ray, args->N, k), RTCRayN_dir_y(args->ray, args->N, k),
+                    RTCRayN_dir_z(args->ray, args->N, k)),
+          distance(RTCRayN_tfar(args->ray, args->N, k)),
+          point(glm::vec3(RTCRayN_org_x(args->ray, args->N, k),
+                          RTCRayN_org_y(args->ray, args->N, k),
+                          RTCRayN_org_z(args->ray, args->N, k)) +
+                distance * direction) {}
+
+    const glm::vec3 direction;
+    const float distance;
+    const glm::vec3 point;
+};
+
+// What a ray meets first. Of surfaces that coincide there it is the one that comesBefore the others;
+// so a ray that has met one goes on a little, through all that may coincide with it.
+struct Nearest {
+    uint32_t parent = kNoParent;
+    float distance = 0,
+          zone = 0;  // metres along the ray; what is within `zone` behind may coincide
+    struct Other {
+        uint32_t parent;
+        float distance;
+    };
+    std::vector<Other> others;  // what the ray has met about as far away
+
+    // Notes what the ray meets; returns how far it goes on, metres.
+    float meet(uint32_t other, float at, float otherZone) {
+        if (parent == kNoParent || at < distance) {
+            if (parent != kNoParent && distance <= at + otherZone)
+                others.push_back({parent, distance});
+            parent = other;
+            distance = at;
+            zone = otherZone;
+        } else if (at <= distance + zone) {
+            others.push_back({other, at});
+        }
+        return distance + zone;
+    }
+
+    // Of the nearest one and those that coincide with it, the first.
+    uint32_t first(const Patches& patches, const glm::vec3& direction) const {
+        uint32_t result = parent;
+        auto enters = [&](uint32_t k) {
+            return glm::dot(patches.parents[k].normal, direction) < 0;
+        };
+        for (const Other& other : others)
+            if (other.parent != result && other.distance <= distance + zone &&
+                areParallel(patches.parents[result], patches.parents[other.parent]) &&
+                comesBefore(patches, other.parent, enters(other.parent), result, enters(result)))
+                result = other.parent;
+        return result;
+    }
+};
+
 // What the filters need to know of a ray; starts with Embree's own part.
-struct Start {
+struct Query {
     RTCIntersectContext context;
     Passage passage;
+    Nearest nearest;
+
+    explicit Query(const Patches& patches, const uint32_t* parentOf) {
+        rtcInitIntersectContext(&context);
+        passage.patches = &patches;
+        passage.parentOf = parentOf;
+    }
+    // Of a ray that is to find the first surface and meets one.
+    void meet(const RTCFilterFunctionNArguments* args, uint32_t parent, const Hit& hit) {
+        const float cosine =
+            std::abs(glm::dot(passage.patches->parents[parent].normal, hit.direction));
+        RTCRayN_tfar(args->ray, args->N, 0) = nearest.meet(
+            parent, hit.distance, 2 * offsetAt(*passage.patches, parent) / std::max(0.01f, cosine));
+    }
+};
+
+struct Start : Query {
+    using Query::Query;
     uint32_t parent;
     bool isFront;      // the ray leaves the front of the parent
     glm::vec3 normal;  // of the side
@@ -151,21 +230,6 @@ bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction,
                      !comesBefore(patches, start.parent, !start.isFront, other, turn < 0));
 }
 
-struct Hit {
-    explicit Hit(const RTCFilterFunctionNArguments* args, uint32_t k = 0)
-        : direction(RTCRayN_dir_x(args->ray, args->N, k), RTCRayN_dir_y(args->ray, args->N, k),
-                    RTCRayN_dir_z(args->ray, args->N, k)),
-          distance(RTCRayN_tfar(args->ray, args->N, k)),
-          point(glm::vec3(RTCRayN_org_x(args->ray, args->N, k),
-                          RTCRayN_org_y(args->ray, args->N, k),
-                          RTCRayN_org_z(args->ray, args->N, k)) +
-                distance * direction) {}
-
-    const glm::vec3 direction;
-    const float distance;
-    const glm::vec3 point;
-};
-
 void passStart(const RTCFilterFunctionNArguments* args) {
     Start& start = *reinterpret_cast<Start*>(args->context);
     for (uint32_t k = 0; k < args->N; ++k) {
@@ -178,6 +242,14 @@ void passStart(const RTCFilterFunctionNArguments* args) {
             start.passage.goesOn(other, hit.point))
             args->valid[k] = 0;
     }
+}
+
+// Of a ray that is to find the first surface.
+void meetAfterStart(const RTCFilterFunctionNArguments* args) {
+    passStart(args);
+    if (args->valid[0] == 0) return;
+    Start& start = *reinterpret_cast<Start*>(args->context);
+    start.meet(args, start.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)], Hit(args));
 }
 
 // Embree's assertions end the process for rays from or to where squares leave the range of floats.
@@ -205,40 +277,28 @@ void setRay(RTCRay& ray, glm::vec3 origin, glm::vec3 direction, float distance) 
     ray.id = 0;
 }
 
-// A ray that starts on no surface; starts with Embree's own part.
-struct FromNowhere {
-    RTCIntersectContext context;
-    Passage passage;
-};
-
-void pass(const RTCFilterFunctionNArguments* args) {
-    Passage& passage = reinterpret_cast<FromNowhere*>(args->context)->passage;
-    const uint32_t parent = passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
-    if (passage.goesOn(parent, Hit(args).point)) args->valid[0] = 0;
+// Of a ray that starts on no surface.
+void meet(const RTCFilterFunctionNArguments* args) {
+    Query& query = *reinterpret_cast<Query*>(args->context);
+    const uint32_t parent = query.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
+    const Hit hit(args);
+    if (query.passage.goesOn(parent, hit.point))
+        args->valid[0] = 0;
+    else
+        query.meet(args, parent, hit);
 }
 
 }  // namespace
 
-struct Visibility::Passing : FromNowhere {
-    explicit Passing(const Visibility& visibility) {
-        rtcInitIntersectContext(&context);
-        if (!visibility.patches.opacity.empty()) context.filter = pass;
-        passage.patches = &visibility.patches;
-        passage.parentOf = visibility.embree->parentOf.data();
-    }
-};
-
 struct Visibility::FromSide : Start {
-    FromSide(const Visibility& visibility, uint32_t side) {
-        rtcInitIntersectContext(&context);
+    FromSide(const Visibility& visibility, uint32_t side)
+        : Start(visibility.patches, visibility.embree->parentOf.data()) {
         context.filter = passStart;
         const Patches& patches = visibility.patches;
-        passage.patches = &patches;
-        passage.parentOf = visibility.embree->parentOf.data();
         parent = patches.parentOf[side / 2];
         isFront = side % 2 == 0;
         normal = patches.normal(side);
-        zone = 2 * visibility.offsetAt(parent);
+        zone = 2 * offsetAt(patches, parent);
         target.fill(kNoParent);
     }
     // Rays start this much behind the surface, so that they meet what coincides with it.
@@ -314,61 +374,6 @@ void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
         shares[k] = isShort[size_t(k)] || packet.tfar[k] >= 0 ? 1.0f : 0.0f;
 }
 
-namespace {
-
-// What the filter below has found among the surfaces that coincide where a ray ends; starts with
-// Embree's own part.
-struct Meeting {
-    RTCIntersectContext context;
-    Passage passage;
-    uint32_t first;  // the parent that comes before all others so far
-    glm::vec3 direction;
-};
-
-// Looks at every surface within the ray's short range and lets the ray pass.
-void findFirst(const RTCFilterFunctionNArguments* args) {
-    Meeting& meeting = *reinterpret_cast<Meeting*>(args->context);
-    args->valid[0] = 0;
-    Passage& passage = meeting.passage;
-    const uint32_t other = passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
-    if (other == meeting.first) return;
-    const Parent& a = passage.patches->parents[meeting.first];
-    const Parent& b = passage.patches->parents[other];
-    auto enters = [&](const Parent& parent) {
-        return glm::dot(parent.normal, meeting.direction) < 0;
-    };
-    if (areParallel(a, b) &&
-        comesBefore(*passage.patches, other, enters(b), meeting.first, enters(a)) &&
-        !passage.goesOn(other, Hit(args).point))
-        meeting.first = other;
-}
-
-}  // namespace
-
-float Visibility::offsetAt(uint32_t parent) const {
-    return kRelativeOffset * patches.islands[patches.parents[parent].island].reach;
-}
-
-// Of the parents that coincide with one that a ray meets at some distance, the first.
-uint32_t Visibility::firstCoinciding(uint32_t parent, const glm::vec3& origin,
-                                     const glm::vec3& direction, float distance) const {
-    Meeting meeting;
-    rtcInitIntersectContext(&meeting.context);
-    meeting.context.filter = findFirst;
-    meeting.passage.patches = &patches;
-    meeting.passage.parentOf = embree->parentOf.data();
-    meeting.passage.line = lineName(origin, direction);
-    meeting.first = parent;
-    meeting.direction = direction;
-    const float cosine = std::abs(glm::dot(patches.parents[parent].normal, direction));
-    const float zone = 2 * offsetAt(parent) / std::max(0.01f, cosine);
-    RTCRay ray{};
-    setRay(ray, origin, direction, distance + zone);
-    ray.tnear = std::max(0.0f, distance - zone);
-    embree3.occluded1(embree->scene, &meeting.context, &ray);
-    return meeting.first;
-}
-
 // The side of a parent, at a point on it, that a direction looks at.
 uint32_t Visibility::sideOf(uint32_t parent, const glm::vec3& point,
                             const glm::vec3& direction) const {
@@ -382,32 +387,34 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
     FromSide start(*this, side);
     const glm::vec3 origin = start.origin(point, direction);
     if (!patches.opacity.empty()) start.passage.line = lineName(origin, direction);
+    start.context.filter = meetAfterStart;
     RTCRayHit query{};
     setRay(query.ray, origin, direction, farthest + start.behind[0]);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     embree3.intersect1(embree->scene, &start.context, &query);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-    if (distance) *distance = std::max(0.0f, query.ray.tfar - glm::length(point - origin));
-    uint32_t parent = embree->parentOf[query.hit.primID];
+    const Nearest& nearest = start.nearest;
+    if (nearest.parent == kNoParent) return std::nullopt;
+    if (distance) *distance = std::max(0.0f, nearest.distance - glm::length(point - origin));
     // What coincides with the start has its order already.
-    if (query.ray.tfar * glm::dot(direction, start.normal) > 2 * start.zone)
-        parent = firstCoinciding(parent, origin, direction, query.ray.tfar);
-    return sideOf(parent, origin + query.ray.tfar * direction, direction);
+    const bool isAtStart = nearest.distance * glm::dot(direction, start.normal) <= 2 * start.zone;
+    return sideOf(isAtStart ? nearest.parent : nearest.first(patches, direction),
+                  origin + nearest.distance * direction, direction);
 }
 
 std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm::vec3& direction,
                                              float* distance) const {
-    Passing passing(*this);
-    if (!patches.opacity.empty()) passing.passage.line = lineName(origin, direction);
+    Query from(patches, embree->parentOf.data());
+    from.context.filter = meet;
+    if (!patches.opacity.empty()) from.passage.line = lineName(origin, direction);
     RTCRayHit query{};
     setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    embree3.intersect1(embree->scene, &passing.context, &query);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-    if (distance) *distance = query.ray.tfar;
-    const uint32_t parent =
-        firstCoinciding(embree->parentOf[query.hit.primID], origin, direction, query.ray.tfar);
-    return sideOf(parent, origin + query.ray.tfar * direction, direction);
+    embree3.intersect1(embree->scene, &from.context, &query);
+    const Nearest& nearest = from.nearest;
+    if (nearest.parent == kNoParent) return std::nullopt;
+    if (distance) *distance = nearest.distance;
+    return sideOf(nearest.first(patches, direction), origin + nearest.distance * direction,
+                  direction);
 }
 
 namespace {
@@ -476,7 +483,7 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
         return a.depth != b.depth ? a.depth < b.depth : a.side < b.side;
     });
     auto isSameCrossing = [&](const LineHit& a, const LineHit& b) {
-        return b.depth - a.depth <= 2 * double(offsetAt(patches.parentOf[a.side / 2])) &&
+        return b.depth - a.depth <= 2 * double(offsetAt(patches, patches.parentOf[a.side / 2])) &&
                a.side % 2 == b.side % 2 &&
                haveCommonVertex(patches.parents[patches.parentOf[a.side / 2]],
                                 patches.parents[patches.parentOf[b.side / 2]]);

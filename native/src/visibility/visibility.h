@@ -70,16 +70,12 @@ class Visibility {
     void lineHits(const glm::dvec3& point, const glm::dvec3& direction,
                   std::vector<LineHit>& hits) const;
 
-    // Some tens of float rounding errors, metres: anywhere, and at a parent.
+    // Some tens of float rounding errors anywhere in the scene, metres.
     float offset() const { return surfaceOffset; }
 
   private:
     struct Embree;
-    struct Passing;
     struct FromSide;
-    uint32_t firstCoinciding(uint32_t parent, const glm::vec3& origin, const glm::vec3& direction,
-                             float distance) const;
-    float offsetAt(uint32_t parent) const;
     uint32_t sideOf(uint32_t parent, const glm::vec3& point, const glm::vec3& direction) const;
 
     const Patches& patches;
