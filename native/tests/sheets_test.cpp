@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <map>
 #include <random>
 #include <set>
@@ -61,6 +62,7 @@ void expectWhole(const Patches& patches) {
                 const float s = (float(column) + 0.3f) / float(sheet.columns);
                 const float t = (float(row) + 0.6f) / float(sheet.rows);
                 const uint32_t patch = sheet.grid().patchAt(s, t);
+                if (patch >= Sheet::kUneven) continue;
                 ++found[patch];
                 const glm::vec3 point = sheet.origin + s * sheet.a + t * sheet.b;
                 ASSERT_EQ(patches.patchAt(patches.parentOf[patch], point), patch);
@@ -69,6 +71,23 @@ void expectWhole(const Patches& patches) {
                 const float reach = glm::length(sheet.a) / float(sheet.columns) +
                                     glm::length(sheet.b) / float(sheet.rows);
                 ASSERT_LT(glm::distance(point, middle), 0.5f * reach);
+            }
+        for (size_t place = 0; place + 1 < sheet.firstPart.size(); ++place)
+            for (uint32_t k = sheet.firstPart[place]; k < sheet.firstPart[place + 1]; ++k) {
+                const Parent& parent = patches.parents[sheet.parts[k].parent];
+                for (uint32_t p = 0; p < parent.patchCount(); ++p) {
+                    ++found[parent.firstPatch + p];
+                    // Where the sheet has the middle of the patch, it has the patch.
+                    const glm::vec2 middle(parent.isTriangle ? 1.0f / 3 : 0.5f);
+                    const glm::dvec3 d(parent.position(parent.pointOn(p, middle)) - sheet.origin);
+                    const glm::dvec3 a(sheet.a), b(sheet.b), n = glm::cross(a, b);
+                    const double square = glm::dot(n, n);
+                    const float s = float(glm::dot(glm::cross(d, b), n) / square);
+                    const float t = float(glm::dot(glm::cross(a, d), n) / square);
+                    const uint32_t uneven = Sheet::kUneven + uint32_t(place);
+                    ASSERT_EQ(sheet.grid().patchAt(s, t), uneven);
+                    ASSERT_EQ(sheet.patchIn(uneven, patches, s, t), parent.firstPatch + p);
+                }
             }
     }
     for (int count : found) ASSERT_EQ(count, 1);
@@ -204,13 +223,11 @@ TEST(Sheets, PartlyWeldedObjectsHaveClosedOutlines) {
     EXPECT_GT(joined, 0u);
 }
 
-TEST(Sheets, BundlesAreTheSame) {
-    const Scene scene = roomOfGrids();
-    Patches whole = subdivide(scene, 0.08f, kMany);
-    ASSERT_EQ(whole.sheets.sheets.size(), 12u);
-    Patches single = whole;
+// Bundles through the sheets and through the parents by themselves.
+void expectSameBundles(const Patches& patches) {
+    Patches single = patches;
     single.sheets = withoutSheets(single);
-    FragmentLists bySheet(whole, 0.02f, 1e-4f), byParent(single, 0.02f, 1e-4f);
+    FragmentLists bySheet(patches, 0.02f, 1e-4f), byParent(single, 0.02f, 1e-4f);
     uint64_t all = 0, different = 0;
     for (const Bundle& bundle : Directions("RANDOM", 7).next(100)) {
         BundleLines a, b;
@@ -230,6 +247,33 @@ TEST(Sheets, BundlesAreTheSame) {
     // Where a line meets the border of two patches within rounding (1e-6 of a patch), it may count
     // for the other one.
     EXPECT_LT(double(different), 1e-4 * double(all));
+}
+
+TEST(Sheets, BundlesAreTheSame) {
+    const Patches patches = subdivide(roomOfGrids(), 0.08f, kMany);
+    ASSERT_EQ(patches.sheets.sheets.size(), 12u);
+    expectSameBundles(patches);
+}
+
+// The faces of a floor that a box stands on are cut along its outline, and some tiles are cut; it is
+// one sheet all the same.
+TEST(Sheets, WhatWallsAndLightCutStaysOne) {
+    Scene scene = roomOfGrids();
+    const Patches room = subdivide(scene, 0.08f, kMany);
+    place(scene, box("box", {-0.33f, -0.21f, -1}, {0.33f, 0.21f, -0.8f}, false), grey("box", 0.5f),
+          scene.instances[0].transform * glm::rotate(glm::dmat4(1), 0.3, glm::dvec3(0, 0, 1)));
+    Patches patches = subdivide(scene, 0.08f, kMany);
+    ASSERT_GT(patches.crossedCells.size(), 3u);
+    std::vector<uint8_t> levels(patches.tileCount);
+    for (size_t k = 0; k < levels.size(); ++k) levels[k] = k % 11 == 0 ? 1 : k % 37 == 0 ? 2 : 0;
+    for (bool isCut : {false, true}) {
+        SCOPED_TRACE(isCut);
+        if (isCut) cutTiles(scene, patches, levels);
+        EXPECT_EQ(patches.sheets.sheets.size(), room.sheets.sheets.size());
+        EXPECT_EQ(patches.sheets.loose.size(), 6u) << "the box";
+        expectWhole(patches);
+        expectSameBundles(patches);
+    }
 }
 
 TEST(Sheets, NothingThatExchangesMakesNoLines) {

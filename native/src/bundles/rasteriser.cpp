@@ -22,9 +22,8 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
     };
     const std::vector<Sheet>& sheets = patches.sheets.sheets;
     for (uint32_t i = 0; i < sheets.size(); ++i) {
-        const uint32_t island = patches.parents[patches.parentOf[sheets[i].patches[0]]].island;
-        islands[island].sheets.push_back(i);
-        for (const auto& edge : sheets[i].outline) use(island, edge[0]);
+        islands[sheets[i].island].sheets.push_back(i);
+        for (const auto& edge : sheets[i].outline) use(sheets[i].island, edge[0]);
     }
     auto useAll = [&](const Parent& parent) {
         for (int k = 0; k < (parent.isTriangle ? 3 : 4); ++k)

@@ -114,10 +114,12 @@ class Rasteriser {
     template <class Visit>
     void sampleParent(const Parent& parent, const Visit& visit);
     // Visits the pixels within a convex outline: edge k runs from vertex edge(k)[0] to edge(k)[1],
-    // around the front; origin, a, b: of its affine coordinates; patchAt(s, t): of all patches.
-    template <class EdgeAt, class PatchAt, class Visit>
+    // around the front; origin, a, b: of its affine coordinates; patchAt(s, t): of all patches;
+    // lookUp(side, count, s, t, dsdx, dtdx): mends the sides of a run where patchAt is not enough.
+    template <class EdgeAt, class PatchAt, class LookUp, class Visit>
     void sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& origin, const glm::vec3& a,
-                       const glm::vec3& b, const PatchAt& patchAt, const Visit& visit);
+                       const glm::vec3& b, const PatchAt& patchAt, const LookUp& lookUp,
+                       const Visit& visit);
     // Patch by patch, for ROULETTE.
     template <class Visit>
     void fillPatches(const Parent& parent, const Visit& visit);
@@ -195,7 +197,16 @@ void Rasteriser::sampleSheet(const Sheet& sheet, const Visit& visit) {
     auto edge = [&](int k) { return sheet.outline[size_t(k)]; };
     // By value: the sheet could lie where patches are written, for all the compiler knows.
     auto patchAt = [grid = sheet.grid()](float s, float t) { return grid.patchAt(s, t); };
-    sampleOutline(int(sheet.outline.size()), edge, sheet.origin, sheet.a, sheet.b, patchAt, visit);
+    auto lookUp = [&](uint32_t* side, int count, float s, float t, float dsdx, float dtdx) {
+        if (sheet.parts.empty()) return;
+        for (int k = 0; k < count; ++k)
+            if (side[k] >= 2 * Sheet::kUneven)
+                side[k] = 2 * sheet.patchIn(side[k] / 2, patches, s + float(k) * dsdx,
+                                            t + float(k) * dtdx) +
+                          side[k] % 2;
+    };
+    sampleOutline(int(sheet.outline.size()), edge, sheet.origin, sheet.a, sheet.b, patchAt, lookUp,
+                  visit);
 }
 
 template <class Visit>
@@ -206,20 +217,21 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
                                        parent.vertex[size_t((k + 1) % sides)]};
     };
     const uint32_t first = parent.firstPatch;
+    auto isRight = [](uint32_t*, int, float, float, float, float) {};
     if (parent.patchCount() == 1)
         sampleOutline(
             sides, edge, parent.origin, parent.a, parent.b, [first](float, float) { return first; },
-            visit);
+            isRight, visit);
     else
         sampleOutline(
             sides, edge, parent.origin, parent.a, parent.b,
-            [&, first](float s, float t) { return first + parent.patchAt(s, t); }, visit);
+            [&, first](float s, float t) { return first + parent.patchAt(s, t); }, isRight, visit);
 }
 
-template <class EdgeAt, class PatchAt, class Visit>
+template <class EdgeAt, class PatchAt, class LookUp, class Visit>
 void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& origin,
                                const glm::vec3& a, const glm::vec3& b, const PatchAt& patchAt,
-                               const Visit& visit) {
+                               const LookUp& lookUp, const Visit& visit) {
     double yMin = std::numeric_limits<double>::max(), yMax = -yMin;
     double zMin = std::numeric_limits<double>::max(), zMax = -zMin;
     for (int k = 0; k < edges; ++k) {
@@ -275,6 +287,8 @@ void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& o
                 const float dx = float(first - x0 + k);
                 side[k] = 2 * patchAt(s0 + dx * dsdx, t0 + dx * dtdx) + plane.facing;
             }
+            lookUp(side, count, s0 + float(first - x0) * dsdx, t0 + float(first - x0) * dtdx, dsdx,
+                   dtdx);
             for (int k = 0; k < count; ++k)
                 z[k] = std::min(std::max(zRow + (first + k) * plane.dzdx, zMin), zMax);
             visit(rowStart + uint32_t(first), count, z, side);

@@ -91,6 +91,11 @@ std::pair<float, float> affine(const glm::dvec3& a, const glm::dvec3& b, const g
 
 }  // namespace
 
+glm::vec2 Parent::affineAt(const glm::dvec3& point) const {
+    const auto [s, t] = affine(a, b, point - glm::dvec3(origin));
+    return {s, t};
+}
+
 std::array<float, 4> Cell::weights(const glm::vec3& point) const {
     const auto [s, t] = affine(a, b, glm::dvec3(point) - glm::dvec3(origin));
     if (isTriangle()) return {1 - s - t, s, t, 0};
@@ -104,8 +109,8 @@ glm::vec3 Patches::point(uint32_t patch, glm::vec2 uv) const {
 
 uint32_t Patches::patchAt(uint32_t parentIndex, const glm::vec3& point) const {
     const Parent& parent = parents[parentIndex];
-    const auto [s, t] = affine(parent.a, parent.b, glm::dvec3(point) - glm::dvec3(parent.origin));
-    return parent.firstPatch + parent.patchAt(s, t);
+    const glm::vec2 st = parent.affineAt(glm::dvec3(point));
+    return parent.firstPatch + parent.patchAt(st.x, st.y);
 }
 
 namespace {

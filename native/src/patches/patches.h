@@ -87,6 +87,8 @@ struct Parent {
     // area.
     glm::vec2 pointOn(uint32_t patchInParent, glm::vec2 uv) const;
     glm::vec3 position(glm::vec2 st) const { return origin + st.x * a + st.y * b; }
+    // The affine coordinates of a point in its plane.
+    glm::vec2 affineAt(const glm::dvec3& point) const;
     float area() const { return glm::length(glm::cross(a, b)) * (isTriangle ? 0.5f : 1.0f); }
 };
 
@@ -121,6 +123,12 @@ struct Cell {
     std::array<float, 4> weights(const glm::vec3& point) const;
 };
 
+// A parallelogram of the user's mesh that walls cut into several parents (patches/crossings.h).
+struct CrossedCell {
+    std::array<uint32_t, 4> vertex;     // of its corners, in order around, as Parent has them
+    uint32_t firstParent, parentCount;  // into Patches::parents
+};
+
 // Surfaces with empty space around them (patches/patch_size.h).
 struct Island {
     glm::vec3 centre;  // of its bounding box, metres, relative to Patches::centre
@@ -143,8 +151,9 @@ struct Patches {
         islands;  // the one with the most patches first; the centre is that of its box
     std::vector<Parent> parents;
     std::vector<Cell> cells;
-    Sheets sheets;                   // of the parents
-    std::vector<uint32_t> parentOf;  // per patch
+    std::vector<CrossedCell> crossedCells;  // ascending
+    Sheets sheets;                          // of the parents
+    std::vector<uint32_t> parentOf;         // per patch
     // Per patch, m^2. Of a patch that lets light through only the opaque share counts, as if it had
     // many small holes: a global line meets that share of it, and reflectance and emission are
     // those of what is left between the holes.

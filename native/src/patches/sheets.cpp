@@ -4,7 +4,9 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <unordered_map>
 
@@ -21,27 +23,28 @@ constexpr float kCongruence = 1e-4f;
 // of the parents' edges.
 constexpr float kFlatness = 3e-7f, kEvenness = 0.01f;
 
-// A parent in a lattice: corner k of its place there (in order around, (0, 0) first) is its vertex
+// A parallelogram that may be part of a sheet.
+struct Member {
+    std::array<uint32_t, 4> vertex;  // as in Parent
+    uint32_t firstParent, parentCount;
+    int countA, countB;  // patches along its edges; 0 where it is uneven
+
+    bool isUneven() const { return countA == 0; }
+};
+
+// A member in a lattice: corner k of its place there (in order around, (0, 0) first) is its vertex
 // (k + turn) % 4.
 struct Place {
-    uint32_t parent = 0;
+    const Member* member = nullptr;
     int turn = 0;
 
-    uint32_t vertex(const Patches& patches, int corner) const {
-        return patches.parents[parent].vertex[size_t(corner + turn) % 4];
-    }
+    uint32_t vertex(int corner) const { return member->vertex[size_t(corner + turn) % 4]; }
     glm::vec3 position(const Patches& patches, int corner) const {
-        return patches.vertices[vertex(patches, corner)];
+        return patches.vertices[vertex(corner)];
     }
     // Patches along the lattice's two directions.
-    int countA(const Patches& patches) const {
-        const Parent& p = patches.parents[parent];
-        return turn % 2 ? p.countB : p.countA;
-    }
-    int countB(const Patches& patches) const {
-        const Parent& p = patches.parents[parent];
-        return turn % 2 ? p.countA : p.countB;
-    }
+    int countA() const { return turn % 2 ? member->countB : member->countA; }
+    int countB() const { return turn % 2 ? member->countA : member->countB; }
 };
 
 // Where in a lattice.
@@ -61,53 +64,72 @@ class SheetSearch {
     explicit SheetSearch(const Patches& patches) : patches(patches) {}
 
     Sheets run() {
+        findMembers();
         listEdges();
-        isPlaced.assign(patches.parents.size(), false);
-        for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+        isPlaced.assign(members.size(), false);
+        // What is uneven joins others.
+        for (uint32_t i = 0; i < members.size(); ++i) {
             throwIfCancelledAt(i);
-            if (!patches.parents[i].exchanges) continue;
-            if (!mayJoin(i))
-                result.loose.push_back(i);
-            else if (!isPlaced[i])
-                cutIntoSheets(growFrom(i));
+            if (!isPlaced[i] && !members[i].isUneven()) cutIntoSheets(growFrom(i));
         }
+        for (uint32_t i = 0; i < members.size(); ++i)
+            if (!isPlaced[i]) leaveLoose(members[i]);
         // The order of the faces, in which their vertices lie beside each other.
         std::sort(result.loose.begin(), result.loose.end());
         return std::move(result);
     }
 
   private:
-    bool mayJoin(uint32_t i) const {
-        const Parent& parent = patches.parents[i];
-        return parent.exchanges && !parent.isTriangle && !parent.cut;
+    void findMembers() {
+        auto crossed = patches.crossedCells.begin();
+        for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+            throwIfCancelledAt(i);
+            const Parent& parent = patches.parents[i];
+            const bool isCrossed =
+                crossed != patches.crossedCells.end() && crossed->firstParent == i;
+            const uint32_t count = isCrossed ? crossed->parentCount : 1;
+            if (parent.exchanges && isCrossed)
+                members.push_back({crossed->vertex, i, count, 0, 0});
+            else if (parent.exchanges && parent.isTriangle)
+                result.loose.push_back(i);
+            else if (parent.exchanges)
+                members.push_back({parent.vertex, i, 1, parent.cut ? 0 : int(parent.countA),
+                                   parent.cut ? 0 : int(parent.countB)});
+            if (isCrossed) ++crossed;
+            i += count - 1;
+        }
     }
 
-    // A parent's edge by its two vertices in order around.
+    void leaveLoose(const Member& member) {
+        for (uint32_t k = 0; k < member.parentCount; ++k)
+            result.loose.push_back(member.firstParent + k);
+    }
+
+    // A member's edge by its two vertices in order around.
     struct Edge {
         uint64_t key;
-        uint32_t parent;
+        uint32_t member;
         int side;
         bool operator<(const Edge& other) const {
-            return key != other.key ? key < other.key : parent < other.parent;
+            return key != other.key ? key < other.key : member < other.member;
         }
     };
     static uint64_t keyOf(uint32_t from, uint32_t to) { return uint64_t(from) << 32 | to; }
 
     void listEdges() {
-        for (uint32_t i = 0; i < patches.parents.size(); ++i) {
+        for (uint32_t i = 0; i < members.size(); ++i) {
             throwIfCancelledAt(i);
-            if (!mayJoin(i)) continue;
-            const auto& v = patches.parents[i].vertex;
+            const auto& v = members[i].vertex;
             for (int k = 0; k < 4; ++k)
                 edges.push_back({keyOf(v[size_t(k)], v[size_t(k + 1) % 4]), i, k});
         }
         tbb::parallel_sort(edges.begin(), edges.end());
     }
 
-    // The lattice of all parents like this one that are joined to it by edges.
+    // The lattice of all members like this one that are joined to it by edges.
     Lattice growFrom(uint32_t start) {
         Lattice lattice;
-        const Place first{start, 0};
+        const Place first{&members[start], 0};
         lattice.emplace(At{0, 0}, first);
         isPlaced[start] = true;
         std::vector<At> open{{0, 0}};
@@ -121,7 +143,7 @@ class SheetSearch {
                 const std::optional<Place> found = across(place, side);
                 if (!found || !isCongruent(first, *found)) continue;
                 lattice.emplace(next, *found);
-                isPlaced[found->parent] = true;
+                isPlaced[size_t(found->member - members.data())] = true;
                 open.push_back(next);
             }
         }
@@ -130,19 +152,19 @@ class SheetSearch {
 
     // What lies across an edge, as part of the same surface.
     std::optional<Place> across(const Place& place, int side) const {
-        const uint32_t from = place.vertex(patches, side),
-                       to = place.vertex(patches, (side + 1) % 4);
+        const uint32_t from = place.vertex(side), to = place.vertex((side + 1) % 4);
         const uint64_t key = keyOf(to, from);
         auto edge = std::lower_bound(edges.begin(), edges.end(), Edge{key, 0, 0});
         for (; edge != edges.end() && edge->key == key; ++edge)
             // The edge is side (side + 2) % 4 of its place.
-            if (!isPlaced[edge->parent]) return Place{edge->parent, (edge->side + 6 - side) % 4};
+            if (!isPlaced[edge->member])
+                return Place{&members[edge->member], (edge->side + 6 - side) % 4};
         return std::nullopt;
     }
 
     bool isCongruent(const Place& first, const Place& other) const {
-        if (first.countA(patches) != other.countA(patches) ||
-            first.countB(patches) != other.countB(patches))
+        if (!other.member->isUneven() &&
+            (first.countA() != other.countA() || first.countB() != other.countB()))
             return false;
         const glm::vec3 a = edgeA(first), b = edgeB(first);
         const float off = kCongruence * std::max(glm::length(a), glm::length(b));
@@ -157,6 +179,8 @@ class SheetSearch {
 
     // Row by row, the widest rectangles that are left.
     void cutIntoSheets(Lattice lattice) {
+        const Place& any = lattice.at({0, 0});
+        const uint32_t countA = uint32_t(any.countA()), countB = uint32_t(any.countB());
         std::vector<At> order;
         for (const auto& entry : lattice) order.push_back(entry.first);
         std::sort(order.begin(), order.end(), [](const At& p, const At& q) {
@@ -172,13 +196,15 @@ class SheetSearch {
                 return true;
             };
             while (isWhole(high[1])) ++high[1];
-            addSheet(lattice, low, high);
+            addSheet(lattice, low, high, countA, countB);
             for (int y = low[1]; y < high[1]; ++y)
                 for (int x = low[0]; x < high[0]; ++x) lattice.erase({x, y});
         }
     }
 
-    void addSheet(const Lattice& lattice, const At& low, const At& high) {
+    // countA, countB: patches along the edges of a member that is not uneven.
+    void addSheet(const Lattice& lattice, const At& low, const At& high, uint32_t countA,
+                  uint32_t countB) {
         const int width = high[0] - low[0], height = high[1] - low[1];
         auto at = [&](int x, int y) -> const Place& {
             return lattice.at({low[0] + x, low[1] + y});
@@ -192,8 +218,7 @@ class SheetSearch {
             for (int x = 0; x < width && isOne; ++x)
                 isOne = fits(sheet, at(x, y), x, y, width, height);
         auto addEdge = [&](const Place& place, int side) {
-            sheet.outline.push_back(
-                {place.vertex(patches, side), place.vertex(patches, (side + 1) % 4)});
+            sheet.outline.push_back({place.vertex(side), place.vertex((side + 1) % 4)});
         };
         for (int x = 0; x < width; ++x) addEdge(at(x, 0), 0);
         for (int y = 0; y < height; ++y) addEdge(at(width - 1, y), 1);
@@ -205,29 +230,47 @@ class SheetSearch {
                 isOne && sheet.outline[k][1] == sheet.outline[(k + 1) % sheet.outline.size()][0];
         if (!isOne) {
             for (int y = 0; y < height; ++y)
-                for (int x = 0; x < width; ++x) result.loose.push_back(at(x, y).parent);
+                for (int x = 0; x < width; ++x) leaveLoose(*at(x, y).member);
             return;
         }
 
-        const uint32_t countA = uint32_t(at(0, 0).countA(patches)),
-                       countB = uint32_t(at(0, 0).countB(patches));
+        sheet.island = patches.parents[at(0, 0).member->firstParent].island;
         sheet.columns = uint32_t(width) * countA;
         sheet.rows = uint32_t(height) * countB;
         sheet.patches.resize(size_t(sheet.columns) * sheet.rows);
-        for (uint32_t row = 0; row < sheet.rows; ++row)
-            for (uint32_t column = 0; column < sheet.columns; ++column)
-                sheet.patches[size_t(row) * sheet.columns + column] = patchOf(
-                    at(int(column / countA), int(row / countB)), column % countA, row % countB);
-
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const Place& place = at(x, y);
+                result.joined += place.member->parentCount;
+                const uint32_t uneven = Sheet::kUneven + uint32_t(sheet.firstPart.size());
+                if (place.member->isUneven()) addParts(sheet, *place.member);
+                for (uint32_t row = 0; row < countB; ++row)
+                    for (uint32_t column = 0; column < countA; ++column)
+                        sheet.patches[(uint32_t(y) * countB + row) * size_t(sheet.columns) +
+                                      uint32_t(x) * countA + column] =
+                            place.member->isUneven() ? uneven : patchOf(place, column, row);
+            }
+        sheet.firstPart.push_back(uint32_t(sheet.parts.size()));
         result.sheets.push_back(std::move(sheet));
-        result.joined += size_t(width) * size_t(height);
     }
 
-    // Whether the vertices of the parent in column x and row y are where the sheet has them.
+    void addParts(Sheet& sheet, const Member& member) const {
+        sheet.firstPart.push_back(uint32_t(sheet.parts.size()));
+        const glm::dvec3 origin(sheet.origin), a(sheet.a), b(sheet.b);
+        for (uint32_t p = member.firstParent; p < member.firstParent + member.parentCount; ++p) {
+            const Parent& parent = patches.parents[p];
+            const glm::vec2 at = parent.affineAt(origin);
+            sheet.parts.push_back(
+                {p, at, parent.affineAt(origin + a) - at, parent.affineAt(origin + b) - at});
+        }
+    }
+
+    // Whether the vertices of the member in column x and row y are where the sheet has them.
     bool fits(const Sheet& sheet, const Place& place, int x, int y, int width, int height) const {
         const glm::vec3 a = sheet.a / float(width), b = sheet.b / float(height);
         const glm::vec3 normal = glm::normalize(glm::cross(sheet.a, sheet.b));
-        const float reach = patches.islands[patches.parents[place.parent].island].reach;
+        const float reach =
+            patches.islands[patches.parents[place.member->firstParent].island].reach;
         constexpr int kCorners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
         for (int k = 0; k < 4; ++k) {
             const glm::vec3 off = place.position(patches, k) - sheet.origin -
@@ -239,9 +282,10 @@ class SheetSearch {
         return true;
     }
 
-    // The patch in a column and row of a parent as it lies in the lattice.
+    // The patch in a column and row of a member that is no other than a parent, as it lies in the
+    // lattice.
     uint32_t patchOf(const Place& place, uint32_t column, uint32_t row) const {
-        const Parent& parent = patches.parents[place.parent];
+        const Parent& parent = patches.parents[place.member->firstParent];
         const uint32_t a = parent.countA, b = parent.countB;
         // Vertex `turn` is the lattice's (0, 0), from where the parent's own column and row run.
         switch (place.turn) {
@@ -265,11 +309,32 @@ class SheetSearch {
 
     const Patches& patches;
     std::vector<Edge> edges;  // in order of their keys
-    std::vector<bool> isPlaced;
+    std::vector<Member> members;
+    std::vector<bool> isPlaced;  // per member
     Sheets result;
 };
 
 }  // namespace
+
+uint32_t Sheet::patchIn(uint32_t uneven, const Patches& all, float s, float t) const {
+    const Part* const end = parts.data() + firstPart[uneven - kUneven + 1];
+    const Part* best = parts.data() + firstPart[uneven - kUneven];
+    float most = -std::numeric_limits<float>::infinity();
+    glm::vec2 at(0.0f);
+    for (const Part* part = best; part != end; ++part) {
+        const glm::vec2 st = part->origin + s * part->a + t * part->b;
+        // How far inside, in shares of the parent.
+        const float inside = std::min(std::min(st.x, st.y), all.parents[part->parent].isTriangle
+                                                                ? 1 - st.x - st.y
+                                                                : 1 - std::max(st.x, st.y));
+        if (!(inside > most)) continue;
+        best = part;
+        most = inside;
+        at = st;
+    }
+    const Parent& parent = all.parents[best->parent];
+    return parent.firstPatch + parent.patchAt(at.x, at.y);
+}
 
 Sheets findSheets(const Patches& patches) { return SheetSearch(patches).run(); }
 

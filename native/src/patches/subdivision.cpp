@@ -101,12 +101,21 @@ class Subdivision {
             const auto crossing = crossings.ofCell.find(c);
             if (crossing != crossings.ofCell.end())
                 patches.cells[c].parted = crossing->second.parted;
-            if (crossing != crossings.ofCell.end() && !crossing->second.pieces.empty())
+            const Cell& cell = patches.cells[c];
+            if (crossing != crossings.ofCell.end() && !crossing->second.pieces.empty()) {
                 for (const CellPiece& piece : crossing->second.pieces)
                     cutPiece(c, piece, cellSizes[c]);
-            else
+                if (!cell.isTriangle())
+                    patches.crossedCells.push_back(
+                        {{worldVertex(cell.instance, cell.corner[0]),
+                          worldVertex(cell.instance, cell.corner[1]),
+                          worldVertex(cell.instance, cell.corner[2]),
+                          worldVertex(cell.instance, cell.corner[3])},
+                         uint32_t(firstParent),
+                         uint32_t(patches.parents.size() - firstParent)});
+            } else {
                 cutCell(c, cellSizes[c]);
-            const Cell& cell = patches.cells[c];
+            }
             const size_t face = faces.firstFace[cell.instance] + size_t(cell.face);
             for (size_t p = firstParent; p < patches.parents.size(); ++p) {
                 Parent& parent = patches.parents[p];
