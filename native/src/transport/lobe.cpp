@@ -16,6 +16,8 @@ namespace {
 constexpr int kCosines = 8, kAngles = 16;
 constexpr float kCosine[kCosines] = {0.01985507f, 0.10166676f, 0.23723380f, 0.40828268f,
                                      0.59171732f, 0.76276620f, 0.89833324f, 0.98014493f};
+constexpr float kCosineOfAngle[kAngles / 2 + 1] = {
+    1, 0.92387953f, 0.70710678f, 0.38268343f, 0, -0.38268343f, -0.70710678f, -0.92387953f, -1};
 constexpr float kWeight[kCosines] = {0.05061427f, 0.11119052f, 0.15685332f, 0.18134189f,
                                      0.18134189f, 0.15685332f, 0.11119052f, 0.05061427f};
 // Of the table of gloss: steps of the roughness and of the cosine, and for each entry rings of
@@ -179,7 +181,7 @@ Lobe::Moments Lobe::GlossTable::find(Kind kind, float roughness, float cosine) {
             const float more =
                 kind == Kind::SEVERAL_FACETS ? of(Kind::GLOSS).lost(roughness, no) : 1;
             const float share = more * visible * 4 * r * inward / (kRings * kInRing);
-            const auto [value, edge] = white.shape(2 * ih * h - in);
+            const auto [value, edge] = white.shape(no, 2 * ih * ih - 1);
             sum.add(share, {1, edge, value, value * edge, value * edge * edge});
         }
     return sum;
@@ -239,16 +241,16 @@ Lobe Lobe::of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming, 
 }
 
 void Lobe::normalise() {
-    const auto [x, y] = frame(normal);
+    const float sineIn = std::sqrt(std::max(1 - cosine * cosine, 0.0f));
     float mean = 0, meanSquare = 0;
     for (int i = 0; i < kCosines; ++i) {
-        const float no = kCosine[i], sine = std::sqrt(1 - no * no);
-        for (int j = 0; j < kAngles; ++j) {
-            const float angle = glm::two_pi<float>() * float(j) / kAngles;
-            const float value =
-                shape(sine * (std::cos(angle) * x + std::sin(angle) * y) + no * normal).first;
-            mean += 2 * no * kWeight[i] / kAngles * value;
-            meanSquare += 2 * no * kWeight[i] / kAngles * value * value;
+        const float no = kCosine[i], sines = sineIn * std::sqrt(1 - no * no);
+        // Alike on both sides of the plane of incidence.
+        for (int j = 0; j <= kAngles / 2; ++j) {
+            const float value = shape(no, sines * kCosineOfAngle[j] + no * cosine).first;
+            const float count = j % (kAngles / 2) == 0 ? 1 : 2;
+            mean += 2 * no * kWeight[i] * count / kAngles * value;
+            meanSquare += 2 * no * kWeight[i] * count / kAngles * value * value;
         }
     }
     normalise(mean, meanSquare);
@@ -266,17 +268,17 @@ float Lobe::visibility(float out) const {
 }
 
 glm::vec3 Lobe::towards(const glm::vec3& direction) const {
-    const auto [value, rise] = shape(direction);
+    const auto [value, rise] = shape(glm::dot(normal, direction), glm::dot(incoming, direction));
     return value * (facing + rise * rising);
 }
 
 // facing and rising are f0 and 1 - f0 over it.
 glm::vec3 Lobe::mean() const { return 1.0f / glm::max(facing + rising, 1e-30f); }
 
-std::pair<float, float> Lobe::shape(const glm::vec3& direction) const {
-    const float ni = cosine, no = glm::dot(normal, direction);
+std::pair<float, float> Lobe::shape(float no, float io) const {
     if (no <= 0) return {0, 0};
-    const float io = std::min(glm::dot(incoming, direction), 1.0f);
+    const float ni = cosine;
+    io = std::min(io, 1.0f);
     switch (kind) {
         case Kind::GLOSS:
         case Kind::SEPARATE_GLOSS:
