@@ -61,6 +61,11 @@ struct Plane {
                kOfCoordinates * mostOf(d);
     }
 
+    // No point within a distance of the origin, metres, has more half thickness.
+    double halfThicknessWithin(double distance) const {
+        return thickness + tilt * std::sqrt(3.0) * distance;
+    }
+
   private:
     glm::dvec3 alongA{0.0}, alongB{0.0};  // shares of a and b in a vector, per metre
     double tilt = kOfCoordinates;         // bound of what the thickness grows by, per metre away

@@ -98,6 +98,7 @@ class PointSource : public LightSource {
     }
 
     // Uniform by the angle at which the source sees them, as its light is.
+    bool choosesPlaces() const override { return true; }
     PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const override {
         if (patch.radius == 0 || patch.radius < kNear * distance(patch.middle) || !isBefore(patch))
             return LightSource::placeOn(patch, uv);
@@ -272,7 +273,7 @@ class AreaSource : public LightSource {
                        glm::vec2 uv) const override {
         if (plane.side(point) != PlaneSide::FRONT) return {};
         LightSample sample = sampleBefore(point, receiver, uv);
-        sample.setMargin(plane);
+        sample.setMargin(normal, float(plane.thickness));
         return sample;
     }
 

@@ -37,10 +37,9 @@ struct LightSample {
     ShadowRay ray(const glm::vec3& point) const {
         return {point, direction, std::max(0.0f, distance - margin), parent};
     }
-    // For a plane source of that normal, as thick as `plane` has it.
-    void setMargin(const Plane& plane) {
-        margin = float(2 * plane.thickness) /
-                 std::max(0.01f, -glm::dot(direction, glm::vec3(plane.normal)));
+    // For a plane source of that normal and half thickness, metres.
+    void setMargin(const glm::vec3& normal, float halfThickness) {
+        margin = 2 * halfThickness / std::max(0.01f, -glm::dot(direction, normal));
     }
 };
 
@@ -127,6 +126,8 @@ class LightSource {
 
     // A point of a patch to look at its light from, by uv uniform in [0, 1)^2, and what it counts for
     // in the mean over the patch: most of the light of a source close by arrives at few points of it.
+    // Called where choosesPlaces(); the points of others are uniform.
+    virtual bool choosesPlaces() const { return false; }
     virtual PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const;
 
     // Whether no point within `radius` of a point with a unit normal can get any of its light,

@@ -11,7 +11,7 @@ namespace {
 
 // A cluster with a cone of normals narrower than that is flat; it is far at so many times its
 // radius, and the receiver is clear of its horizon at so many times the sine of the cone.
-constexpr float kFlat = 0.999f, kFar = 3, kClear = 2;
+constexpr float kFlat = 0.999f, kFar = 2, kClear = 2;
 
 float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
 
@@ -36,6 +36,12 @@ LightTree::LightTree(const std::vector<LightFace>& faces) : order(faces.size()) 
         const double power = double(faces[k].strength * faces[k].area());
         powerBefore.push_back(powerBefore.back() + power);
         perPower.push_back(1 / power);
+    }
+    sharesPerPower = double(faces.size()) / powerBefore.back();
+    uint32_t place = 0;
+    for (size_t k = 0; k < faces.size(); ++k) {
+        while (powerBefore[place + 1] * sharesPerPower <= double(k)) ++place;
+        placeAt.push_back(place);
     }
 }
 
@@ -115,19 +121,22 @@ bool LightTree::isEven(const Node& node, const glm::vec3& point, const glm::vec3
 }
 
 LightTree::Choice LightTree::byPower(const Node& node, double u, double weight) const {
-    const auto first = powerBefore.begin() + node.first;
-    const double all = first[node.count] - first[0], at = first[0] + u * all;
-    // Faces of about the same power are where they would be by their number.
-    auto after = first + 1 + std::min(uint32_t(u * double(node.count)), node.count - 1);
-    if (!(after[-1] <= at && at < after[0]))
-        after = std::upper_bound(first + 1, first + node.count, at);
-    const size_t place = size_t(after - powerBefore.begin()) - 1;
+    const double first = powerBefore[node.first];
+    const double all = powerBefore[node.first + node.count] - first, at = first + u * all;
+    const uint32_t last = node.first + node.count - 1;
+    const size_t share = std::min(size_t(at * sharesPerPower), placeAt.size() - 1);
+    const uint32_t low = std::clamp(placeAt[share], node.first, last);
+    const uint32_t high =
+        share + 1 < placeAt.size() ? std::clamp(placeAt[share + 1], low, last) : last;
+    const auto before = powerBefore.begin();
+    const auto after = std::upper_bound(before + low + 1, before + high + 1, at);
+    const uint32_t place = uint32_t(after - before) - 1;
     return {order[place], float(weight * all * perPower[place]),
-            std::clamp(float((at - after[-1]) * perPower[place]), 0.0f, 0.9999999f)};
+            std::clamp(float((at - powerBefore[place]) * perPower[place]), 0.0f, 0.9999999f)};
 }
 
-LightTree::Choice LightTree::choose(const glm::vec3& point, const glm::vec3& normal,
-                                    float u) const {
+LightTree::Choice LightTree::chooseOfMany(const glm::vec3& point, const glm::vec3& normal,
+                                          float u) const {
     if (nodes.empty()) return {0, 0, u};
     uint32_t index = 0;
     double left = double(u), weight = 1;

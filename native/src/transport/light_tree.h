@@ -45,9 +45,13 @@ class LightTree {
     Choice chooseByPower(double u) const { return byPower(nodes.front(), u, 1); }
     // By the bounds of what a plane with that normal at a point gets from each cluster; u uniform in
     // [0, 1).
-    Choice choose(const glm::vec3& point, const glm::vec3& normal, float u) const;
+    Choice choose(const glm::vec3& point, const glm::vec3& normal, float u) const {
+        return order.size() == 1 ? Choice{order[0], 1, u} : chooseOfMany(point, normal, u);
+    }
 
   private:
+    Choice chooseOfMany(const glm::vec3& point, const glm::vec3& normal, float u) const;
+
     struct Node {
         glm::vec3 centre;       // of a sphere around it, metres
         float radius;           // metres
@@ -67,7 +71,10 @@ class LightTree {
 
     std::vector<uint32_t> order;
     std::vector<double> powerBefore;  // per place in `order`, and of all: sum of the channels, W
-    std::vector<double> perPower;     // per place in `order`: one over its own, 1/W
+    // Of as many equal shares of the power as there are faces: the place that each starts in.
+    std::vector<uint32_t> placeAt;
+    double sharesPerPower = 0;     // 1/W
+    std::vector<double> perPower;  // per place in `order`: one over its own, 1/W
     std::vector<Node> nodes;
 };
 

@@ -86,8 +86,14 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
     auto add = [&](const LightFace& face, const Plane& plane) {
         if (!(face.strength * face.area() > 0)) return;
         faces.push_back(face);
-        const float near = 0.5f * kNear * (glm::length(face.a) + glm::length(face.b));
-        shapes.push_back({plane, face.middle(), face.area(), near * near});
+        const float size = 0.5f * (glm::length(face.a) + glm::length(face.b));
+        // Twice the half thickness, for what floats make of the height; (x + y)^2 <= 2 x^2 + 2 y^2.
+        const double most = 2 * plane.halfThicknessWithin(double(size));
+        const double slope = 2 * (plane.halfThicknessWithin(1) - plane.halfThicknessWithin(0));
+        shapes.push_back({plane, face.middle(), face.normal,
+                          emissionOf(face.side) * glm::one_over_pi<float>(), face.area(),
+                          kNear * kNear * size * size, float(2 * most * most),
+                          float(2 * slope * slope), patches.parentOf[face.side / 2]});
         totalPower += face.area() * emissionOf(face.side);
     };
     for (uint32_t index : parents) {
@@ -122,20 +128,19 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     if (!(choice.weight > 0)) return {};
     const LightFace& face = faces[choice.face];
     const FaceShape& shape = shapes[choice.face];
-    if (shape.plane.side(point) != PlaneSide::FRONT) return {};
-    const glm::vec3 radiance = emissionOf(face.side) * glm::one_over_pi<float>();
-    const glm::vec2 own(choice.u, uv.y);
     const glm::vec3 d = shape.middle - point;
-    const auto seen =
-        glm::dot(d, d) <= shape.nearSquare ? directionTo(face, point, own) : std::nullopt;
+    const float distance2 = glm::dot(d, d);
+    if (shape.isNotBefore(point, d, distance2)) return {};
+    const glm::vec2 own(choice.u, uv.y);
+    const auto seen = distance2 <= shape.nearSquare ? directionTo(face, point, own) : std::nullopt;
     LightSample sample =
         seen ? LightSample{seen->direction, seen->distance,
-                           radiance * (seen->solidAngle * choice.weight *
-                                       std::max(0.0f, glm::dot(receiver, seen->direction)))}
-             : surfaceSample(point, receiver, pointOn(face, own), face.normal, radiance,
+                           shape.radiance * (seen->solidAngle * choice.weight *
+                                             std::max(0.0f, glm::dot(receiver, seen->direction)))}
+             : surfaceSample(point, receiver, pointOn(face, own), face.normal, shape.radiance,
                              shape.area * choice.weight);
-    sample.parent = patches.parentOf[face.side / 2];
-    sample.setMargin(shape.plane);
+    sample.parent = shape.parent;
+    sample.setMargin(shape.normal, float(shape.plane.thickness));
     return sample;
 }
 

@@ -212,6 +212,7 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
     };
     std::array<Held, Visibility::kPacket> held;
     int waiting = 0;
+    const bool choosesPlaces = source.choosesPlaces();
     auto see = [&](Block& block, const glm::vec3& irradiance, const glm::vec3& direction) {
         block.visible += irradiance;
         const float brightness = brightest(irradiance);
@@ -230,7 +231,8 @@ void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleA
     };
     auto take = [&](int i, Block& block) {
         const glm::vec4 u = points[uint32_t(i)];
-        const auto [point, weight] = source.placeOn(place, {u.x, u.y});
+        const auto [point, weight] =
+            choosesPlaces ? source.placeOn(place, {u.x, u.y}) : PatchPoint{place.at({u.x, u.y})};
         LightSample sample = sampleAt(point, glm::vec2(u.z, u.w));
         sample.irradiance *= weight;
         ++block.count;
