@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patches/crossings.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -59,24 +61,28 @@ std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const VertexOf
             edges.push_back({std::min(from, to), std::max(from, to), c, k});
         }
     }
-    std::sort(edges.begin(), edges.end(), [](const CellEdge& a, const CellEdge& b) {
+    tbb::parallel_sort(edges.begin(), edges.end(), [](const CellEdge& a, const CellEdge& b) {
         return std::tie(a.low, a.high, a.cell, a.k) < std::tie(b.low, b.high, b.cell, b.k);
     });
     return edges;
 }
 
+bool areInOnePlane(const glm::dvec3& normal, const glm::dvec3& other) {
+    return glm::length(glm::cross(normal, other)) <= kLeastTurn;
+}
+
 // Of the cells at an edge: which lie in one plane, by a number of the plane for each. In few planes: of
-// an edge at which many meet those that come late have one each.
-std::vector<size_t> planesOf(const std::vector<Cell>& cells, const CellEdge* edges, size_t count) {
+// an edge at which many meet those that come late have one each. ofCells: the normals of all cells.
+std::vector<size_t> planesOf(const std::vector<glm::dvec3>& ofCells, const CellEdge* edges,
+                             size_t count) {
     constexpr size_t kMostCompared = 64;
     std::vector<size_t> planes;
     std::vector<glm::dvec3> normals;  // per plane
     for (size_t k = 0; k < count; ++k) {
-        const glm::dvec3 normal = cells[edges[k].cell].normal();
+        const glm::dvec3& normal = ofCells[edges[k].cell];
         const size_t most = std::min(normals.size(), kMostCompared);
         size_t plane = 0;
-        while (plane < most && glm::length(glm::cross(normal, normals[plane])) > kLeastTurn)
-            ++plane;
+        while (plane < most && !areInOnePlane(normal, normals[plane])) ++plane;
         if (plane == most) {
             plane = normals.size();
             normals.push_back(normal);
@@ -101,13 +107,22 @@ struct Walls {
 Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
                 const VertexOf& vertexOf, std::map<uint32_t, Crossing>& crossings) {
     const std::vector<CellEdge> edges = sortedEdges(cells, vertexOf);
+    std::vector<glm::dvec3> normals(cells.size());
+    for (const CellEdge& edge : edges) normals[edge.cell] = cells[edge.cell].normal();
     DisjointSets joined(cells.size());
     for (size_t first = 0; first < edges.size();) {
         size_t end = first;
         while (end < edges.size() && edges[end].low == edges[first].low &&
                edges[end].high == edges[first].high)
             ++end;
-        const std::vector<size_t> planes = planesOf(cells, &edges[first], end - first);
+        // Two cells part nothing.
+        if (end - first <= 2) {
+            const uint32_t a = edges[first].cell, b = edges[end - 1].cell;
+            if (areInOnePlane(normals[a], normals[b])) joined.join(a, b);
+            first = end;
+            continue;
+        }
+        const std::vector<size_t> planes = planesOf(normals, &edges[first], end - first);
         std::map<size_t, std::vector<uint32_t>> inPlane;  // positions from `first` on
         for (uint32_t k = 0; k < planes.size(); ++k) inPlane[planes[k]].push_back(k);
         for (const auto& [plane, members] : inPlane)

@@ -16,28 +16,36 @@ constexpr double kBlind = 1e-3;
 constexpr size_t kBlindFaces = 16;
 // Directions that are tried for the scene's own axes, and faces that they are judged by.
 constexpr size_t kTriedAxes = 64, kJudgingFaces = size_t(1) << 16;
-// Cosine of what counts as parallel, and as at right angles; and of axes that are the world's.
-constexpr double kParallel = 0.9998, kAcross = 0.02, kSameAxes = 1 - 1e-9;
+// Cosine of what counts as parallel, and as at right angles; of axes that are the world's, and of
+// directions of which one is tried.
+constexpr double kParallel = 0.9998, kAcross = 0.02, kSameAxes = 1 - 1e-9, kSame = 1 - 1e-13;
 
 // The direction along which most of some vectors lie, by their lengths; 0 without any. pole: what
 // lies at right angles to the direction and to this counts too, as the sides of a grid do and its
 // diagonals do not.
 glm::dvec3 commonest(const std::vector<glm::dvec3>& vectors, const glm::dvec3* pole) {
     double total = 0, passed = 0, next = 0, most = 0;
-    for (const glm::dvec3& v : vectors) total += glm::length(v);
+    std::vector<double> lengths;
+    for (const glm::dvec3& v : vectors) {
+        lengths.push_back(glm::length(v));
+        total += lengths.back();
+    }
     glm::dvec3 best(0.0);
-    for (const glm::dvec3& candidate : vectors) {
-        const double own = glm::length(candidate);
-        passed += own;
-        if (!(own > 0) || passed < next) continue;
+    std::vector<glm::dvec3> tried;
+    for (size_t k = 0; k < vectors.size(); ++k) {
+        passed += lengths[k];
+        if (!(lengths[k] > 0) || passed < next) continue;
         next = passed + total / double(kTriedAxes);
-        const glm::dvec3 direction = candidate / own;
+        const glm::dvec3 direction = vectors[k] / lengths[k];
+        auto isThis = [&](const glm::dvec3& d) { return std::abs(glm::dot(d, direction)) > kSame; };
+        if (std::any_of(tried.begin(), tried.end(), isThis)) continue;
+        tried.push_back(direction);
         const glm::dvec3 other = pole ? glm::cross(*pole, direction) : glm::dvec3(0.0);
         double along = 0;
-        for (const glm::dvec3& v : vectors)
-            if (std::max(std::abs(glm::dot(v, direction)), std::abs(glm::dot(v, other))) >
-                kParallel * glm::length(v))
-                along += glm::length(v);
+        for (size_t j = 0; j < vectors.size(); ++j)
+            if (std::max(std::abs(glm::dot(vectors[j], direction)),
+                         std::abs(glm::dot(vectors[j], other))) > kParallel * lengths[j])
+                along += lengths[j];
         // By more than rounding, so that equal ones stay in their order.
         if (along > most * (1 + 1e-6)) {
             most = along;
