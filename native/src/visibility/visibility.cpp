@@ -140,14 +140,14 @@ struct Hit {
 // What a ray meets first. Of surfaces that coincide there it is the one that comesBefore the others;
 // so a ray that has met one goes on a little, through all that may coincide with it.
 struct Nearest {
-    uint32_t parent = kNoParent;
-    float distance = 0,
-          zone = 0;  // metres along the ray; what is within `zone` behind may coincide
     struct Other {
         uint32_t parent;
-        float distance;
+        float distance;  // metres along the ray
     };
-    std::vector<Other> others;  // what the ray has met about as far away
+    uint32_t parent = kNoParent;
+    float distance = 0;         // metres along the ray
+    float zone = 0;             // what it meets less than this behind may coincide, metres
+    std::vector<Other> others;  // what it has met about as far away
 
     // Notes what the ray meets; returns how far it goes on, metres.
     float meet(uint32_t other, float at, float otherZone) {
