@@ -137,8 +137,8 @@ struct Hit {
     const glm::vec3 point;
 };
 
-// What a ray meets first. Of surfaces that coincide there it is the one that comesBefore the others;
-// so a ray that has met one goes on a little, through all that may coincide with it.
+// What a ray meets first. Of surfaces that coincide there it is the one that comesBefore the
+// others; so a ray that has met one goes on a little, through all that may coincide with it.
 struct Nearest {
     struct Other {
         uint32_t parent;
