@@ -268,17 +268,19 @@ Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double
             Box box = boxes[c];
             box.min().array() -= kMargin * ofPatch;
             box.max().array() += kMargin * ofPatch;
+            std::optional<Plane> plane;
             std::optional<CutCell> crossed;
             size_t own = 0;
             places.forEachWall(box, [&](uint32_t wall) {
                 ++own;
                 if (wall == walls.of[c] || !isWide(wall, size)) return;
-                if (!crossed) crossed.emplace(cells[c], ofPatch);
-                if (!isHigh(walls.box[wall], crossed->ownPlane(), kLeastHeight * size)) return;
+                if (!plane) plane = CutCell::planeOf(cells[c]);
+                if (!isHigh(walls.box[wall], *plane, kLeastHeight * size)) return;
                 places.forEachCell(wall, box, [&](uint32_t other) {
                     ++own;
-                    if (!haveCommonEdge(cells[c], cells[other], vertexOf))
-                        crossed->meet(cells[other]);
+                    if (haveCommonEdge(cells[c], cells[other], vertexOf)) return;
+                    if (!crossed) crossed.emplace(cells[c], ofPatch);
+                    crossed->meet(cells[other]);
                 });
             });
             if (crossed) found[k - first] = crossed->crossing();

@@ -60,7 +60,7 @@ CutCell::CutCell(const Cell& cell, double size)
       x(glm::normalize(glm::dvec3(cell.a))),
       normal(cell.normal()),
       y(glm::cross(normal, x)),
-      plane(origin, cell.a, cell.b, normal, cell.longestEdge()) {
+      plane(planeOf(cell)) {
     for (const glm::dvec3& place : cornersOf(cell)) outline.push_back({inPlane(place), place});
     onEdges.resize(outline.size());
 }

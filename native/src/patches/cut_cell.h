@@ -40,7 +40,9 @@ class CutCell {
     // What they make of the cell, if that is anything.
     std::optional<Crossing> crossing() const;
 
-    const Plane& ownPlane() const { return plane; }
+    static Plane planeOf(const Cell& cell) {
+        return {cell.origin, cell.a, cell.b, cell.normal(), cell.longestEdge()};
+    }
 
   private:
     // Parts of a line, by the distance along it, metres.
