@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <vector>
 
 #include "bake/error.h"
@@ -97,6 +98,27 @@ Visibility::~Visibility() = default;
 
 namespace {
 
+// A list that filters write to. Embree swallows their exceptions: that there is no memory left is
+// kept until the ray is done.
+struct ParentList {
+    std::vector<uint32_t> all;
+    bool isIncomplete = false;
+
+    bool has(uint32_t parent) const {
+        return std::find(all.begin(), all.end(), parent) != all.end();
+    }
+    void add(uint32_t parent) {
+        try {
+            all.push_back(parent);
+        } catch (const std::bad_alloc&) {
+            isIncomplete = true;
+        }
+    }
+    void check() const {
+        if (isIncomplete) throw std::bad_alloc();
+    }
+};
+
 // How a ray passes what lets light through: in part, or by chance.
 struct Passage {
     const Patches* patches;
@@ -105,7 +127,7 @@ struct Passage {
     float share = 1;               // that has come through, where it passes in part
     // Parents that have taken their part: a ray along the diagonal of a quad meets both of its
     // triangles, and Embree may offer a hit twice.
-    std::vector<uint32_t> passed;
+    ParentList passed;
 
     // Whether the ray goes on through a parent that it meets at a point.
     bool goesOn(uint32_t parent, const glm::vec3& point) {
@@ -114,8 +136,8 @@ struct Passage {
         const float opacity = patches->opacity[patch];
         if (opacity >= 1) return false;
         if (line) return !stops(*patches, patch, *line);
-        if (std::find(passed.begin(), passed.end(), parent) == passed.end()) {
-            passed.push_back(parent);
+        if (!passed.has(parent)) {
+            passed.add(parent);
             share *= 1 - opacity;
         }
         return share > 0;
@@ -145,22 +167,32 @@ struct Nearest {
         float distance;  // metres along the ray
     };
     uint32_t parent = kNoParent;
-    float distance = 0;         // metres along the ray
-    float zone = 0;             // what it meets less than this behind may coincide, metres
-    std::vector<Other> others;  // what it has met about as far away
+    float distance = 0;  // metres along the ray
+    float zone = 0;      // what it meets less than this behind may coincide, metres
+    // What it has met about as far away; of more than that, those that it met first. Without memory
+    // of its own: Embree would swallow the exception if there were none left.
+    std::array<Other, 16> others;
+    size_t count = 0;
 
     // Notes what the ray meets; returns how far it goes on, metres.
     float meet(uint32_t other, float at, float otherZone) {
         if (parent == kNoParent || at < distance) {
-            if (parent != kNoParent && distance <= at + otherZone)
-                others.push_back({parent, distance});
+            if (parent != kNoParent && distance <= at + otherZone) keep({parent, distance});
             parent = other;
             distance = at;
             zone = otherZone;
         } else if (at <= distance + zone) {
-            others.push_back({other, at});
+            keep({other, at});
         }
         return distance + zone;
+    }
+    void keep(const Other& other) {
+        if (count == others.size()) {
+            // What was about as far away as one that was nearer meanwhile.
+            const auto isFar = [&](const Other& o) { return o.distance > distance + zone; };
+            count = size_t(std::remove_if(others.begin(), others.end(), isFar) - others.begin());
+        }
+        if (count < others.size()) others[count++] = other;
     }
 
     // Of the nearest one and those that coincide with it, the first.
@@ -169,11 +201,13 @@ struct Nearest {
         auto enters = [&](uint32_t k) {
             return glm::dot(patches.parents[k].normal, direction) < 0;
         };
-        for (const Other& other : others)
-            if (other.parent != result && other.distance <= distance + zone &&
-                areParallel(patches.parents[result], patches.parents[other.parent]) &&
-                comesBefore(patches, other.parent, enters(other.parent), result, enters(result)))
-                result = other.parent;
+        for (size_t k = 0; k < count; ++k) {
+            const auto& [other, at] = others[k];
+            if (other != result && at <= distance + zone &&
+                areParallel(patches.parents[result], patches.parents[other]) &&
+                comesBefore(patches, other, enters(other), result, enters(result)))
+                result = other;
+        }
         return result;
     }
 };
@@ -332,6 +366,7 @@ float Visibility::visibleShare(uint32_t side, const ShadowRay& shadow) const {
     RTCRay ray{};
     if (!start.setShadowRay(ray, shadow)) return 1;
     embree3.occluded1(embree->scene, &start.context, &ray);
+    start.passage.passed.check();
     return ray.tfar < 0 ? 0.0f : start.passage.share;
 }
 
@@ -423,7 +458,7 @@ namespace {
 struct Crossed {
     RTCIntersectContext context;
     const uint32_t* parentOf;
-    std::vector<uint32_t> parents;
+    ParentList parents;
 };
 
 // Notes a hit and lets the ray go on. A parent is plane and crossed once: a line along the diagonal
@@ -431,8 +466,7 @@ struct Crossed {
 void collect(const RTCFilterFunctionNArguments* args) {
     Crossed& crossed = *reinterpret_cast<Crossed*>(args->context);
     const uint32_t parent = crossed.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
-    if (std::find(crossed.parents.begin(), crossed.parents.end(), parent) == crossed.parents.end())
-        crossed.parents.push_back(parent);
+    if (!crossed.parents.has(parent)) crossed.parents.add(parent);
     args->valid[0] = 0;
 }
 
@@ -459,7 +493,8 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
 
     hits.clear();
     const uint64_t name = lineName(glm::vec3(point), glm::vec3(direction));
-    for (uint32_t index : crossed.parents) {
+    crossed.parents.check();
+    for (uint32_t index : crossed.parents.all) {
         // In double and from the plane of the parent, as the rasteriser does: surfaces that
         // coincide then have the same depth.
         const Parent& parent = patches.parents[index];
