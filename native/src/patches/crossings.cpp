@@ -115,7 +115,7 @@ Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
         while (end < edges.size() && edges[end].low == edges[first].low &&
                edges[end].high == edges[first].high)
             ++end;
-        // Two cells part nothing.
+        // Most edges have two cells, which part nothing, or one.
         if (end - first <= 2) {
             const uint32_t a = edges[first].cell, b = edges[end - 1].cell;
             if (areInOnePlane(normals[a], normals[b])) joined.join(a, b);

@@ -105,7 +105,7 @@ class Subdivision {
             if (crossing != crossings.ofCell.end() && !crossing->second.pieces.empty()) {
                 for (const CellPiece& piece : crossing->second.pieces)
                     cutPiece(c, piece, cellSizes[c]);
-                if (!cell.isTriangle())
+                if (!cell.isTriangle() && patches.parents.size() > firstParent)
                     patches.crossedCells.push_back(
                         {{worldVertex(cell.instance, cell.corner[0]),
                           worldVertex(cell.instance, cell.corner[1]),

@@ -124,10 +124,11 @@ class LightSource {
         return std::nullopt;
     }
 
-    // A point of a patch to look at its light from, by uv uniform in [0, 1)^2, and what it counts for
-    // in the mean over the patch: most of the light of a source close by arrives at few points of it.
-    // Called where choosesPlaces(); the points of others are uniform.
+    // Whether the points of a patch to look at its light from are those of placeOn, and not uniform.
     virtual bool choosesPlaces() const { return false; }
+
+    // Such a point, by uv uniform in [0, 1)^2, and what it counts for in the mean over the patch: most
+    // of the light of a source close by arrives at few points of it.
     virtual PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const;
 
     // Whether no point within `radius` of a point with a unit normal can get any of its light,

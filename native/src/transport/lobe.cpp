@@ -7,7 +7,6 @@
 #include <glm/gtc/constants.hpp>
 
 #include "transport/microfibers.h"
-#include "transport/sphere_sampling.h"
 
 namespace raybundle {
 namespace {
@@ -16,10 +15,11 @@ namespace {
 constexpr int kCosines = 8, kAngles = 16;
 constexpr float kCosine[kCosines] = {0.01985507f, 0.10166676f, 0.23723380f, 0.40828268f,
                                      0.59171732f, 0.76276620f, 0.89833324f, 0.98014493f};
-constexpr float kCosineOfAngle[kAngles / 2 + 1] = {
-    1, 0.92387953f, 0.70710678f, 0.38268343f, 0, -0.38268343f, -0.70710678f, -0.92387953f, -1};
 constexpr float kWeight[kCosines] = {0.05061427f, 0.11119052f, 0.15685332f, 0.18134189f,
                                      0.18134189f, 0.15685332f, 0.11119052f, 0.05061427f};
+// Of the angles on one side of the plane of incidence.
+constexpr float kCosineOfAngle[kAngles / 2 + 1] = {
+    1, 0.92387953f, 0.70710678f, 0.38268343f, 0, -0.38268343f, -0.70710678f, -0.92387953f, -1};
 // Of the table of gloss: steps of the roughness and of the cosine, and for each entry rings of
 // visible normals and normals in them.
 constexpr int kRoughnesses = 21, kTableCosines = 25, kRings = 48, kInRing = 12;

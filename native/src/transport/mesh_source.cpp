@@ -90,9 +90,8 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
         // Twice the half thickness, for what floats make of the height; (x + y)^2 <= 2 x^2 + 2 y^2.
         const double most = 2 * plane.halfThicknessWithin(double(size));
         const double slope = 2 * (plane.halfThicknessWithin(1) - plane.halfThicknessWithin(0));
-        shapes.push_back({plane, face.middle(), face.normal,
-                          emissionOf(face.side) * glm::one_over_pi<float>(), face.area(),
-                          kNear * kNear * size * size, float(2 * most * most),
+        shapes.push_back({plane, face.middle(), emissionOf(face.side) * glm::one_over_pi<float>(),
+                          face.area(), kNear * kNear * size * size, float(2 * most * most),
                           float(2 * slope * slope), patches.parentOf[face.side / 2]});
         totalPower += face.area() * emissionOf(face.side);
     };
@@ -130,7 +129,7 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
     const FaceShape& shape = shapes[choice.face];
     const glm::vec3 d = shape.middle - point;
     const float distance2 = glm::dot(d, d);
-    if (shape.isNotBefore(point, d, distance2)) return {};
+    if (!shape.isBefore(point, -glm::dot(face.normal, d), distance2)) return {};
     const glm::vec2 own(choice.u, uv.y);
     const auto seen = distance2 <= shape.nearSquare ? directionTo(face, point, own) : std::nullopt;
     LightSample sample =
@@ -140,7 +139,7 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
              : surfaceSample(point, receiver, pointOn(face, own), face.normal, shape.radiance,
                              shape.area * choice.weight);
     sample.parent = shape.parent;
-    sample.setMargin(shape.normal, float(shape.plane.thickness));
+    sample.setMargin(face.normal, float(shape.plane.thickness));
     return sample;
 }
 

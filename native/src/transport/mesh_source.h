@@ -60,18 +60,20 @@ class MeshSource : public LightSource {
     // Per face: what its samples need and its corners give.
     struct FaceShape {
         Plane plane;
-        glm::vec3 middle, normal, radiance;  // W/(m^2 sr)
-        float area;                          // m^2
-        float nearSquare;  // of the distance from the middle below which it is near, m^2
+        glm::vec3 middle;
+        glm::vec3 radiance;  // W/(m^2 sr)
+        float area;          // m^2
+        float nearSquare;    // of the distance from the middle below which it is near, m^2
         // A point is in front for certain where the square of its height is larger than the first
         // and so many times the square of its distance from the middle, m^2 and 1.
         float clearSquare, clearSlope;
         uint32_t parent;  // into Patches::parents
 
-        bool isNotBefore(const glm::vec3& point, const glm::vec3& toMiddle, float distance2) const {
-            const float height = -glm::dot(normal, toMiddle);
-            if (height > 0 && height * height > clearSquare + clearSlope * distance2) return false;
-            return plane.side(point) != PlaneSide::FRONT;
+        // Of a point at about that height over the plane, and square of the distance from the middle,
+        // metres and m^2.
+        bool isBefore(const glm::vec3& point, float height, float distance2) const {
+            return (height > 0 && height * height > clearSquare + clearSlope * distance2) ||
+                   plane.side(point) == PlaneSide::FRONT;
         }
     };
     std::vector<FaceShape> shapes;

@@ -264,26 +264,33 @@ bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction,
                      !comesBefore(patches, start.parent, !start.isFront, other, turn < 0));
 }
 
+// Whether a ray goes on through a parent that it hits; id: of the ray in its packet.
+bool goesOn(Start& start, uint32_t id, uint32_t other, const Hit& hit) {
+    return other == start.target[id] ||
+           passesStart(start, other, hit.direction, hit.distance, start.behind[id]) ||
+           start.passage.goesOn(other, hit.point);
+}
+
+// Of rays that are blocked or not.
 void passStart(const RTCFilterFunctionNArguments* args) {
     Start& start = *reinterpret_cast<Start*>(args->context);
     for (uint32_t k = 0; k < args->N; ++k) {
         if (args->valid[k] == 0) continue;
         const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, k)];
-        const Hit hit(args, k);
-        const uint32_t id = RTCRayN_id(args->ray, args->N, k);
-        if (other == start.target[id] ||
-            passesStart(start, other, hit.direction, hit.distance, start.behind[id]) ||
-            start.passage.goesOn(other, hit.point))
+        if (goesOn(start, RTCRayN_id(args->ray, args->N, k), other, Hit(args, k)))
             args->valid[k] = 0;
     }
 }
 
 // Of a ray that is to find the first surface.
 void meetAfterStart(const RTCFilterFunctionNArguments* args) {
-    passStart(args);
-    if (args->valid[0] == 0) return;
     Start& start = *reinterpret_cast<Start*>(args->context);
-    start.meet(args, start.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)], Hit(args));
+    const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
+    const Hit hit(args);
+    if (goesOn(start, 0, other, hit))
+        args->valid[0] = 0;
+    else
+        start.meet(args, other, hit);
 }
 
 // Embree's assertions end the process for rays from or to where squares leave the range of floats.
