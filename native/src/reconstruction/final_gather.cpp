@@ -137,8 +137,9 @@ bool FinalGather::isNear(const Receiver& receiver) const {
     const float longest = std::ldexp(
         std::max(glm::length(parent.a) / parent.countA, glm::length(parent.b) / parent.countB),
         -patches.level(receiver.side / 2));
+    const SobolPoints points(hash(receiver.seed, 0));
     for (uint32_t i = 0; i < kNearRays; ++i) {
-        const glm::vec4 u = sobolPoint(i, hash(receiver.seed, 0));
+        const glm::vec4 u = points[i];
         const glm::vec3 direction = cosineDirection(patches.normal(receiver.side), {u.x, u.y});
         float distance = 0;
         const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction, &distance);

@@ -251,10 +251,11 @@ std::vector<PowerShares> DirectLight::powerShares(float touchDistance) const {
     for (size_t k = 0; k < sources.size(); ++k) {
         if (brightest(sources[k]->power()) <= 0 || !sources[k]->castsShadows) continue;
         const uint32_t own = hash(seed, uint32_t(k));
+        const SobolPoints points(own);
         tbb::enumerable_thread_specific<PowerShares> sums;
         parallelFor(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
-                glm::vec4 u = sobolPoint(i, own);
+                glm::vec4 u = points[i];
                 // Of a mesh of 2^n faces all points could lie alike in their faces' shares, as on
                 // their fronts alone.
                 u.x = std::min(glm::fract(u.x + float(hash(own, i)) * 0x1p-32f / float(rays)),

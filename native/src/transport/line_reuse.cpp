@@ -394,11 +394,12 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
         parallelFor(first, last, [&](size_t k) {
             const uint32_t side = starved[k];
             const glm::vec3 normal = patches.normal(side);
+            const SobolPoints points(hash(seed, side));
             const float m = linesAt(side);
             glm::vec3 direct(0.0f), byDirection(0.0f);
             weights[k] = m;
             for (size_t i = 0; i < rays; ++i) {
-                const glm::vec4 u = sobolPoint(uint32_t(i), hash(seed, side));
+                const glm::vec4 u = points[uint32_t(i)];
                 const glm::vec3 direction = cosineDirection(normal, {u.z, u.w});
                 float distance = 0;
                 const auto hit = visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}),

@@ -41,26 +41,23 @@ uint32_t hash(uint32_t a, uint32_t b) {
     return uint32_t(z ^ (z >> 31));
 }
 
-SobolPoints::SobolPoints(uint32_t seed) : table(firstPoints().data()) {
+SobolPoints::SobolPoints(uint32_t seed) : tables(allTables()) {
     for (uint32_t d = 0; d < 4; ++d) shift[d] = hash(seed, d);
 }
 
-SobolPoints::Bits SobolPoints::bitsOf(uint32_t index) {
-    static const Columns kColumns = sobolColumns();
-    Bits bits{};
-    for (int d = 0; d < 4; ++d)
-        for (uint32_t i = index, k = 0; i; i >>= 1, ++k)
-            if (i & 1) bits[d] ^= kColumns[d][k];
-    return bits;
-}
-
-const std::array<SobolPoints::Bits, SobolPoints::kTableSize>& SobolPoints::firstPoints() {
-    static const std::array<Bits, kTableSize> points = [] {
-        std::array<Bits, kTableSize> first;
-        for (uint32_t i = 0; i < kTableSize; ++i) first[i] = bitsOf(i);
-        return first;
+const SobolPoints::Bits* SobolPoints::allTables() {
+    using Tables = std::array<Bits, size_t(kTables) * kTableSize>;
+    static const Tables tables = [] {
+        const Columns columns = sobolColumns();
+        Tables made{};
+        for (uint32_t table = 0; table < kTables; ++table)
+            for (uint32_t i = 0; i < kTableSize; ++i)
+                for (uint32_t k = 0; k < kTableBits; ++k)
+                    for (uint32_t d = 0; i >> k & 1 && d < 4; ++d)
+                        made[table * kTableSize + i][d] ^= columns[d][table * kTableBits + k];
+        return made;
     }();
-    return points;
+    return tables.data();
 }
 
 }  // namespace raybundle

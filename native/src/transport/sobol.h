@@ -17,7 +17,13 @@ class SobolPoints {
 
     // In [0, 1)^4.
     glm::vec4 operator[](uint32_t index) const {
-        const Bits bits = index < kTableSize ? table[index] : bitsOf(index);
+        Bits bits = tables[index % kTableSize];
+        // The bits of an index each add their own: exclusive or.
+        for (const Bits* next = tables; index >= kTableSize;) {
+            index /= kTableSize;
+            next += kTableSize;
+            for (size_t d = 0; d < 4; ++d) bits[d] ^= next[index % kTableSize][d];
+        }
         glm::vec4 point;
         // The top 24 bits fit a float and stay below 1.
         for (int d = 0; d < 4; ++d) point[d] = float((bits[d] ^ shift[d]) >> 8) * 0x1p-24f;
@@ -26,13 +32,13 @@ class SobolPoints {
 
   private:
     using Bits = std::array<uint32_t, 4>;
-    // Most points are taken from the beginning of the sequence.
-    static constexpr uint32_t kTableSize = 1024;
-    static const std::array<Bits, kTableSize>& firstPoints();
-    static Bits bitsOf(uint32_t index);
+    // Tables one after the other: of the lowest bits of an index, of as many next ones, and so on.
+    static constexpr uint32_t kTableBits = 8, kTableSize = 1 << kTableBits;
+    static constexpr uint32_t kTables = 32 / kTableBits;
+    static const Bits* allTables();
 
     Bits shift;
-    const Bits* table;  // of the first points
+    const Bits* tables;
 };
 
 // A single point of a seed's.
