@@ -13,6 +13,8 @@
 
 #include "test_scenes.h"
 #include "test_shots.h"
+#include "transport/direct_light.h"
+#include "transport/receiver_place.h"
 #include "transport/sobol.h"
 
 namespace raybundle {
@@ -231,6 +233,56 @@ TEST(MeshSource, FillsTheHemisphereInsideOfItself) {
             const Mean inside = meanLight(shots.patches, shot, 0, 1);
             EXPECT_NEAR(inside.value, 5, 5 * 2e-3) << lamp.name << (isTurned ? ", turned" : "");
         }
+    }
+}
+
+// Receivers that are told to get nothing do get nothing, at any of their points; and so is a ceiling
+// closely behind a panel, however wide its patches are.
+TEST(MeshSource, WhatIsOutOfItsSightGetsNothing) {
+    std::mt19937 random(5);
+    for (const bool isPanel : {true, false}) {
+        Scene scene;
+        const glm::dmat4 turn = kTurn;
+        if (isPanel)
+            place(scene, grid("panel", {-0.3f, -0.3f, 0}, {0, 0.6f, 0}, {0.6f, 0, 0}, 3, 2),
+                  grey("", 0, 5), turn);
+        else
+            scene.addLight(areaLight({0, 0, 0}, turn * glm::dvec4(0.3, 0, 0, 0),
+                                     turn * glm::dvec4(0, -0.3, 0, 0), glm::dvec3(7)));
+        const size_t first = scene.instances.size();
+        place(scene, grid("ceiling", {-2, -2, 0.02f}, {0, 4, 0}, {4, 0, 0}, 2, 2), grey("", 0.5f),
+              turn);
+        for (int k = 0; k < 200; ++k) {
+            const glm::vec3 at = anywhere(random);
+            place(scene,
+                  polygons("", {at, at + 0.4f * anywhere(random), at + 0.4f * anywhere(random)},
+                           {{0, 1, 2}}),
+                  grey("", 0.5f));
+        }
+        const ShotScene shots(scene);
+        const DirectLight direct(shots.scene, shots.patches, shots.visibility, 0, kNoLightSet, {});
+        size_t hidden = 0;
+        for (uint32_t side = 0; side < shots.patches.sideCount(); ++side) {
+            const ReceiverPlace place(shots.patches, {side, shots.patches.normal(side), {}, side});
+            bool isHidden = true;
+            for (const auto& source : direct.lightSources()) {
+                const bool isOut = source->isOutOfSight(place);
+                isHidden = isHidden && isOut;
+                for (uint32_t i = 0; isOut && i < 64; ++i) {
+                    const glm::vec4 u = sobolPoint(i, side);
+                    EXPECT_EQ(
+                        source->sample(place.at({u.x, u.y}), place.normal, {u.z, u.w}).irradiance,
+                        glm::vec3(0.0f))
+                        << side;
+                }
+            }
+            const uint32_t instance = shots.patches.parentAt(side).instance;
+            EXPECT_TRUE(isHidden || instance != first) << side;
+            if (instance > first) hidden += isHidden;
+        }
+        // About half of all lie behind the plane or face away.
+        EXPECT_GT(hidden, 150u);
+        EXPECT_LT(hidden, 350u);
     }
 }
 

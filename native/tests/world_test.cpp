@@ -12,6 +12,7 @@
 #include "test_scenes.h"
 #include "test_shots.h"
 #include "transport/mesh_outline.h"
+#include "transport/receiver_place.h"
 #include "transport/sphere_sampling.h"
 #include "transport/world_source.h"
 
@@ -184,10 +185,13 @@ TEST(WorldImage, SamplesFollowTheProductOfLightAndCosine) {
 TEST(WorldImage, IsOutOfSightWhereItIsBlack) {
     const WorldSource world(
         painted(256, 128, [](const glm::dvec3& w) { return glm::vec3(w.z > 0.5 ? 1.0f : 0.0f); }));
-    EXPECT_TRUE(world.isOutOfSight({}, {0, 0, -1}, 1));
-    EXPECT_FALSE(world.isOutOfSight({}, {1, 0, 0}, 1));
-    EXPECT_FALSE(world.isOutOfSight({}, glm::normalize(glm::vec3(1, 0, -1)), 1));
-    EXPECT_TRUE(world.isOutOfSight({}, glm::normalize(glm::vec3(1, 0, -2)), 1));
+    auto isOutOfSight = [&](const glm::vec3& normal) {
+        return world.isOutOfSight({glm::vec3(0.0f), glm::normalize(normal)});
+    };
+    EXPECT_TRUE(isOutOfSight({0, 0, -1}));
+    EXPECT_FALSE(isOutOfSight({1, 0, 0}));
+    EXPECT_FALSE(isOutOfSight({1, 0, -1}));
+    EXPECT_TRUE(isOutOfSight({1, 0, -2}));
 }
 
 // A house on the ground, under an image.

@@ -241,7 +241,7 @@ bool DirectLight::hasPassingLight(uint32_t side) const {
 }
 
 bool DirectLight::isOutOfSight(const LightSource& source, const Place& place) const {
-    return skips.skipFacing && source.isOutOfSight(place.middle, place.normal, place.radius);
+    return skips.skipFacing && source.isOutOfSight(place);
 }
 
 std::vector<PowerShares> DirectLight::powerShares(float touchDistance) const {

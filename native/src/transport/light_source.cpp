@@ -119,9 +119,9 @@ class PointSource : public LightSource {
                 float(all * along * along / (cosine * areaOf(patch)))};
     }
 
-    bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal,
-                      float radius) const override {
-        return glm::dot(normal, position - point) < -(radius + float(light.radius));
+    bool isOutOfSight(const ReceiverPlace& place) const override {
+        return glm::dot(place.normal, position - place.middle) <
+               -(place.reach(place.normal) + float(light.radius));
     }
 
     float distance(const glm::vec3& point) const override {
@@ -217,8 +217,8 @@ class SunSource : public LightSource {
         return std::nullopt;
     }
 
-    bool isOutOfSight(const glm::vec3&, const glm::vec3& normal, float) const override {
-        return glm::dot(normal, direction) <= -sinHalf;
+    bool isOutOfSight(const ReceiverPlace& place) const override {
+        return glm::dot(place.normal, direction) <= -sinHalf;
     }
 
     float distance(const glm::vec3&) const override { return kInfinity; }
@@ -286,14 +286,15 @@ class AreaSource : public LightSource {
         return radiance * float(polygonIrradiance(point, receiver, corners, 4));
     }
 
-    bool isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
-                      float radius) const override {
-        const float height = glm::dot(point - position, normal);
-        const float across = glm::length(point - position - height * normal);
-        return height < -radius ||
-               (!spread.isWhole() && across > (height + radius) * spread.tangent() + radius +
-                                                  glm::length(u) + glm::length(v)) ||
-               glm::dot(receiver, position - point) < -(radius + glm::length(u) + glm::length(v));
+    bool isOutOfSight(const ReceiverPlace& place) const override {
+        const float radius = place.radius, size = glm::length(u) + glm::length(v);
+        const glm::vec3 from = place.middle - position;
+        const float height = glm::dot(from, normal);
+        const float across = glm::length(from - height * normal);
+        return height < -(place.reach(normal) + float(plane.thickness)) ||
+               (!spread.isWhole() &&
+                across > (height + radius) * spread.tangent() + radius + size) ||
+               glm::dot(place.normal, from) > place.reach(place.normal) + size;
     }
 
     float distance(const glm::vec3& point) const override {

@@ -131,10 +131,9 @@ class LightSource {
     // of the light of a source close by arrives at few points of it.
     virtual PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const;
 
-    // Whether no point within `radius` of a point with a unit normal can get any of its light,
-    // occluders aside. False where that is not certain.
-    virtual bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal,
-                              float radius) const = 0;
+    // Whether no point of a receiver can get any of its light, occluders aside. False where that is
+    // not certain.
+    virtual bool isOutOfSight(const ReceiverPlace& place) const = 0;
 
     // A lower bound of the distance from a point to the source, metres.
     virtual float distance(const glm::vec3& point) const = 0;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 namespace raybundle {
 namespace {
@@ -27,29 +26,28 @@ Angle rest(const Angle& x, const Angle& y) {
 
 }  // namespace
 
-LightTree::LightTree(const std::vector<LightFace>& faces) : order(faces.size()) {
-    std::iota(order.begin(), order.end(), 0u);
+LightTree::LightTree(std::vector<LightFace>& faces) {
     nodes.reserve(2 * faces.size());
     if (!faces.empty()) build(faces, 0, uint32_t(faces.size()));
     powerBefore.push_back(0);
-    for (const uint32_t k : order) {
-        const double power = double(faces[k].strength * faces[k].area());
+    for (const LightFace& face : faces) {
+        const double power = double(face.strength * face.area());
         powerBefore.push_back(powerBefore.back() + power);
         perPower.push_back(1 / power);
     }
     sharesPerPower = double(faces.size()) / powerBefore.back();
-    uint32_t place = 0;
+    uint32_t face = 0;
     for (size_t k = 0; k < faces.size(); ++k) {
-        while (powerBefore[place + 1] * sharesPerPower <= double(k)) ++place;
-        placeAt.push_back(place);
+        while (powerBefore[face + 1] * sharesPerPower <= double(k)) ++face;
+        faceAt.push_back(face);
     }
 }
 
-uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, uint32_t count) {
+uint32_t LightTree::build(std::vector<LightFace>& faces, uint32_t first, uint32_t count) {
     glm::vec3 low(INFINITY), high(-INFINITY), middleLow(INFINITY), middleHigh(-INFINITY), sum(0.0f);
     double power = 0;
     for (uint32_t k = first; k < first + count; ++k) {
-        const LightFace& face = faces[order[k]];
+        const LightFace& face = faces[k];
         const glm::vec3 across = face.origin + face.a + face.b;
         for (const glm::vec3& corner : {face.origin, face.origin + face.a, face.origin + face.b,
                                         face.isTriangle ? face.origin : across}) {
@@ -67,7 +65,7 @@ uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, u
     node.axis = glm::length(sum) > 1e-3f * float(count) ? glm::normalize(sum) : glm::vec3(0, 0, 1);
     node.cosine = 1;
     for (uint32_t k = first; k < first + count; ++k)
-        node.cosine = std::min(node.cosine, glm::dot(node.axis, faces[order[k]].normal));
+        node.cosine = std::min(node.cosine, glm::dot(node.axis, faces[k].normal));
     node.sine = sineOf(node.cosine);
     node.power = float(power);
     node.first = first;
@@ -79,13 +77,13 @@ uint32_t LightTree::build(const std::vector<LightFace>& faces, uint32_t first, u
     const glm::vec3 size = middleHigh - middleLow;
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     // By place, then by normal, so that the order of the faces in the mesh does not matter.
-    auto key = [&](uint32_t f) {
-        const glm::vec3 at = faces[f].middle(), n = faces[f].normal;
+    auto key = [&](const LightFace& face) {
+        const glm::vec3 at = face.middle(), n = face.normal;
         return std::array<float, 6>{at[axis], at.x, at.y, n.x, n.y, n.z};
     };
-    const auto begin = order.begin() + first;
+    const auto begin = faces.begin() + first;
     std::nth_element(begin, begin + count / 2, begin + count,
-                     [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+                     [&](const LightFace& a, const LightFace& b) { return key(a) < key(b); });
     build(faces, first, count / 2);
     nodes[index].second = build(faces, first + count / 2, count - count / 2);
     return index;
@@ -120,19 +118,27 @@ bool LightTree::isEven(const Node& node, const glm::vec3& point, const glm::vec3
            height * height > horizon * horizon * distance2;
 }
 
+LightTree::Choice LightTree::chosen(uint32_t face, double at, double all) const {
+    const double own = perPower[face];
+    return {face, float(all * own),
+            std::clamp(float((at - powerBefore[face]) * own), 0.0f, 0.9999999f)};
+}
+
+LightTree::Choice LightTree::chooseByPower(double u) const {
+    const double at = u * powerBefore.back();
+    const uint32_t last = uint32_t(faceAt.size()) - 1;
+    uint32_t face = faceAt[std::min(uint32_t(at * sharesPerPower), last)];
+    // A share holds one more than it starts in, in the mean.
+    while (face < last && powerBefore[face + 1] <= at) ++face;
+    return chosen(face, at, powerBefore.back());
+}
+
 LightTree::Choice LightTree::byPower(const Node& node, double u, double weight) const {
-    const double first = powerBefore[node.first];
-    const double all = powerBefore[node.first + node.count] - first, at = first + u * all;
-    const uint32_t last = node.first + node.count - 1;
-    const size_t share = std::min(size_t(at * sharesPerPower), placeAt.size() - 1);
-    const uint32_t low = std::clamp(placeAt[share], node.first, last);
-    const uint32_t high =
-        share + 1 < placeAt.size() ? std::clamp(placeAt[share + 1], low, last) : last;
-    const auto before = powerBefore.begin();
-    const auto after = std::upper_bound(before + low + 1, before + high + 1, at);
-    const uint32_t place = uint32_t(after - before) - 1;
-    return {order[place], float(weight * all * perPower[place]),
-            std::clamp(float((at - powerBefore[place]) * perPower[place]), 0.0f, 0.9999999f)};
+    const double all = powerBefore[node.first + node.count] - powerBefore[node.first];
+    const double at = powerBefore[node.first] + u * all;
+    const auto begin = powerBefore.begin() + node.first + 1;
+    const auto after = std::upper_bound(begin, begin + node.count - 1, at);
+    return chosen(uint32_t(after - powerBefore.begin()) - 1, at, weight * all);
 }
 
 LightTree::Choice LightTree::chooseOfMany(const glm::vec3& point, const glm::vec3& normal,
@@ -141,7 +147,8 @@ LightTree::Choice LightTree::chooseOfMany(const glm::vec3& point, const glm::vec
     uint32_t index = 0;
     double left = double(u), weight = 1;
     while (nodes[index].count > 1) {
-        if (isEven(nodes[index], point, normal)) return byPower(nodes[index], left, weight);
+        if (isEven(nodes[index], point, normal))
+            return index == 0 ? chooseByPower(left) : byPower(nodes[index], left, weight);
         const uint32_t first = index + 1, second = nodes[index].second;
         const double a = double(importance(nodes[first], point, normal));
         const double b = double(importance(nodes[second], point, normal));
@@ -153,7 +160,7 @@ LightTree::Choice LightTree::chooseOfMany(const glm::vec3& point, const glm::vec
         weight *= (a + b) * own;
         left = (isFirst ? at : at - a) * own;
     }
-    return {order[nodes[index].first], float(weight), std::clamp(float(left), 0.0f, 0.9999999f)};
+    return {nodes[index].first, float(weight), std::clamp(float(left), 0.0f, 0.9999999f)};
 }
 
 }  // namespace raybundle

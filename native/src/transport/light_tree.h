@@ -34,7 +34,8 @@ struct LightFace {
 class LightTree {
   public:
     LightTree() = default;
-    explicit LightTree(const std::vector<LightFace>& faces);
+    // Brings the faces into its own order.
+    explicit LightTree(std::vector<LightFace>& faces);
 
     struct Choice {
         uint32_t face;  // into the faces
@@ -42,11 +43,11 @@ class LightTree {
         float u;        // what is left of the random number, uniform in [0, 1)
     };
     // By the power alone; u uniform in [0, 1). There must be a face.
-    Choice chooseByPower(double u) const { return byPower(nodes.front(), u, 1); }
+    Choice chooseByPower(double u) const;
     // By the bounds of what a plane with that normal at a point gets from each cluster; u uniform in
     // [0, 1).
     Choice choose(const glm::vec3& point, const glm::vec3& normal, float u) const {
-        return order.size() == 1 ? Choice{order[0], 1, u} : chooseOfMany(point, normal, u);
+        return nodes.size() == 1 ? Choice{0, 1, u} : chooseOfMany(point, normal, u);
     }
 
   private:
@@ -58,23 +59,24 @@ class LightTree {
         glm::vec3 axis;         // of the cone of normals
         float cosine, sine;     // of half its opening
         float power;            // sum of the channels, W
-        uint32_t first, count;  // of the faces in `order`; a leaf has one
+        uint32_t first, count;  // of the faces; a leaf has one
         uint32_t second;        // the second child; the first one follows
     };
-    uint32_t build(const std::vector<LightFace>& faces, uint32_t first, uint32_t count);
+    uint32_t build(std::vector<LightFace>& faces, uint32_t first, uint32_t count);
     static float importance(const Node& node, const glm::vec3& point, const glm::vec3& normal);
 
     // Whether its faces give the plane about what their powers say.
     static bool isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal);
     // Of a cluster, itself chosen with that weight.
     Choice byPower(const Node& node, double u, double weight) const;
+    // The face in which the power of all before comes to `at`, W; all: of those it was chosen among.
+    Choice chosen(uint32_t face, double at, double all) const;
 
-    std::vector<uint32_t> order;
-    std::vector<double> powerBefore;  // per place in `order`, and of all: sum of the channels, W
-    // Of as many equal shares of the power as there are faces: the place that each starts in.
-    std::vector<uint32_t> placeAt;
-    double sharesPerPower = 0;     // 1/W
-    std::vector<double> perPower;  // per place in `order`: one over its own, 1/W
+    std::vector<double> powerBefore;  // per face, and of all: sum of the channels, W
+    std::vector<double> perPower;     // per face: one over its own, 1/W
+    // Of as many equal shares of the power as there are faces: the face that each starts in.
+    std::vector<uint32_t> faceAt;
+    double sharesPerPower = 0;  // 1/W
     std::vector<Node> nodes;
 };
 

@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "bake/cancellation.h"
+#include "transport/receiver_place.h"
 #include "transport/sphere_sampling.h"
 #include "transport/spherical_triangle.h"
 
@@ -71,6 +72,7 @@ MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& pare
     wholeExtent = std::max(double(extent), 0.5 * whole.diagonal());
     collectFaces(parents, back);
     tree = LightTree(faces);
+    for (const LightFace& face : faces) shapes.push_back(shapeOf(face));
     if (!sideEmission) outline = MeshOutline(patches, parents, back == 1, wholeExtent);
 }
 
@@ -83,16 +85,9 @@ void MeshSource::boundSource(const std::vector<uint32_t>& parents) {
 }
 
 void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t back) {
-    auto add = [&](const LightFace& face, const Plane& plane) {
+    auto add = [&](const LightFace& face) {
         if (!(face.strength * face.area() > 0)) return;
         faces.push_back(face);
-        const float size = 0.5f * (glm::length(face.a) + glm::length(face.b));
-        // Twice the half thickness, for what floats make of the height; (x + y)^2 <= 2 x^2 + 2 y^2.
-        const double most = 2 * plane.halfThicknessWithin(double(size));
-        const double slope = 2 * (plane.halfThicknessWithin(1) - plane.halfThicknessWithin(0));
-        shapes.push_back({plane, face.middle(), emissionOf(face.side) * glm::one_over_pi<float>(),
-                          face.area(), kNear * kNear * size * size, float(2 * most * most),
-                          float(2 * slope * slope), patches.parentOf[face.side / 2]});
         totalPower += face.area() * emissionOf(face.side);
     };
     for (uint32_t index : parents) {
@@ -104,9 +99,8 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
                        parent.isTriangle,
                        strength(emission),
                        2 * parent.firstPatch + back};
-        const Plane plane(parent.origin, parent.a, parent.b, face.normal, wholeExtent);
         if (!sideEmission) {
-            add(face, plane);
+            add(face);
             continue;
         }
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
@@ -116,9 +110,27 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
             face.b = patches.point(p, {0, 1}) - face.origin;
             face.side = 2 * p + back;
             face.strength = strength(emissionOf(face.side));
-            add(face, plane);
+            add(face);
         }
     }
+}
+
+MeshSource::FaceShape MeshSource::shapeOf(const LightFace& face) const {
+    const uint32_t index = patches.parentOf[face.side / 2];
+    const Parent& parent = patches.parents[index];
+    const Plane plane(parent.origin, parent.a, parent.b, face.normal, wholeExtent);
+    const float size = 0.5f * (glm::length(face.a) + glm::length(face.b));
+    // Twice the half thickness, for what floats make of the height; (x + y)^2 <= 2 x^2 + 2 y^2.
+    const double most = 2 * plane.halfThicknessWithin(double(size));
+    const double slope = 2 * (plane.halfThicknessWithin(1) - plane.halfThicknessWithin(0));
+    return {plane,
+            face.middle(),
+            emissionOf(face.side) * glm::one_over_pi<float>(),
+            face.area(),
+            kNear * kNear * size * size,
+            float(2 * most * most),
+            float(2 * slope * slope),
+            index};
 }
 
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
@@ -149,11 +161,13 @@ std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
     return emission * float(outline.irradiance(point, receiver) / glm::pi<double>());
 }
 
-bool MeshSource::isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
-                              float radius) const {
-    if (glm::dot(receiver, centre - point) < -(radius + extent)) return true;
-    if (isEnclosed && whole.distance(glm::dvec3(point)) > double(radius)) return true;
-    return outline.plane() && outline.plane()->height(point) < -double(radius);
+bool MeshSource::isOutOfSight(const ReceiverPlace& place) const {
+    if (glm::dot(place.normal, centre - place.middle) < -(place.reach(place.normal) + extent))
+        return true;
+    if (isEnclosed && whole.distance(glm::dvec3(place.middle)) > double(place.radius)) return true;
+    const Plane* const plane = outline.plane();
+    return plane && plane->height(place.middle) <
+                        -(double(place.reach(glm::vec3(plane->normal))) + plane->thickness);
 }
 
 EmittedRay MeshSource::emit(const glm::vec4& r, float) const {

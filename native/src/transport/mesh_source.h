@@ -30,8 +30,7 @@ class MeshSource : public LightSource {
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& receiver) const override;
     bool staysInside() const override { return isEnclosed; }
-    bool isOutOfSight(const glm::vec3& point, const glm::vec3& receiver,
-                      float radius) const override;
+    bool isOutOfSight(const ReceiverPlace& place) const override;
     float distance(const glm::vec3& point) const override {
         return glm::length(centre - point) - extent;
     }
@@ -55,7 +54,7 @@ class MeshSource : public LightSource {
     glm::vec3 centre{0.0f};
     float extent = 0;        // radius of a sphere around centre, metres
     double wholeExtent = 0;  // of one around what it is part of
-    // Sides of parents, or of patches where the emission varies.
+    // Sides of parents, or of patches where the emission varies; in the tree's order.
     std::vector<LightFace> faces;
     // Per face: what its samples need and its corners give.
     struct FaceShape {
@@ -76,6 +75,7 @@ class MeshSource : public LightSource {
                    plane.side(point) == PlaneSide::FRONT;
         }
     };
+    FaceShape shapeOf(const LightFace& face) const;
     std::vector<FaceShape> shapes;
     LightTree tree;
     MeshOutline outline;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cmath>
 #include <glm/glm.hpp>
 
 #include "patches/patches.h"
@@ -15,11 +16,13 @@ struct ReceiverPlace {
     float radius = 0;  // of a sphere around the middle that holds it, metres
     bool isTriangle = false;
 
-    ReceiverPlace(const Patches& patches, const Receiver& receiver) : normal(receiver.normal) {
-        if (receiver.point) {
-            origin = middle = *receiver.point;
-            return;
-        }
+    // A point.
+    ReceiverPlace(const glm::vec3& point, const glm::vec3& normal)
+        : origin(point), middle(point), normal(normal) {}
+
+    ReceiverPlace(const Patches& patches, const Receiver& receiver)
+        : ReceiverPlace(receiver.point.value_or(glm::vec3(0.0f)), receiver.normal) {
+        if (receiver.point) return;
         const uint32_t patch = receiver.side / 2;
         const Parent& parent = patches.parents[patches.parentOf[patch]];
         isTriangle = parent.isTriangle;
@@ -34,6 +37,10 @@ struct ReceiverPlace {
     glm::vec3 at(glm::vec2 uv) const {
         if (isTriangle && uv.x + uv.y > 1) uv = 1.0f - uv;
         return origin + uv.x * a + uv.y * b;
+    }
+    // No point of it is further from the middle along that direction (unit), metres.
+    float reach(const glm::vec3& direction) const {
+        return 0.5f * (std::abs(glm::dot(a, direction)) + std::abs(glm::dot(b, direction)));
     }
     glm::vec3 centroid() const { return isTriangle ? origin + (a + b) / 3.0f : middle; }
 };

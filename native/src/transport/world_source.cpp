@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 #include <limits>
 
+#include "transport/receiver_place.h"
 #include "transport/sphere_sampling.h"
 
 namespace raybundle {
@@ -328,8 +329,8 @@ bool WorldSource::isSeen(uint32_t index, const glm::vec3& normal) const {
     return isSeen(index + 1, normal) || isSeen(region.second, normal);
 }
 
-bool WorldSource::isOutOfSight(const glm::vec3&, const glm::vec3& normal, float) const {
-    return !isSeen(0, normal);
+bool WorldSource::isOutOfSight(const ReceiverPlace& place) const {
+    return !isSeen(0, place.normal);
 }
 
 float WorldSource::distance(const glm::vec3&) const {

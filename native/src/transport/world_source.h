@@ -40,7 +40,7 @@ class WorldSource : public LightSource {
                                  const std::vector<float>& seen) const override;
     LightSample sampleSeen(const glm::vec3& normal, glm::vec2 uv,
                            const std::vector<float>& sumOfSeen) const override;
-    bool isOutOfSight(const glm::vec3& point, const glm::vec3& normal, float radius) const override;
+    bool isOutOfSight(const ReceiverPlace& place) const override;
     float distance(const glm::vec3& point) const override;
     int mostSamples() const override { return 1024; }
     bool surrounds() const override { return true; }
