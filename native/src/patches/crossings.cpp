@@ -50,14 +50,15 @@ struct CellEdge {
 };
 
 // Of the cells with patches; those of one edge side by side.
-std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const VertexOf& vertexOf) {
+std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const CellVertices& vertices) {
     std::vector<CellEdge> edges;
+    edges.reserve(4 * cells.size());
     for (uint32_t c = 0; c < cells.size(); ++c) {
         throwIfCancelledAt(c);
         if (!cells[c].hasPatches) continue;
         const int n = cells[c].cornerCount();
         for (int k = 0; k < n; ++k) {
-            const uint32_t from = vertexOf(cells[c], k), to = vertexOf(cells[c], (k + 1) % n);
+            const uint32_t from = vertices[c][size_t(k)], to = vertices[c][size_t((k + 1) % n)];
             edges.push_back({std::min(from, to), std::max(from, to), c, k});
         }
     }
@@ -105,8 +106,8 @@ struct Walls {
 // The walls; boxes: per cell. And parts the edges at which cells of one plane meet others that stand on
 // them there, by common vertices.
 Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
-                const VertexOf& vertexOf, std::map<uint32_t, Crossing>& crossings) {
-    const std::vector<CellEdge> edges = sortedEdges(cells, vertexOf);
+                const CellVertices& vertices, std::map<uint32_t, Crossing>& crossings) {
+    const std::vector<CellEdge> edges = sortedEdges(cells, vertices);
     std::vector<glm::dvec3> normals(cells.size());
     for (const CellEdge& edge : edges) normals[edge.cell] = cells[edge.cell].normal();
     DisjointSets joined(cells.size());
@@ -150,23 +151,16 @@ Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
     return walls;
 }
 
-// Visits what is in a tree whose boxes meet another box.
+// Visits what is in the parts of a tree whose boxes meet another box. Not by Eigen::BVIntersect, which
+// allocates for each query.
 template <class Visit>
-struct MeetBox {
-    const Box& box;
-    const Visit& visit;
-
-    bool intersectVolume(const Box& volume) const { return volume.intersects(box); }
-    bool intersectObject(uint32_t index) const {
-        visit(index);
-        return false;
-    }
-};
-
-template <class Visit>
-void forEachIn(const Tree& tree, const Box& box, const Visit& visit) {
-    MeetBox<Visit> query{box, visit};
-    Eigen::BVIntersect(tree, query);
+void forEachIn(const Tree& tree, Tree::Index part, const Box& box, const Visit& visit) {
+    Tree::VolumeIterator inner = nullptr, innerEnd = nullptr;
+    Tree::ObjectIterator leaf = nullptr, leafEnd = nullptr;
+    tree.getChildren(part, inner, innerEnd, leaf, leafEnd);
+    for (; leaf != leafEnd; ++leaf) visit(*leaf);
+    while (innerEnd != inner)
+        if (tree.getVolume(*--innerEnd).intersects(box)) forEachIn(tree, *innerEnd, box, visit);
 }
 
 // The cells of wide walls, by place.
@@ -194,11 +188,11 @@ class CellsByPlace {
     // The walls that may meet a box, and the cells of one that may.
     template <class Visit>
     void forEachWall(const Box& box, const Visit& visit) const {
-        forEachIn(walls, box, visit);
+        forEachIn(walls, walls.getRootIndex(), box, visit);
     }
     template <class Visit>
     void forEachCell(uint32_t wall, const Box& box, const Visit& visit) const {
-        forEachIn(trees[wall], box, visit);
+        forEachIn(trees[wall], trees[wall].getRootIndex(), box, visit);
     }
 
   private:
@@ -206,19 +200,18 @@ class CellsByPlace {
     Tree walls;
 };
 
-bool haveCommonEdge(const Cell& a, const Cell& b, const VertexOf& vertexOf) {
-    std::array<uint32_t, 4> ofB;
-    const int nA = a.cornerCount(), nB = b.cornerCount();
-    for (int k = 0; k < nB; ++k) ofB[size_t(k)] = vertexOf(b, k);
+// a, b: vertices of two cells with that many corners.
+bool haveCommonEdge(const std::array<uint32_t, 4>& a, int nA, const std::array<uint32_t, 4>& b,
+                    int nB) {
     auto placeInB = [&](uint32_t vertex) {
         for (int k = 0; k < nB; ++k)
-            if (ofB[size_t(k)] == vertex) return k;
+            if (b[size_t(k)] == vertex) return k;
         return -1;
     };
     for (int k = 0; k < nA; ++k) {
-        const int from = placeInB(vertexOf(a, k));
+        const int from = placeInB(a[size_t(k)]);
         if (from < 0) continue;
-        const int to = placeInB(vertexOf(a, (k + 1) % nA));
+        const int to = placeInB(a[size_t((k + 1) % nA)]);
         if (to >= 0 && (to == (from + 1) % nB || from == (to + 1) % nB)) return true;
     }
     return false;
@@ -234,11 +227,12 @@ bool isHigh(const Box& box, const Plane& plane, double least) {
 }  // namespace
 
 Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double>& sizes,
-                        const VertexOf& vertexOf) {
+                        const CellVertices& vertices) {
     Crossings result;
     std::vector<Box> boxes;
+    boxes.reserve(cells.size());
     for (const Cell& cell : cells) boxes.push_back(boxOf(cell));
-    const Walls walls = findWalls(cells, boxes, vertexOf, result.ofCell);
+    const Walls walls = findWalls(cells, boxes, vertices, result.ofCell);
     auto isWide = [&](uint32_t wall, double size) {
         return walls.width(wall) >= kLeastWidth * size;
     };
@@ -278,7 +272,9 @@ Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double
                 if (!isHigh(walls.box[wall], *plane, kLeastHeight * size)) return;
                 places.forEachCell(wall, box, [&](uint32_t other) {
                     ++own;
-                    if (haveCommonEdge(cells[c], cells[other], vertexOf)) return;
+                    if (haveCommonEdge(vertices[c], cells[c].cornerCount(), vertices[other],
+                                       cells[other].cornerCount()))
+                        return;
                     if (!crossed) crossed.emplace(cells[c], ofPatch);
                     crossed->meet(cells[other]);
                 });

@@ -10,8 +10,8 @@
 // Differs: a line cuts a whole piece of the face, and only where it runs along about a patch of it.
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <vector>
 
@@ -20,8 +20,8 @@
 
 namespace raybundle {
 
-// The common vertex that corner k of a cell is.
-using VertexOf = std::function<uint32_t(const Cell& cell, int k)>;
+// Per cell and corner: the common vertex that it is.
+using CellVertices = std::vector<std::array<uint32_t, 4>>;
 
 struct Crossings {
     std::map<uint32_t, Crossing> ofCell;  // of the cells that have any
@@ -31,6 +31,6 @@ struct Crossings {
 // sizes: per cell, edge of a patch where the cell is no smaller, metres. Large cells come first: what exceeds some tests a cell, or a quarter more patches
 // than there are cells, stays whole.
 Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double>& sizes,
-                        const VertexOf& vertexOf);
+                        const CellVertices& vertices);
 
 }  // namespace raybundle

@@ -85,10 +85,12 @@ class Subdivision {
                     " faces lie on others that look the same way, whose light they get; merge such "
                     "faces (Merge by Distance), or remove the object if it lies on another");
         }
-        auto vertexOf = [&](const Cell& cell, int k) {
-            return worldVertex(cell.instance, cell.corner[size_t(k)]);
-        };
-        const Crossings crossings = findCrossings(patches.cells, cellSizes, vertexOf);
+        CellVertices vertices(patches.cells.size());
+        for (size_t c = 0; c < vertices.size(); ++c)
+            for (int k = 0; k < patches.cells[c].cornerCount(); ++k)
+                vertices[c][size_t(k)] =
+                    worldVertex(patches.cells[c].instance, patches.cells[c].corner[size_t(k)]);
+        const Crossings crossings = findCrossings(patches.cells, cellSizes, vertices);
         if (!crossings.isAll)
             patches.warnings.push_back(
                 "faces go through each other in so many places that the smaller ones are not cut "
