@@ -126,6 +126,30 @@ TEST(BakeEnergy, IsBalancedUnderTheSky) {
     EXPECT_NEAR(roof, 1, 1e-4);
 }
 
+// What no line met gets in the balance what others of its object get: the power that the world sends
+// does not depend on how many patches lines meet. A ball in the sun, whose light is not asked for.
+TEST(BakeEnergy, HasNoHoleWhereNoLineMetAnything) {
+    Scene scene;
+    place(scene, icosphere("ball", 1, 5, false), grey("ball", 0.8f),
+          glm::translate(glm::dmat4(1), {0, 0, 1.5}), RB_ROLE_OCCLUDE);
+    place(scene, rectangle("ground", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}), grey("ground", 0.8f));
+    scene.addLight(sunLight({0.3, 0.2, 1}, glm::dvec3(1)));
+    scene.setWorld(glm::vec3(0.3f));
+    Json few, many;
+    for (Json* report : {&few, &many}) {
+        Bake bake;
+        bake.settings.linesPerBundle = report == &few ? 2000 : 16000;
+        bake.settings.maxBundles = 64;
+        bake.run(scene);
+        *report = reportOf(bake);
+    }
+    EXPECT_LT(few["lines"].get<double>(), 2 * few["patches"].get<double>());
+    // 0.14 % and 0.01 %; where what no line met got nothing, 1.8 % and 4.7 %.
+    EXPECT_LT(few["energy"]["balance_error"].get<double>(), 5e-3);
+    const double sent = many["energy"]["emitted"];
+    EXPECT_NEAR(few["energy"]["emitted"].get<double>(), sent, 5e-3 * sent);
+}
+
 TEST(BakeOutputs, AreParts) {
     Bake bake;
     setQuick(bake);

@@ -135,7 +135,7 @@ class LineReuseTransport : public Transport {
 
     std::vector<float> openShare() const override {
         const LineCounts& counts = input.counts;
-        std::vector<float> share(counts.sideCount(), 0.0f);
+        std::vector<float> share(counts.sideCount(), -1.0f);
         for (size_t i = 0; i < share.size(); ++i)
             if (const uint32_t m = counts.total[i][0] + counts.total[i][1]; m > 0)
                 share[i] = float(counts.sky[i][0] + counts.sky[i][1]) / float(m);

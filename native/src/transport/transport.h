@@ -122,7 +122,8 @@ class Transport {
     // Relative error that both halves have alike, so that their difference does not show it.
     virtual double bias() const { return 0; }
 
-    // Per side: the share of the lines from it that leave the scene.
+    // Per side: the share of the lines from it that leave the scene; below 0 where none met it, so
+    // that nothing is known of what lines bring it.
     virtual std::vector<float> openShare() const = 0;
 };
 
