@@ -50,7 +50,9 @@ class Places {
   public:
     // near: per vertex, within which others are in the same place, metres.
     Places(const std::vector<glm::dvec3>& places, const std::vector<double>& near)
-        : places(places), near(near) {}
+        : places(places), near(near), before(places.size(), kNone) {
+        lastIn.reserve(places.size());
+    }
 
     // The first vertex met that lies where this one does, else itself.
     uint32_t firstAt(uint32_t vertex) {
@@ -63,12 +65,14 @@ class Places {
             for (double x = low.x; x <= high.x; ++x)
                 for (double y = low.y; y <= high.y; ++y)
                     for (double z = low.z; z <= high.z; ++z)
-                        for (uint32_t other : metIn(keyOf({x, y, z}, at)))
-                            if (glm::distance(places[other], place) <=
-                                std::min(near[vertex], near[other]))
-                                return other;
+                        if (const uint32_t other = firstIn(keyOf({x, y, z}, at), vertex);
+                            other != kNone)
+                            return other;
         }
-        met[keyOf(cellOf(place, level), level)].push_back(vertex);
+        uint32_t& last =
+            lastIn.try_emplace(keyOf(cellOf(place, level), level), kNone).first->second;
+        before[vertex] = last;
+        last = vertex;
         return vertex;
     }
 
@@ -82,15 +86,22 @@ class Places {
                uint64_t(int64_t(cell.y)) * 0xC2B2AE3D27D4EB4Fu ^
                uint64_t(int64_t(cell.z)) * 0x165667B19E3779F9u ^ uint64_t(uint32_t(level)) << 48;
     }
-    const std::vector<uint32_t>& metIn(uint64_t key) const {
-        static const std::vector<uint32_t> kNone;
-        const auto found = met.find(key);
-        return found == met.end() ? kNone : found->second;
+    // The first met in a cell that lies where a vertex does; kNone.
+    uint32_t firstIn(uint64_t key, uint32_t vertex) const {
+        const auto last = lastIn.find(key);
+        uint32_t first = kNone;
+        for (uint32_t other = last == lastIn.end() ? kNone : last->second; other != kNone;
+             other = before[other])
+            if (glm::distance(places[other], places[vertex]) <= std::min(near[vertex], near[other]))
+                first = other;
+        return first;
     }
 
+    static constexpr uint32_t kNone = UINT32_MAX;
     const std::vector<glm::dvec3>& places;
     const std::vector<double>& near;
-    std::unordered_map<uint64_t, std::vector<uint32_t>> met;
+    std::unordered_map<uint64_t, uint32_t> lastIn;  // of those met, by cell
+    std::vector<uint32_t> before;  // per vertex met: the one met before in its cell
 };
 
 }  // namespace
