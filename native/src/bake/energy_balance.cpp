@@ -36,7 +36,7 @@ size_t objectSide(const Patches& patches, size_t side) {
 std::vector<BroughtByLines> broughtByLines(const Patches& patches, const Irradiance& irradiance,
                                            const std::vector<float>& exposedShare,
                                            const std::vector<float>& openShare) {
-    std::vector<BroughtByLines> brought;
+    std::vector<BroughtByLines> brought;  // for as many instances as have patches
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         const size_t of = objectSide(patches, side);
         brought.resize(std::max(brought.size(), of + 1));
@@ -98,8 +98,7 @@ double leakedShare(const Scene& scene, const Patches& patches, const std::vector
     double total = 0;
     for (size_t side = 0; side < weight.size(); ++side) {
         if (open[side] < 0) continue;
-        const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
-        difference[2 * instance + side % 2] +=
+        difference[objectSide(patches, side)] +=
             double(weight[side] * (open[side] - exactOpen[side]));
         total += double(weight[side]);
     }

@@ -34,8 +34,7 @@ class Gaps {
           visibility(visibility),
           touchDistance(touchDistance),
           narrow(patches.sideCount()) {
-        for (const float area : patches.area)
-            farthest = std::max(farthest, kNarrow * std::sqrt(area));
+        for (const float area : patches.area) widest = std::max(widest, kNarrow * std::sqrt(area));
     }
 
     // Looks from each side which gaps are narrow beside it or beside what it meets.
@@ -46,7 +45,7 @@ class Gaps {
             std::array<ShadowRay, kFirstRays> rays;
             for (uint32_t i = 0; i < kFirstRays; ++i) {
                 const glm::vec4 u = points[i];
-                rays[i] = {patches.point(side / 2, {u.x, u.y}), patches.normal(side), farthest};
+                rays[i] = {patches.point(side / 2, {u.x, u.y}), patches.normal(side), widest};
             }
             // Over most sides there is nothing, which takes less time to find for all rays at once.
             std::array<float, kFirstRays> shares;
@@ -54,7 +53,7 @@ class Gaps {
             for (uint32_t i = 0; i < kFirstRays; ++i) {
                 if (shares[i] == 1) continue;
                 uint32_t met = 0;
-                const auto gap = gapAt(side, rays[i].point, rays[i].direction, farthest, &met);
+                const auto gap = gapAt(side, rays[i].point, rays[i].direction, widest, &met);
                 if (!gap) continue;
                 if (*gap < kNarrow * width(side)) narrow[side] = true;
                 if (*gap < kNarrow * width(met)) narrow[met] = true;
@@ -85,9 +84,9 @@ class Gaps {
     // From a point of a side to what is not too far in a direction, metres; none to what touches
     // it.
     std::optional<float> gapAt(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
-                               float most, uint32_t* met = nullptr) const {
+                               float farthest, uint32_t* met = nullptr) const {
         float distance = 0;
-        const auto hit = visibility.firstHit(side, point, direction, &distance, most);
+        const auto hit = visibility.firstHit(side, point, direction, &distance, farthest);
         if (!hit || distance <= std::min(touchDistance, patches.islandAt(side).touchDistance))
             return std::nullopt;
         if (met) *met = *hit;
@@ -97,7 +96,7 @@ class Gaps {
     const Patches& patches;
     const Visibility& visibility;
     const float touchDistance;
-    float farthest = 0;                     // the widest gap that is narrow anywhere, metres
+    float widest = 0;                       // no gap is narrow anywhere that is wider, metres
     std::vector<std::atomic<bool>> narrow;  // per side
 };
 

@@ -20,7 +20,7 @@
 
 namespace raybundle {
 
-// Per cell and corner: the common vertex that it is.
+// Per cell and corner: the common vertex that it is. The fourth of a triangle means nothing.
 using CellVertices = std::vector<std::array<uint32_t, 4>>;
 
 struct Crossings {
@@ -28,8 +28,8 @@ struct Crossings {
     bool isAll = true;                    // whether all that cross were found and cut
 };
 
-// sizes: per cell, edge of a patch where the cell is no smaller, metres. Large cells come first: what exceeds some tests a cell, or a quarter more patches
-// than there are cells, stays whole.
+// sizes: per cell, edge of a patch where the cell is no smaller, metres. Large cells come first: what
+// exceeds some tests a cell, or a quarter more patches than there are cells, stays whole.
 Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double>& sizes,
                         const CellVertices& vertices);
 

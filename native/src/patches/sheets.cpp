@@ -260,8 +260,8 @@ class SheetSearch {
         for (uint32_t p = member.firstParent; p < member.firstParent + member.parentCount; ++p) {
             const Parent& parent = patches.parents[p];
             const glm::vec2 at = parent.affineAt(origin);
-            sheet.parts.push_back({p, parent.isTriangle, at, parent.affineAt(origin + a) - at,
-                                   parent.affineAt(origin + b) - at});
+            sheet.parts.push_back(
+                {p, at, parent.affineAt(origin + a) - at, parent.affineAt(origin + b) - at});
         }
     }
 
@@ -325,8 +325,9 @@ uint32_t Sheet::patchIn(uint32_t uneven, const Patches& all, float s, float t) c
     for (const Part* part = best; part != end && most < 0; ++part) {
         const glm::vec2 st = part->origin + s * part->a + t * part->b;
         // How far inside, in shares of the parent.
-        const float inside = std::min(
-            std::min(st.x, st.y), part->isTriangle ? 1 - st.x - st.y : 1 - std::max(st.x, st.y));
+        const float inside = std::min(std::min(st.x, st.y), all.parents[part->parent].isTriangle
+                                                                ? 1 - st.x - st.y
+                                                                : 1 - std::max(st.x, st.y));
         if (!(inside > most)) continue;
         best = part;
         most = inside;

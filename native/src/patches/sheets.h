@@ -47,7 +47,6 @@ struct Sheet {
     // A parent of an uneven parallelogram, whose affine coordinates are origin + s * a + t * b.
     struct Part {
         uint32_t parent;  // into Patches::parents
-        bool isTriangle;
         glm::vec2 origin, a, b;
     };
     static constexpr uint32_t kUneven = 1u << 30;

@@ -122,8 +122,9 @@ class Transport {
     // Relative error that both halves have alike, so that their difference does not show it.
     virtual double bias() const { return 0; }
 
-    // Per side: the share of the lines from it that leave the scene; below 0 where none met it, so
-    // that nothing is known of what lines bring it.
+    // Per side: the share of the lines from it that leave the scene. Where none met it 0, if the power
+    // that it would get went to those that lines met; below 0 if each of these has that of its own
+    // area alone, and nothing is known of this one's.
     virtual std::vector<float> openShare() const = 0;
 };
 
