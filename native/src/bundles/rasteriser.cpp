@@ -31,7 +31,7 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
     };
     for (uint32_t i = 0; i < patches.sheets.loose.size(); ++i) {
         const Parent& parent = patches.parents[patches.sheets.loose[i]];
-        islands[parent.island].loose.push_back(i);
+        islands[parent.island].loose.push_back(patches.sheets.loose[i]);
         useAll(parent);
     }
     if (all)
@@ -72,24 +72,10 @@ void Rasteriser::begin(const Bundle& bundle) {
     }
     if (shown.empty()) whole.low = whole.high = glm::dvec2(0.0);
     findRegions();
-    showIslands(std::move(shown), whole.low, whole.high);
+    showIslands(shown, whole.low, whole.high);
     if (windows.empty()) return;
 
-    bounds.clear();
-    auto addBounds = [&](int edges, const auto& vertexAt) {
-        Rectangle r{projected[vertexAt(0)], projected[vertexAt(0)]};
-        for (int k = 1; k < edges; ++k) {
-            r.low = glm::min(r.low, projected[vertexAt(k)]);
-            r.high = glm::max(r.high, projected[vertexAt(k)]);
-        }
-        bounds.push_back(r);
-    };
-    for (const Sheet& sheet : patches.sheets.sheets)
-        addBounds(int(sheet.outline.size()), [&](int k) { return sheet.outline[size_t(k)][0]; });
-    for (uint32_t i : patches.sheets.loose) {
-        const Parent& parent = patches.parents[i];
-        addBounds(parent.isTriangle ? 3 : 4, [&](int k) { return parent.vertex[size_t(k)]; });
-    }
+    for (uint32_t k : shown) findBounds(islands[k]);
     // The shadows of the boxes do not depend on the shift, or lines near their borders would not be
     // uniform.
     openings.clear();
@@ -103,6 +89,34 @@ void Rasteriser::begin(const Bundle& bundle) {
         openings.push_back({(at - reach) * perPixel, (at + reach) * perPixel});
     }
     findTaken(windows.size());
+}
+
+void Rasteriser::Bounds::add(const glm::dvec2& point) {
+    for (int c = 0; c < 2; ++c) {
+        const float nearest = float(point[c]);
+        const float step = std::abs(nearest) * std::numeric_limits<float>::epsilon();
+        low[c] = std::min(low[c], nearest - step);
+        high[c] = std::max(high[c], nearest + step);
+    }
+}
+
+void Rasteriser::findBounds(Island& island) {
+    island.sheetBounds.clear();
+    for (uint32_t i : island.sheets) {
+        Bounds bounds;
+        for (const auto& edge : patches.sheets.sheets[i].outline) bounds.add(projected[edge[0]]);
+        island.sheetBounds.push_back(bounds);
+    }
+    island.looseBounds.clear();
+    island.groupBounds.assign((island.loose.size() + kGroup - 1) / kGroup, Bounds());
+    for (size_t k = 0; k < island.loose.size(); ++k) {
+        const Parent& parent = patches.parents[island.loose[k]];
+        Bounds bounds;
+        for (size_t v = 0; v < (parent.isTriangle ? 3 : 4); ++v)
+            bounds.add(projected[parent.vertex[v]]);
+        island.looseBounds.push_back(bounds);
+        island.groupBounds[k / kGroup].add(bounds);
+    }
 }
 
 void Rasteriser::showIslands(std::vector<uint32_t> shown, const glm::dvec2& low,
@@ -195,12 +209,10 @@ bool Rasteriser::lookThrough(size_t window) {
         const Island& island = islands[k];
         if (island.vertices.empty() || !isInView(island.shadow)) continue;
         // The shadow of a long wire lies in many views, the wire itself in few.
-        const size_t sheets = patches.sheets.sheets.size();
-        auto isSeen = [&](size_t i) { return isInView(bounds[i]); };
+        auto isSeen = [&](const Bounds& bounds) { return isInView(bounds); };
         if (islands.size() > 1 &&
-            std::none_of(island.sheets.begin(), island.sheets.end(), isSeen) &&
-            std::none_of(island.loose.begin(), island.loose.end(),
-                         [&](uint32_t i) { return isSeen(sheets + i); }))
+            std::none_of(island.sheetBounds.begin(), island.sheetBounds.end(), isSeen) &&
+            std::none_of(island.groupBounds.begin(), island.groupBounds.end(), isSeen))
             continue;
         lowest = inSight.empty() ? island.lowest : std::min(lowest, island.lowest);
         highest = inSight.empty() ? island.highest : std::max(highest, island.highest);

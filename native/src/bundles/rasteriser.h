@@ -34,6 +34,9 @@ namespace raybundle {
 class Rasteriser {
   public:
     static constexpr int kRun = 64;  // pixels of a row that are looked at together, at most
+    // Loose parents beside each other in the mesh that are passed over together.
+    static constexpr size_t kGroup = 32;
+    static constexpr double kSlack = 1e-6;  // pixels: more than rounding moves an edge by
 
     // pixelSize: edge of a pixel in metres, outside of the windows. `patches` must outlive it.
     // Keeps its memory from bundle to bundle. ROULETTE has no windows.
@@ -100,13 +103,13 @@ class Rasteriser {
             return;
         }
         const std::vector<Sheet>& sheets = patches.sheets.sheets;
-        const std::vector<uint32_t>& loose = patches.sheets.loose;
         for (uint32_t island : inSight) {
-            for (uint32_t i : islands[island].sheets)
-                if (level == 0 || isInView(bounds[i])) sampleSheet(sheets[i], visit);
-            for (uint32_t i : islands[island].loose)
-                if (level == 0 || isInView(bounds[sheets.size() + i]))
-                    sampleParent(patches.parents[loose[i]], visit);
+            const Island& own = islands[island];
+            for (size_t k = 0; k < own.sheets.size(); ++k)
+                if (windows.empty() || mayHavePixels(own.sheetBounds[k]))
+                    sampleSheet(sheets[own.sheets[k]], visit);
+            forEachLooseInView(
+                own, [&](size_t k) { sampleParent(patches.parents[own.loose[k]], visit); });
         }
     }
     template <class Visit>
@@ -142,10 +145,23 @@ class Rasteriser {
         glm::dvec2 low{std::numeric_limits<double>::max()},
             high{-std::numeric_limits<double>::max()};
     };
+    // The same, a little larger, in half the memory.
+    struct Bounds {
+        glm::vec2 low{std::numeric_limits<float>::max()}, high{-std::numeric_limits<float>::max()};
+
+        void add(const glm::dvec2& point);
+        void add(const Bounds& other) {
+            low = glm::min(low, other.low);
+            high = glm::max(high, other.high);
+        }
+    };
     // What an island has, and where it is seen along the bundle in hand.
     struct Island {
-        std::vector<uint32_t> sheets, loose;  // into Patches::sheets
-        std::vector<uint32_t> vertices;       // all but those inside of sheets
+        std::vector<uint32_t> sheets;    // into Patches::sheets
+        std::vector<uint32_t> loose;     // parents that are in none, as the mesh has them
+        std::vector<uint32_t> vertices;  // all but those inside of sheets
+        // If there are windows, of each sheet, of each loose parent, and of groups of these.
+        std::vector<Bounds> sheetBounds, looseBounds, groupBounds;
         Rectangle shadow;
         double lowest = 0, highest = 0;  // depth, metres
     };
@@ -163,6 +179,33 @@ class Rasteriser {
         return r.high.x * zoom > corner.x && r.low.x * zoom < corner.x + width &&
                r.high.y * zoom > corner.y && r.low.y * zoom < corner.y + height;
     }
+    bool isInView(const Bounds& b) const {
+        return isInView(Rectangle{glm::dvec2(b.low), glm::dvec2(b.high)});
+    }
+    // False where no pixel of the view has its centre within.
+    bool mayHavePixels(const Bounds& b) const {
+        const glm::dvec2 low = glm::dvec2(b.low) * zoom - corner - kSlack;
+        const glm::dvec2 high = glm::dvec2(b.high) * zoom - corner + kSlack;
+        return hasPixels(low.x, high.x, width) && hasPixels(low.y, high.y, height);
+    }
+    static bool hasPixels(double low, double high, int count) {
+        return std::max(0.0, std::ceil(low - 0.5)) < std::min(double(count), std::ceil(high - 0.5));
+    }
+    // Calls visit(k) for those of Island::loose that may have pixels in the view.
+    template <class Visit>
+    void forEachLooseInView(const Island& island, const Visit& visit) const {
+        if (windows.empty()) {
+            for (size_t k = 0; k < island.loose.size(); ++k) visit(k);
+            return;
+        }
+        for (size_t group = 0; group < island.groupBounds.size(); ++group) {
+            if (!isInView(island.groupBounds[group])) continue;
+            const size_t end = std::min(kGroup * (group + 1), island.loose.size());
+            for (size_t k = kGroup * group; k < end; ++k)
+                if (mayHavePixels(island.looseBounds[k])) visit(k);
+        }
+    }
+    void findBounds(Island& island);
     // Marks the pixels that belong to finer windows; of windows as fine, to the first.
     void findTaken(size_t window);
 
@@ -181,12 +224,11 @@ class Rasteriser {
     double lowest = 0, highest = 0;  // depth, metres
     std::vector<Island> islands;     // of Patches::islands
     std::vector<Region> regions;
-    std::vector<uint32_t> inSight;      // islands, ascending
-    std::vector<glm::dvec2> projected;  // per vertex: on the plane
-    std::vector<Rectangle> bounds;      // per sheet, then per loose parent, if there are windows
-    std::vector<Rectangle> openings;    // per window: what of the plane is in it
-    std::vector<uint8_t> taken;         // per pixel of the view; empty: none
-    std::vector<double> depth;          // per vertex, metres
+    std::vector<uint32_t> inSight;            // islands, ascending
+    std::vector<glm::dvec2> projected;        // per vertex: on the plane
+    std::vector<Rectangle> openings;          // per window: what of the plane is in it
+    std::vector<uint8_t> taken;               // per pixel of the view; empty: none
+    std::vector<double> depth;                // per vertex, metres
     std::vector<double> spanLeft, spanRight;  // per row of a parent, pixels
     Roulette roulette;
     PolygonFiller filler;
@@ -232,20 +274,23 @@ template <class EdgeAt, class PatchAt, class LookUp, class Visit>
 void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& origin,
                                const glm::vec3& a, const glm::vec3& b, const PatchAt& patchAt,
                                const LookUp& lookUp, const Visit& visit) {
+    double xMin = std::numeric_limits<double>::max(), xMax = -xMin;
     double yMin = std::numeric_limits<double>::max(), yMax = -yMin;
     double zMin = std::numeric_limits<double>::max(), zMax = -zMin;
     for (int k = 0; k < edges; ++k) {
         const uint32_t vertex = edge(k)[0];
-        const double y = inView(vertex).y;
-        yMin = std::min(yMin, y);
-        yMax = std::max(yMax, y);
+        const glm::dvec2 p = inView(vertex);
+        xMin = std::min(xMin, p.x);
+        xMax = std::max(xMax, p.x);
+        yMin = std::min(yMin, p.y);
+        yMax = std::max(yMax, p.y);
         zMin = std::min(zMin, depth[vertex]);
         zMax = std::max(zMax, depth[vertex]);
     }
     // Row y belongs to the outline if its centre y + 0.5 lies in [yMin, yMax).
     const int row0 = std::max(0, int(std::ceil(yMin - 0.5)));
     const int row1 = std::min(height, int(std::ceil(yMax - 0.5)));
-    if (row0 >= row1) return;
+    if (row0 >= row1 || !hasPixels(xMin - kSlack, xMax + kSlack, width)) return;
     Plane plane;
     if (!findPlane(origin, a, b, plane)) return;
 
