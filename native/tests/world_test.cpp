@@ -107,6 +107,33 @@ TEST(WorldImage, AHalfWhiteSphereHasAClosedForm) {
     }
 }
 
+TEST(WorldImage, IrradianceIsTheIntegralOverItsPixels) {
+    constexpr int kWidth = 512, kHeight = 256;
+    const WorldImage image = painted(kWidth, kHeight, sunAndSky);
+    const WorldSource world(image);
+    std::mt19937 random(1);
+    std::uniform_real_distribution<float> uniform(0, 1);
+    for (int k = 0; k < 20; ++k) {
+        const glm::dvec3 normal(uniformDirection({uniform(random), uniform(random)}));
+        double exact = 0;
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x) {
+                const double low = kPi * (double(y) / kHeight - 0.5), step = kPi / kHeight;
+                const double solidAngle = 2 * kPi / kWidth * (std::sin(low + step) - std::sin(low));
+                double cosine = 0;
+                for (int part = 0; part < 4; ++part) {
+                    const double e = low + (0.25 + 0.5 * (part / 2)) * step;
+                    const double phi = kPi * (1 - 2 * (x + 0.25 + 0.5 * (part % 2)) / kWidth);
+                    const glm::dvec3 w(std::cos(e) * std::cos(phi), std::cos(e) * std::sin(phi),
+                                       std::sin(e));
+                    cosine += 0.25 * std::max(0.0, glm::dot(normal, w));
+                }
+                exact += solidAngle * cosine * double(image.pixels[size_t(y * kWidth + x)].y);
+            }
+        EXPECT_NEAR(double(world.irradiance({0, 0, 0}, glm::vec3(normal))->y), exact, 2e-4 * exact);
+    }
+}
+
 TEST(WorldImage, ABrightPixelIsASun) {
     WorldImage image{512, 256, std::vector<glm::vec3>(512 * 256, glm::vec3(0.0f))};
     const int x = 300, y = 180;

@@ -15,8 +15,12 @@ namespace {
 // A region whose radiance varies by less than this share of the mean radiance's integral over the
 // sphere has no children if it is also small enough to be flat: the cosine's mean over a flat
 // piece is wrong by about the square of its size, on a ring as wide as that.
-constexpr double kLeastVariation = 1e-5;
-constexpr double kFlat = 0.06;  // radians
+constexpr double kLeastVariation = 1e-4;
+constexpr double kFlat = 0.12;  // radians
+
+// Of a flat region at the horizon the children are looked at if its light, times its reach, is more
+// than this share of all light: below it they change the irradiance by less than 1e-4 of it.
+constexpr float kLeastCut = 1e-4f;
 
 // Of a part, sr, if it has children: some 500 of them.
 constexpr float kPartSolidAngle = 0.03f;
@@ -75,14 +79,16 @@ WorldSource::WorldSource(const WorldImage& given) : image(refined(given)) {
     leastVariation = float(kLeastVariation * 4 * glm::pi<double>()) * sum(image.meanRadiance());
     build(0, uint32_t(image.width), 0, uint32_t(image.height));
     regions.shrink_to_fit();
+    lights.shrink_to_fit();
+    leastCut = kLeastCut * regions[0].strength;
     findParts(0);
     findPartNeighbours();
 }
 
 void WorldSource::findParts(uint32_t index) {
     Region& region = regions[index];
-    if (region.second == 0 || region.solidAngle <= kPartSolidAngle) {
-        region.part = int32_t(partRegions.size());
+    if (region.second == 0 || lights[index].solidAngle <= kPartSolidAngle) {
+        region.part = int16_t(partRegions.size());
         partRegions.push_back(index);
         return;
     }
@@ -112,16 +118,15 @@ void WorldSource::findPartNeighbours() {
 WorldSource::Extremes WorldSource::build(uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1) {
     const size_t index = regions.size();
     regions.emplace_back();
+    lights.emplace_back();
     Region made;
-    made.x0 = x0;
-    made.x1 = x1;
-    made.y0 = y0;
-    made.y1 = y1;
-    measure(made);
+    RegionLight light{x0, x1, y0, y1};
+    measure(made, light);
     if (x1 - x0 == 1 && y1 - y0 == 1) {
-        setPixel(made);
+        setPixel(made, light);
         regions[index] = made;
-        const float value = made.solidAngle > 0 ? made.strength / made.solidAngle : 0;
+        lights[index] = light;
+        const float value = light.solidAngle > 0 ? made.strength / light.solidAngle : 0;
         return {value, value};
     }
     // The longer edge is cut.
@@ -132,29 +137,32 @@ WorldSource::Extremes WorldSource::build(uint32_t x0, uint32_t x1, uint32_t y0, 
     const Extremes a = made.cutsColumns ? build(x0, x, y0, y1) : build(x0, x1, y0, y);
     made.second = uint32_t(regions.size());
     const Extremes b = made.cutsColumns ? build(x, x1, y0, y1) : build(x0, x1, y, y1);
-    const Region &first = regions[index + 1], &second = regions[made.second];
-    made.flux = first.flux + second.flux;
-    made.strength = first.strength + second.strength;
-    made.moment = first.moment + second.moment;
-    for (size_t c = 0; c < 3; ++c) made.moments[c] = first.moments[c] + second.moments[c];
+    for (const size_t child : {index + 1, size_t(made.second)}) {
+        made.strength += regions[child].strength;
+        made.moment += regions[child].moment;
+        light.flux += lights[child].flux;
+        for (size_t c = 0; c < 3; ++c) light.moments[c] += lights[child].moments[c];
+    }
     const Extremes both{std::min(a.least, b.least), std::max(a.most, b.most)};
-    const bool isFlat = 2 * std::max(width, height_) < kFlat;
-    if ((isFlat && (both.most - both.least) * made.solidAngle < leastVariation) || both.most <= 0) {
+    if ((isFlat(made) && (both.most - both.least) * light.solidAngle < leastVariation) ||
+        both.most <= 0) {
         made.second = 0;
         regions.resize(index + 1);
+        lights.resize(index + 1);
     }
     regions[index] = made;
+    lights[index] = light;
     return both;
 }
 
 // Everything but the light.
-void WorldSource::measure(Region& region) const {
-    const double azimuth = glm::two_pi<double>() * (region.x1 - region.x0) / image.width;
-    region.solidAngle = float(azimuth * (height[region.y1] - height[region.y0]));
+void WorldSource::measure(Region& region, RegionLight& light) const {
+    const double azimuth = glm::two_pi<double>() * (light.x1 - light.x0) / image.width;
+    light.solidAngle = float(azimuth * (height[light.y1] - height[light.y0]));
     const double middle =
-        glm::pi<double>() * (1 - (double(region.x0) + double(region.x1)) / image.width);
-    const double low = glm::pi<double>() * (double(region.y0) / image.height - 0.5),
-                 high = glm::pi<double>() * (double(region.y1) / image.height - 0.5);
+        glm::pi<double>() * (1 - (double(light.x0) + double(light.x1)) / image.width);
+    const double low = glm::pi<double>() * (double(light.y0) / image.height - 0.5),
+                 high = glm::pi<double>() * (double(light.y1) / image.height - 0.5);
     const double elevation = 0.5 * (low + high);
     auto towards = [](double phi, double e) {
         return glm::dvec3(std::cos(e) * std::cos(phi), std::cos(e) * std::sin(phi), std::sin(e));
@@ -178,54 +186,50 @@ void WorldSource::measure(Region& region) const {
 }
 
 // The light of one pixel, whose radiance is constant.
-void WorldSource::setPixel(Region& region) const {
-    const glm::vec3& radiance = image.pixels[size_t(region.y0) * size_t(image.width) + region.x0];
-    const uint32_t x = region.x0, y = region.y0;
+void WorldSource::setPixel(Region& region, RegionLight& light) const {
+    const uint32_t x = light.x0, y = light.y0;
+    const glm::vec3& radiance = image.pixels[size_t(y) * size_t(image.width) + x];
     const double across = heightAngle[y + 1] - heightAngle[y];
     const double azimuth = glm::two_pi<double>() / image.width;
     // The azimuth falls from column to column.
     const glm::dvec3 directions(
         across * (sine[x] - sine[x + 1]), across * (cosine[x + 1] - cosine[x]),
         0.5 * azimuth * (height[y + 1] * height[y + 1] - height[y] * height[y]));
-    region.flux = radiance * region.solidAngle;
-    region.strength = sum(region.flux);
+    light.flux = radiance * light.solidAngle;
+    region.strength = sum(light.flux);
     region.moment = glm::vec3(double(sum(radiance)) * directions);
     for (int c = 0; c < 3; ++c)
-        region.moments[size_t(c)] = glm::vec3(double(radiance[c]) * directions);
+        light.moments[size_t(c)] = glm::vec3(double(radiance[c]) * directions);
 }
 
-template <class Weights>
-WorldSource::Choice WorldSource::choose(const Region& from, glm::vec2 uv, float probability,
-                                        Weights weights) const {
-    Choice choice{&from, uv, probability, from.part};
-    while (choice.region->second != 0) {
-        const Region &a = regions[firstChild(*choice.region)], &b = regions[choice.region->second];
-        float wa = 0, wb = 0;
-        weights(*choice.region, wa, wb);
-        if (!(wa + wb > 0)) return {nullptr, uv, 0, -1};
+template <class WeightOf>
+WorldSource::Choice WorldSource::choose(uint32_t from, glm::vec2 uv, float probability,
+                                        const WeightOf& weightOf) const {
+    Choice choice{from, uv, probability, regions[from].part};
+    while (const uint32_t second = regions[choice.region].second) {
+        const uint32_t first = choice.region + 1;
+        const float wa = weightOf(first), wb = weightOf(second);
+        if (!(wa + wb > 0)) return {kNone, uv, 0, -1};
         const float p = wa / (wa + wb);
-        float& u = choice.region->cutsColumns ? choice.uv.x : choice.uv.y;
+        float& u = regions[choice.region].cutsColumns ? choice.uv.x : choice.uv.y;
         const bool isFirst = u < p;
         u = std::min(isFirst ? u / p : (u - p) / (1 - p), kBelowOne);
         choice.probability *= isFirst ? p : 1 - p;
-        choice.region = isFirst ? &a : &b;
-        if (choice.region->part >= 0) choice.part = choice.region->part;
+        choice.region = isFirst ? first : second;
+        if (regions[choice.region].part >= 0) choice.part = regions[choice.region].part;
     }
     return choice;
 }
 
 // By radiance times cosine.
-WorldSource::Choice WorldSource::chooseFacing(const Region& from, glm::vec2 uv, float probability,
+WorldSource::Choice WorldSource::chooseFacing(uint32_t from, glm::vec2 uv, float probability,
                                               const glm::vec3& normal) const {
     const Facing& facing = facingOf(normal);
-    return choose(from, uv, probability, [&](const Region& region, float& wa, float& wb) {
-        wa = weightOf(firstChild(region), facing);
-        wb = weightOf(region.second, facing);
-    });
+    return choose(from, uv, probability, [&](uint32_t region) { return weightOf(region, facing); });
 }
 
 // Uniform by solid angle.
-glm::vec3 WorldSource::directionIn(const Region& region, glm::vec2 uv) const {
+glm::vec3 WorldSource::directionIn(const RegionLight& region, glm::vec2 uv) const {
     const double x = region.x0 + double(uv.x) * (region.x1 - region.x0);
     const double z = height[region.y0] + double(uv.y) * (height[region.y1] - height[region.y0]);
     const double azimuth = glm::pi<double>() * (1 - 2 * x / image.width);
@@ -234,21 +238,20 @@ glm::vec3 WorldSource::directionIn(const Region& region, glm::vec2 uv) const {
 }
 
 // A region without children has the same radiance everywhere.
-LightSample WorldSource::sampleOf(const Choice& choice, const glm::vec3& normal,
-                                  const glm::vec3& direction) {
+LightSample WorldSource::sampleOf(const Choice& choice, const glm::vec3& normal) const {
     LightSample sample;
+    if (choice.region == kNone) return sample;
+    const RegionLight& region = lights[choice.region];
     sample.distance = std::numeric_limits<float>::infinity();
-    sample.direction = direction;
+    sample.direction = directionIn(region, choice.uv);
     sample.part = uint32_t(choice.part);
-    const float c = std::max(0.0f, glm::dot(normal, direction));
-    sample.irradiance = choice.region->flux * (c / choice.probability);
+    const float c = std::max(0.0f, glm::dot(normal, sample.direction));
+    sample.irradiance = region.flux * (c / choice.probability);
     return sample;
 }
 
 LightSample WorldSource::sample(const glm::vec3&, const glm::vec3& normal, glm::vec2 uv) const {
-    const Choice choice = chooseFacing(regions[0], uv, 1, normal);
-    return choice.region ? sampleOf(choice, normal, directionIn(*choice.region, choice.uv))
-                         : LightSample{};
+    return sampleOf(chooseFacing(0, uv, 1, normal), normal);
 }
 
 std::vector<float> WorldSource::sumOfSeen(const glm::vec3& normal,
@@ -271,48 +274,68 @@ LightSample WorldSource::sampleSeen(const glm::vec3& normal, glm::vec2 uv,
     if (part >= partRegions.size()) return {};
     const float before = part > 0 ? sumOfSeen[part - 1] : 0, own = sumOfSeen[part] - before;
     uv.x = std::min((u - before) / own, kBelowOne);
-    const Choice choice = chooseFacing(regions[partRegions[part]], uv, own / all, normal);
-    return choice.region ? sampleOf(choice, normal, directionIn(*choice.region, choice.uv))
-                         : LightSample{};
+    return sampleOf(chooseFacing(partRegions[part], uv, own / all, normal), normal);
 }
 
 float WorldSource::weightOf(uint32_t index, const Facing& facing) const {
     if (facing.weight[index] >= 0) return facing.weight[index];
-    return std::max(0.0f, glm::dot(facing.normal, regions[index].moment));
+    return weightOf(regions[index], facing.normal);
+}
+
+float WorldSource::weightOf(const Region& region, const glm::vec3& normal) {
+    const float s = glm::dot(normal, region.axis), h = region.reach;
+    if (!(region.strength > 0) || s <= -h) return 0;
+    if (s >= h) return std::max(0.0f, glm::dot(normal, region.moment));
+    // A curved piece may rise above a horizon that the flat one is below.
+    return region.strength *
+           std::max(meanCosine(region, normal), kLeastAbove * (s + h) * (s + h) / h);
+}
+
+bool WorldSource::isFlat(const Region& region) {
+    const float longest = std::max(glm::dot(region.half[0], region.half[0]),
+                                   glm::dot(region.half[1], region.half[1]));
+    return 4 * double(longest) < kFlat * kFlat;
+}
+
+// As of a flat piece in the mean direction of the light.
+float WorldSource::meanCosine(const Region& region, const glm::vec3& normal) {
+    return float(meanAbove(double(glm::dot(normal, region.moment)) / double(region.strength),
+                           double(glm::dot(normal, region.half[0])),
+                           double(glm::dot(normal, region.half[1]))));
 }
 
 // Irradiance from a region; notes the weights of all regions that it looks at.
-glm::vec3 WorldSource::look(uint32_t index, const glm::vec3& normal,
-                            std::vector<float>& weights) const {
+glm::vec3 WorldSource::look(uint32_t index, Facing& facing) const {
     const Region& region = regions[index];
-    float& weight = weights[index];
+    const glm::vec3& normal = facing.normal;
     const float s = glm::dot(normal, region.axis), h = region.reach;
+    facing.looked.push_back(index);
+    float& weight = facing.weight[index];
     weight = 0;
     if (!(region.strength > 0) || s <= -h) return glm::vec3(0.0f);
     if (s >= h) {
+        const auto& moments = lights[index].moments;
         weight = std::max(0.0f, glm::dot(normal, region.moment));
-        return {glm::dot(normal, region.moments[0]), glm::dot(normal, region.moments[1]),
-                glm::dot(normal, region.moments[2])};
+        return {glm::dot(normal, moments[0]), glm::dot(normal, moments[1]),
+                glm::dot(normal, moments[2])};
     }
-    if (region.second != 0) {
-        const glm::vec3 sum =
-            look(index + 1, normal, weights) + look(region.second, normal, weights);
-        weight = weights[index + 1] + weights[region.second];
+    if (region.second != 0 && (region.strength * h > leastCut || !isFlat(region))) {
+        const glm::vec3 sum = look(index + 1, facing) + look(region.second, facing);
+        weight = facing.weight[index + 1] + facing.weight[region.second];
         return sum;
     }
-    const float mean = float(meanAbove(double(s), double(glm::dot(normal, region.half[0])),
-                                       double(glm::dot(normal, region.half[1]))));
-    // A curved piece may rise above a horizon that the flat one is below.
-    weight = region.strength * std::max(mean, kLeastAbove * (s + h) * (s + h) / h);
-    return region.flux * mean;
+    weight = weightOf(region, normal);
+    return lights[index].flux * meanCosine(region, normal);
 }
 
 const WorldSource::Facing& WorldSource::facingOf(const glm::vec3& normal) const {
     Facing& known = facing.local();
     if (known.normal != normal) {
         known.normal = normal;
-        known.weight.assign(regions.size(), -1.0f);
-        known.irradiance = glm::max(glm::vec3(0.0f), look(0, normal, known.weight));
+        known.weight.resize(regions.size(), -1.0f);
+        for (const uint32_t region : known.looked) known.weight[region] = -1;
+        known.looked.clear();
+        known.irradiance = glm::max(glm::vec3(0.0f), look(0, known));
     }
     return known;
 }
@@ -340,24 +363,22 @@ float WorldSource::distance(const glm::vec3&) const {
 // Parallel rays of each direction, from a disk that covers the scene.
 glm::vec3 WorldSource::shootingPower(float sceneRadius) const {
     const float r = kCover * sceneRadius;
-    return regions[0].flux * (glm::pi<float>() * r * r);
+    return lights[0].flux * (glm::pi<float>() * r * r);
 }
 
 EmittedRay WorldSource::emit(const glm::vec4& u, float sceneRadius) const {
     EmittedRay ray;
     const Choice choice =
-        choose(regions[0], {u.x, u.y}, 1, [&](const Region& region, float& wa, float& wb) {
-            wa = regions[firstChild(region)].strength;
-            wb = regions[region.second].strength;
-        });
-    const glm::vec3 towards = directionIn(*choice.region, choice.uv);
+        choose(0, {u.x, u.y}, 1, [&](uint32_t region) { return regions[region].strength; });
+    const RegionLight& all = lights[0];
+    const glm::vec3 towards = directionIn(lights[choice.region], choice.uv);
     const auto [x, y] = frame(towards);
     const glm::vec2 d = onDisk({u.z, u.w});
     ray.origin = kCover * sceneRadius * (towards + d.x * x + d.y * y);
     ray.direction = -towards;
     for (int c = 0; c < 3; ++c)
-        ray.weight[c] = regions[0].flux[c] > 0
-                            ? choice.region->flux[c] / (choice.probability * regions[0].flux[c])
+        ray.weight[c] = all.flux[c] > 0
+                            ? lights[choice.region].flux[c] / (choice.probability * all.flux[c])
                             : 0;
     return ray;
 }

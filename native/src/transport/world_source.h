@@ -52,65 +52,74 @@ class WorldSource : public LightSource {
     size_t regionCount() const { return regions.size(); }
 
   private:
-    // Pixels [x0, x1) x [y0, y1), and the light of all directions in them.
+    // Pixels [x0, x1) x [y0, y1): what samples look at on their way, one cache line.
     struct Region {
-        uint32_t x0 = 0, x1 = 0, y0 = 0, y1 = 0;
-        uint32_t second = 0;       // child; the first child is the next region. 0: no children
-        bool cutsColumns = false;  // the children lie side by side, else one above the other
-        int32_t part = -1;         // that it is, if it is one
-        float solidAngle = 0;      // sr
-        float reach = 0;           // sine of the angle from the axis to the farthest direction
-        glm::vec3 axis{0.0f};      // its middle
-        std::array<glm::vec3, 2> half{glm::vec3(0.0f), glm::vec3(0.0f)};  // edges from the middle
-        glm::vec3 flux{0.0f};    // integral of the radiance, W/m^2
-        float strength = 0;      // sum of the channels of flux
+        glm::vec3 axis{0.0f};    // its middle
+        float reach = 0;         // sine of the angle from the axis to the farthest direction
         glm::vec3 moment{0.0f};  // integral of the radiance's channels' sum times direction
-        std::array<glm::vec3, 3> moments{};  // the same by channel
+        float strength = 0;      // integral of the radiance's channels' sum, W/m^2
+        std::array<glm::vec3, 2> half{glm::vec3(0.0f), glm::vec3(0.0f)};  // edges from the middle
+        uint32_t second = 0;       // child; the first child is the next region. 0: no children
+        int16_t part = -1;         // that it is, if it is one
+        bool cutsColumns = false;  // the children lie side by side, else one above the other
+    };
+    // The same, of all its directions: what is asked for at the end.
+    struct RegionLight {
+        uint32_t x0 = 0, x1 = 0, y0 = 0, y1 = 0;
+        float solidAngle = 0;                // sr
+        glm::vec3 flux{0.0f};                // integral of the radiance, W/m^2
+        std::array<glm::vec3, 3> moments{};  // Region::moment by channel
     };
     struct Extremes {
         float least, most;  // sum of the channels of the radiance
     };
     struct Choice {
-        const Region* region;
+        uint32_t region;  // without children; kNone: no light comes from any
         glm::vec2 uv;
         float probability;
         int32_t part;
     };
+    static constexpr uint32_t kNone = UINT32_MAX;
 
     // The light as a plane sees it: neighbouring receivers have it in common.
     struct Facing {
         glm::vec3 normal{0.0f}, irradiance{0.0f};
-        // Per region that the horizon cuts, and its children: the irradiance from it, all channels
-        // together. -1 of all others.
+        // Per region: the irradiance from it, all channels together, if it is one of those that were
+        // looked at. -1 of all others.
         std::vector<float> weight;
+        std::vector<uint32_t> looked;
     };
 
     Extremes build(uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1);
     void findParts(uint32_t region);
     void findPartNeighbours();
-    void measure(Region& region) const;
-    void setPixel(Region& region) const;
-    // Walks from a region to one without children; weights(region, wa, wb) tells those of its own.
-    template <class Weights>
-    Choice choose(const Region& from, glm::vec2 uv, float probability, Weights weights) const;
-    Choice chooseFacing(const Region& from, glm::vec2 uv, float probability,
+    void measure(Region& region, RegionLight& light) const;
+    void setPixel(Region& region, RegionLight& light) const;
+    // Walks from a region to one without children; weightOf(region) tells how to share them out.
+    template <class WeightOf>
+    Choice choose(uint32_t from, glm::vec2 uv, float probability, const WeightOf& weightOf) const;
+    Choice chooseFacing(uint32_t from, glm::vec2 uv, float probability,
                         const glm::vec3& normal) const;
-    static LightSample sampleOf(const Choice& choice, const glm::vec3& normal,
-                                const glm::vec3& direction);
-    glm::vec3 directionIn(const Region& region, glm::vec2 uv) const;
-    glm::vec3 look(uint32_t index, const glm::vec3& normal, std::vector<float>& weights) const;
+    LightSample sampleOf(const Choice& choice, const glm::vec3& normal) const;
+    glm::vec3 directionIn(const RegionLight& region, glm::vec2 uv) const;
+    static bool isFlat(const Region& region);
+    // Of the cosine by which a plane sees the light of a region that its horizon cuts.
+    static float meanCosine(const Region& region, const glm::vec3& normal);
+    glm::vec3 look(uint32_t index, Facing& facing) const;
     const Facing& facingOf(const glm::vec3& normal) const;
     // The irradiance from a region, all channels together, or nearly.
     float weightOf(uint32_t region, const Facing& facing) const;
+    static float weightOf(const Region& region, const glm::vec3& normal);
     bool isSeen(uint32_t region, const glm::vec3& normal) const;
-    uint32_t firstChild(const Region& region) const { return uint32_t(&region - &regions[0]) + 1; }
 
     const WorldImage image;
     std::vector<double> height;        // z of the lower edge of each row, and of the top
     std::vector<double> heightAngle;   // integral of the cosine of the elevation below it, squared
     std::vector<double> cosine, sine;  // of the azimuth of the left edge of each column, and last
     float leastVariation = 0;          // of a region with children, W/m^2
+    float leastCut = 0;  // of a flat region whose children matter at the horizon, W/m^2
     std::vector<Region> regions;
+    std::vector<RegionLight> lights;    // of each
     std::vector<uint32_t> partRegions;  // that together are all of the source
     PartNeighbours partNeighbours;
 
