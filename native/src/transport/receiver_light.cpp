@@ -343,7 +343,8 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
         if (all.count >= aim.samples &&
             (wanted <= tolerance * tolerance || all.count >= source.mostSamples()))
             break;
-        next = all.count < aim.samples ? aim.samples : (isGuided ? 2 : 4) * all.count;
+        next = all.count < aim.samples ? aim.samples
+                                       : (isGuided || all.count >= 64 ? 2 : 4) * all.count;
     }
     if (closed && all.visible == all.open) ++sum.unblocked;
     const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
