@@ -344,7 +344,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
             (wanted <= tolerance * tolerance || all.count >= source.mostSamples()))
             break;
         next = all.count < aim.samples ? aim.samples
-                                       : (isGuided || all.count >= 64 ? 2 : 4) * all.count;
+                                       : (isGuided || source.surrounds() ? 2 : 4) * all.count;
     }
     if (closed && all.visible == all.open) ++sum.unblocked;
     const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
