@@ -260,8 +260,9 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         items=enum_reconstruction, default='LEAST_SQUARES')
     final_gather: BoolProperty(
         name="Final Gather",
-        description="Of the reconstruction Point: gather the light of other surfaces at the "
-                    "vertices too, where it changes between them",
+        description="Of the reconstruction Point, and of meshes that modifiers subdivide: gather "
+                    "the light of other surfaces at the vertices too, where it changes between "
+                    "them",
         default=True)
     max_bundles: IntProperty(
         name="Maximum Bundles",

@@ -257,7 +257,9 @@ RB_API rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, boo
 /* Optional, for an instance with role RB_ROLE_BAKE: which corners of its mesh have a result, as where
  * a mesh is finer than the one that the light is written to. The light of faces away from them is
  * computed no better than what it lights needs it, and counts in no stated error; corners without a
- * result get what is known there. Without it all have one. */
+ * result get what is known there. Where an eighth of the corners at most have one, and half of those
+ * on the faces that have any, these gather the light at their points (reconstruction LEAST_SQUARES
+ * and POINT, final_gather 1, LINE_REUSE and GATHER). Without it all have one. */
 RB_API rb_error rb_set_result_corners(rb_scene scene, int32_t instance, const int32_t* corners,
                                       size_t corner_count);
 
@@ -348,7 +350,8 @@ RB_API void rb_release_bake(rb_bake bake);
  *   int    lines_per_bundle   0 = automatic: two lines per mean patch (0)
  *   float  memory_limit    for the exchanges, in MB (4096)
  *   int    seed, threads   threads 0 = all (0, 0)
- *   int    final_gather    of POINT: 0 leaves the light of other surfaces to interpolation (1)
+ *   int    final_gather    of POINT and sparse results: 0 leaves the light of other surfaces to
+ *                          interpolation (1)
  *   float  regularization  of the reconstruction: weight of slope changes across edges (0.005)
  *   string reconstruction  LEAST_SQUARES | AREA_AVERAGE | POINT
  *   string solver          LINE_REUSE | MULTIPATH | STOCHASTIC_ITERATION | RANDOM_WALK

@@ -16,6 +16,7 @@
 #include "bake/cancellation.h"
 #include "bake/combination.h"
 #include "bake/energy_balance.h"
+#include "bake/gathered_noise.h"
 #include "bake/geometry_hash.h"
 #include "bake/light_hash.h"
 #include "bake/threads.h"
@@ -24,6 +25,7 @@
 #include "patches/contacts.h"
 #include "patches/refinement.h"
 #include "patches/reflectance.h"
+#include "reconstruction/corner_gather.h"
 #include "reconstruction/left_out_corners.h"
 #include "reconstruction/reconstruction.h"
 #include "reconstruction/shown_light.h"
@@ -180,7 +182,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                                       "they lie in a plane with others like them: projected as one",
                                       patches.sheets.joined - patches.sheets.sheets.size()});
         }
-        const ShownLight shown(scene, patches);
+        const ShownLight shown(scene, patches, gathersSparseResults(settings));
         if (const size_t count = scene.cornersWithoutResult())
             report.skipped.push_back({"corners", "their light is not asked for", count});
         SetLights lights = shootSources(scene, shown, coarse, report);
@@ -388,6 +390,7 @@ SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLi
     std::vector<float> weight = wantedArea(patches, shown);
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exposed[side];
     const std::vector<float> tileWeight = tiles.sum(weight);
+    const GatheredNoise gathered(patches, shown);
     std::vector<std::vector<float>> errorOfSets;
     std::vector<std::array<Irradiance, 2>> halves;
     for (SetLight& light : lights) {
@@ -397,7 +400,7 @@ SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLi
         light.irradiance.indirect = std::move(first.indirect);
         const Irradiance mean = meanOver(tiles, light.irradiance, weight);
         halves.push_back({mean, mean});
-        errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
+        errorOfSets.push_back(tiles.errorOfMean(gathered.withoutGathered(light.shot.error)));
     }
     SetNoise noise({}, std::move(errorOfSets), tileWeight, tiles.patches());
     noise.look(halves, 1, 0);
@@ -418,9 +421,11 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     const size_t n = patches.sideCount();
     // Sides whose noise counts: those with a result, by the area that is exposed as far as known.
     const std::vector<float> area = wantedArea(patches, shown);
+    const GatheredNoise gathered(patches, shown);
     std::vector<float> weight(n, 0);
     std::vector<std::vector<float>> errorOfSets;
-    for (const SetLight& light : lights) errorOfSets.push_back(tiles.errorOfMean(light.shot.error));
+    for (const SetLight& light : lights)
+        errorOfSets.push_back(tiles.errorOfMean(gathered.withoutGathered(light.shot.error)));
     std::vector<float> tileWeight(tiles.sideCount(), 0);
     SetNoise noise(trace->looks, std::move(errorOfSets), tileWeight, tiles.patches());
 
@@ -445,14 +450,14 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         const std::vector<float> exposed = trace->exposedShare();
         for (size_t side = 0; side < n; ++side) weight[side] = area[side] * exposed[side];
         tileWeight = tiles.sum(weight);
-        for (size_t k = 0; k < lights.size(); ++k)
-            for (int h = 0; h < 2; ++h)
-                halves[k][h] = meanOver(
-                    tiles,
-                    shown.of(
-                        transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError),
-                        exposed),
-                    weight);
+        for (size_t k = 0; k < lights.size(); ++k) {
+            for (size_t h = 0; h < 2; ++h)
+                halves[k][h] = shown.of(
+                    transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError),
+                    exposed);
+            gathered.apply(halves[k], weight);
+            for (Irradiance& half : halves[k]) half = meanOver(tiles, half, weight);
+        }
         noise.look(halves, bundles, transport.bias());
         errors = noise.relative();
         trace->looks = noise.looks();

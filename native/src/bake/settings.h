@@ -29,7 +29,7 @@ struct Settings : Skips {
     std::string projector = "AUTO";
     std::string smallPatches = "CENTRE_SAMPLING";
     std::string reconstruction = "LEAST_SQUARES";
-    int finalGather = 1;  // of POINT; 0: light of other surfaces is always interpolated
+    int finalGather = 1;  // of POINT and sparse results; 0: other surfaces' light is interpolated
     int planeCount = 4;   // of the projector PLANES
     std::string planePlacement = "SYSTEMATIC";
     int planeCoherence = 1;               // 0: makes the planes' depth buffers one by one

@@ -35,14 +35,45 @@ double meanLight(const Scene& scene, const Patches& patches,
     return area > 0 ? std::sqrt(squares / area) : 0;
 }
 
+// Those at one node share in its mean, whose error is what counts.
+void shareErrors(std::vector<CornerReceiver>& corners, size_t first, const SmoothRegions& regions) {
+    auto nodeOf = [&](size_t c) { return regions.nodeOf[size_t(corners[c].corner)]; };
+    std::vector<uint32_t> count(regions.nodeCount, 0);
+    for (size_t c = first; c < corners.size(); ++c) ++count[nodeOf(c)];
+    for (size_t c = first; c < corners.size(); ++c)
+        corners[c].receiver.errorFactor = std::sqrt(float(count[nodeOf(c)]));
+}
+
 }  // namespace
+
+bool gathersSparseResults(const Settings& settings) {
+    return settings.reconstruction != "AREA_AVERAGE" && settings.finalGather &&
+           settings.solver == "LINE_REUSE" && settings.firstShot == "GATHER";
+}
+
+std::vector<bool> gatheringInstances(const Scene& scene, const Settings& settings) {
+    std::vector<bool> gathers;
+    for (const Instance& instance : scene.instances)
+        gathers.push_back(instance.role == RB_ROLE_BAKE &&
+                          (settings.reconstruction == "POINT" ||
+                           (instance.hasSparseResults && gathersSparseResults(settings))));
+    return gathers;
+}
 
 CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
                            float touchDistance, const SetLights& lights, const ShownLight& shown,
                            const std::vector<InstanceRange>& ranges,
+                           const std::vector<bool>& gathers,
+                           const std::vector<SmoothRegions>& regions,
                            const std::vector<float>& exposed, const Settings& settings,
                            const Progress& progress)
-    : scene(scene), shown(shown), ranges(ranges), exposed(exposed), skips(settings) {
+    : scene(scene),
+      shown(shown),
+      ranges(ranges),
+      regions(regions),
+      exposed(exposed),
+      skips(settings),
+      gathersSparse(gathersSparseResults(settings)) {
     // Whether another surface lies against the corner, though not against all of its patch.
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
@@ -54,7 +85,7 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
     };
     for (size_t i = 0; i < ranges.size(); ++i) {
         first.push_back(corners.size());
-        if (scene.instances[i].role != RB_ROLE_BAKE) continue;
+        if (!gathers[i]) continue;
         std::vector<CornerReceiver> all = cornerReceivers(scene, patches, uint32_t(i), ranges[i]);
         const std::vector<int32_t>& vertices =
             scene.meshes[size_t(scene.instances[i].mesh)].cornerVertices;
@@ -68,6 +99,8 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
         });
         for (size_t c = 0; c < all.size(); ++c)
             if (isFree[c]) corners.push_back(all[c]);
+        shareErrors(corners, first.back(), regions[i]);
+        if (isSparse(i)) sparse += corners.size() - first.back();
     }
     first.push_back(corners.size());
     // After the corners, the other sides of those that show their light.
@@ -87,6 +120,8 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
             corners.size() + behind.size(), receiverAt, settings.targetError,
             [&](double done) { part.report(RB_STAGE_RECONSTRUCTION, done); });
         std::vector<glm::vec3>& light = sources.emplace_back();
+        std::vector<float>& variance = variances.emplace_back();
+        for (size_t c = 0; c < corners.size(); ++c) variance.push_back(gathered[c].variance);
         for (size_t c = 0; c < corners.size(); ++c)
             light.push_back(shown.byAngle(corners[c].receiver.side, gathered[c].meanAngles()) *
                             gathered[c].irradiance);
@@ -103,28 +138,35 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
     }
 }
 
-void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regions,
-                           const std::vector<float>& cornerAngles, NodeLight& light) {
+CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
+                                            const std::vector<float>& cornerAngles,
+                                            NodeLight& light) const {
+    Outcome outcome;
+    const std::vector<uint32_t>& nodeOf = regions[instance].nodeOf;
+    const uint32_t nodeCount = regions[instance].nodeCount;
     const size_t begin = first[instance], end = first[instance + 1];
+    std::vector<double> gathered(nodeCount, 0.0);  // variances, in the mean of the channels
     if (k < others.size()) {
         const FinalGather& gather = others[k];
-        std::vector<bool> wanted =
-            gather.isWanted(ranges[instance], regions, scene.instances[instance].side, exposed,
-                            light.carried, light.indirect);
-        std::vector<uint8_t> isNear(end - begin);
-        parallelFor(begin, end, [&](size_t c) {
-            isNear[c - begin] = showsOwnAlone(c) && !wanted[regions.nodeOf[corners[c].corner]] &&
-                                (corners[c].isBesideGap || gather.isNear(corners[c].receiver));
-        });
-        if (!skips.skipGather) wanted.assign(wanted.size(), true);
-        for (size_t c = begin; c < end; ++c)
-            if (isNear[c - begin]) wanted[regions.nodeOf[corners[c].corner]] = true;
+        std::vector<bool> wanted(nodeCount, true);
+        if (skips.skipGather && !isSparse(instance)) {
+            wanted =
+                gather.isWanted(ranges[instance], regions[instance], scene.instances[instance].side,
+                                exposed, light.carried, light.indirect);
+            std::vector<uint8_t> isNear(end - begin);
+            parallelFor(begin, end, [&](size_t c) {
+                isNear[c - begin] = showsOwnAlone(c) && !wanted[nodeOf[corners[c].corner]] &&
+                                    (corners[c].isBesideGap || gather.isNear(corners[c].receiver));
+            });
+            for (size_t c = begin; c < end; ++c)
+                if (isNear[c - begin]) wanted[nodeOf[corners[c].corner]] = true;
+        }
         // What comes from behind is not gathered.
         for (size_t c = begin; c < end; ++c)
-            if (!showsOwnAlone(c)) wanted[regions.nodeOf[corners[c].corner]] = false;
-        std::vector<std::vector<FinalGather::Share>> receivers(regions.nodeCount);
+            if (!showsOwnAlone(c)) wanted[nodeOf[corners[c].corner]] = false;
+        std::vector<std::vector<FinalGather::Share>> receivers(nodeCount);
         for (size_t c = begin; c < end; ++c) {
-            const uint32_t node = regions.nodeOf[corners[c].corner];
+            const uint32_t node = nodeOf[corners[c].corner];
             const float angle = cornerAngles[corners[c].corner];
             if (wanted[node] && angle > 0) receivers[node].push_back({&corners[c].receiver, angle});
         }
@@ -135,34 +177,46 @@ void CornerGather::improve(size_t instance, size_t k, const SmoothRegions& regio
             for (FinalGather::Share& share : receivers[node]) share.share /= sum;
             const FinalGather::Light found = gather.gather(
                 receivers[node], brightest(light.direct[node] + light.indirect[node]));
+            gathered[node] = found.variance;
             light.carried[node] = found.carried;
             light.indirect[node] = found.reflected;
         });
-        smooth += size_t(std::count(wanted.begin(), wanted.end(), false));
+        outcome.smooth = size_t(std::count(wanted.begin(), wanted.end(), false));
     }
-    const auto means =
-        nodeMeans(instance, regions, cornerAngles, [&](size_t c) { return sources[k][c]; });
+    const auto means = nodeMeans(instance, cornerAngles, [&](size_t c) { return sources[k][c]; });
     for (size_t node = 0; node < light.shownShare.size(); ++node) {
         light.carried[node] *= light.shownShare[node];
         light.indirect[node] *= light.shownShare[node];
     }
     for (size_t node = 0; node < means.size(); ++node)
         if (means[node]) light.direct[node] = light.carried[node] + *means[node];
+    std::vector<double> variance(nodeCount, 0.0), weights(nodeCount, 0.0);
+    for (size_t c = begin; c < end; ++c) {
+        const double angle = double(cornerAngles[corners[c].corner]);
+        variance[nodeOf[corners[c].corner]] += angle * angle * double(variances[k][c]);
+        weights[nodeOf[corners[c].corner]] += angle;
+    }
+    for (size_t node = 0; node < nodeCount; ++node) {
+        if (!(weights[node] > 0)) continue;
+        ++outcome.gathered;
+        outcome.noise += 3 * (variance[node] / (weights[node] * weights[node]) + gathered[node]);
+    }
+    return outcome;
 }
 
 template <class LightOf>
 std::vector<std::optional<glm::vec3>> CornerGather::nodeMeans(
-    size_t instance, const SmoothRegions& regions, const std::vector<float>& cornerAngles,
-    const LightOf& lightOf) const {
-    std::vector<glm::vec3> sums(regions.nodeCount, glm::vec3(0.0f));
-    std::vector<float> weights(regions.nodeCount, 0.0f);
+    size_t instance, const std::vector<float>& cornerAngles, const LightOf& lightOf) const {
+    const uint32_t nodeCount = regions[instance].nodeCount;
+    std::vector<glm::vec3> sums(nodeCount, glm::vec3(0.0f));
+    std::vector<float> weights(nodeCount, 0.0f);
     for (size_t c = first[instance]; c < first[instance + 1]; ++c) {
-        const uint32_t node = regions.nodeOf[corners[c].corner];
+        const uint32_t node = regions[instance].nodeOf[corners[c].corner];
         const float angle = cornerAngles[corners[c].corner];
         sums[node] += angle * lightOf(c);
         weights[node] += angle;
     }
-    std::vector<std::optional<glm::vec3>> means(regions.nodeCount);
+    std::vector<std::optional<glm::vec3>> means(nodeCount);
     for (size_t node = 0; node < means.size(); ++node)
         if (weights[node] > 0) means[node] = sums[node] / weights[node];
     return means;

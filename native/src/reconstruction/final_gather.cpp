@@ -26,6 +26,8 @@ constexpr uint32_t kTellingPatches = 4;
 constexpr uint32_t kNearRays = 8;
 // What is so many lengths of the receiver's patch away may light its ends differently.
 constexpr float kNearLengths = 2;
+// Cosine between shading normal and face up to which a face is nearly flat.
+constexpr float kNearlyFlat = 0.99f;
 // The standard error of what is gathered, and how far interpolation may be off the light around,
 // as shares of the error.
 constexpr float kNoiseShare = 0.6f, kInterpolationShare = 1;
@@ -96,6 +98,7 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
         variance *= double(count) / double(count - 1);
         // What few rays meet can be missed by all parts alike: the step from half as many counts
         // too.
+        mean.variance = variance / (kSpreadOverError * kSpreadOverError);
         const double step = done > 0 ? square(mean.total() - before.total()) : INFINITY;
         if (std::max(variance, step) <= tolerance) break;
         done = wanted;
@@ -109,9 +112,13 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
     const glm::vec3 side = patches.normal(receiver.side);
     for (uint32_t i = first; i < first + count; ++i) {
         const glm::vec4 u = points[i];
-        const glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
-        // Below a face that is shaded as if it were bent.
-        if (glm::dot(direction, side) <= 0) continue;
+        glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
+        if (const float up = glm::dot(direction, side); up <= 0) {
+            // Lost on a face that is shaded as if it were bent, as in Cycles; not where a quad is
+            // only a little off its plane.
+            if (glm::dot(receiver.normal, side) < kNearlyFlat) continue;
+            direction -= 2 * up * side;
+        }
         float distance = 0;
         const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
         sum.carried += hit ? emission[*hit] : world;

@@ -43,6 +43,7 @@ class FinalGather {
     struct Light {
         glm::vec3 carried{0.0f};  // emission that is no source, and the world's
         glm::vec3 reflected{0.0f};
+        double variance = 0;  // of the total, in the mean of the channels; only of gather()
         glm::vec3 total() const { return carried + reflected; }
     };
     // A receiver and its share in a mean.

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct InstanceLight : CornerLight {
     std::vector<float> cornerAngles;  // radians, weights of the mean at a vertex
     std::vector<CornerLight> sets;    // per light set of the scene
     std::vector<float> error;         // per corner, W/(m^2 sr), see rb_get_corner_error
+    // Of sparse results that corners gathered: the noise of their rays, relative to the RMS.
+    std::optional<float> gatheredNoise{};
 
     // An output of this or of a set, per vertex: the mean of its corners, weighted by their angles.
     std::vector<glm::vec3> perVertex(rb_output output) const { return perVertex(*this, output); }

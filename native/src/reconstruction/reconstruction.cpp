@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <optional>
 
 #include "bake/cancellation.h"
@@ -30,7 +31,7 @@ struct SideLight {
     Irradiance shown;
     Field emission;  // W/m^2
     Field exitance;  // emission included, W/m^2
-    // For POINT: as if all of it were shown, whatever its angle, W/m^2.
+    // For what corners gather: as if all of it were shown, whatever its angle, W/m^2.
     Field carried;  // direct light without that of the sources
     Field indirect;
 };
@@ -52,7 +53,7 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
 
 std::vector<SideLight> sideLights(const Patches& patches, const ShownLight& shown,
                                   const std::vector<float>& exposed, const SetLights& lights,
-                                  bool isPoint) {
+                                  bool gathersCorners) {
     std::vector<SideLight> result;
     for (const SetLight& light : lights) {
         SideLight out{
@@ -63,7 +64,7 @@ std::vector<SideLight> sideLights(const Patches& patches, const ShownLight& show
             out.emission[side] *= opacity;
             out.exitance[side] = out.emission[side] + shown.color()[side] * out.shown.all(side);
         }
-        if (isPoint) {
+        if (gathersCorners) {
             Irradiance all = shown.of(light.irradiance, exposed);
             for (size_t side = 0; side < all.direct.size(); ++side)
                 all.direct[side] -= all.gathered[side];
@@ -73,6 +74,19 @@ std::vector<SideLight> sideLights(const Patches& patches, const ShownLight& show
         result.push_back(std::move(out));
     }
     return result;
+}
+
+// Of the light at the corners with a result, summed over RGB.
+double meanSquare(const Instance& instance, const InstanceLight& light) {
+    double sum = 0;
+    size_t count = 0;
+    for (size_t c = 0; c < light.direct.size(); ++c) {
+        if (!instance.hasResultAtVertex(size_t(light.cornerVertices[c]))) continue;
+        const glm::dvec3 all(light.direct[c] + light.indirect[c]);
+        sum += glm::dot(all, all);
+        ++count;
+    }
+    return count > 0 ? sum / double(count) : 0;
 }
 
 // One value per corner from one per node.
@@ -111,18 +125,27 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                                        const SetLights& lights, const ShownLight& shown,
                                        const std::vector<float>& exposed, const Settings& settings,
                                        const Progress& progress, Report& report) {
-    const bool isPoint = settings.reconstruction == "POINT";
-    const std::vector<SideLight> onSides = sideLights(patches, shown, exposed, lights, isPoint);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
     const std::vector<float> outside = exposedOutside(patches, visibility, exposed);
+    const std::vector<bool> gathers = gatheringInstances(scene, settings);
+    const bool anyGathers = std::find(gathers.begin(), gathers.end(), true) != gathers.end();
+    const std::vector<SideLight> onSides = sideLights(patches, shown, exposed, lights, anyGathers);
+    auto findRegions = [&](size_t i) {
+        return smoothRegions(scene.meshes[scene.instances[i].mesh], patches.cells,
+                             ranges[i].firstCell, ranges[i].lastCell);
+    };
+    std::vector<SmoothRegions> regionsOf(scene.instances.size());  // of those that gather
+    parallelFor(size_t(0), regionsOf.size(), [&](size_t i) {
+        if (gathers[i]) regionsOf[i] = findRegions(i);
+    });
     std::optional<CornerGather> atCorners;
-    if (isPoint)
-        atCorners.emplace(scene, patches, visibility, touchDistance, lights, shown, ranges, outside,
-                          settings, progress.part(0, 2));
+    if (anyGathers)
+        atCorners.emplace(scene, patches, visibility, touchDistance, lights, shown, ranges, gathers,
+                          regionsOf, outside, settings, progress.part(0, 2));
 
     std::vector<InstanceLight> result(scene.instances.size());
     report.objects.resize(scene.instances.size());
-    std::atomic<size_t> occluders = 0;
+    std::atomic<size_t> occluders = 0, smooth = 0;
     std::vector<std::string> warnings(scene.instances.size());
     auto reconstructInstance = [&](size_t i) {
         const Instance& instance = scene.instances[i];
@@ -139,10 +162,11 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         out.cornerVertices = mesh.cornerVertices;
         out.vertexCount = mesh.vertices.size();
         out.cornerAngles = cornerAngles(mesh);
-        const SmoothRegions regions =
-            smoothRegions(mesh, patches.cells, ranges[i].firstCell, ranges[i].lastCell);
-        // Three fields of each light, one after the other; for POINT the colour, and what is shown
-        // of light from everywhere, are the last.
+        const bool isPoint = gathers[i];
+        if (!isPoint) regionsOf[i] = findRegions(i);
+        const SmoothRegions& regions = regionsOf[i];
+        // Three fields of each light, one after the other; where corners gather the colour, and what
+        // is shown of light from everywhere, are the last.
         std::vector<const Field*> fields;
         for (const SideLight& light : onSides) {
             fields.push_back(&light.shown.direct);
@@ -169,6 +193,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                     "mean of the light around them; merge vertices by distance, or choose "
                     "the reconstruction AREA_AVERAGE";
         }
+        double noise = 0;  // of what corners gather: mean square
         for (size_t k = 0; k < lights.size(); ++k) {
             Field &direct = nodes[3 * k], &indirect = nodes[3 * k + 1];
             Field& exitance = nodes[3 * k + 2];
@@ -176,7 +201,10 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                 CornerGather::NodeLight atNodes{
                     std::move(direct), std::move(indirect), std::move(exitance), {}};
                 if (!shown.everywhere().empty()) atNodes.shownShare = nodes.back();
-                atCorners->improve(i, k, regions, out.cornerAngles, atNodes);
+                const CornerGather::Outcome outcome =
+                    atCorners->improve(i, k, out.cornerAngles, atNodes);
+                smooth += outcome.smooth;
+                if (outcome.gathered > 0) noise += outcome.noise / double(outcome.gathered);
                 direct = std::move(atNodes.direct);
                 indirect = std::move(atNodes.indirect);
                 exitance.resize(direct.size());
@@ -195,6 +223,10 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                 out.sets.push_back(std::move(light));
         }
         for (const CornerLight& light : out.sets) out.add(light);
+        regionsOf[i] = {};
+        if (isPoint && atCorners->isSparse(i))
+            if (const double signal = meanSquare(instance, out); signal > 0)
+                out.gatheredNoise = float(std::sqrt(noise / signal));
 
         if (out.isBaked && isInsideOut(patches, ranges[i], instance.side, onSides)) {
             report.objects[i].status = "baked; no light on this side";
@@ -206,15 +238,18 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
     // Some at a time, so that this thread can report, and cancel, between them.
     for (size_t i = 0; i < scene.instances.size(); i += kTogether) {
         const double share = double(i) / double(scene.instances.size());
-        progress.report(RB_STAGE_RECONSTRUCTION, isPoint ? 0.5 + 0.5 * share : share);
+        progress.report(RB_STAGE_RECONSTRUCTION, anyGathers ? 0.5 + 0.5 * share : share);
         parallelFor(i, std::min(i + kTogether, scene.instances.size()), reconstructInstance);
     }
     for (const std::string& warning : warnings)
         if (!warning.empty()) report.warnings.push_back(warning);
     if (atCorners) {
         report.shadowRays += atCorners->shadowRays();
-        report.skipped.push_back({"final gather", "corners whose light interpolation follows",
-                                  atCorners->smoothNodes()});
+        report.skipped.push_back(
+            {"final gather", "corners whose light interpolation follows", smooth.load()});
+        report.skipped.push_back({"light on patches",
+                                  "corners with a result are few: they gather it",
+                                  atCorners->sparseCorners()});
     }
     if (occluders)
         report.skipped.push_back({"reconstruction", "objects that only occlude", occluders.load()});

@@ -23,7 +23,7 @@ std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
 
 }  // namespace
 
-ShownLight::ShownLight(const Scene& scene, const Patches& patches)
+ShownLight::ShownLight(const Scene& scene, const Patches& patches, bool gathersAtCorners)
     : scene(scene),
       patches(patches),
       results(resultSides(scene, patches)),
@@ -33,6 +33,11 @@ ShownLight::ShownLight(const Scene& scene, const Patches& patches)
                     [](const Material& material) { return material.showsByAngle(); }))
         for (size_t side = 0; side < shown.size(); ++side)
             fromEverywhere.push_back(materialOf(side).shown(side % 2, kEverywhere));
+    if (gathersAtCorners)
+        for (size_t side = 0; side < shown.size(); ++side)
+            if (isOwnAlone(side) &&
+                scene.instances[patches.parentAt(uint32_t(side)).instance].hasSparseResults)
+                shown[side] = false;
     if (isOwnAlone()) return;
     for (size_t side = 0; side < shown.size(); ++side)
         if (results[side ^ 1] && !isOwnAlone(side ^ 1)) shown[side] = true;

@@ -21,8 +21,9 @@ namespace raybundle {
 
 class ShownLight {
   public:
-    // Both must outlive the object.
-    ShownLight(const Scene& scene, const Patches& patches);
+    // gathersAtCorners: whether sparse results are gathered (corner_gather.h). Both others must
+    // outlive the object.
+    ShownLight(const Scene& scene, const Patches& patches, bool gathersAtCorners);
 
     // Per side: the diffuse reflectance and the translucence of the whole patch, what lets light
     // straight through included.
@@ -32,6 +33,8 @@ class ShownLight {
     bool isResult(size_t side) const { return results[side]; }
     // Per side: whether its light shows, on itself or on the other side of its patch.
     const std::vector<bool>& sides() const { return shown; }
+    // Whether a side has a result that is not its own light: what its corners gather.
+    bool isGathered(size_t side) const { return results[side] && !shown[side]; }
 
     // Whether every side shows its own light alone.
     bool isOwnAlone() const { return patches.translucence.empty(); }

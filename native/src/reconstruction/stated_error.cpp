@@ -27,8 +27,9 @@ constexpr double kKnownShare = 0.3;
 // Squares summed over RGB times exposed area, (W/m^2)^2 m^2.
 struct Squares {
     double signal = 0, noise = 0, residual = 0;
-    double shown = 0;   // signal at the corners, which have less of what is narrower than a face
-    double ripple = 0;  // of the noise: what interpolation between the corners cannot follow
+    double shown = 0;     // signal at the corners, which have less of what is narrower than a face
+    double ripple = 0;    // of the noise: what interpolation between the corners cannot follow
+    double gathered = 0;  // noise of what corners gather, beside that of bundles
     double smooth = 0, step = 0, known = 0;  // of the patches whose surplus is known; their signal
     double knownArea = 0, area = 0, cellArea = 0, patches = 0, cells = 0;
 
@@ -38,6 +39,7 @@ struct Squares {
         noise += o.noise;
         residual += o.residual;
         ripple += o.ripple;
+        gathered += o.gathered;
         smooth += o.smooth;
         step += o.step;
         known += o.known;
@@ -78,6 +80,7 @@ class InstanceErrors {
           side(uint32_t(instance.side)),
           irradiance(irradiance),
           sides(sides),
+          isGathered(light.gatheredNoise.has_value()),
           light(light),
           surplus(surplusOf(patches, range.firstParent, range.lastParent, instance.side, irradiance,
                             sides.exposed, sides.directError)) {
@@ -111,7 +114,10 @@ class InstanceErrors {
             sum.cellArea += double(glm::length(glm::cross(cell.a, cell.b)));
             corners += cell.isTriangle() ? 0.5 : 1.0;
         }
-        sum.ripple = sum.noise * rippleShare();
+        if (isGathered)
+            sum.gathered = std::pow(double(*light.gatheredNoise), 2) * sum.shown;
+        else
+            sum.ripple = sum.noise * rippleShare();
     }
 
     const Squares& squares() const { return sum; }
@@ -125,7 +131,10 @@ class InstanceErrors {
                          const std::array<float, 4>& w, double residual, const Surplus& s) {
             const double beyond = s.isKnown ? double(s.smooth + std::max(s.step, 0.0f))
                                             : unknownShare * square(lightAt(at));
-            const double noise = noiseScale * noiseAt(at);
+            const double noise =
+                noiseScale * noiseAt(at) +
+                (isGathered ? std::pow(double(*this->light.gatheredNoise), 2) * square(lightAt(at))
+                            : 0.0);
             const double mesh = std::max(0.0, residual - ripple * noise);
             const double error = mesh + noise + beyond;
             for (int k = 0; k < 4; ++k)
@@ -199,7 +208,10 @@ class InstanceErrors {
                 const Surplus& whole = surplus[patch - first];
                 const double known = double(whole.smooth - beyond.smooth) +
                                      std::max(0.0, double(whole.step - beyond.step));
-                body(at, weight, cell, w, square(shown - lightAt(at)) + known, beyond);
+                if (isGathered)
+                    body(at, weight, cell, w, 0.0, Surplus{true, 0, 0});
+                else
+                    body(at, weight, cell, w, square(shown - lightAt(at)) + known, beyond);
             }
         }
     }
@@ -211,6 +223,7 @@ class InstanceErrors {
     const uint32_t side;
     const Irradiance& irradiance;
     const SideErrors& sides;
+    const bool isGathered;
     const InstanceLight& light;
     const std::vector<Surplus> surplus;
     Squares sum;
@@ -221,7 +234,7 @@ class InstanceErrors {
 Report::Errors relative(const Squares& s, double noiseScale, double shownScale,
                         double discretisation) {
     if (!(s.signal > 0)) return {};
-    return {s.shown > 0 ? std::sqrt(shownScale * s.shownNoise() / s.shown) : 0,
+    return {s.shown > 0 ? std::sqrt((shownScale * s.shownNoise() + s.gathered) / s.shown) : 0,
             std::sqrt(discretisation), std::sqrt(s.mesh(noiseScale) / s.signal),
             std::sqrt(noiseScale * s.noise / s.signal)};
 }
@@ -314,7 +327,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     }
     warnOf(std::move(coarse), report);
     report.error = relative(all, noiseScale, shownScale, discretisation);
-    report.error.noise = shown;
+    report.error.noise = std::hypot(shown, all.shown > 0 ? std::sqrt(all.gathered / all.shown) : 0);
     report.error.ofPatches = report.estimatedError;
 }
 

@@ -33,6 +33,8 @@ struct SideErrors {
 // settings. ranges: of the patches; irradiance: mean over each tile's side. errsAlike: the directions
 // of bundles are independent, so that all objects get too much light together, or too little: what
 // the halves tell of one object is a single sample then, and none has less noise than all together.
+// Sparse results that are gathered are the light of points (InstanceLight::gatheredNoise), whose error
+// is noise alone.
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
                  const Irradiance& irradiance, const SideErrors& sides, float targetError,
                  bool errsAlike, std::vector<InstanceLight>& light, Report& report);

@@ -11,6 +11,10 @@
 namespace raybundle {
 namespace {
 
+// Results are sparse if a corner has one at most of so many of the mesh, and of so many on the faces
+// that have any: those of a copy, as Array makes them, are not.
+constexpr size_t kSparse = 8, kSparseOnFaces = 2;
+
 template <class T>
 T& checked(std::vector<T>& items, int32_t id, const char* what) {
     if (id < 0 || size_t(id) >= items.size())
@@ -210,6 +214,15 @@ void Scene::setResultCorners(int32_t id, const int32_t* corners, size_t count) {
             faces[face] |= vertices[size_t(own.cornerVertices[size_t(c)])];
     target.resultVertices = std::move(vertices);
     target.resultFaces = std::move(faces);
+    size_t results = 0, onTheirFaces = 0;
+    for (size_t face = 0; face < own.faceCount(); ++face) {
+        if (!target.resultFaces[face]) continue;
+        onTheirFaces += size_t(own.faceOffsets[face + 1] - own.faceOffsets[face]);
+        for (int32_t c = own.faceOffsets[face]; c < own.faceOffsets[face + 1]; ++c)
+            results += target.resultVertices[size_t(own.cornerVertices[size_t(c)])];
+    }
+    target.hasSparseResults =
+        kSparse * results <= own.cornerCount() && kSparseOnFaces * results <= onTheirFaces;
 }
 
 size_t Scene::cornersWithoutResult() const {

@@ -145,6 +145,9 @@ struct Instance {
     // Where only some corners have a result: per vertex of the mesh, whether one of its corners has,
     // and per face, whether one of its vertices. Empty: all.
     std::vector<uint8_t> resultVertices{}, resultFaces{};
+    // Whether these are few among corners without a result, as those of a mesh that a modifier has
+    // subdivided.
+    bool hasSparseResults = false;
 
     bool hasResultAtVertex(size_t vertex) const {
         return role == RB_ROLE_BAKE && (resultVertices.empty() || resultVertices[vertex]);
