@@ -15,6 +15,7 @@
 #include "bake/cancellation.h"
 #include "patches/neighbours.h"
 #include "transport/first_shot.h"
+#include "transport/stand_ins.h"
 
 namespace raybundle {
 namespace {
@@ -54,32 +55,68 @@ namespace {
 // So many times the error of a result may be that of a side whose light is not shown. What it lights
 // gets it from many such sides, whose errors even out: the variance of their sum goes with the area
 // of each, beside that of all.
-float othersError(const Patches& patches, uint32_t side) {
+float othersError(const Patches& patches, const StandIns& standIns, uint32_t side) {
     if (patches.reflectance[side] == glm::vec3(0.0f) &&
         patches.translucenceOf(side ^ 1) == glm::vec3(0.0f))
         return kMostError;
+    if (standIns.isStandIn(side)) return kOthersError;
     const float edge = patches.islandAt(side).size;
     return kOthersError *
            std::max(1.0f, edge / std::sqrt(std::max(patches.area[side / 2], 1e-30f)));
 }
 
+// Of neighbouring sides that gather both, their numbers.
+std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns) {
+    std::vector<ReceiverPair> pairs = neighbouringSides(patches);
+    for (ReceiverPair& pair : pairs)
+        pair = {standIns.numberOf(pair.first), standIns.numberOf(pair.second)};
+    pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                               [](const ReceiverPair& pair) {
+                                   return pair.first == StandIns::kNone ||
+                                          pair.second == StandIns::kNone;
+                               }),
+                pairs.end());
+    return pairs;
+}
+
+// What a side has of those that stand for it.
+Gathered meanOf(const std::vector<Gathered>& results, const StandIns& standIns, uint32_t side) {
+    Gathered mean;
+    float count = 0;
+    standIns.forEachOf(side, [&](uint32_t number) {
+        const Gathered& one = results[number];
+        ++count;
+        mean.irradiance += one.irradiance;
+        mean.unpowered += one.unpowered;
+        mean.variance += one.variance;
+        mean.angles += one.angles;
+        mean.brightness += one.brightness;
+        mean.noisiest = one.noisiest;
+        if (mean.incoming.weight < one.incoming.weight) mean.incoming = one.incoming;
+    });
+    mean.irradiance /= count;
+    mean.unpowered /= count;
+    mean.variance /= count;
+    return mean;
+}
+
 // By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
-CoarseShot coarseOfPatches(const FirstShotInput& input,
+CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32_t>& gatherers,
                            const std::function<Receiver(size_t)>& receiverAt,
                            const std::function<void(double)>& report) {
     CoarseShot coarse;
     if (!input.fromTiles) return coarse;
     const Patches& patches = input.patches;
     coarse.seen = input.fromTiles->seen;
-    coarse.gathered.resize(patches.sideCount());
+    coarse.gathered.resize(gatherers.size());
     std::vector<uint32_t> cut;
-    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
-        throwIfCancelledAt(side);
+    for (uint32_t k = 0; k < gatherers.size(); ++k) {
+        throwIfCancelledAt(k);
+        const uint32_t side = gatherers[k];
         if (patches.level(side / 2) > 0)
-            cut.push_back(side);
+            cut.push_back(k);
         else
-            coarse.gathered[side] =
-                input.fromTiles->gathered[2 * patches.tileOf(side / 2) + side % 2];
+            coarse.gathered[k] = input.fromTiles->gathered[2 * patches.tileOf(side / 2) + side % 2];
     }
     input.light.shootCoarsely(coarse, cut, receiverAt, report);
     return coarse;
@@ -91,6 +128,8 @@ FirstShot gather(const FirstShotInput& input) {
     const DirectLight& light = input.light;
     const Patches& patches = input.patches;
     const size_t n = patches.sideCount();
+    const StandIns standIns(patches, input.isShown);
+    const std::vector<uint32_t>& gatherers = standIns.gatherers();
     FirstShot shot;
     shot.emission = light.bundledEmission();
     shot.irradiance.resize(n);
@@ -99,17 +138,17 @@ FirstShot gather(const FirstShotInput& input) {
     shot.error.resize(n);
     shot.noisiest.resize(n);
     auto report = [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); };
-    auto receiverAt = [&](size_t side) {
-        Receiver receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
-                          uint32_t(side)};
+    auto receiverAt = [&](size_t k) {
+        const uint32_t side = gatherers[k];
+        Receiver receiver{side, patches.normal(side), std::nullopt, side};
         // Most of the error of a cut tile's patches is not in its mean, which keeps twice what
         // other tiles have.
-        if (const int level = patches.level(uint32_t(side / 2)); level > 0)
+        if (const int level = patches.level(side / 2); level > 0)
             receiver.errorFactor = std::ldexp(1.0f, level);
         if (input.isShown && !(*input.isShown)[side]) {
             receiver.isShown = false;
             receiver.errorFactor =
-                std::min(receiver.errorFactor * othersError(patches, uint32_t(side)), kMostError);
+                std::min(receiver.errorFactor * othersError(patches, standIns, side), kMostError);
         }
         return receiver;
     };
@@ -124,27 +163,33 @@ FirstShot gather(const FirstShotInput& input) {
             if (const auto source = (*matches)[k].source)
                 shares[*source] = input.before->powerShares[k];
     } else {
-        auto bySource = std::make_shared<LightBySource>(sources, n);
+        auto bySource = std::make_shared<LightBySource>(sources, gatherers.size());
         bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
-        results =
-            light.gather(n, receiverAt, target, report, coarseOfPatches(input, receiverAt, report),
-                         neighbouringSides(patches), bySource->isWhole ? bySource.get() : nullptr);
+        results = light.gather(gatherers.size(), receiverAt, target, report,
+                               coarseOfPatches(input, gatherers, receiverAt, report),
+                               neighbouringGatherers(patches, standIns),
+                               bySource->isWhole ? bySource.get() : nullptr);
         shares = bySource->powerShares = light.powerShares(input.touchDistance);
         shot.bySource = std::move(bySource);
     }
-    for (size_t side = 0; side < n; ++side) {
-        const Gathered& result = results[side];
+    for (const Gathered& result : results) {
+        shot.rays += result.rays;
+        shot.unblockedSides += result.unblocked;
+        shot.hiddenSides += result.hidden;
+        shot.weakSides += result.weak;
+        shot.insideSides += result.inside;
+    }
+    for (uint32_t side = 0; side < n; ++side) {
+        const uint32_t number = standIns.numberOf(side);
+        const Gathered result =
+            number != StandIns::kNone ? results[number] : meanOf(results, standIns, side);
         shot.irradiance[side] = result.irradiance;
         shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
         shot.angles[side] = result.meanAngles();
         if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
         shot.error[side] = std::sqrt(result.variance);
         shot.noisiest[side] = result.noisiest;
-        shot.rays += result.rays;
-        shot.unblockedSides += result.unblocked;
-        shot.hiddenSides += result.hidden;
-        shot.weakSides += result.weak;
-        shot.insideSides += result.inside;
+        if (gatherers.size() < n) shot.isByOthers.push_back(number == StandIns::kNone);
     }
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::dvec3 power(sources[k]->power());
