@@ -57,10 +57,12 @@ def materials_reordered() -> None:
         slots = np.empty(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get('material_index', slots)
         materials = list(mesh.materials)
+        if not materials:
+            continue
         mesh.materials.clear()
         for material in (unused, *reversed(materials)):
             mesh.materials.append(material)
-        slots = np.clip(slots, 0, max(len(materials) - 1, 0))
+        slots = np.clip(slots, 0, len(materials) - 1)
         mesh.polygons.foreach_set('material_index', (len(materials) - slots).astype(np.int32))
         mesh.update()
 

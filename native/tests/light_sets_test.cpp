@@ -99,6 +99,19 @@ TEST(LightSets, EachIsWhatABakeOfItsLightsAloneGives) {
     }
 }
 
+// What is in none is dark then.
+TEST(LightSets, EachIsThatWhereAllLightIsInOne) {
+    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"}) {
+        const auto together = baked(court({true, true, false}, true), reconstruction);
+        const auto first = baked(court({true, false, false}), reconstruction);
+        const auto second = baked(court({false, true, false}), reconstruction);
+        EXPECT_LT(difference(light(*together, 0), light(*first)), kSolverTolerance)
+            << reconstruction;
+        EXPECT_LT(difference(light(*together, 1), light(*second)), kSolverTolerance)
+            << reconstruction;
+    }
+}
+
 TEST(LightSets, AllLightIsTheSumOfTheSetsAndOfWhatIsInNone) {
     const auto together = baked(court({}, true));
     const auto rest = baked(court({false, false, true}));

@@ -132,9 +132,11 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
         }
         for (const Gathered& one : gathered) rays += one.rays;
         const double mean = meanLight(scene, patches, ranges, exposed, lights[k].irradiance);
-        if (settings.finalGather && mean > 0)
-            others.emplace_back(patches, visibility, lights[k], exposed, float(mean),
-                                settings.targetError);
+        others.push_back(settings.finalGather && mean > 0
+                             ? std::make_unique<const FinalGather>(patches, visibility, lights[k],
+                                                                   exposed, float(mean),
+                                                                   settings.targetError)
+                             : nullptr);
     }
 }
 
@@ -146,8 +148,8 @@ CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
     const uint32_t nodeCount = regions[instance].nodeCount;
     const size_t begin = first[instance], end = first[instance + 1];
     std::vector<double> gathered(nodeCount, 0.0);  // variances, in the mean of the channels
-    if (k < others.size()) {
-        const FinalGather& gather = others[k];
+    if (others[k]) {
+        const FinalGather& gather = *others[k];
         std::vector<bool> wanted(nodeCount, true);
         if (skips.skipGather && !isSparse(instance)) {
             wanted =

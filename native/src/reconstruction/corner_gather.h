@@ -6,6 +6,7 @@
 // which most are not seen, would cost more than what is shown of them.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -90,8 +91,9 @@ class CornerGather {
     std::vector<std::vector<glm::vec3>> sources;  // per light and corner: irradiance, W/m^2
     std::vector<std::vector<float>> variances;    // of its brightest channel, (W/m^2)^2
     uint64_t rays = 0;                            // for them
-    std::vector<FinalGather> others;              // per light; none where it is switched off
-    size_t sparse = 0;                            // of the corners
+    // Per light; null where it is dark, or where that is switched off.
+    std::vector<std::unique_ptr<const FinalGather>> others;
+    size_t sparse = 0;  // of the corners
 };
 
 }  // namespace raybundle
