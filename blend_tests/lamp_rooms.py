@@ -115,6 +115,18 @@ def _two_panels() -> None:
     _panel((0.0, -0.6), (0.6, 0.6), 2.7, "lamp_east")
 
 
+def _subdivided() -> None:
+    """Two panels, and objects whose vertices are few beside the faces that modifiers make."""
+    _two_panels()
+    grey = material("prop", Diffuse((0.5, 0.5, 0.6)))
+    ball = add_mesh("ball", uv_sphere(0.35, 8, 6, at=(0, 0, 0)), grey)
+    ball.location = (-0.6, 0.8, 0.36)
+    ball.data.polygons.foreach_set('use_smooth', np.ones(len(ball.data.polygons), bool))
+    for item, levels in ((ball, 3), (bpy.data.objects["cube"], 2)):
+        modifier = item.modifiers.new("Subdivision", 'SUBSURF')
+        modifier.levels = modifier.render_levels = levels
+
+
 def _part_of_wall() -> None:
     wall = bpy.data.objects["wall_north"].data
     wall.materials.append(material("lamp", Emission((1, 1, 1), 10.0)))
@@ -174,4 +186,5 @@ ROOMS: dict[str, Callable[[], object]] = {
     "tube": _tube,
     "ring": _ring,
     "wavy_panel": _wavy_panel,
+    "subdivided": _subdivided,
 }

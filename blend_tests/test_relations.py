@@ -22,6 +22,7 @@ CHOSEN = {
     "room:two_panels": ["emissive meshes joined", "the sum of light sets"],
     "room:ring": ["faces in another order"],
     "room:sun": ["an object far away"],
+    "room:subdivided": ["faces in another order", "mirrored", "the sum of light sets"],
 }
 TURN = "turned by (0.4, 0.7, 1.1)"
 CASES = [(scene, relation) for scene, names in CHOSEN.items()
@@ -43,7 +44,7 @@ def test_relation(scenes, scene, relation):
     assert result.failures == []
 
 
-@pytest.mark.parametrize("room", ["area_near", "tube"])
+@pytest.mark.parametrize("room", ["area_near", "tube", "subdivided"])
 def test_noise(room):
     target = lamp_noise.TARGETS[0]
     assert lamp_noise.measure(room, target, cells=lamp_rooms.COARSE).failures(target) == []
