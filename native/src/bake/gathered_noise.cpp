@@ -34,15 +34,20 @@ GatheredNoise::GatheredNoise(const Patches& patches, const ShownLight& shown) {
         area.resize(std::max(area.size(), instance + 1), 0.0f);
         area[instance] += patches.area[side / 2];
     }
-    std::map<std::array<int, 5>, uint32_t> parts;
+    std::map<std::array<int, 6>, uint32_t> parts;
     for (Side& one : sides) {
         throwIfCancelledAt(one.side);
-        const uint32_t instance = patches.parentAt(one.side).instance;
-        const float width = std::sqrt(kPartOfArea * area[instance]);
-        const glm::vec3 at = patches.axes * patches.point(one.side / 2, glm::vec2(0.5f)) / width;
-        const std::array<int, 5> key{
-            int(instance), mainAxis(patches.axes * patches.normal(one.side)), int(std::floor(at.x)),
-            int(std::floor(at.y)), int(std::floor(at.z))};
+        const Parent& parent = patches.parentAt(one.side);
+        const float width = std::sqrt(kPartOfArea * area[parent.instance]);
+        const glm::vec3 from = patches.islandAt(one.side).centre;
+        const glm::vec3 at =
+            patches.axes * (patches.point(one.side / 2, glm::vec2(0.5f)) - from) / width;
+        const std::array<int, 6> key{int(parent.instance),
+                                     int(parent.island),
+                                     mainAxis(patches.axes * patches.normal(one.side)),
+                                     int(std::floor(at.x)),
+                                     int(std::floor(at.y)),
+                                     int(std::floor(at.z))};
         one.part = parts.emplace(key, uint32_t(parts.size())).first->second;
     }
     partCount = parts.size();

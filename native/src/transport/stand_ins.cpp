@@ -5,7 +5,8 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <tuple>
+#include <unordered_map>
+#include <utility>
 
 #include "bake/cancellation.h"
 #include "transport/sobol.h"
@@ -19,7 +20,7 @@ constexpr uint32_t kFewest = 2, kOneOf = 16;
 constexpr int kNormalCells = 8;
 // Width of a cell of places, of a tile.
 constexpr float kWidth = 0.5f;
-// Sides of more than this share of a tile's area stand for themselves.
+// Sides of more than this share of a cell's area stand for themselves.
 constexpr float kSmall = 0.25f;
 
 std::array<int, 2> cellOf(const glm::vec3& normal) {
@@ -34,14 +35,13 @@ std::array<int, 2> cellOf(const glm::vec3& normal) {
     return {cell(p.x), cell(p.y)};
 }
 
-struct Member {
-    std::array<int, 5>
-        key;         // surface and whether it is the inside, cell of the normal, of the place
-    uint32_t order;  // by chance, whatever order the faces have
-    uint32_t side;
-    bool operator<(const Member& other) const {
-        return key != other.key ? key < other.key
-                                : std::tie(order, side) < std::tie(other.order, other.side);
+// Surface and whether it is the inside, cell of the normal, cell of the place.
+using Key = std::array<int, 5>;
+struct HashOf {
+    size_t operator()(const Key& key) const {
+        uint32_t mixed = 0;
+        for (const int part : key) mixed = hash(mixed, uint32_t(part));
+        return mixed;
     }
 };
 
@@ -49,43 +49,51 @@ struct Member {
 
 StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
     const uint32_t count = uint32_t(patches.sideCount());
-    std::vector<Member> all;
+    std::unordered_map<Key, uint32_t, HashOf> clusters;
+    std::vector<uint32_t> small;  // the sides that are in any
+    clusterOf.assign(count, kNone);
     if (isShown)
         for (uint32_t side = 0; side < count; ++side) {
             throwIfCancelledAt(side);
-            const float width = kWidth * patches.islandAt(side).size;
+            const Island& island = patches.islandAt(side);
+            const float width = kWidth * island.size;
             if ((*isShown)[side] || patches.area[side / 2] > kSmall * width * width) continue;
-            const Parent& parent = patches.parentAt(side);
             const auto normal = cellOf(patches.axes * patches.normal(side));
-            const glm::ivec3 place(
-                glm::floor(patches.axes * patches.point(side / 2, glm::vec2(0.5f)) / width));
-            all.push_back({{int(2 * parent.surface + side % 2),
-                            normal[0] * kNormalCells + normal[1], place.x, place.y, place.z},
-                           hash(side, 0),
-                           side});
+            const glm::vec3 at = patches.point(side / 2, glm::vec2(0.5f)) - island.centre;
+            const glm::ivec3 place(glm::floor(patches.axes * at / width));
+            const Key key{int(2 * patches.parentAt(side).surface + side % 2),
+                          normal[0] * kNormalCells + normal[1], place.x, place.y, place.z};
+            clusterOf[side] = clusters.emplace(key, uint32_t(clusters.size())).first->second;
+            small.push_back(side);
         }
-    if (all.empty()) {
+    if (small.empty()) {
+        clusterOf.clear();
         sides.resize(count);
         std::iota(sides.begin(), sides.end(), 0u);
         return;
     }
-    std::sort(all.begin(), all.end());
+    std::vector<uint32_t> begin(clusters.size() + 1, 0), inCluster(small.size());
+    for (const uint32_t side : small) ++begin[clusterOf[side] + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
+    for (const uint32_t side : small) inCluster[next[clusterOf[side]]++] = side;
+
     numbers.assign(count, 0);
-    clusterOf.assign(count, kNone);
     first.push_back(0);
-    for (size_t begin = 0, end = 0; begin < all.size(); begin = end) {
-        while (end < all.size() && all[end].key == all[begin].key) ++end;
-        const size_t gathering =
-            std::min(end - begin, std::max<size_t>(kFewest, (end - begin) / kOneOf));
-        for (size_t k = begin; k < end; ++k) {
-            clusterOf[all[k].side] = uint32_t(first.size() - 1);
-            if (k < begin + gathering)
-                members.push_back(all[k].side);
-            else
-                numbers[all[k].side] = kNone;
-        }
+    for (uint32_t cluster = 0; cluster < clusters.size(); ++cluster) {
+        throwIfCancelledAt(cluster);
+        const auto from = inCluster.begin() + begin[cluster];
+        const auto to = inCluster.begin() + begin[cluster + 1];
+        const auto gathering =
+            std::min(to - from, std::max<ptrdiff_t>(kFewest, (to - from) / kOneOf));
+        // By chance, whatever order the faces have.
+        std::partial_sort(from, from + gathering, to, [](uint32_t a, uint32_t b) {
+            return std::make_pair(hash(a, 0), a) < std::make_pair(hash(b, 0), b);
+        });
+        members.insert(members.end(), from, from + gathering);
+        for (auto side = from + gathering; side < to; ++side) numbers[*side] = kNone;
         first.push_back(uint32_t(members.size()));
-        standsForOthers.push_back(gathering < end - begin);
+        standsForOthers.push_back(from + gathering < to);
     }
     for (uint32_t side = 0; side < count; ++side) {
         if (numbers[side] == kNone) continue;
