@@ -257,7 +257,7 @@ RB_API rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, boo
 /* Optional, for an instance with role RB_ROLE_BAKE: which corners of its mesh have a result, as where
  * a mesh is finer than the one that the light is written to. The light of faces away from them is
  * computed no better than what it lights needs it, and counts in no stated error; corners without a
- * result get what is known there. Where an eighth of the corners at most have one, and half of those
+ * result get what is known there. Where a quarter of the corners at most have one, and half of those
  * on the faces that have any, these gather the light at their points (reconstruction LEAST_SQUARES
  * and POINT, final_gather 1, LINE_REUSE and GATHER). Without it all have one. */
 RB_API rb_error rb_set_result_corners(rb_scene scene, int32_t instance, const int32_t* corners,
