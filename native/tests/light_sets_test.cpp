@@ -86,30 +86,26 @@ std::vector<glm::vec3> sum(std::vector<glm::vec3> a, const std::vector<glm::vec3
     return a;
 }
 
-TEST(LightSets, EachIsWhatABakeOfItsLightsAloneGives) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
-        const auto together = baked(court({}, true), reconstruction);
-        const auto first = baked(court({true, false, false}), reconstruction);
-        const auto second = baked(court({false, true, false}), reconstruction);
-        EXPECT_LT(difference(light(*together, 0), light(*first)), kSolverTolerance)
-            << reconstruction;
-        EXPECT_LT(difference(light(*together, 1), light(*second)), kSolverTolerance)
-            << reconstruction;
-        EXPECT_EQ(reportOf(*together)["lines"], reportOf(*first)["lines"]);
-    }
+// Both sets of a court, of which the light in none is `rest`, are those of courts with their lights
+// alone, from the same lines.
+void expectSetsAsAlone(const std::string& reconstruction, bool rest) {
+    SCOPED_TRACE(reconstruction);
+    const auto together = baked(court({true, true, rest}, true), reconstruction);
+    const auto first = baked(court({true, false, false}), reconstruction);
+    const auto second = baked(court({false, true, false}), reconstruction);
+    EXPECT_LT(difference(light(*together, 0), light(*first)), kSolverTolerance);
+    EXPECT_LT(difference(light(*together, 1), light(*second)), kSolverTolerance);
+    EXPECT_EQ(reportOf(*together)["lines"], reportOf(*first)["lines"]);
 }
 
-// What is in none is dark then.
+TEST(LightSets, EachIsWhatABakeOfItsLightsAloneGives) {
+    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
+        expectSetsAsAlone(reconstruction, true);
+}
+
 TEST(LightSets, EachIsThatWhereAllLightIsInOne) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"}) {
-        const auto together = baked(court({true, true, false}, true), reconstruction);
-        const auto first = baked(court({true, false, false}), reconstruction);
-        const auto second = baked(court({false, true, false}), reconstruction);
-        EXPECT_LT(difference(light(*together, 0), light(*first)), kSolverTolerance)
-            << reconstruction;
-        EXPECT_LT(difference(light(*together, 1), light(*second)), kSolverTolerance)
-            << reconstruction;
-    }
+    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
+        expectSetsAsAlone(reconstruction, false);
 }
 
 TEST(LightSets, AllLightIsTheSumOfTheSetsAndOfWhatIsInNone) {

@@ -375,7 +375,7 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
             {"most shadow rays", "the side is the inside of a solid", shot.insideSides});
         report.skipped.push_back(
             {"shadow rays", "sides finer than tiles that are not shown: others stand for them",
-             size_t(std::count(shot.isByOthers.begin(), shot.isByOthers.end(), true))});
+             shot.sidesByOthers});
         lights.push_back({set, std::move(direct), std::move(shot), scene.worldRadianceOf(set),
                           Irradiance(patches.sideCount())});
     }

@@ -10,8 +10,9 @@
 namespace raybundle {
 namespace {
 
-// Of the noise that the patches of a part have in common: it is halved again by what they absorb
-// and by the other directions from which a corner gets light.
+// Of the noise that the patches of a part have in common, what is left at a corner that gathers from
+// many parts, which absorb some of it. Fitted: with it the room `subdivided` of lamp_noise.py states
+// 0.93 and 1.30 times its true noise, at 0.02 and 0.005.
 constexpr float kShare = 0.3f;
 // A part is as wide as the root of this share of its object's area, and faces alike.
 constexpr float kPartOfArea = 1.0f / 64;

@@ -192,6 +192,7 @@ CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
     }
     for (size_t node = 0; node < means.size(); ++node)
         if (means[node]) light.direct[node] = light.carried[node] + *means[node];
+    if (!isSparse(instance)) return outcome;
     std::vector<double> variance(nodeCount, 0.0), weights(nodeCount, 0.0);
     for (size_t c = begin; c < end; ++c) {
         const double angle = double(cornerAngles[corners[c].corner]);

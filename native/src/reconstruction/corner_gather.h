@@ -57,9 +57,11 @@ class CornerGather {
     };
 
     struct Outcome {
-        size_t smooth = 0;    // nodes where interpolation was good enough
-        size_t gathered = 0;  // nodes whose light is their corners'
-        double noise = 0;     // of them: sum of its squares
+        size_t smooth = 0;  // nodes where interpolation was good enough
+        // Of sparse results: nodes whose light is their corners', and the sum of its variances over
+        // RGB there, (W/m^2)^2.
+        size_t gathered = 0;
+        double noise = 0;
     };
     // Puts what corners gather of light k in its place; nodes none of whose corners can gather keep
     // their light.

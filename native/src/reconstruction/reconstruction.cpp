@@ -162,23 +162,23 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         out.cornerVertices = mesh.cornerVertices;
         out.vertexCount = mesh.vertices.size();
         out.cornerAngles = cornerAngles(mesh);
-        const bool isPoint = gathers[i];
-        if (!isPoint) regionsOf[i] = findRegions(i);
+        const bool isGathered = gathers[i];
+        if (!isGathered) regionsOf[i] = findRegions(i);
         const SmoothRegions& regions = regionsOf[i];
         // Three fields of each light, one after the other; where corners gather the colour, and what
         // is shown of light from everywhere, are the last.
         std::vector<const Field*> fields;
         for (const SideLight& light : onSides) {
             fields.push_back(&light.shown.direct);
-            if (isPoint)
+            if (isGathered)
                 fields.insert(fields.end(), {&light.indirect, &light.carried});
             else
                 fields.insert(fields.end(), {&light.shown.indirect, &light.exitance});
         }
         for (const SideLight& light : onSides)
-            if (isPoint) fields.push_back(&light.emission);
-        if (isPoint) fields.push_back(&shown.color());
-        if (isPoint && !shown.everywhere().empty()) fields.push_back(&shown.everywhere());
+            if (isGathered) fields.push_back(&light.emission);
+        if (isGathered) fields.push_back(&shown.color());
+        if (isGathered && !shown.everywhere().empty()) fields.push_back(&shown.everywhere());
         std::vector<Field> nodes;
         if (settings.reconstruction == "AREA_AVERAGE") {
             nodes = areaAverage(patches, ranges[i], regions, instance.side, outside, fields);
@@ -197,7 +197,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         for (size_t k = 0; k < lights.size(); ++k) {
             Field &direct = nodes[3 * k], &indirect = nodes[3 * k + 1];
             Field& exitance = nodes[3 * k + 2];
-            if (isPoint) {
+            if (isGathered) {
                 CornerGather::NodeLight atNodes{
                     std::move(direct), std::move(indirect), std::move(exitance), {}};
                 if (!shown.everywhere().empty()) atNodes.shownShare = nodes.back();
@@ -224,7 +224,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         }
         for (const CornerLight& light : out.sets) out.add(light);
         regionsOf[i] = {};
-        if (isPoint && atCorners->isSparse(i))
+        if (isGathered && atCorners->isSparse(i))
             if (const double signal = meanSquare(instance, out); signal > 0)
                 out.gatheredNoise = float(std::sqrt(noise / signal));
 

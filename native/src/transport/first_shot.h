@@ -34,8 +34,7 @@ struct FirstShot {
     glm::dvec3 emitted{0.0};  // power of the gathered sources, W; without a power: what arrives
     glm::dvec3 escaped{0.0};  // part of it that meets no surface, W
     uint64_t rays = 0;
-    // Per side: whether it has the light of others that stand for it (stand_ins.h); empty: none has.
-    std::vector<bool> isByOthers;
+    uint64_t sidesByOthers = 0;   // that have the light of others that stand for them (stand_ins.h)
     uint64_t unblockedSides = 0;  // side and source pairs without noise: wholly visible
     uint64_t hiddenSides = 0;     // side and source pairs that cannot face each other
     uint64_t weakSides = 0;    // pairs with fewer rays since the source gives little of the light

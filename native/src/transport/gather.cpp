@@ -189,8 +189,8 @@ FirstShot gather(const FirstShotInput& input) {
         if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
         shot.error[side] = std::sqrt(result.variance);
         shot.noisiest[side] = result.noisiest;
-        if (gatherers.size() < n) shot.isByOthers.push_back(number == StandIns::kNone);
     }
+    shot.sidesByOthers = n - gatherers.size();
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::dvec3 power(sources[k]->power());
         if (sources[k]->castsShadows) shot.emitted += power * (1.0 - shares[k].covered);

@@ -11,8 +11,9 @@
 // - No wavelets: a binary tree of equirectangular regions with the exact first moments of their
 //   light. Its branches end where the radiance hardly varies, so that smooth skies are cheap and a
 //   sun of a few pixels is found by every sample that should.
-// - The product is exact for regions above the horizon. It is summed from the smallest of those
-//   that the horizon cuts, which take the cosine's mean over a flat piece.
+// - The product is exact for regions above the horizon. Those that it cuts take the cosine's mean
+//   over a flat piece in the mean direction of their light, and are looked into no further than the
+//   irradiance needs to be right to 1e-4.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
