@@ -79,7 +79,8 @@ SETTINGS: dict[str, type] = {
 
 # Skips of a bake: settings "skip.NAME" that are 0 or 1.
 SKIPS = ('darkness', 'reflection', 'geometry', 'lights', 'facing', 'occluders', 'lit', 'weak',
-         'inside', 'gather', 'bundles', 'warm_start', 'sheets', 'lamp_insides')
+         'inside', 'gather', 'bundles', 'warm_start', 'sheets', 'lamp_insides',
+         'clusters')
 SETTINGS.update({f'skip.{name}': int for name in SKIPS})
 
 # Called with the stage and the share of it that is done (0 to 1); returning False cancels.

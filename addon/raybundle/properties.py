@@ -70,6 +70,7 @@ enum_skip = (
     ('sheets', "Sheets", "Projection of faces that lie in a plane with others of their kind"),
     ('lamp_insides', "Lamp Insides",
      "Emission inside of closed surfaces that hold nothing else"),
+    ('clusters', "Clusters", "Light of each patch where it is not shown and finer than needed"),
 )
 
 enum_solver = (

@@ -39,6 +39,14 @@ Scene roomWithCarpet() {
     return scene;
 }
 
+// The same with a ball of faces finer than tiles that only occludes.
+Scene roomWithFineBall() {
+    Scene scene = roomOfLamps();
+    place(scene, icosphere("ball", 0.3f, 4, false), grey("ball", 0.5f),
+          glm::translate(glm::dmat4(1), {3, 0.8, 1.5}), RB_ROLE_OCCLUDE);
+    return scene;
+}
+
 // With a lamp that is a ball and emits from both sides, and another in a box of its own.
 Scene roomOfBulbs() {
     Scene scene = litRoom();
@@ -101,6 +109,7 @@ INSTANTIATE_TEST_SUITE_P(
                          [](Settings& settings) { settings.skipGeometry = 0; }},
                     Case{"lit", "closed form", 0}, Case{"weak", "little of the light", 0},
                     Case{"inside", "inside of a solid", 0},
+                    Case{"clusters", "exchange it as clusters", 0, roomWithFineBall},
                     Case{"lamp_insides", "that hold nothing else", 0, roomOfBulbs},
                     Case{"gather", "whose light interpolation follows", 0, roomOfLamps,
                          [](Settings& settings) { settings.reconstruction = "POINT"; }},

@@ -366,8 +366,8 @@ RB_API void rb_release_bake(rb_bake bake);
  *   int    thesis_literal  1: MULTIPATH as the thesis' pseudo-code has it, for comparison (0)
  *   int    skip.NAME       0 does work that the scene does not need, for tests (1). NAME: darkness,
  *                          reflection, geometry, lights, facing, sheets, occluders, lit, weak,
- *                          inside, lamp_insides, gather, bundles, warm_start
- *                          (bake/skips.h)
+ *                          inside, lamp_insides, clusters, gather, bundles,
+ *                          warm_start (bake/skips.h)
  * The first of each choice is the default; docs/method.md says what they do and which work
  * together. rb_execute_bake refuses others with the reason.
  */

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "bake/bake_warnings.h"
 #include "bake/cancellation.h"
@@ -207,7 +208,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
                      trace->surrounding.exposed, trace->touchDistance, settings, *trace->tracer,
                      trace->counts,
                      settings.solver == "LINE_REUSE" ? &trace->solutionsOf(light.set) : nullptr,
-                     &shown.sides()});
+                     &shown.sides(), &trace->clusters});
             const Transports transports = makeTransports(settings.solver, inputs);
             noise = solveToTarget(scene, tiles, shown, lights, transports, report);
             exposed = trace->exposedShare();
@@ -232,7 +233,10 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         checkFinite(made);
     }
     throwIfCancelled();
-    report.patches = trace->patches.count();
+    report.patches = trace->clusters.patches().count();
+    report.skipped.push_back(
+        {"patches", "not shown and finer than light is exchanged by: they exchange it as clusters",
+         trace->clusters.memberCount()});
     report.cuts = trace->cuts;
     report.lines = trace->tracer->lineCount();
     report.exchanges = trace->counts.exchangeCount();
@@ -245,15 +249,20 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
     progress.report(RB_STAGE_PATCHES, 0);
     const uint64_t hash = geometryHash(scene, settings), likeness = likenessHash(scene);
-    if (settings.skipGeometry && trace && trace->isOf(hash, likeness) && trace->isWhole()) {
-        assignMaterials(scene, trace->patches);
+    const bool isSameGeometry =
+        settings.skipGeometry && trace && trace->isOf(hash, likeness) && trace->isWhole();
+    if (isSameGeometry) assignMaterials(scene, trace->patches);
+    std::optional<Clusters> clusters;
+    if (isSameGeometry) clusters = clustersOf(scene, trace->patches, settings);
+    if (clusters && clusters->areThoseOf(trace->clusters)) {
+        trace->clusters = std::move(*clusters);
         report.skipped.push_back({"patches and lines", "geometry unchanged since the last bake",
                                   trace->tracer->bundleCount()});
     } else {
         trace.reset();
         trace = std::make_unique<Trace>(
             hash, likeness, subdivide(scene, settings.patchSize, size_t(settings.maxPatches)),
-            settings);
+            scene, settings);
     }
     const Patches& patches = trace->patches;
     report.warnings.insert(report.warnings.end(), patches.warnings.begin(), patches.warnings.end());
@@ -287,7 +296,10 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
         cuts.add(worthwhileCuts(scene, patches, shots, most, settings.targetError));
     }
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
-    if (cuts.count() > 0) cutTiles(scene, patches, cuts.levels);
+    if (cuts.count() > 0) {
+        cutTiles(scene, patches, cuts.levels);
+        trace->clusters = clustersOf(scene, patches, settings);
+    }
     trace->cuts = {{"narrow gap", cuts.contacts},
                    {"edge of a shadow", cuts.shadowEdges},
                    {"light that bends within the patch", cuts.bentLight}};

@@ -45,6 +45,7 @@ const std::vector<Number<int>>& integers() {
         {"skip.weak", &Settings::skipWeak, 0, 1},
         {"skip.inside", &Settings::skipInside, 0, 1},
         {"skip.lamp_insides", &Settings::skipLampInsides, 0, 1},
+        {"skip.clusters", &Settings::skipClusters, 0, 1},
         {"skip.gather", &Settings::skipGather, 0, 1},
         {"skip.bundles", &Settings::skipBundles, 0, 1},
         {"skip.warm_start", &Settings::skipWarmStart, 0, 1},

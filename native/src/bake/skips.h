@@ -21,6 +21,7 @@ struct Skips {
     int skipLit = 1;        // noise of a source wholly visible: its closed form
     int skipWeak = 1;       // most shadow rays to a source that gives little of the light
     int skipInside = 1;     // most shadow rays from the inside of solids
+    int skipClusters = 1;   // light of each patch, where it is not shown and finer than tiles
     int skipGather = 1;     // final gather, where interpolation follows the light
     int skipBundles = 1;    // bundles once the noise is at its target
     int skipWarmStart = 1;  // iterations that a solve from zero takes more than one from the last

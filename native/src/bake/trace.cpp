@@ -5,6 +5,9 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "reconstruction/corner_gather.h"
+#include "reconstruction/shown_light.h"
+
 namespace raybundle {
 namespace {
 
@@ -33,10 +36,8 @@ float pixelSize(const Patches& patches, int linesPerBundle) {
 LineDensity densityOf(const Patches& patches) {
     std::vector<double> area(patches.islands.size(), 0);
     std::vector<size_t> count(area.size(), 0);
-    for (const Parent& parent : patches.parents) {
-        area[parent.island] += double(parent.area());
-        count[parent.island] += parent.tileCount();
-    }
+    for (const Parent& parent : patches.parents) area[parent.island] += double(parent.area());
+    for (const uint32_t parent : patches.parentOf) ++count[patches.parents[parent].island];
     std::vector<float> pixels, least;
     for (size_t k = 0; k < area.size(); ++k) {
         const Island& island = patches.islands[k];
@@ -48,8 +49,20 @@ LineDensity densityOf(const Patches& patches) {
 
 }  // namespace
 
-Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Settings& settings)
-    : hash(hash), likeness(likeness), patches(std::move(made)), visibility(patches), counts(0) {
+Clusters clustersOf(const Scene& scene, const Patches& patches, const Settings& settings) {
+    if (!settings.skipClusters || !settings.hasLineWindows() || settings.firstShot != "GATHER")
+        return Clusters(patches);
+    return Clusters(patches, ShownLight(scene, patches, gathersSparseResults(settings)).sides());
+}
+
+Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Scene& scene,
+             const Settings& settings)
+    : hash(hash),
+      likeness(likeness),
+      patches(std::move(made)),
+      clusters(clustersOf(scene, patches, settings)),
+      visibility(patches),
+      counts(0) {
     for (const Parent& parent : patches.parents)
         if (parent.stopsDirect != parent.exchanges && !directVisibility)
             directVisibility =
@@ -57,7 +70,7 @@ Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Settings& set
     for (const Island& island : patches.islands)
         touchDistance = std::max(touchDistance, island.touchDistance);
     if (settings.hasLineWindows() && patches.count() > 0)
-        density = densityOf(patches);
+        density = densityOf(clusters.patches());
     else
         density.pixelSize = pixelSize(patches, settings.linesPerBundle);
 }
@@ -66,9 +79,9 @@ void Trace::startLines(const Settings& settings) {
     const ProjectorInput input = projectorInput(settings);
     if (!settings.skipSheets || input.smallPatches == SmallPatches::ROULETTE || input.singleLine)
         patches.sheets = withoutSheets(patches);
-    counts = LineCounts(patches.sideCount());
+    counts = LineCounts(clusters.patches().sideCount());
     tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
-                                            uint32_t(settings.seed));
+                                            uint32_t(settings.seed), &clusters);
     // Only line reuse on exact projection sees what lies against what while it traces.
     if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact())
         surrounding = surroundings(exactInput(settings), uint32_t(settings.seed));

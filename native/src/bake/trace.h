@@ -13,17 +13,23 @@
 #include "bundles/bundle_tracer.h"
 #include "bundles/line_counts.h"
 #include "bundles/line_windows.h"
+#include "patches/clusters.h"
 #include "patches/patches.h"
+#include "scene/scene.h"
 #include "transport/first_shot.h"
 #include "transport/transport.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
 
+// Of patches whose light is not shown; none where the settings have none.
+Clusters clustersOf(const Scene& scene, const Patches& patches, const Settings& settings);
+
 // Patches and traced lines, which stay valid as long as the geometry does, and what later bakes
 // with them can go on with.
 struct Trace {
-    Trace(uint64_t hash, uint64_t likeness, Patches made, const Settings& settings);
+    Trace(uint64_t hash, uint64_t likeness, Patches made, const Scene& scene,
+          const Settings& settings);
 
     // When the patches are as they stay: from here on lines are traced.
     void startLines(const Settings& settings);
@@ -48,11 +54,12 @@ struct Trace {
 
     // Per side: the share that nothing covers.
     std::vector<float> exposedShare() const {
-        return surrounding.exposed.empty() ? counts.exposedShare() : surrounding.exposed;
+        return surrounding.exposed.empty() ? clusters.spread(counts.exposedShare())
+                                           : surrounding.exposed;
     }
 
     LineSolutions& solutionsOf(int32_t lightSet) {
-        return solutions.try_emplace(lightSet, patches.sideCount()).first->second;
+        return solutions.try_emplace(lightSet, counts.sideCount()).first->second;
     }
 
     // Through the bounding sphere.
@@ -61,6 +68,7 @@ struct Trace {
     const uint64_t hash;      // geometryHash
     const uint64_t likeness;  // likenessHash
     Patches patches;
+    Clusters clusters;        // of the patches, between which light is exchanged
     float touchDistance = 0;  // the largest of all islands, metres
     const Visibility visibility;
     std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
@@ -68,7 +76,7 @@ struct Trace {
     LineDensity density{};
     std::vector<Report::Cut> cuts;
     size_t uncutGaps = 0;  // patches beside narrow gaps that the solver does not have cut
-    LineCounts counts;
+    LineCounts counts;     // per side of the clusters
     std::unique_ptr<BundleTracer> tracer;
     Looks looks;  // at the light along its lines
 
@@ -78,7 +86,7 @@ struct Trace {
         FirstShot shot;
     };
     std::map<int32_t, Shot> shots;               // the last GATHER of each light set
-    std::map<int32_t, LineSolutions> solutions;  // of each light set
+    std::map<int32_t, LineSolutions> solutions;  // of each light set, between the clusters
 };
 
 }  // namespace raybundle

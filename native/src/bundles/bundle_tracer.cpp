@@ -9,12 +9,20 @@ namespace raybundle {
 
 namespace {
 constexpr uint32_t kExactBundles = 32;
+
+void joinClusters(const Clusters& clusters, BundleLines& lines) {
+    for (Exchange& e : lines.exchanges) e = {clusters.sideOf(e.i), clusters.sideOf(e.j), e.lines};
+    for (uint32_t& side : lines.sky) side = clusters.sideOf(side);
+    for (uint32_t& side : lines.touching) side = clusters.sideOf(side);
 }
 
+}  // namespace
+
 BundleTracer::BundleTracer(const std::string& projector, const ProjectorInput& input,
-                           const std::string& directions, uint32_t seed)
+                           const std::string& directions, uint32_t seed, const Clusters* clusters)
     : pixelArea(double(input.pixelSize) * double(input.pixelSize)),
       directions(directions, seed),
+      clusters(clusters && !clusters->isNone() ? clusters : nullptr),
       projectors([projector, input] { return makeProjector(projector, input); }) {}
 
 std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
@@ -24,6 +32,7 @@ std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
     parallelFor(size_t(0), sequence.size(), [&](size_t k) {
         traced[k].bundle = sequence[k];
         projectors.local()->project(sequence[k], traced[k].lines);
+        if (clusters) joinClusters(*clusters, traced[k].lines);
         for (const Exchange& e : traced[k].lines.exchanges) joined[k] += e.lines;
     });
     bundles += count;

@@ -12,6 +12,7 @@
 
 #include "bundles/directions.h"
 #include "bundles/projector.h"
+#include "patches/clusters.h"
 
 namespace raybundle {
 
@@ -22,9 +23,11 @@ struct TracedBundle {
 
 class BundleTracer {
   public:
-    // projector, directions: names of their tables. What `input` refers to must outlive it.
+    // projector, directions: names of their tables. clusters: of the patches, whose sides lines are
+    // to join; null: those of the patches themselves. What `input` refers to and the clusters must
+    // outlive it.
     BundleTracer(const std::string& projector, const ProjectorInput& input,
-                 const std::string& directions, uint32_t seed);
+                 const std::string& directions, uint32_t seed, const Clusters* clusters = nullptr);
 
     // Traces the next `count` bundles (even; see Directions::next) in parallel.
     std::vector<TracedBundle> trace(uint32_t count);
@@ -47,6 +50,7 @@ class BundleTracer {
 
   private:
     Directions directions;
+    const Clusters* const clusters;
     tbb::enumerable_thread_specific<std::unique_ptr<Projector>> projectors;
     uint32_t bundles = 0;
     uint64_t lines = 0, exchanges = 0, disordered = 0, cycles = 0;  // exchanges: line by line

@@ -90,6 +90,10 @@ class Clustering {
     double patchArea(uint32_t parent) const {
         return double(patches.area[patches.parents[parent].firstPatch]);
     }
+    // Of a parent, or of the cluster that it stands for (patches/clusters.h), m^2.
+    double area(uint32_t parent) const {
+        return std::max(double(patches.parents[parent].area()), patchArea(parent));
+    }
     size_t patchCount(const Members& members) const {
         size_t count = 0;
         for (uint32_t m : members) count += patches.parents[m].patchCount();
@@ -129,7 +133,7 @@ class Clustering {
                 area.resize(parent.instance + 1, 0.0);
             }
             box[parent.instance].add(boxes[m]);
-            area[parent.instance] += double(parent.area());
+            area[parent.instance] += this->area(m);
         }
         Members rest;
         for (uint32_t m : members)
@@ -295,7 +299,8 @@ struct IslandDensity {
 
 // Without the starved patches of objects that hardly have any by area: slivers between large faces,
 // whose light is that of what lies beside them.
-Members withoutCrumbs(const Patches& patches, const Members& members, double starvedArea) {
+Members withoutCrumbs(const Patches& patches, const Clustering& clustering, const Members& members,
+                      double starvedArea) {
     auto isStarved = [&](const Parent& parent) {
         return double(patches.area[parent.firstPatch]) < starvedArea;
     };
@@ -306,8 +311,8 @@ Members withoutCrumbs(const Patches& patches, const Members& members, double sta
             area.resize(parent.instance + 1, 0.0);
             starved.resize(parent.instance + 1, 0.0);
         }
-        area[parent.instance] += double(parent.area());
-        if (isStarved(parent)) starved[parent.instance] += double(parent.area());
+        area[parent.instance] += clustering.area(m);
+        if (isStarved(parent)) starved[parent.instance] += clustering.area(m);
     }
     Members rest;
     for (uint32_t m : members) {
@@ -324,7 +329,7 @@ void findWindows(const Patches& patches, const Clustering& clustering, float pix
     const double starvedArea =
         kStarvedPixels * double(density.pixelSize) * double(density.pixelSize);
     const Members members =
-        withoutCrumbs(patches, clustering.withoutDust(island.members), starvedArea);
+        withoutCrumbs(patches, clustering, clustering.withoutDust(island.members), starvedArea);
     size_t starved = 0;
     double logSum = 0;
     for (uint32_t m : members) {
@@ -374,6 +379,7 @@ LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pi
     for (uint32_t i = 0; i < patches.parents.size(); ++i) {
         throwIfCancelledAt(i);
         const Parent& parent = patches.parents[i];
+        if (patches.parentOf[parent.firstPatch] != i) continue;  // another stands for its cluster
         IslandDensity& island = islands[parent.island];
         island.members.push_back(i);
         island.patchCount += parent.patchCount();
@@ -400,7 +406,14 @@ LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pi
         alone += island.costAlone();
         largest = std::max(largest, island.largest);
     }
-    if (islands.size() == 1) return islands.front().density;
+    auto fillClusters = [&](std::vector<int32_t>& windowOf) {
+        for (size_t i = 0; i < windowOf.size(); ++i)
+            windowOf[i] = windowOf[patches.parentOf[patches.parents[i].firstPatch]];
+    };
+    if (islands.size() == 1) {
+        fillClusters(islands.front().density.windowOf);
+        return islands.front().density;
+    }
 
     // The pixels of the first island, or coarser by powers of two.
     const double first = double(islands.front().density.pixelSize);
@@ -445,6 +458,7 @@ LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pi
                 all.windowOf[m] = offset + window;
     }
     if (all.windows.empty()) all.windowOf.clear();
+    fillClusters(all.windowOf);
     int finest = 0;
     for (const LineWindow& window : all.windows) finest = std::max(finest, window.level);
     const double units = std::ldexp(largest / (pixel * pixel), 2 * finest);

@@ -180,7 +180,8 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         if (isGathered) fields.push_back(&shown.color());
         if (isGathered && !shown.everywhere().empty()) fields.push_back(&shown.everywhere());
         std::vector<Field> nodes;
-        if (settings.reconstruction == "AREA_AVERAGE") {
+        // Of sparse results only corners that cannot gather have the light of patches.
+        if (settings.reconstruction == "AREA_AVERAGE" || (isGathered && atCorners->isSparse(i))) {
             nodes = areaAverage(patches, ranges[i], regions, instance.side, outside, fields);
         } else {
             LeastSquaresFit fit = leastSquares(patches, ranges[i], regions, instance.side, outside,

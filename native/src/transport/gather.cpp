@@ -59,7 +59,7 @@ float othersError(const Patches& patches, const StandIns& standIns, uint32_t sid
     if (patches.reflectance[side] == glm::vec3(0.0f) &&
         patches.translucenceOf(side ^ 1) == glm::vec3(0.0f))
         return kMostError;
-    if (standIns.isStandIn(side)) return kOthersError;
+    if (standIns.isForOthers(standIns.numberOf(side))) return kOthersError;
     const float edge = patches.islandAt(side).size;
     return kOthersError *
            std::max(1.0f, edge / std::sqrt(std::max(patches.area[side / 2], 1e-30f)));
@@ -67,37 +67,14 @@ float othersError(const Patches& patches, const StandIns& standIns, uint32_t sid
 
 // Of neighbouring sides that gather both, their numbers.
 std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns) {
-    std::vector<ReceiverPair> pairs = neighbouringSides(patches);
-    for (ReceiverPair& pair : pairs)
-        pair = {standIns.numberOf(pair.first), standIns.numberOf(pair.second)};
-    pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
-                               [](const ReceiverPair& pair) {
-                                   return pair.first == StandIns::kNone ||
-                                          pair.second == StandIns::kNone;
-                               }),
-                pairs.end());
+    std::vector<ReceiverPair> pairs;
+    for (const ReceiverPair& sides : neighbouringSides(patches)) {
+        const ReceiverPair pair{standIns.numberOf(sides.first), standIns.numberOf(sides.second)};
+        if (standIns.gatherers()[pair.first] == sides.first &&
+            standIns.gatherers()[pair.second] == sides.second)
+            pairs.push_back(pair);
+    }
     return pairs;
-}
-
-// What a side has of those that stand for it.
-Gathered meanOf(const std::vector<Gathered>& results, const StandIns& standIns, uint32_t side) {
-    Gathered mean;
-    float count = 0;
-    standIns.forEachOf(side, [&](uint32_t number) {
-        const Gathered& one = results[number];
-        ++count;
-        mean.irradiance += one.irradiance;
-        mean.unpowered += one.unpowered;
-        mean.variance += one.variance;
-        mean.angles += one.angles;
-        mean.brightness += one.brightness;
-        mean.noisiest = one.noisiest;
-        if (mean.incoming.weight < one.incoming.weight) mean.incoming = one.incoming;
-    });
-    mean.irradiance /= count;
-    mean.unpowered /= count;
-    mean.variance /= count;
-    return mean;
 }
 
 // By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
@@ -128,7 +105,7 @@ FirstShot gather(const FirstShotInput& input) {
     const DirectLight& light = input.light;
     const Patches& patches = input.patches;
     const size_t n = patches.sideCount();
-    const StandIns standIns(patches, input.isShown);
+    const StandIns standIns(patches, input.settings.skipClusters ? input.isShown : nullptr);
     const std::vector<uint32_t>& gatherers = standIns.gatherers();
     FirstShot shot;
     shot.emission = light.bundledEmission();
@@ -180,9 +157,7 @@ FirstShot gather(const FirstShotInput& input) {
         shot.insideSides += result.inside;
     }
     for (uint32_t side = 0; side < n; ++side) {
-        const uint32_t number = standIns.numberOf(side);
-        const Gathered result =
-            number != StandIns::kNone ? results[number] : meanOf(results, standIns, side);
+        const Gathered& result = results[standIns.numberOf(side)];
         shot.irradiance[side] = result.irradiance;
         shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
         shot.angles[side] = result.meanAngles();

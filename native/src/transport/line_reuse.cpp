@@ -355,8 +355,8 @@ void LineReuse::addPower(const Field& light, const std::vector<float>& exposed,
         power += double(patches.area[i / 2] * exposed[i]) * glm::dvec3(light[i]);
 }
 
-size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDistance,
-                                     uint32_t minLines, uint32_t seed,
+size_t LineReuse::gatherStarvedSides(const Visibility& visibility, const Clusters* clusters,
+                                     float touchDistance, uint32_t minLines, uint32_t seed,
                                      const std::vector<bool>& wanted, const Field& reflected,
                                      Irradiance& irradiance) const {
     auto linesAt = [&](uint32_t side) { return float(counts.linesMet(side)); };
@@ -377,6 +377,7 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
         starved.empty() ? 0
                         : std::clamp(kMostLocalRays / starved.size(), kFewLocalRays, kLocalRays);
 
+    const Patches& surface = clusters ? clusters->members() : patches;
     // Trace local rays and add up their direct light. The lines that the side has are
     // cosine-distributed too: weigh all alike.
     constexpr uint32_t kNone = UINT32_MAX;
@@ -393,19 +394,20 @@ size_t LineReuse::gatherStarvedSides(const Visibility& visibility, float touchDi
         known.resize(last);
         parallelFor(first, last, [&](size_t k) {
             const uint32_t side = starved[k];
-            const glm::vec3 normal = patches.normal(side);
             const SobolPoints points(hash(seed, side));
             const float m = linesAt(side);
             glm::vec3 direct(0.0f), byDirection(0.0f);
             weights[k] = m;
             for (size_t i = 0; i < rays; ++i) {
                 const glm::vec4 u = points[uint32_t(i)];
-                const glm::vec3 direction = cosineDirection(normal, {u.z, u.w});
+                const uint32_t from = clusters ? clusters->memberOf(side, uint32_t(i)) : side;
+                const glm::vec3 direction = cosineDirection(surface.normal(from), {u.z, u.w});
                 float distance = 0;
-                const auto hit = visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}),
-                                                     direction, &distance);
-                if (hit && isCovered(patches, side, *hit, direction, distance, touchDistance))
+                auto hit = visibility.firstHit(from, surface.point(from / 2, {u.x, u.y}), direction,
+                                               &distance);
+                if (hit && isCovered(surface, from, *hit, direction, distance, touchDistance))
                     continue;
+                if (hit && clusters) hit = clusters->sideOf(*hit);
                 if (hit) hits[k * rays + i] = *hit;
                 if (hit && !directedLight.isNone(*hit) && exposed[*hit] > 0)
                     byDirection += directedLight.towards(*hit, -direction) / exposed[*hit];

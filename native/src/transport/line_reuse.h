@@ -32,6 +32,7 @@
 #include <vector>
 
 #include "bundles/line_counts.h"
+#include "patches/clusters.h"
 #include "patches/patches.h"
 #include "transport/directed_light.h"
 #include "transport/first_shot.h"
@@ -72,9 +73,11 @@ class LineReuse {
     // Adds local rays (cosine distribution, weighted like the lines the side has) to the irradiance
     // of wanted sides that have fewer than `minLines` lines, and to that of other such sides that
     // these rays meet. Rays that start where the side is covered, by a surface not further than
-    // touchDistance (m), do not count. Returns the number of sides.
-    size_t gatherStarvedSides(const Visibility& visibility, float touchDistance, uint32_t minLines,
-                              uint32_t seed, const std::vector<bool>& wanted,
+    // touchDistance (m), do not count. clusters: if the patches are theirs, the visibility is of
+    // those that they are made of; null: it is of the patches. Returns the number of sides.
+    size_t gatherStarvedSides(const Visibility& visibility, const Clusters* clusters,
+                              float touchDistance, uint32_t minLines, uint32_t seed,
+                              const std::vector<bool>& wanted,
                               const std::vector<glm::vec3>& reflected,
                               Irradiance& irradiance) const;
 

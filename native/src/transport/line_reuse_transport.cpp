@@ -113,8 +113,8 @@ class LineReuseTransport : public Transport {
             report.skipped.push_back(
                 {"iterations of a solve", "it starts from the last solution", solves - 2});
         const size_t starved = solver.gatherStarvedSides(
-            input.visibility, input.touchDistance, kStarvedLines, uint32_t(input.settings.seed),
-            wanted, last.of[size_t(Half::BOTH)].reflected, result);
+            input.visibility, input.clusters, input.touchDistance, kStarvedLines,
+            uint32_t(input.settings.seed), wanted, last.of[size_t(Half::BOTH)].reflected, result);
         if (starved)
             report.skipped.push_back({"bundles on small patches",
                                       "too few lines met them: they gathered with local rays",

@@ -219,6 +219,15 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
     });
 }
 
+ScatteredLight ScatteredLight::renumbered(const std::vector<uint32_t>& sides) const {
+    ScatteredLight other = *this;
+    other.indices.clear();
+    if (isNone()) return other;
+    other.indices.reserve(sides.size());
+    for (const uint32_t side : sides) other.indices.push_back(indices[side]);
+    return other;
+}
+
 void ScatteredLight::findTransfers() {
     // Alike to within a hundredth of the roughness.
     auto rounded = [](float roughness) { return float(std::lround(100 * roughness)) / 100; };

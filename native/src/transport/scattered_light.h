@@ -38,6 +38,10 @@ class ScatteredLight {
     // it knows none. seesSky: whether there is an even one. patches must outlive the object.
     ScatteredLight(const Patches& patches, const FirstShot& shot, bool seesSky);
 
+    // The same with other numbers of the sides: per side, the one that it has here. Nothing more is
+    // to be set in it.
+    ScatteredLight renumbered(const std::vector<uint32_t>& sides) const;
+
     // No side sends anything by direction, ever.
     bool isNone() const { return indices.empty(); }
     bool isNone(uint32_t side) const { return isNone() || indices[side] == kNone; }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "patches/clusters.h"
+
 namespace raybundle {
 namespace {
 
@@ -46,6 +48,10 @@ std::unique_ptr<Transport> makeTransport(const std::string& kind, const Transpor
 }
 
 Transports makeTransports(const std::string& kind, const std::vector<TransportInput>& inputs) {
+    if (inputs.front().clusters && !inputs.front().clusters->isNone()) {
+        assert(kind == "LINE_REUSE" && "the settings have clusters for no other");
+        return lineReuseOfClusters(inputs);
+    }
     if (inputs.size() > 1) {
         assert(kind == "LINE_REUSE" && "checkCombination refuses light sets for others");
         return lineReuseOfMany(inputs);

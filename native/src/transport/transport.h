@@ -24,6 +24,7 @@
 
 namespace raybundle {
 
+class Clusters;
 class ScatteredLight;
 
 // Irradiance per side, W/m^2, in two parts.
@@ -98,6 +99,9 @@ struct TransportInput {
     LineSolutions* solutions = nullptr;
     // Per side: whether its light is shown, and not only that of what it lights; null: all is.
     const std::vector<bool>* isShown = nullptr;
+    // Between which LINE_REUSE exchanges light: `patches` are theirs, and `visibility` is of those
+    // that they are made of. Null: each patch exchanges light by itself.
+    const Clusters* clusters = nullptr;
 };
 
 class Transport {
@@ -142,6 +146,9 @@ std::unique_ptr<Transport> lineReuse(const TransportInput& input);
 // all of them, and advances them with it.
 using Transports = std::vector<std::unique_ptr<Transport>>;
 Transports lineReuseOfMany(const std::vector<TransportInput>& inputs);
+// The same between clusters: all that goes in and comes out is per side of the patches that they are
+// made of, but for the solutions.
+Transports lineReuseOfClusters(const std::vector<TransportInput>& inputs);
 std::unique_ptr<Transport> multipath(const TransportInput& input);
 std::unique_ptr<Transport> stochasticIteration(const TransportInput& input);
 std::unique_ptr<Transport> randomWalk(const TransportInput& input);

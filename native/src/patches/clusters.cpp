@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/clusters.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+#include "bake/cancellation.h"
+
+namespace raybundle {
+namespace {
+
+// Cells of the normals along each edge of the octahedron that they are mapped to: some 25 degrees.
+constexpr int kNormalCells = 8;
+// Width of a cell of places, of a tile.
+constexpr float kWidth = 0.5f;
+// Patches of more than this share of a cell's area stand for themselves.
+constexpr float kSmall = 0.25f;
+
+int cellOf(const glm::vec3& normal) {
+    const glm::vec3 a = glm::abs(normal);
+    glm::vec2 p = glm::vec2(normal) / (a.x + a.y + a.z);
+    if (normal.z < 0)
+        p = (1.0f - glm::abs(glm::vec2(p.y, p.x))) *
+            glm::vec2(p.x < 0 ? -1.0f : 1.0f, p.y < 0 ? -1.0f : 1.0f);
+    const auto cell = [](float x) {
+        return std::clamp(int(0.5f * (x + 1) * kNormalCells), 0, kNormalCells - 1);
+    };
+    return cell(p.x) * kNormalCells + cell(p.y);
+}
+
+// Surface, object and material, cell of the normal, cell of the place.
+using Key = std::array<uint32_t, 7>;
+struct HashOf {
+    size_t operator()(const Key& key) const {
+        size_t mixed = 0;
+        for (const uint32_t part : key)
+            mixed = (mixed ^ part) * 0x9e3779b97f4a7c15u, mixed ^= mixed >> 29;
+        return mixed;
+    }
+};
+
+}  // namespace
+
+std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn) {
+    std::vector<uint32_t> cluster(patches.count(), kNoCluster);
+    std::unordered_map<Key, uint32_t, HashOf> clusters;
+    for (uint32_t patch = 0; patch < cluster.size(); ++patch) {
+        throwIfCancelledAt(patch);
+        if (!isIn[patch]) continue;
+        const Parent& parent = patches.parentAt(2 * patch);
+        const Island& island = patches.islands[parent.island];
+        const float width = kWidth * island.size;
+        if (!(patches.area[patch] <= kSmall * width * width)) continue;
+        const glm::vec3 at = patches.point(patch, glm::vec2(0.5f)) - island.centre;
+        const glm::ivec3 place(glm::floor(patches.axes * at / width));
+        const Key key{parent.surface,    parent.instance,
+                      parent.scattering, uint32_t(cellOf(patches.axes * parent.normal)),
+                      uint32_t(place.x), uint32_t(place.y),
+                      uint32_t(place.z)};
+        cluster[patch] = clusters.emplace(key, uint32_t(clusters.size())).first->second;
+    }
+    return cluster;
+}
+
+Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&all) {
+    std::vector<bool> isIn(all.count());
+    for (uint32_t patch = 0; patch < isIn.size(); ++patch)
+        isIn[patch] = !isShown[2 * patch] && !isShown[2 * patch + 1] &&
+                      all.parentAt(2 * patch).patchCount() == 1 && all.opacityOf(patch) == 1.0f &&
+                      all.translucenceOf(2 * patch) == glm::vec3(0.0f) &&
+                      all.translucenceOf(2 * patch + 1) == glm::vec3(0.0f);
+    const std::vector<uint32_t> cluster = findClusters(all, isIn);
+    std::vector<uint32_t> numberOf;  // per cluster, once it has one
+    std::vector<uint32_t> number(all.count()), size;
+    for (uint32_t patch = 0; patch < number.size(); ++patch) {
+        uint32_t own = uint32_t(size.size());
+        if (const uint32_t c = cluster[patch]; c != kNoCluster) {
+            if (c == numberOf.size()) numberOf.push_back(own);
+            own = numberOf[c];
+        }
+        if (own == size.size()) size.push_back(0);
+        number[patch] = own;
+        ++size[own];
+    }
+    if (size.size() == all.count()) return;
+    numbers = std::move(number);
+    first.assign(1, 0);
+    for (const uint32_t count : size) {
+        first.push_back(first.back() + count);
+        if (count > 1) inClusters += count;
+    }
+    memberList.resize(numbers.size());
+    std::vector<uint32_t> next(first.begin(), first.end() - 1);
+    for (uint32_t patch = 0; patch < numbers.size(); ++patch)
+        memberList[next[numbers[patch]]++] = patch;
+
+    joined.emplace();
+    joined->centre = all.centre;
+    joined->radius = all.radius;
+    joined->axes = all.axes;
+    joined->islands = all.islands;
+    joined->parents = all.parents;
+    joined->totalArea = all.totalArea;
+    joined->size = all.size;
+    joined->finest = all.finest;
+    joined->tileCount = all.tileCount - (all.count() - size.size());
+    for (Parent& parent : joined->parents) parent.firstPatch = numbers[parent.firstPatch];
+    for (uint32_t k = 0; k < size.size(); ++k) {
+        throwIfCancelledAt(k);
+        // The largest one's place is that of all; of equal ones, the first one's.
+        const auto from = memberList.begin() + first[k], to = memberList.begin() + first[k + 1];
+        std::iter_swap(from, std::max_element(from, to, [&](uint32_t a, uint32_t b) {
+                           return all.area[a] < all.area[b];
+                       }));
+        joined->parentOf.push_back(all.parentOf[*from]);
+        joined->area.push_back(std::accumulate(
+            from, to, 0.0f, [&](float sum, uint32_t patch) { return sum + all.area[patch]; }));
+        if (!all.opacity.empty()) joined->opacity.push_back(all.opacity[*from]);
+    }
+    takeMaterials();
+}
+
+void Clusters::takeMaterials() {
+    joined->reflectance = mean(all->reflectance);
+    joined->emission = mean(all->emission);
+    joined->translucence = mean(all->translucence);
+    joined->scattering = all->scattering;
+    for (size_t i = 0; i < joined->parents.size(); ++i)
+        joined->parents[i].scattering = all->parents[i].scattering;
+    joined->byAngle.assign(all->byAngle.empty() ? 0 : joined->sideCount(), AngleFactors{});
+    for (uint32_t side = 0; side < joined->byAngle.size(); ++side)
+        forEachMember(side / 2, [&](uint32_t patch, float share) {
+            for (size_t term = 0; term < joined->byAngle[side].size(); ++term)
+                joined->byAngle[side][term] += share * all->byAngle[2 * patch + side % 2][term];
+        });
+}
+
+}  // namespace raybundle

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/clusters.h"
+
+#include <gtest/gtest.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <set>
+
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+// Whether the light of an instance's patches is not shown, per side.
+std::vector<bool> shownBut(const Patches& patches, uint32_t instance) {
+    std::vector<bool> isShown(patches.sideCount());
+    for (uint32_t side = 0; side < isShown.size(); ++side)
+        isShown[side] = patches.parentAt(side).instance != instance;
+    return isShown;
+}
+
+// The room with two boxes and a ball of small faces that only occludes; it glows as the room does.
+Scene roomWithBall(int subdivisions, float reflectance, float emission = 0, float gloss = 0) {
+    Scene scene = roomWithBoxes(reflectance, emission);
+    Material paint = grey("ball", reflectance, emission, emission);
+    if (gloss > 0) {
+        paint.scattering[0].glossOffset = glm::vec3(gloss);
+        paint.scattering[0].glossRoughness = 0.3f;
+    }
+    place(scene, icosphere("ball", 0.4f, subdivisions, false), paint,
+          glm::translate(glm::dmat4(1), {3.1, 2.3, 1.9}), RB_ROLE_OCCLUDE);
+    return scene;
+}
+
+TEST(Clusters, AreNoneWhereAllIsShown) {
+    const Patches patches = subdivide(roomWithBall(5, 0.5f), 0.4f, kMany);
+    const Clusters clusters(patches, std::vector<bool>(patches.sideCount(), true));
+    EXPECT_TRUE(clusters.isNone());
+    EXPECT_EQ(&clusters.patches(), &patches);
+    EXPECT_EQ(clusters.sideOf(7), 7u);
+    EXPECT_EQ(clusters.memberCount(), 0u);
+    // Nor where the faces are as large as tiles.
+    const Patches coarse = subdivide(roomWithBall(1, 0.5f), 0.4f, kMany);
+    EXPECT_TRUE(Clusters(coarse, shownBut(coarse, 3)).isNone());
+}
+
+TEST(Clusters, AreOfNearPatchesThatFaceAlike) {
+    const Patches patches = subdivide(roomWithBall(5, 0.5f), 0.4f, kMany);
+    const Clusters clusters(patches, shownBut(patches, 3));
+    ASSERT_FALSE(clusters.isNone());
+    const Patches& joined = clusters.patches();
+    EXPECT_LT(joined.count(), patches.count() / 5);
+    std::vector<double> area(joined.count(), 0);
+    std::vector<int> members(joined.count(), 0);
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        const uint32_t own = clusters.sideOf(side);
+        ASSERT_LT(own, joined.sideCount());
+        EXPECT_EQ(own % 2, side % 2);
+        EXPECT_EQ(joined.parentAt(own).instance, patches.parentAt(side).instance);
+        EXPECT_GT(glm::dot(joined.normal(own), patches.normal(side)), 0.6f);
+        EXPECT_LT(glm::distance(joined.point(own / 2, {0.3f, 0.3f}),
+                                patches.point(side / 2, {0.3f, 0.3f})),
+                  patches.islandAt(side).size);
+        // What a ray meets is found by its parent.
+        const Parent& parent = joined.parents[patches.parentOf[side / 2]];
+        EXPECT_EQ(
+            parent.firstPatch + side / 2 - patches.parents[patches.parentOf[side / 2]].firstPatch,
+            own / 2);
+        if (side % 2) continue;
+        area[own / 2] += double(patches.area[side / 2]);
+        ++members[own / 2];
+    }
+    size_t inClusters = 0;
+    for (uint32_t k = 0; k < joined.count(); ++k) {
+        EXPECT_NEAR(double(joined.area[k]), area[k], 1e-5 * area[k]);
+        if (members[k] > 1) inClusters += size_t(members[k]);
+        std::set<uint32_t> seen;
+        for (uint32_t i = 0; i < uint32_t(members[k]); ++i) {
+            const uint32_t side = clusters.memberOf(2 * k + 1, i);
+            EXPECT_EQ(clusters.sideOf(side), 2 * k + 1);
+            seen.insert(side);
+        }
+        EXPECT_EQ(seen.size(), size_t(members[k]));
+    }
+    EXPECT_EQ(clusters.memberCount(), inClusters);
+}
+
+TEST(Clusters, HaveTheMeansOfTheirPatches) {
+    const Patches patches = subdivide(roomWithBall(5, 0.5f), 0.4f, kMany);
+    const Clusters clusters(patches, shownBut(patches, 3));
+    std::vector<float> values(patches.sideCount());
+    double sum = 0, sumOfMeans = 0;
+    for (uint32_t side = 0; side < values.size(); ++side) {
+        values[side] = patches.normal(side).x + 2;
+        sum += double(values[side] * patches.area[side / 2]);
+    }
+    const std::vector<float> means = clusters.mean(values), spread = clusters.spread(means);
+    for (uint32_t side = 0; side < means.size(); ++side)
+        sumOfMeans += double(means[side] * clusters.patches().area[side / 2]);
+    EXPECT_NEAR(sumOfMeans, sum, 1e-5 * sum);
+    ASSERT_EQ(spread.size(), values.size());
+    for (uint32_t side = 0; side < spread.size(); ++side)
+        EXPECT_EQ(spread[side], means[clusters.sideOf(side)]);
+    EXPECT_TRUE(clusters.mean(std::vector<float>()).empty());
+}
+
+// However many faces the ball has, the work is that of its light.
+TEST(Clusters, AreAsManyHoweverManyFacesThereAre) {
+    double patches[2], rays[2], bundles[2];
+    for (int k : {0, 1}) {
+        Scene scene = roomWithBall(5 + k, 0.5f);
+        scene.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
+        Bake bake;
+        bake.settings.patchSize = 0.3f;
+        bake.run(scene);
+        const Json report = reportOf(bake);
+        EXPECT_TRUE(mentions(report["skipped"], "exchange it as clusters"));
+        patches[k] = report["patches"];
+        rays[k] = report["shadow_rays"];
+        bundles[k] = report["bundles"];
+    }
+    EXPECT_LT(patches[1], 1.2 * patches[0]);
+    EXPECT_LT(rays[1], 1.2 * rays[0]);
+    EXPECT_LT(bundles[1], 1.5 * bundles[0]);
+}
+
+void expectFurnace(const Bake& bake) {
+    for (int32_t instance = 0; instance < 3; ++instance)
+        for (const glm::vec3& light : cornerLight(bake, instance, RB_OUTPUT_LIGHTING))
+            EXPECT_NEAR(double(light.x) * kPi, 1, 1e-4) << instance;
+}
+
+TEST(Clusters, LeaveAFurnaceExact) {
+    Bake bake;
+    bake.run(roomWithBall(5, 0.5f, 0.5f));
+    ASSERT_TRUE(mentions(reportOf(bake)["skipped"], "exchange it as clusters"));
+    expectFurnace(bake);
+    // Some of the ball's clusters and most of the room's patches meet few lines, and local rays.
+    bake.settings.minBundles = bake.settings.maxBundles = 2;
+    bake.run(roomWithBall(5, 0.5f, 0.5f));
+    expectFurnace(bake);
+}
+
+// With light of a lamp, gloss that sends it by direction, lines beyond the memory limit, light sets.
+TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
+    for (const float gloss : {0.0f, 0.3f})
+        for (const float megabytes : {4096.0f, 0.5f}) {
+            Scene scene = roomWithBall(5, 0.6f, 0, gloss);
+            scene.lightSets = {"lamp"};
+            Light lamp = pointLight({2.2, 1.2, 2.2}, glm::dvec3(5));
+            lamp.lightSet = 0;
+            scene.addLight(lamp);
+            scene.addLight(pointLight({1, 1, 2}, glm::dvec3(1)));
+            std::vector<glm::vec3> light[2];
+            double balance[2], stated[2];
+            for (int on : {0, 1}) {
+                Bake bake;
+                bake.settings.minBundles = bake.settings.maxBundles = 192;
+                bake.settings.targetError = 0.005f;
+                bake.settings.memoryLimit = megabytes;
+                bake.settings.skipClusters = on;
+                bake.run(scene);
+                const Json report = reportOf(bake);
+                EXPECT_EQ(mentions(report["warnings"], "memory_limit"), megabytes < 1);
+                light[on] = everything(bake);
+                stated[on] = report["estimated_error"];
+                balance[on] = report["energy"]["balance_error"];
+                // Lines are balanced only while they are kept.
+                EXPECT_LT(std::abs(balance[on]), megabytes < 1 ? 4e-3 : 1e-3) << on << gloss;
+            }
+            EXPECT_LT(noise(light[1], light[0]), 2 * std::hypot(stated[0], stated[1]))
+                << gloss << " " << megabytes;
+        }
+}
+
+TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
+    Scene hidden = roomWithBall(4, 0.5f), shown = hidden;
+    for (Scene* scene : {&hidden, &shown}) scene->addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
+    shown.instances[3].role = RB_ROLE_BAKE;
+    Bake again, fresh;
+    setQuick(again);
+    setQuick(fresh);
+    again.run(hidden);
+    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "exchange it as clusters"));
+    again.run(shown);
+    EXPECT_FALSE(mentions(reportOf(again)["skipped"], "exchange it as clusters"));
+    fresh.run(shown);
+    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
+    EXPECT_LT(difference(cornerLight(again, 3, RB_OUTPUT_LIGHTING),
+                         cornerLight(fresh, 3, RB_OUTPUT_LIGHTING)),
+              1e-5);
+    // Other paint is none of that.
+    Scene painted = roomWithBall(4, 0.3f);
+    painted.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
+    again.run(hidden);
+    again.run(painted);
+    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "geometry unchanged"));
+    fresh.run(painted);
+    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
+}
+
+}  // namespace
+}  // namespace raybundle
