@@ -342,7 +342,8 @@ RB_API void rb_release_bake(rb_bake bake);
  *   float  target_error    relative noise at which bundles stop (0.02)
  *   float  patch_size      edge of a patch in metres, 0 = automatic (0)
  *   int    max_patches     most patches that subdivision may make (100000); a face is one at
- *                          least, and where faces take most of them those that are cut may have
+ *                          least, but for small ones whose light is not shown, which exchange it
+ *                          in clusters; where faces take most of them those that are cut may have
  *                          an eighth as many beside
  *   int    refine          1: smaller patches at shadow edges where that pays (0)
  *   int    contacts        1: smaller patches beside gaps much narrower than a patch (1)

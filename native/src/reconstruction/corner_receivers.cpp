@@ -11,7 +11,7 @@ namespace raybundle {
 namespace {
 
 // How far inside a face a corner's receiver lies, as a share of the way to the centre.
-constexpr float kInside = 0.01f;
+constexpr float kTowardsMiddle = 0.01f;
 // Shading normals up to this cosine to a face are as good as at right angles to it, where which side
 // they look at is a matter of rounding: the face's own normal counts then.
 constexpr float kUpright = 1e-3f;
@@ -53,7 +53,7 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
         for (int k = 0; k < n; ++k) centre += cell.position(k) / float(n);
         for (int k = 0; k < n; ++k) {
             const int32_t corner = cell.corner[k];
-            const glm::vec3 point = glm::mix(cell.position(k), centre, kInside);
+            const glm::vec3 point = glm::mix(cell.position(k), centre, kTowardsMiddle);
             const glm::vec2 st = affine(parent, point);
             const float off = outside(parent, st);
             if (off >= nearest[corner]) continue;

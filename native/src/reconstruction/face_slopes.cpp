@@ -9,7 +9,7 @@ namespace {
 
 // How far inside a face its corners are looked at, as a share of the way to the middle: on the edge
 // of a source the closed form is a matter of rounding.
-constexpr float kInside = 1e-4f;
+constexpr float kOffCorner = 1e-4f;
 
 }  // namespace
 
@@ -39,7 +39,7 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
             cell.position(0) + (cell.isTriangle() ? 1 / 3.0f : 0.5f) * (cell.a + cell.b);
         forEachNode(cell, [&](int k, uint32_t node) {
             isAlone = isAlone && cells[node] == 1;
-            points[count] = glm::mix(cell.position(k), middle, kInside);
+            points[count] = glm::mix(cell.position(k), middle, kOffCorner);
             nodes[count++] = node;
         });
         const uint32_t at = 2 * parent.firstPatch + uint32_t(side);
@@ -54,7 +54,7 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
         glm::vec3 mean(0.0f), share(0.0f);
         for (size_t k = 0; k < count; ++k) mean += values[k] / float(count);
         for (size_t k = 0; k < count; ++k)
-            values[k] = glm::max(mean + (values[k] - mean) / (1 - kInside), 0.0f);
+            values[k] = glm::max(mean + (values[k] - mean) / (1 - kOffCorner), 0.0f);
         for (int c = 0; c < 3; ++c)
             if (mean[c] > 0) share[c] = std::min(1.0f, gathered[c] / mean[c]);
         for (size_t k = 0; k < count; ++k) {

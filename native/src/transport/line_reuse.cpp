@@ -33,7 +33,7 @@ constexpr double kSameSolution = 1.2;
 // all light is (0.7 % left out made a bright room 1.1 % too bright), and at most so many.
 constexpr double kSettledTurns = 0.25;
 constexpr int kMostTurns = 6;
-constexpr size_t kGrain = 2048;  // sides per task
+constexpr size_t kGrain = 2048;  // sides per task of a sum
 constexpr int kMaxSweeps = 64;   // over the starved sides
 constexpr float kSettled = 1e-5f;
 // Local rays per starved side: kLocalRays, less where there are many, to stay below kMostLocalRays
@@ -49,13 +49,6 @@ constexpr float kBalancePowers[] = {0.5f, 1.0f, 0.5f, 1.0f, 0.5f, 1.0f, 0.5f, 1.
 constexpr size_t kBalanceSteps = 4;
 constexpr float kMaxLineWeight =
     2.0f;  // and at least its inverse: a few lines cannot stand for many
-
-template <class Body>
-void forEachSide(size_t n, const Body& body) {
-    parallelFor(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
-        for (size_t i = range.begin(); i < range.end(); ++i) body(i);
-    });
-}
 
 // In double and in an order that does not depend on the number of threads. Over the sides that
 // `which` holds for; null: all.

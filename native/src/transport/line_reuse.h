@@ -31,6 +31,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "bake/cancellation.h"
 #include "bundles/line_counts.h"
 #include "patches/clusters.h"
 #include "patches/patches.h"
@@ -41,6 +42,14 @@
 #include "visibility/visibility.h"
 
 namespace raybundle {
+
+// Calls body(side) for the sides below n, so many of them in a task.
+template <class Body>
+void forEachSide(size_t n, const Body& body, size_t inTask = 2048) {
+    parallelFor(tbb::blocked_range<size_t>(0, n, inTask), [&](const auto& range) {
+        for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+    });
+}
 
 class LineReuse {
   public:
