@@ -202,5 +202,33 @@ TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
 }
 
+// Of clusters of backs, whose fronts are shown, one side gathers for all: another one where faces
+// got another material, of which each cluster has one.
+TEST(Clusters, OfOtherMaterialsGatherAnew) {
+    Scene before = roomWithBall(4, 0.5f, 0, 0.3f);
+    before.instances[3].role = RB_ROLE_BAKE;
+    before.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
+    before.addMaterial(grey("other", 0.5f));
+    Scene after = before;
+    std::vector<int32_t>& paint = after.meshes[size_t(after.instances[3].mesh)].faceMaterials;
+    for (size_t face = 0; face < paint.size(); face += 3)
+        paint[face] = int32_t(after.materials.size()) - 1;
+    Bake again, fresh;
+    setQuick(again);
+    setQuick(fresh);
+    again.run(before);
+    again.run(after);
+    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "geometry unchanged"));
+    fresh.run(after);
+    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
+    // Nor does a bake without clusters go on with what one with them kept.
+    Bake single;
+    setQuick(single);
+    again.settings.skipClusters = single.settings.skipClusters = 0;
+    again.run(after);
+    single.run(after);
+    EXPECT_LT(difference(everything(again), everything(single)), 1e-5);
+}
+
 }  // namespace
 }  // namespace raybundle

@@ -10,7 +10,10 @@ uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vecto
     Hasher hasher;
     for (const Material& material : scene.materials)
         hasher.add(material.shownFromAbove, material.shownByAngle);
-    hasher.add(hasDirections);
+    hasher.add(hasDirections, settings.skipClusters);
+    // Clusters are of one material where directions matter.
+    for (const Mesh& mesh : scene.meshes)
+        if (hasDirections) hasher.add(mesh.faceMaterials);
     hasher.add(std::vector<uint8_t>(isShown.begin(), isShown.end()));
     hasher.add(settings.targetError, settings.seed, settings.skipFacing, settings.skipLit,
                settings.skipWeak, settings.skipInside);

@@ -52,7 +52,7 @@ LineDensity densityOf(const Patches& patches) {
 Clusters clustersOf(const Scene& scene, const Patches& patches, const Settings& settings) {
     if (!settings.skipClusters || !settings.hasLineWindows() || settings.firstShot != "GATHER")
         return Clusters(patches);
-    return Clusters(patches, ShownLight(scene, patches, gathersSparseResults(settings)).sides());
+    return Clusters(patches, shownSides(scene, patches, gathersSparseResults(settings)));
 }
 
 Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Scene& scene,

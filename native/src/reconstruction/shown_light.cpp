@@ -23,24 +23,30 @@ std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
 
 }  // namespace
 
+std::vector<bool> shownSides(const Scene& scene, const Patches& patches, bool gathersAtCorners) {
+    const std::vector<bool> results = resultSides(scene, patches);
+    std::vector<bool> shown = results;
+    auto isOwnAlone = [&](size_t side) { return patches.translucenceOf(side) == glm::vec3(0.0f); };
+    for (size_t side = 0; gathersAtCorners && side < shown.size(); ++side)
+        if (isOwnAlone(side) &&
+            scene.instances[patches.parentAt(uint32_t(side)).instance].hasSparseResults)
+            shown[side] = false;
+    for (size_t side = 0; !patches.translucence.empty() && side < shown.size(); ++side)
+        if (results[side ^ 1] && !isOwnAlone(side ^ 1)) shown[side] = true;
+    return shown;
+}
+
 ShownLight::ShownLight(const Scene& scene, const Patches& patches, bool gathersAtCorners)
     : scene(scene),
       patches(patches),
       results(resultSides(scene, patches)),
-      shown(results),
+      shown(shownSides(scene, patches, gathersAtCorners)),
       colors(diffuseReflectances(scene, patches)) {
     if (std::any_of(scene.materials.begin(), scene.materials.end(),
                     [](const Material& material) { return material.showsByAngle(); }))
         for (size_t side = 0; side < shown.size(); ++side)
             fromEverywhere.push_back(materialOf(side).shown(side % 2, kEverywhere));
-    if (gathersAtCorners)
-        for (size_t side = 0; side < shown.size(); ++side)
-            if (isOwnAlone(side) &&
-                scene.instances[patches.parentAt(uint32_t(side)).instance].hasSparseResults)
-                shown[side] = false;
     if (isOwnAlone()) return;
-    for (size_t side = 0; side < shown.size(); ++side)
-        if (results[side ^ 1] && !isOwnAlone(side ^ 1)) shown[side] = true;
     othersShare.resize(colors.size());
     for (size_t side = 0; side < colors.size(); ++side) {
         const glm::vec3 through =

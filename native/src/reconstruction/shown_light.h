@@ -19,10 +19,13 @@
 
 namespace raybundle {
 
+// Per side: whether its light shows, on itself or on the other side of its patch. gathersAtCorners:
+// whether sparse results are gathered (corner_gather.h).
+std::vector<bool> shownSides(const Scene& scene, const Patches& patches, bool gathersAtCorners);
+
 class ShownLight {
   public:
-    // gathersAtCorners: whether sparse results are gathered (corner_gather.h). Both others must
-    // outlive the object.
+    // gathersAtCorners: as in shownSides. Both others must outlive the object.
     ShownLight(const Scene& scene, const Patches& patches, bool gathersAtCorners);
 
     // Per side: the diffuse reflectance and the translucence of the whole patch, what lets light
@@ -31,7 +34,7 @@ class ShownLight {
 
     // Whether a side has a result; all have where none is asked for.
     bool isResult(size_t side) const { return results[side]; }
-    // Per side: whether its light shows, on itself or on the other side of its patch.
+    // See shownSides.
     const std::vector<bool>& sides() const { return shown; }
     // Whether a side has a result that is not its own light: what its corners gather.
     bool isGathered(size_t side) const { return results[side] && !shown[side]; }
