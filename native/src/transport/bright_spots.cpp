@@ -117,23 +117,26 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
             unshot[side] = reflected(patches, shot, side);
     const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707);
     const DirectLight light(scene, patches, exchange, seed, input.settings, std::move(spots));
+    const StandIns standIns(patches, input.settings.skipClusters ? input.isShown : nullptr);
+    const std::vector<uint32_t>& gatherers = standIns.gatherers();
     const std::vector<Gathered> results = light.gather(
-        n,
-        [&](size_t side) {
-            Receiver receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
-                              uint32_t(side)};
+        gatherers.size(),
+        [&](size_t k) {
+            const uint32_t side = gatherers[k];
+            Receiver receiver{side, patches.normal(side), std::nullopt, side};
             receiver.isShown = !input.isShown || (*input.isShown)[side];
             return receiver;
         },
         float(double(input.settings.targetError) * (all + inSpots) / inSpots),
         [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); }, {},
-        neighbouringSides(patches));
+        neighbouringGatherers(patches, standIns));
     shot.indirect.resize(n);
+    for (const Gathered& result : results) shot.rays += result.rays;
     for (size_t side = 0; side < n; ++side) {
-        shot.indirect[side] = results[side].irradiance;
-        unshot[side] += patches.reflectance[side] * results[side].irradiance;
-        shot.error[side] = std::hypot(shot.error[side], std::sqrt(results[side].variance));
-        shot.rays += results[side].rays;
+        const Gathered& result = results[standIns.numberOf(uint32_t(side))];
+        shot.indirect[side] = result.irradiance;
+        unshot[side] += patches.reflectance[side] * result.irradiance;
+        shot.error[side] = std::hypot(shot.error[side], std::sqrt(result.variance));
     }
     for (size_t side = 0; side < n; ++side)
         if (!patches.parentAt(uint32_t(side)).exchanges) unshot[side] = glm::vec3(0.0f);

@@ -16,6 +16,7 @@
 #include "bake/settings.h"
 #include "patches/patches.h"
 #include "transport/direct_light.h"
+#include "transport/stand_ins.h"
 
 namespace raybundle {
 
@@ -76,9 +77,9 @@ double localToGlobalRatio(double intersections, double meanReflectance, double s
 // What a side reflects of the first shot's light.
 glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t side);
 
-// Receivers of all sides that are beside each other: the sides of neighbouring tiles; the patches of
-// a cut one stand beside each other.
-std::vector<ReceiverPair> neighbouringSides(const Patches& patches);
+// Receivers that are beside each other, by their numbers: those of the sides of neighbouring tiles
+// that gather, for themselves or for others; the patches of a cut one stand beside each other.
+std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns);
 
 // A first shot by the name of its row.
 FirstShot firstShot(const std::string& kind, const FirstShotInput& input);

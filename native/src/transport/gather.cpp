@@ -27,8 +27,7 @@ constexpr float kOthersError = 2;
 // energy balance alone.
 constexpr float kMostError = 10;
 
-}  // namespace
-
+// Of all sides, by themselves.
 std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
     std::vector<uint32_t> firstOf;  // per tile; one more at the end
     for (const Parent& parent : patches.parents)
@@ -50,6 +49,19 @@ std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
     return pairs;
 }
 
+}  // namespace
+
+std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns) {
+    std::vector<ReceiverPair> pairs;
+    for (const ReceiverPair& sides : neighbouringSides(patches)) {
+        const ReceiverPair pair{standIns.numberOf(sides.first), standIns.numberOf(sides.second)};
+        if (standIns.gatherers()[pair.first] == sides.first &&
+            standIns.gatherers()[pair.second] == sides.second)
+            pairs.push_back(pair);
+    }
+    return pairs;
+}
+
 namespace {
 
 // So many times the error of a result may be that of a side whose light is not shown. What it lights
@@ -63,18 +75,6 @@ float othersError(const Patches& patches, const StandIns& standIns, uint32_t sid
     const float edge = patches.islandAt(side).size;
     return kOthersError *
            std::max(1.0f, edge / std::sqrt(std::max(patches.area[side / 2], 1e-30f)));
-}
-
-// Of neighbouring sides that gather both, their numbers.
-std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns) {
-    std::vector<ReceiverPair> pairs;
-    for (const ReceiverPair& sides : neighbouringSides(patches)) {
-        const ReceiverPair pair{standIns.numberOf(sides.first), standIns.numberOf(sides.second)};
-        if (standIns.gatherers()[pair.first] == sides.first &&
-            standIns.gatherers()[pair.second] == sides.second)
-            pairs.push_back(pair);
-    }
-    return pairs;
 }
 
 // By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
