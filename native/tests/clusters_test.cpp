@@ -14,14 +14,6 @@ namespace {
 
 using namespace test;
 
-// Whether the light of an instance's patches is not shown, per side.
-std::vector<bool> shownBut(const Patches& patches, uint32_t instance) {
-    std::vector<bool> isShown(patches.sideCount());
-    for (uint32_t side = 0; side < isShown.size(); ++side)
-        isShown[side] = patches.parentAt(side).instance != instance;
-    return isShown;
-}
-
 // The room with two boxes and a ball of small faces that only occludes; it glows as the room does.
 Scene roomWithBall(int subdivisions, float reflectance, float emission = 0, float gloss = 0) {
     Scene scene = roomWithBoxes(reflectance, emission);

@@ -36,9 +36,7 @@ TEST(StandIns, AreNoneWhereAllIsShown) {
 
 TEST(StandIns, AreNearAndFaceAlike) {
     const Patches patches = subdivide(ballOverGround(5), 0.2f, 10000);
-    std::vector<bool> isShown(patches.sideCount());
-    for (uint32_t side = 0; side < patches.sideCount(); ++side)
-        isShown[side] = patches.parentAt(side).instance == 1;
+    const std::vector<bool> isShown = shownBut(patches, 0);
     const StandIns standIns(patches, &isShown);
     EXPECT_LT(standIns.gatherers().size(), patches.sideCount() / 3);
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {

@@ -202,6 +202,13 @@ uint64_t exchangedLines(const BundleLines& lines) {
     return sum;
 }
 
+std::vector<bool> shownBut(const Patches& patches, uint32_t instance) {
+    std::vector<bool> isShown(patches.sideCount());
+    for (uint32_t side = 0; side < isShown.size(); ++side)
+        isShown[side] = patches.parentAt(side).instance != instance;
+    return isShown;
+}
+
 double linesOf(const LineCounts& counts, uint32_t side) {
     return double(counts.total[side][0]) + counts.total[side][1];
 }

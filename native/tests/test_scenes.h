@@ -71,6 +71,9 @@ LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, u
 // Lines that the pairs of a bundle exchange.
 uint64_t exchangedLines(const BundleLines& lines);
 
+// Per side: whether its light is shown, as that of all but one instance is.
+std::vector<bool> shownBut(const Patches& patches, uint32_t instance);
+
 // m_i of both halves together.
 double linesOf(const LineCounts& counts, uint32_t side);
 // c_ij of both halves together.

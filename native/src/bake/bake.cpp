@@ -336,6 +336,7 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
     const Patches& patches = trace->patches;
     const Visibility& visibility = trace->visibilityOfLights();
     const uint64_t aims = shotHash(scene, settings, shown.sides(), !patches.scattering.empty());
+    const StandIns standIns(patches, settings.skipClusters ? &shown.sides() : nullptr);
     SetLights lights;
     const int32_t count = int32_t(scene.lightSets.size());
     for (int32_t set = kNoLightSet; set < count; ++set) {
@@ -356,7 +357,8 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
                                    &trace->visibility,
                                    coarse.empty() ? nullptr : &coarse[lights.size()],
                                    mayKeep && last.aims == aims ? last.shot.bySource : nullptr,
-                                   &shown.sides()};
+                                   &shown.sides(),
+                                   &standIns};
         if (mayKeep && last.hash == hash) {
             report.skipped.push_back({"first shot", "lights unchanged since the last bake", 1});
             shot = last.shot;

@@ -88,10 +88,7 @@ Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&
     if (size.size() == all.count()) return;
     numbers = std::move(number);
     first.assign(1, 0);
-    for (const uint32_t count : size) {
-        first.push_back(first.back() + count);
-        if (count > 1) inClusters += count;
-    }
+    for (const uint32_t count : size) first.push_back(first.back() + count);
     memberList.resize(numbers.size());
     std::vector<uint32_t> next(first.begin(), first.end() - 1);
     for (uint32_t patch = 0; patch < numbers.size(); ++patch)
@@ -121,6 +118,13 @@ Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&
         if (!all.opacity.empty()) joined->opacity.push_back(all.opacity[*from]);
     }
     takeMaterials();
+}
+
+size_t Clusters::memberCount() const {
+    size_t count = 0;
+    for (size_t k = 1; k < first.size(); ++k)
+        if (const uint32_t size = first[k] - first[k - 1]; size > 1) count += size;
+    return count;
 }
 
 void Clusters::takeMaterials() {

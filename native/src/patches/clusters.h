@@ -41,7 +41,7 @@ class Clusters {
     // Whether they are the same patches, whatever these reflect and emit.
     bool areThoseOf(const Clusters& other) const { return numbers == other.numbers; }
     // The patches that are in a cluster with others.
-    size_t memberCount() const { return inClusters; }
+    size_t memberCount() const;
 
     // One a cluster, and one for each patch that is in none. Each has the place and the normal of
     // the largest of its patches, the area of all and the mean of what they reflect and emit; all
@@ -95,7 +95,6 @@ class Clusters {
     std::optional<Patches> joined;
     std::vector<uint32_t> numbers;  // per patch of `all`; empty where there are no clusters
     std::vector<uint32_t> first, memberList;  // per patch of `joined`
-    size_t inClusters = 0;
 };
 
 }  // namespace raybundle

@@ -117,7 +117,8 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
             unshot[side] = reflected(patches, shot, side);
     const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707);
     const DirectLight light(scene, patches, exchange, seed, input.settings, std::move(spots));
-    const StandIns standIns(patches, input.settings.skipClusters ? input.isShown : nullptr);
+    const StandIns alone(patches, nullptr);
+    const StandIns& standIns = input.standIns ? *input.standIns : alone;
     const std::vector<uint32_t>& gatherers = standIns.gatherers();
     const std::vector<Gathered> results = light.gather(
         gatherers.size(),

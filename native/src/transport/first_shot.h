@@ -60,6 +60,8 @@ struct FirstShotInput {
     std::shared_ptr<const LightBySource> before = nullptr;
     // Per side: whether its light is shown, and not only that of what it lights; null: all is.
     const std::vector<bool>* isShown = nullptr;
+    // Of GATHER: which sides gather for which; null: each for itself.
+    const StandIns* standIns = nullptr;
 };
 
 // The first shots, one a row of the table.

@@ -105,7 +105,8 @@ FirstShot gather(const FirstShotInput& input) {
     const DirectLight& light = input.light;
     const Patches& patches = input.patches;
     const size_t n = patches.sideCount();
-    const StandIns standIns(patches, input.settings.skipClusters ? input.isShown : nullptr);
+    const StandIns alone(patches, nullptr);
+    const StandIns& standIns = input.standIns ? *input.standIns : alone;
     const std::vector<uint32_t>& gatherers = standIns.gatherers();
     FirstShot shot;
     shot.emission = light.bundledEmission();

@@ -43,10 +43,10 @@
 
 namespace raybundle {
 
-// Calls body(side) for the sides below n, so many of them in a task.
-template <class Body>
-void forEachSide(size_t n, const Body& body, size_t inTask = 2048) {
-    parallelFor(tbb::blocked_range<size_t>(0, n, inTask), [&](const auto& range) {
+// Calls body(side) for the sides below n, kInTask of them in a task.
+template <size_t kInTask = 2048, class Body>
+void forEachSide(size_t n, const Body& body) {
+    parallelFor(tbb::blocked_range<size_t>(0, n, kInTask), [&](const auto& range) {
         for (size_t i = range.begin(); i < range.end(); ++i) body(i);
     });
 }

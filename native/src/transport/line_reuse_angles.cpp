@@ -64,36 +64,30 @@ std::vector<glm::vec3> LineReuse::directed(Half half, const LineWeights& weights
     if (directedLight.isNone()) return {};
     const std::vector<float> exposed = exposedShare();
     std::vector<glm::vec3> brought(counts.sideCount(), glm::vec3(0.0f));
-    forEachSide(
-        brought.size(),
-        [&](uint32_t i) {
-            alongLines(half, weights, directedLight.neededLines(), i,
-                       [&](float share, uint32_t from, uint32_t entry) {
-                           if (directedLight.isNone(from) || exposed[from] <= 0) return;
-                           brought[i] +=
-                               share / exposed[from] *
-                               (half == Half::BOTH ? directedLight.between(from, i, hash(i, entry))
-                                                   : scatteredOfSources.towards(
-                                                         from, directedLight.wayBetween(from, i)));
-                       });
-        },
-        kInTask);
+    forEachSide<kInTask>(brought.size(), [&](uint32_t i) {
+        alongLines(half, weights, directedLight.neededLines(), i,
+                   [&](float share, uint32_t from, uint32_t entry) {
+                       if (directedLight.isNone(from) || exposed[from] <= 0) return;
+                       brought[i] +=
+                           share / exposed[from] *
+                           (half == Half::BOTH ? directedLight.between(from, i, hash(i, entry))
+                                               : scatteredOfSources.towards(
+                                                     from, directedLight.wayBetween(from, i)));
+                   });
+    });
     return brought;
 }
 
 void LineReuse::findOpen(const LineWeights& weights, ScatteredLight& scattered) const {
-    forEachSide(
-        counts.sideCount(),
-        [&](uint32_t i) {
-            const float sky = skyShare(weights, i);
-            if (scattered.isNone(i) || sky == 0) return;
-            ScatteredLight::Hemisphere met{};
-            alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
-                scattered.add(i, -directedLight.wayBetween(from, i), share, met);
-            });
-            scattered.setOpen(i, met, sky);
-        },
-        kInTask);
+    forEachSide<kInTask>(counts.sideCount(), [&](uint32_t i) {
+        const float sky = skyShare(weights, i);
+        if (scattered.isNone(i) || sky == 0) return;
+        ScatteredLight::Hemisphere met{};
+        alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
+            scattered.add(i, -directedLight.wayBetween(from, i), share, met);
+        });
+        scattered.setOpen(i, met, sky);
+    });
 }
 
 float LineReuse::skyShare(const LineWeights& weights, uint32_t side) const {
@@ -114,46 +108,42 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
     byAngle.brought = byAngle.ofSources;
     byAngle.brought.resize(n, glm::vec3(0.0f));
     if (!patches.byAngle.empty()) byAngle.reflected.resize(n);
-    forEachSide(
-        n,
-        [&](uint32_t i) {
-            const glm::vec3 normal = patches.normal(i);
-            const bool scatters = !scattered.isNone(i);
-            glm::vec4 terms(0.0f);  // of the angles at which light arrives, times its brightness
-            float sum = 0;          // of that brightness
-            ScatteredLight::Cells arriving{};
-            if (const float sky = skyShare(weights, i); sky > 0) {
-                const auto [angles, share] = scatters ? scattered.addSky(i, worldExitance, arriving)
-                                                      : std::pair(sky * kEverywhere, sky);
-                terms += brightest(worldExitance) * angles;
-                sum += brightest(worldExitance) * share;
+    forEachSide<kInTask>(n, [&](uint32_t i) {
+        const glm::vec3 normal = patches.normal(i);
+        const bool scatters = !scattered.isNone(i);
+        glm::vec4 terms(0.0f);  // of the angles at which light arrives, times its brightness
+        float sum = 0;          // of that brightness
+        ScatteredLight::Cells arriving{};
+        if (const float sky = skyShare(weights, i); sky > 0) {
+            const auto [angles, share] = scatters ? scattered.addSky(i, worldExitance, arriving)
+                                                  : std::pair(sky * kEverywhere, sky);
+            terms += brightest(worldExitance) * angles;
+            sum += brightest(worldExitance) * share;
+        }
+        alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
+            const glm::vec3 way = directedLight.wayBetween(from, i);
+            glm::vec3 all = shot.emission[from] + reflected[from];
+            if (directedLight.hasLayers()) {
+                const glm::vec3 layered = directedLight.layer(from, way) * reflected[from];
+                byAngle.brought[i] += share * layered;
+                all += layered;
             }
-            alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
-                const glm::vec3 way = directedLight.wayBetween(from, i);
-                glm::vec3 all = shot.emission[from] + reflected[from];
-                if (directedLight.hasLayers()) {
-                    const glm::vec3 layered = directedLight.layer(from, way) * reflected[from];
-                    byAngle.brought[i] += share * layered;
-                    all += layered;
-                }
-                if (!scattered.isNone(from)) {
-                    if (before) all += before->towards(from, way);
-                    if (exposed[from] > 0)
-                        all += scatteredOfSources.towards(from, way) / exposed[from];
-                }
-                const float brightness = share * std::max(brightest(all), 0.0f);
-                terms += brightness * angleTerms(-glm::dot(way, normal));
-                sum += brightness;
-                if (scatters) scattered.add(i, -way, share * all, arriving);
-            });
-            if (scatters) scattered.set(i, arriving);
-            if (byAngle.reflected.empty() || !(sum > 0)) return;
-            const glm::vec3 more = sumOfTerms(patches.byAngle[i], terms / sum - kEverywhere);
-            byAngle.reflected[i] = glm::clamp(more, -patches.reflectance[i],
-                                              kMostReflectance - patches.reflectance[i]) *
-                                   (light.all(i) - light.gathered[i]);
-        },
-        kInTask);
+            if (!scattered.isNone(from)) {
+                if (before) all += before->towards(from, way);
+                if (exposed[from] > 0) all += scatteredOfSources.towards(from, way) / exposed[from];
+            }
+            const float brightness = share * std::max(brightest(all), 0.0f);
+            terms += brightness * angleTerms(-glm::dot(way, normal));
+            sum += brightness;
+            if (scatters) scattered.add(i, -way, share * all, arriving);
+        });
+        if (scatters) scattered.set(i, arriving);
+        if (byAngle.reflected.empty() || !(sum > 0)) return;
+        const glm::vec3 more = sumOfTerms(patches.byAngle[i], terms / sum - kEverywhere);
+        byAngle.reflected[i] =
+            glm::clamp(more, -patches.reflectance[i], kMostReflectance - patches.reflectance[i]) *
+            (light.all(i) - light.gathered[i]);
+    });
     if (scattered.isNone()) return 0;
     double bent = 0, all = 0;
     for (uint32_t side = 0; side < n; ++side) {
@@ -162,16 +152,13 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
         if (!scattered.isNone(side)) bent += area * double(scattered.contrast(side));
     }
     const double needed = shareOfLines(bent, all);
-    forEachSide(
-        n,
-        [&](uint32_t i) {
-            alongLines(Half::BOTH, weights, needed, i, [&](float share, uint32_t from, uint32_t) {
-                if (scattered.isNone(from)) return;
-                byAngle.brought[i] +=
-                    share * scattered.towards(from, directedLight.wayBetween(from, i));
-            });
-        },
-        kInTask);
+    forEachSide<kInTask>(n, [&](uint32_t i) {
+        alongLines(Half::BOTH, weights, needed, i, [&](float share, uint32_t from, uint32_t) {
+            if (scattered.isNone(from)) return;
+            byAngle.brought[i] +=
+                share * scattered.towards(from, directedLight.wayBetween(from, i));
+        });
+    });
     return all > 0 ? bent / all : 0;
 }
 
