@@ -14,7 +14,7 @@ constexpr float kMostLaxity = 3;
 constexpr double kLaxShare = 0.25;
 // A shadow's edge lies between two neighbours where so much more of the light is visible to one, or
 // where one has more of its contrast by so many times the error that it may have.
-constexpr float kStep = 0.33f, kEdge = 6;
+constexpr float kStep = 0.33f, kEdgeTimes = 6;
 
 // How many times these tolerances the errors may be, so that all of them together are no more than
 // `most` at each receiver that has light: where few receivers have any, each may have more. Of
@@ -44,8 +44,8 @@ std::vector<bool> besideShadows(const std::vector<Gathered>& results,
     for (const auto& [a, b] : neighbours) {
         const bool isStep = std::abs(results[a].visibleShare() - results[b].visibleShare()) > kStep;
         const float edge = results[b].contrast - results[a].contrast;
-        if (isStep || edge > kEdge * tolerance[a]) beside[a] = true;
-        if (isStep || -edge > kEdge * tolerance[b]) beside[b] = true;
+        if (isStep || edge > kEdgeTimes * tolerance[a]) beside[a] = true;
+        if (isStep || -edge > kEdgeTimes * tolerance[b]) beside[b] = true;
     }
     return beside;
 }
