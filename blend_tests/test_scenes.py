@@ -100,7 +100,7 @@ def test_report(name):
     assert 2 <= report["bundles"] <= 4096
     assert report["lines"] >= report["bundles"]
     assert 0 < report["exchanges"] <= 2 * report["patches"] ** 2
-    assert 0.0 <= report["estimated_error"] <= 0.02 or report["bundles"] == 4096
+    assert 0.0 <= report["error"]["noise"] <= 0.02 or report["bundles"] == 4096
     assert report["peak_memory_bytes"] > 0
     for entry in report["objects"]:
         assert set(entry) >= {"name", "corners", "status"} and entry["status"]

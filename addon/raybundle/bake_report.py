@@ -56,5 +56,5 @@ class BakeReport:
         baked = sum(item.status.startswith('baked') for item in self.objects)
         warnings = f", {len(self.warnings)} warnings" if self.warnings else ""
         return (f"{baked} objects baked in {self.seconds['total']:.2f} s: {self.patches} patches, "
-                f"{self.bundles} bundles, noise {100.0 * self.estimated_error:.2g} %, error "
+                f"{self.bundles} bundles, noise {100.0 * self.error['noise']:.2g} %, error "
                 f"{100.0 * self.error['total']:.2g} %{warnings}")

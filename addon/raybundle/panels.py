@@ -51,9 +51,9 @@ class RAYBUNDLE_PT_last_bake(RaybundleRenderPanel, bpy.types.Panel):
         layout = self.layout
         report = json.loads(context.scene.raybundle.report)
         column = layout.column(align=True)
-        column.label(text=f"Noise: {100.0 * report['estimated_error']:.2g} %")
         # Reports of earlier releases have none.
         if error := report.get('error'):
+            column.label(text=f"Noise: {100.0 * error['noise']:.2g} %")
             column.label(text=f"Patch size: {100.0 * error['discretisation']:.2g} %")
             column.label(text=f"Mesh: {100.0 * error['mesh']:.2g} %")
             column.label(text=f"Error: {100.0 * error['total']:.2g} %")

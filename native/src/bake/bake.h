@@ -23,6 +23,7 @@
 
 namespace raybundle {
 
+class NoisyParts;
 class Threads;
 struct Trace;
 
@@ -62,6 +63,10 @@ class Bake {
                            const std::vector<CoarseShot>& coarse, Report& report);
     SideNoise keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLights& lights,
                             Report& report);
+    Report finishSolve(const Transports& transports, SetLights& lights, const ShownLight& shown,
+                       double error) const;
+    bool castRays(const NoisyParts& noisyParts, SetLights& lights,
+                  std::vector<std::array<Irradiance, 2>>& halves, Report& report) const;
     SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
                             SetLights& lights, const Transports& transports, Report& report);
 

@@ -37,7 +37,7 @@ Noise::Noise(const Looks& before, const std::vector<float>& weight,
       looked(before.count),
       before(before) {}
 
-void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double sharedBias) {
+void Noise::measure(const std::array<Irradiance, 2>& half) {
     const size_t n = weight.size();
     difference.resize(n);
     // Sums over the sides of a cell: of the weight, of it times half the difference of the halves, of
@@ -45,7 +45,7 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
     // difference, for what differs from side to side.
     struct Cell {
         double weight = 0, direct = 0, sides = 0;
-        glm::dvec3 difference{0.0};
+        glm::dvec3 difference{0.0}, light{0.0};
         double squares0 = 0, squares2 = 0;
         glm::dvec3 squares1{0.0};
 
@@ -73,6 +73,7 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
         Cell& cell = cells[cellOf[side]];
         cell.weight += w;
         cell.difference += w * 0.5 * (a - b);
+        cell.light += w * 0.5 * (a + b);
         cell.direct += w * w * variance;
         if (!(w > 0)) continue;
         ++cell.sides;
@@ -81,18 +82,27 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
         cell.squares2 += w * w * 0.25 * glm::dot(a - b, a - b);
     }
     double shownSquares = 0, shownVariance = 0;
-    for (const Cell& cell : cells) {
+    ofCells.assign(cells.size(), {});
+    for (size_t c = 0; c < cells.size(); ++c) {
+        const Cell& cell = cells[c];
         if (!(cell.weight > 0)) continue;
-        shownSquares += glm::dot(cell.difference, cell.difference) / cell.weight +
-                        (kCornersOfMeans - 1) * cell.random();
+        const double noise = glm::dot(cell.difference, cell.difference) / cell.weight;
+        const double random = cell.random();
+        shownSquares += noise + (kCornersOfMeans - 1) * random;
         shownVariance += cell.direct / cell.weight;
+        ofCells[c] = {cell.weight, noise / cell.weight, random / cell.weight,
+                      glm::dot(cell.light, cell.light) / (cell.weight * cell.weight)};
     }
-    bias = sharedBias;
     const double scale = signal > 0 ? 1 / signal : 0;
     bundleNoise = squares * scale;
     directNoise = direct * scale;
     shownOfBundles = shownSquares * scale;
     shownDirect = shownVariance * scale;
+}
+
+void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double sharedBias) {
+    measure(half);
+    bias = sharedBias;
     if (bundles == 0 && count == before.bundles) {
         // An earlier bake has seen the same lines.
         pooled = before.share * bundleNoise;
@@ -104,6 +114,12 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
         ++looked;
     }
     bundles = count;
+}
+
+void Noise::lookAgain(const std::array<Irradiance, 2>& half) {
+    const double share = looks().share;
+    measure(half);
+    pooled = share * bundleNoise;
 }
 
 double Noise::factor() const { return 1 + kSmallSample / (double(looked) * looked); }
@@ -151,18 +167,30 @@ SetNoise::SetNoise(const Looks& before, std::vector<std::vector<float>> errors,
         noises.emplace_back(before, weight, errorOfSets[k], cellOf);
 }
 
-void SetNoise::look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles,
-                    double bias) {
+template <class Look>
+void SetNoise::lookAtAll(const std::vector<std::array<Irradiance, 2>>& halves, const Look& look) {
     std::array<Irradiance, 2> all = halves.front();
     for (size_t k = 1; k < halves.size(); ++k) {
-        noises[k].look(halves[k], bundles, bias);
+        look(noises[k], halves[k]);
         for (size_t h = 0; h < 2; ++h)
             for (size_t side = 0; side < directError.size(); ++side) {
                 all[h].direct[side] += halves[k][h].direct[side];
                 all[h].indirect[side] += halves[k][h].indirect[side];
             }
     }
-    noises.front().look(all, bundles, bias);
+    look(noises.front(), all);
+}
+
+void SetNoise::look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles,
+                    double bias) {
+    lookAtAll(halves, [&](Noise& noise, const std::array<Irradiance, 2>& half) {
+        noise.look(half, bundles, bias);
+    });
+}
+
+void SetNoise::lookAgain(const std::vector<std::array<Irradiance, 2>>& halves) {
+    lookAtAll(halves,
+              [](Noise& noise, const std::array<Irradiance, 2>& half) { noise.lookAgain(half); });
 }
 
 std::vector<double> SetNoise::relative() const {

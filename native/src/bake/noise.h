@@ -30,6 +30,7 @@ constexpr double kNoiseSlope = 0.65;
 struct Looks {
     uint32_t count = 0, bundles = 0;
     double share = 1;  // of the last look's squares that counts, by the looks before it
+    std::vector<double> shareOfParts{};  // likewise, see NoisyParts; empty: not known
 };
 
 class Noise {
@@ -43,6 +44,8 @@ class Noise {
 
     // A look at the halves of so many bundles.
     void look(const std::array<Irradiance, 2>& half, uint32_t bundles, double bias);
+    // Of the same bundles, after what else has made the halves better.
+    void lookAgain(const std::array<Irradiance, 2>& half);
 
     // As of the last look, relative to the RMS of the light: on the sides, and shown.
     double relative() const;
@@ -55,16 +58,27 @@ class Noise {
     Looks looks() const;
     // Per side: half the difference of the halves, brought to the stated size, W/m^2.
     std::vector<glm::vec3> perSide() const;
+    // Of one side of a cell, of the last look: the noise of bundles in its mean, what of that is
+    // because patches differ at random, and the light; squares summed over RGB, (W/m^2)^2.
+    struct OfCell {
+        double area = 0;  // exposed, m^2; 0: it has no result
+        double noise = 0, random = 0, light = 0;
+    };
+    // Two a cell.
+    const std::vector<OfCell>& cells() const { return ofCells; }
 
   private:
+    void measure(const std::array<Irradiance, 2>& half);
+
     const std::vector<float>& weight;
     const std::vector<float>& directError;
     const std::vector<uint32_t>& cellOf;
     double factor() const;
 
     std::vector<glm::vec3> difference;  // per side: half that of the halves, W/m^2
-    double bundleNoise = 0;             // relative squares, of the last look
-    double pooled = 0;                  // the same, averaged with the looks before
+    std::vector<OfCell> ofCells;
+    double bundleNoise = 0;  // relative squares, of the last look
+    double pooled = 0;       // the same, averaged with the looks before
     double directNoise = 0, bias = 0, signal = 0;
     double shownOfBundles = 0, shownDirect = 0;  // relative squares, of the last look
     uint32_t bundles = 0, looked = 0;
@@ -91,6 +105,9 @@ class SetNoise {
     // A look at the halves of all lights.
     void look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles, double bias);
 
+    // Of the same bundles, after what else has made the halves better.
+    void lookAgain(const std::vector<std::array<Irradiance, 2>>& halves);
+
     // As of the last look, relative: of the light of all, then of each light set.
     std::vector<double> relative() const;
     // Likewise of the light of all, shown.
@@ -100,12 +117,17 @@ class SetNoise {
     // Of the light of all.
     Looks looks() const { return noises.front().looks(); }
     SideNoise perSide() const;
+    // Of the light of all, then of each light set.
+    const std::vector<Noise>& ofLights() const { return noises; }
 
   private:
+    template <class Look>
+    void lookAtAll(const std::vector<std::array<Irradiance, 2>>& halves, const Look& look);
+
     const std::vector<std::vector<float>> errorOfSets;
     const std::vector<uint32_t> cellOf;
     std::vector<float> directError;  // of the light of all, per side, W/m^2
-    std::vector<Noise> noises;       // of the light of all, then of each light set
+    std::vector<Noise> noises;
 };
 
 }  // namespace raybundle

@@ -112,4 +112,28 @@ double Trace::linesPerBundle() const {
            (double(density.pixelSize) * double(density.pixelSize));
 }
 
+std::vector<float> Trace::linesMet() const {
+    std::vector<float> lines(counts.sideCount());
+    for (uint32_t side = 0; side < lines.size(); ++side) lines[side] = float(counts.linesMet(side));
+    return clusters.spread(lines);
+}
+
+std::vector<std::array<float, 2>> Trace::linesByHalf() const {
+    std::vector<float> met = linesMet();
+    std::vector<std::array<float, 2>> lines(met.size());
+    for (uint32_t side = 0; side < lines.size(); ++side) {
+        const std::array<uint32_t, 2>& total = counts.total[clusters.sideOf(side)];
+        const float all = float(total[0]) + float(total[1]);
+        for (size_t h = 0; h < 2; ++h)
+            lines[side][h] = all > 0 ? met[side] * float(total[h]) / all : 0;
+    }
+    return lines;
+}
+
+double Trace::linesMetByAll() const {
+    double lines = 0;
+    for (uint32_t side = 0; side < counts.sideCount(); ++side) lines += counts.linesMet(side);
+    return lines;
+}
+
 }  // namespace raybundle

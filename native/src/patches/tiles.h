@@ -26,6 +26,11 @@ class Tiles {
     size_t sideCount() const { return patches().sideCount(); }
     // How often the edges of a tile are halved.
     int level(uint32_t tile) const { return uncut ? levels[tile] : 0; }
+    // The patches of a tile: their number, and of the first the side that a side of the tile has.
+    uint32_t patchCount(uint32_t tile) const { return uncut ? first[tile + 1] - first[tile] : 1; }
+    uint32_t firstSide(uint32_t side) const {
+        return uncut ? 2 * first[side / 2] + side % 2 : side;
+    }
 
     // From values per side of the patches to values per side of the tiles. weight: per side of the
     // patches; where a whole tile has none, the area counts.

@@ -6,10 +6,8 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
-#include "transport/scattered_light.h"
 #include "transport/sobol.h"
 #include "transport/sphere_sampling.h"
-#include "transport/translucence.h"
 
 namespace raybundle {
 namespace {
@@ -47,22 +45,10 @@ FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
       visibility(visibility),
       light(light),
       emission(light.direct.bundledEmission()),
-      reflected(patches.sideCount()),
-      directed(patches, light.shot),
-      exposed(exposed),
+      sent(patches, light.shot, light.irradiance, exposed, SentLight::Of::ALL),
       world(glm::pi<float>() * light.worldRadiance),
       targetError(targetError),
-      error(targetError * meanLight) {
-    for (size_t side = 0; side < reflected.size(); ++side)
-        reflected[side] =
-            patches.reflectance[side] *
-                (light.irradiance.direct[side] - light.irradiance.gathered[side] +
-                 light.irradiance.indirect[side]) +
-            shotReflectance(patches, light.shot, side) * light.irradiance.gathered[side] +
-            passedOn(patches, exposed, side, light.irradiance.all(side ^ 1));
-    for (size_t side = 0; side < light.irradiance.byAngle.size(); ++side)
-        reflected[side] += light.irradiance.byAngle[side];
-}
+      error(targetError * meanLight) {}
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
                                        float brightness) const {
@@ -123,13 +109,7 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
         const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
         sum.carried += hit ? emission[*hit] : world;
         if (!hit) continue;
-        sum.reflected += reflected[*hit];
-        if (directed.hasLayers())
-            sum.reflected += directed.layer(*hit, -direction) * reflected[*hit];
-        if (!directed.isNone(*hit) && exposed[*hit] > 0)
-            sum.reflected += directed.towards(*hit, -direction) / exposed[*hit];
-        if (light.irradiance.scattered && !light.irradiance.scattered->isNone(*hit))
-            sum.reflected += light.irradiance.scattered->towards(*hit, -direction);
+        sum.reflected += sent.towards(*hit, -direction);
         if (distance >= width(*hit)) continue;
         const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
                            hash(receiver.seed, kParts)};

@@ -24,7 +24,7 @@
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
 #include "transport/direct_light.h"
-#include "transport/directed_light.h"
+#include "transport/sent_light.h"
 #include "transport/set_light.h"
 #include "transport/sobol.h"
 #include "visibility/visibility.h"
@@ -76,9 +76,7 @@ class FinalGather {
     const Visibility& visibility;
     const SetLight& light;
     const std::vector<glm::vec3>& emission;  // per side, without sources, W/m^2
-    std::vector<glm::vec3> reflected;        // per side, W/m^2
-    const DirectedLight directed;
-    const std::vector<float>& exposed;
+    const SentLight sent;
     const glm::vec3 world;  // exitance, W/m^2
     const float targetError;
     const float error;  // W/m^2

@@ -19,6 +19,8 @@ namespace {
 constexpr double kCoarse = 0.05, kCoarseTargets = 2;
 // Objects that are named for it.
 constexpr size_t kMostNamed = 6;
+// An object is noisy above so many targets.
+constexpr double kNoisyTargets = 2;
 // Objects darker than this share of the mean square light are not worth a finer mesh.
 constexpr double kDark = 0.01;
 // An object of whose area less than this is known takes over the surplus of the others.
@@ -251,6 +253,23 @@ double edgeFor(double limit, double smoothShare, double stepShare, double patchE
     return low * patchEdge;
 }
 
+// Names the noisiest. noises: of those that have too much, relative, with their names.
+void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double target,
+                 Report& report) {
+    if (noises.empty()) return;
+    std::stable_sort(noises.begin(), noises.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    const size_t named = std::min(noises.size(), kMostNamed);
+    std::string text = "noisier than twice the target of " + inPercent(target) + ":";
+    for (size_t k = 0; k < named; ++k)
+        text += (k > 0 ? ", \"" : " object \"") + noises[k].second + "\" (" +
+                inPercent(noises[k].first) + ")";
+    if (noises.size() > named)
+        text += " and " + std::to_string(noises.size() - named) +
+                " more, of which the report has the noise of each";
+    report.warnings.push_back(text + "; lower target_error");
+}
+
 // A mesh that is too coarse: its squared error, and what to say of it.
 using CoarseMesh = std::pair<double, std::string>;
 
@@ -310,6 +329,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     const double limit = std::max(kCoarse, kCoarseTargets * double(targetError));
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;
+    std::vector<std::pair<double, std::string>> noisy;
     for (size_t i = 0; i < light.size(); ++i) {
         throwIfCancelledAt(i);
         if (!errors[i]) continue;
@@ -321,10 +341,14 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         if (errsAlike && own.signal > 0)
             report.objects[i].error.noise = std::max(report.objects[i].error.noise, shown);
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
-        if (own.signal / own.area > kDark * all.signal / all.area)
-            if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
-                coarse.push_back(std::move(*mesh));
+        if (!(own.signal / own.area > kDark * all.signal / all.area)) continue;
+        const double noise = report.objects[i].error.noise;
+        if (!errsAlike && noise > kNoisyTargets * double(targetError))
+            noisy.push_back({noise, light[i].name});
+        if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
+            coarse.push_back(std::move(*mesh));
     }
+    warnOfNoise(std::move(noisy), double(targetError), report);
     warnOf(std::move(coarse), report);
     report.error = relative(all, noiseScale, shownScale, discretisation);
     report.error.noise = std::hypot(shown, all.shown > 0 ? std::sqrt(all.gathered / all.shown) : 0);

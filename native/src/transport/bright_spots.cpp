@@ -6,15 +6,18 @@
 
 #include "bake/noise.h"
 #include "scene/channels.h"
+#include "transport/directed_light.h"
 
 namespace raybundle {
 namespace {
 
 // Sides whose exitance is at least so many times the mean of what lines meet may be bright spots.
-constexpr double kBright = 10;
+constexpr double kBright = 3;
+// Together they have at most this share of all area: of large parts lines bring the light better.
+constexpr double kMostArea = 0.05;
 // Gathering the light of bright spots takes about as long as so many bundles (both in proportion to
 // the patches): they are worth it where they spare more.
-constexpr double kWorthwhileBundles = 2000;
+constexpr double kWorthwhileBundles = 50;
 
 // Points of a side at which is looked whether another surface lies on it.
 constexpr uint32_t kLooks = 16;
@@ -67,18 +70,18 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
     if (!(mean > 0)) return spots;
     // What sides of any exitance do to the noise of others is in proportion to the square of their
     // contrast, to their area, and to the area that a line stands for.
-    double inSpots = 0, inRest = 0;
+    double inSpots = 0, inRest = 0, areaOfSpots = 0;
     for (size_t side = 0; side < n; ++side) {
         const double area = double(patches.area[side / 2]);
-        (exitance[side] > kBright * mean ? inSpots : inRest) +=
-            area * std::pow(exitance[side] / mean - 1, 2) *
-            lineShare(density, patches.parentOf[side / 2]);
+        const bool isBright = exitance[side] > kBright * mean;
+        (isBright ? inSpots : inRest) += area * std::pow(exitance[side] / mean - 1, 2) *
+                                         lineShare(density, patches.parentOf[side / 2]);
+        if (isBright) areaOfSpots += area;
     }
+    if (areaOfSpots > kMostArea * patches.totalArea) return spots;
     auto bundlesFor = [&](double squares) {
-        return std::min(
-            double(input.settings.maxBundles),
-            std::pow(std::sqrt(squares / patches.totalArea) / double(input.settings.targetError),
-                     1 / kNoiseSlope));
+        return std::pow(std::sqrt(squares / patches.totalArea) / double(input.settings.targetError),
+                        1 / kNoiseSlope);
     };
     if (!(bundlesFor(inSpots + inRest) - bundlesFor(inRest) > kWorthwhileBundles)) return spots;
     spots.gathered.resize(n);
@@ -115,6 +118,10 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
     for (size_t side = 0; side < n; ++side)
         if (patches.parentAt(uint32_t(side)).exchanges && !spots.isSource[side])
             unshot[side] = reflected(patches, shot, side);
+    const std::vector<bool> isSpot = spots.isSource;
+    if (!patches.scattering.empty())
+        spots.directed =
+            std::make_shared<const DirectedLight>(patches, shot, DirectedLight::Of::ALL);
     const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707);
     const DirectLight light(scene, patches, exchange, seed, input.settings, std::move(spots));
     const StandIns alone(patches, nullptr);
@@ -142,6 +149,7 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
     for (size_t side = 0; side < n; ++side)
         if (!patches.parentAt(uint32_t(side)).exchanges) unshot[side] = glm::vec3(0.0f);
     shot.unshot = std::move(unshot);
+    shot.sentOn = isSpot;
     return count;
 }
 

@@ -12,6 +12,13 @@
 namespace raybundle {
 namespace {
 
+std::vector<bool> joined(const Clusters& clusters, const std::vector<bool>& values) {
+    std::vector<bool> result(clusters.patches().sideCount());
+    for (uint32_t side = 0; side < result.size(); ++side)
+        result[side] = values[clusters.memberOf(side, 0)];
+    return result;
+}
+
 // The light of a first shot on clusters.
 FirstShot joined(const Clusters& clusters, const FirstShot& shot) {
     FirstShot result;
@@ -20,15 +27,9 @@ FirstShot joined(const Clusters& clusters, const FirstShot& shot) {
     result.unshot = clusters.mean(shot.unshot);
     result.angles = clusters.mean(shot.angles);
     result.emission = clusters.mean(shot.emission);
+    if (!shot.sentOn.empty()) result.sentOn = joined(clusters, shot.sentOn);
     for (uint32_t side = 0; !shot.incoming.empty() && side < result.irradiance.size(); ++side)
         result.incoming.push_back(shot.incoming[clusters.memberOf(side, 0)]);
-    return result;
-}
-
-std::vector<bool> joined(const Clusters& clusters, const std::vector<bool>& values) {
-    std::vector<bool> result(clusters.patches().sideCount());
-    for (uint32_t side = 0; side < result.size(); ++side)
-        result[side] = values[clusters.memberOf(side, 0)];
     return result;
 }
 

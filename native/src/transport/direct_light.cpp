@@ -56,7 +56,8 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
       skips(skips),
       showsByAngle(showAnyByAngle(scene)),
       split(std::make_unique<const EmissionSplit>(std::move(reflected))),
-      sources(meshSources(scene, patches, split->isSource, split->gathered)) {}
+      sources(
+          meshSources(scene, patches, split->isSource, split->gathered, split->directed.get())) {}
 
 void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
                               const std::function<Receiver(size_t)>& receiverAt,

@@ -32,7 +32,8 @@ constexpr size_t kBlock = 256;  // sides per task
 
 }  // namespace
 
-DirectedLight::DirectedLight(const Patches& patches, const FirstShot& shot) : patches(patches) {
+DirectedLight::DirectedLight(const Patches& patches, const FirstShot& shot, Of of)
+    : patches(patches) {
     if (patches.scattering.empty() && patches.byAngle.empty()) return;
     findMiddles();
     findLayers();
@@ -44,7 +45,8 @@ DirectedLight::DirectedLight(const Patches& patches, const FirstShot& shot) : pa
         std::vector<Part>& parts = ofBlock[block];
         for (size_t side = block * kBlock; side < std::min(n, (block + 1) * kBlock); ++side) {
             const size_t before = parts.size();
-            addParts(uint32_t(side), shot, parts);
+            const bool isSentOn = of != Of::ALL && !shot.sentOn.empty() && shot.sentOn[side];
+            if (!isSentOn) addParts(uint32_t(side), shot, parts);
             first[side + 1] = uint32_t(parts.size() - before);
         }
     });

@@ -29,9 +29,10 @@ double shareOfLines(double bent, double reflected);
 
 class DirectedLight {
   public:
-    // Of the light of a first shot; none, if that knows no directions or all surfaces are
-    // Lambert's. patches must outlive the object.
-    DirectedLight(const Patches& patches, const FirstShot& shot);
+    // Of the light of a first shot, or of what it has not sent on itself; none, if that knows no
+    // directions or all surfaces are Lambert's. patches must outlive the object.
+    enum class Of { ALL, BEYOND_FIRST_SHOT };
+    DirectedLight(const Patches& patches, const FirstShot& shot, Of of = Of::BEYOND_FIRST_SHOT);
 
     bool isNone() const { return all.empty(); }
     bool isNone(uint32_t side) const { return isNone() || first[side] == first[side + 1]; }

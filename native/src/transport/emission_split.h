@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
 
 #include "bake/skips.h"
@@ -16,12 +17,16 @@
 
 namespace raybundle {
 
+class DirectedLight;
+
 // Per side, W/m^2.
 struct EmissionSplit {
     std::vector<glm::vec3> emitted;   // all of the light set
     std::vector<glm::vec3> gathered;  // of sources, of the whole patch
     std::vector<glm::vec3> bundled;
     std::vector<bool> isSource;
+    // What sides send towards a direction more than `gathered`, or less; null: nothing.
+    std::shared_ptr<const DirectedLight> directed{};
     // Emission that nobody ever sees is in none of these: its sides, and its power, W.
     size_t unseen = 0;
     glm::dvec3 unseenPower{0.0};

@@ -27,7 +27,10 @@ struct FirstShot {
     std::vector<glm::vec3> indirect, unshot;
     std::vector<glm::vec4> angles;   // per side, of GATHER: means of angleTerms; else empty
     std::vector<Incoming> incoming;  // per side, of GATHER, if any surface is not Lambert's
-    std::vector<float> error;        // per side, standard error of all irradiance, W/m^2
+    // Per side: all that it reflects of the irradiance is in `indirect`, by direction too; empty: of
+    // none.
+    std::vector<bool> sentOn;
+    std::vector<float> error;  // per side, standard error of all irradiance, W/m^2
     std::vector<uint32_t>
         noisiest;  // per side, of GATHER: the source with most of that; else empty
     std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2

@@ -436,7 +436,8 @@ PatchPoint LightSource::placeOn(const ReceiverPlace& patch, glm::vec2 uv) const 
 
 std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
                                                       const std::vector<bool>& gatheredSides,
-                                                      const std::vector<glm::vec3>& emission) {
+                                                      const std::vector<glm::vec3>& emission,
+                                                      const DirectedLight* directed) {
     std::vector<std::unique_ptr<LightSource>> sources;
     using Group = std::tuple<uint32_t, int32_t, uint32_t>;  // instance, material and surface
     std::map<Group, std::vector<uint32_t>> groups;
@@ -470,9 +471,9 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
         for (uint32_t p : parents) enclosing.add(surfaces[patches.parents[p].surface]);
         for (uint32_t back = 0; back < 2; ++back) {
             if (most[back] == glm::vec3(0.0f)) continue;
-            sources.push_back(std::make_unique<MeshSource>(patches, parents, back, most[back],
-                                                           varies ? &emission : nullptr,
-                                                           enclosing.box, enclosing.hides[back]));
+            sources.push_back(std::make_unique<MeshSource>(
+                patches, parents, back, most[back], varies || directed ? &emission : nullptr,
+                enclosing.box, enclosing.hides[back], directed));
             sources.back()->name = "object \"" + scene.instances[std::get<0>(key)].name + "\"";
             sources.back()->magnitude = most[back];
             sources.back()->shape = shapeOf(patches, parents, back, emission, most[back]);
@@ -518,7 +519,7 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
         sources.back()->shape = hasher.value();
     }
 
-    for (auto& source : meshSources(scene, patches, gatheredSides, emission))
+    for (auto& source : meshSources(scene, patches, gatheredSides, emission, nullptr))
         sources.push_back(std::move(source));
     return sources;
 }

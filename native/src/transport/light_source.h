@@ -20,6 +20,7 @@
 
 namespace raybundle {
 
+class DirectedLight;
 struct ReceiverPlace;
 
 // What one sampled point of a source gives to a receiver if nothing is in between.
@@ -174,10 +175,12 @@ class LightSource {
 };
 
 // The emissive faces of sides that are marked, whose emission per side of all patches (W/m^2 of the
-// whole patch, 0 where not marked) is given. All that is passed must outlive them.
+// whole patch, 0 where not marked) is given; directed: what they send towards a direction more than
+// that, or less; null: nothing. All that is passed must outlive them.
 std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
                                                       const std::vector<bool>& gatheredSides,
-                                                      const std::vector<glm::vec3>& emission);
+                                                      const std::vector<glm::vec3>& emission,
+                                                      const DirectedLight* directed);
 
 // All sources of a light set whose light the first shot gathers: its lights, the image of the world
 // if that is in it, and its emissive faces as above.

@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "bake/cancellation.h"
+#include "transport/directed_light.h"
 #include "transport/receiver_place.h"
 #include "transport/sphere_sampling.h"
 #include "transport/spherical_triangle.h"
@@ -62,12 +63,13 @@ std::optional<FaceDirection> directionTo(const LightFace& face, const glm::vec3&
 
 MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                        const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission,
-                       const Extent& whole, bool isEnclosed)
+                       const Extent& whole, bool isEnclosed, const DirectedLight* directed)
     : patches(patches),
       emission(emission),
       sideEmission(sideEmission),
       whole(whole),
-      isEnclosed(isEnclosed) {
+      isEnclosed(isEnclosed),
+      directed(directed) {
     boundSource(parents);
     wholeExtent = std::max(double(extent), 0.5 * whole.diagonal());
     collectFaces(parents, back);
@@ -150,9 +152,21 @@ LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver
                                              std::max(0.0f, glm::dot(receiver, seen->direction)))}
              : surfaceSample(point, receiver, pointOn(face, own), face.normal, shape.radiance,
                              shape.area * choice.weight);
+    if (directed) sample.irradiance *= shareTowards(face.side, -sample.direction);
     sample.parent = shape.parent;
     sample.setMargin(face.normal, float(shape.plane.thickness));
     return sample;
+}
+
+glm::vec3 MeshSource::shareTowards(uint32_t side, const glm::vec3& direction) const {
+    const glm::vec3 mean = emissionOf(side);
+    glm::vec3 more(0.0f);
+    if (!directed->isNone(side)) more += directed->towards(side, direction);
+    if (directed->hasLayers()) more += directed->layer(side, direction) * mean;
+    glm::vec3 share(1.0f);
+    for (int c = 0; c < 3; ++c)
+        if (mean[c] > 0) share[c] = std::max(0.0f, 1 + more[c] / mean[c]);
+    return share;
 }
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,

@@ -21,9 +21,11 @@ class MeshSource : public LightSource {
     // those, W/m^2. `patches` must outlive it. Where the emission varies, sideEmission holds it per
     // side of all patches, W/m^2 of the whole patch, must outlive the source too, and there is no
     // closed form. whole: what the faces are part of; isEnclosed: the light does not get out of that.
+    // directed: what sides send towards a direction beyond that, if emission varies; or null.
     MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission = nullptr,
-               const Extent& whole = {}, bool isEnclosed = false);
+               const Extent& whole = {}, bool isEnclosed = false,
+               const DirectedLight* directed = nullptr);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override;
@@ -45,11 +47,16 @@ class MeshSource : public LightSource {
         return sideEmission ? (*sideEmission)[side] : emission;
     }
 
+    // By channel: what a side of the source sends towards a direction away from it over what it sends
+    // in the mean.
+    glm::vec3 shareTowards(uint32_t side, const glm::vec3& direction) const;
+
     const Patches& patches;
     const glm::vec3 emission;                          // W/m^2
     const std::vector<glm::vec3>* const sideEmission;  // where it varies
     const Extent whole;
     const bool isEnclosed;
+    const DirectedLight* const directed;
     glm::vec3 totalPower{0.0f};  // W
     glm::vec3 centre{0.0f};
     float extent = 0;        // radius of a sphere around centre, metres

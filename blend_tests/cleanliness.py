@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How clean each object is at the default: noise where it is seen.
+
+    blender -b --factory-startup -P blend_tests/cleanliness.py -- \\
+        [SCENE ...] [--target 0.02 ...] [--seeds 1] [--converged 0.0015] [--work build/cleanliness]
+
+Of LIGHTING, at the corners of each object: the difference between a bake and one that has converged
+(--converged, another seed; kept in --work until the library changes), relative to the light there;
+light below 5 % of the scene's mean counts as 5 %. Printed are the 95th percentiles of all objects
+together, of the worst and how many objects are above 3 and 4 %. SCENE: a name of scenes/, a file,
+or room:NAME (lamp_rooms.py); without any, all of scenes/.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+sys.path[:0] = [str(ROOT / "addon"), str(HERE)]
+sys.dont_write_bytecode = True
+
+import lamp_rooms  # noqa: E402
+import raybundle  # noqa: E402
+from surface_error import corner_areas, read_colors  # noqa: E402
+
+DARK = 0.05  # of the scene's mean: what is darker counts as that
+CLEAN, MOST = 0.03, 0.04
+SEED_OF_CONVERGED = 1000
+
+
+@dataclass
+class Baked:
+    light: dict[str, np.ndarray]  # (corners, 3) per object
+    areas: dict[str, np.ndarray]  # (corners,) m^2
+    bundles: int
+    seconds: float
+    noise: float
+
+
+def bake(scene: str, target: float, seed: int, settings: dict[str, str]) -> Baked:
+    open_scene(scene)
+    started = time.perf_counter()
+    report = raybundle.bake(bpy.context, output='LIGHTING', domain='CORNER', target_error=target,
+                            seed=seed, **settings)
+    seconds = time.perf_counter() - started
+    items = [bpy.data.objects[entry.name] for entry in report.objects
+             if entry.status.startswith('baked')]
+    return Baked({item.name: read_colors(item).astype(float) for item in items},
+                 {item.name: corner_areas(item) for item in items}, report.bundles, seconds,
+                 report.error['noise'])
+
+
+def open_scene(name: str) -> None:
+    kind, _, room = name.partition(":")
+    if kind == "room":
+        lamp_rooms.build(room, lamp_rooms.FINE)
+        return
+    path = ROOT / "scenes" / f"{name}.blend"
+    bpy.ops.wm.open_mainfile(filepath=str(path if path.is_file() else Path(name).resolve()))
+
+
+def converged(scene: str, target: float, settings: dict[str, str], work: Path
+              ) -> dict[str, np.ndarray]:
+    said = "".join(f"_{value}" for value in settings.values())
+    kept = work / f"{Path(scene).stem.replace(':', '_')}_{target}{said}.npz"
+    if not kept.is_file():
+        baked = bake(scene, target, SEED_OF_CONVERGED, settings)
+        print(f"    converged: {baked.bundles} bundles, {baked.seconds:.1f} s, "
+              f"noise {100 * baked.noise:.2f} %", flush=True)
+        work.mkdir(parents=True, exist_ok=True)
+        np.savez(kept, **baked.light)
+    with np.load(kept) as arrays:
+        return {name: arrays[name] for name in arrays.files}
+
+
+def differences(baked: Baked, reference: dict[str, np.ndarray]) -> dict[str, float]:
+    """The 95th percentile of each object's; all together by the key ''."""
+    total = sum(areas.sum() for areas in baked.areas.values())
+    mean = sum(baked.areas[name] @ reference[name].mean(axis=1) for name in reference) / total
+    off = {name: np.abs(baked.light[name] - truth).max(axis=1)
+           / np.maximum(truth.max(axis=1), DARK * mean) for name, truth in reference.items()}
+    found = {name: float(np.percentile(values, 95)) for name, values in off.items()}
+    found[''] = float(np.percentile(np.concatenate(list(off.values())), 95))
+    return found
+
+
+def main() -> None:
+    arguments = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scenes", nargs="*")
+    parser.add_argument("--target", type=float, nargs="+", default=[0.02])
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--converged", type=float, default=0.0015)
+    parser.add_argument("--set", nargs="*", default=[], help="NAME=VALUE of both bakes")
+    parser.add_argument("--work", type=Path, default=ROOT / "build" / "cleanliness")
+    options = parser.parse_args(arguments)
+    settings = dict(text.split("=", 1) for text in options.set)
+    scenes = options.scenes or sorted(path.stem for path in (ROOT / "scenes").glob("*.blend"))
+    if not hasattr(bpy.types.Scene, "raybundle"):
+        raybundle.register()
+    print("| scene | target | seconds | bundles | noise stated | all | worst | above 3 % | above 4 % |"
+          "\n|---|---|---|---|---|---|---|---|---|")
+    for scene in scenes:
+        reference = converged(scene, options.converged, settings, options.work)
+        for target in options.target:
+            for seed in range(1, options.seeds + 1):
+                baked = bake(scene, target, seed, settings)
+                found = differences(baked, reference)
+                everything = found.pop('')
+                worst = max(found, key=found.get)
+                above = [sum(value > limit for value in found.values()) for limit in (CLEAN, MOST)]
+                print(f"| `{scene}` | {target} | {baked.seconds:.2f} | {baked.bundles} "
+                      f"| {100 * baked.noise:.2f} % | {100 * everything:.1f} % "
+                      f"| {100 * found[worst]:.1f} % {worst} | {above[0]} of {len(found)} "
+                      f"| {above[1]} |", flush=True)
+
+
+main()

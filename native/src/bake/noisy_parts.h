@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Noise where it is seen: that of the bundles on each part of each object, relative to the light
+// there. It tells when there are enough bundles, and where local rays of their own take less time
+// than more bundles would (transport/extra_rays.h).
+//
+// Source: none; the thesis judges the whole scene (section 4.3.3).
+// - Half the difference of the halves at a cell is one sample of its noise. Those of a part are
+//   pooled, those of its object count a little too, and what the looks before have told.
+// - A bundle takes time for each line, wherever that goes. While the parts that need more of them get
+//   more than a tenth of all lines, another bundle is cheaper; when they get less, rays are.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bake/noise.h"
+#include "patches/tiles.h"
+#include "transport/extra_rays.h"
+
+namespace raybundle {
+
+class NoisyParts {
+  public:
+    // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has a result. isGathered: per side of the
+    // patches, whether its corners gather instead of showing its light: rays do not help there. The
+    // tiles must outlive the object.
+    NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& before,
+               const std::vector<float>& weight, const std::vector<bool>& isGathered);
+
+    // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
+    // those of all sides, not shown ones included.
+    void look(const SetNoise& noise, uint32_t bundles, const std::vector<float>& lines, double all);
+
+    // See Looks::shareOfParts.
+    std::vector<double> shares() const;
+    // So many times too large for a relative target is the noise at corners where more bundles are
+    // the cheapest remedy.
+    double excess(double target) const;
+    // So many times too large is what is left when sides have cast rays, on the object where that is
+    // most: of nine parts of ten of it. It is the noise of the light that rays met, and their own.
+    // noise: as of one look at the halves with rays.
+    double excessWithRays(const SetNoise& noise, double target) const;
+    // For each side of the patches that has too few samples for the target: rays. By the last look
+    // alone: the same light has the same ones, whatever was baked before. lines: per side and half,
+    // how many have met it.
+    std::vector<ExtraRays> rays(double target,
+                                const std::vector<std::array<float, 2>>& lines) const;
+
+  private:
+    struct Part {
+        uint32_t instance = 0;
+        bool isGathered = false;
+        double sides = 0, lines = 0;
+        // Squares of the noise at corners over the light there: by the last look, and pooled with those
+        // before.
+        double last = 0, squares = 0;
+    };
+    struct SeenCell {
+        uint32_t number;  // two a cell, as Noise has them
+        uint32_t part, island;
+        double area;  // m^2, with what is covered
+    };
+    // Squares over the light of one noise, per part.
+    std::vector<double> squaresOf(const Noise& noise) const;
+    std::vector<double> squaresOf(const SetNoise& noise) const;  // the largest of all lights
+
+    const Tiles& tiles;
+    const Looks before;
+    std::vector<uint32_t> partOf;  // per side of the tiles; kNone: has no result
+    std::vector<SeenCell> cells;   // of those with a result
+    std::vector<Part> parts;
+    // Per instance: how much the variance grows from the means of cells to corners, as far as it is
+    // random within them.
+    std::vector<double> growth;
+    double allLines = 0;
+    uint32_t bundles = 0;
+};
+
+}  // namespace raybundle

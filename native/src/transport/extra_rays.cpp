@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/extra_rays.h"
+
+#include <algorithm>
+#include <glm/gtc/constants.hpp>
+#include <memory>
+
+#include "bake/cancellation.h"
+#include "transport/local_lines.h"
+#include "transport/sent_light.h"
+#include "transport/sobol.h"
+#include "transport/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+// The light of one set: what sides send of it by the estimates of both halves together and of each.
+struct Sent {
+    Sent(const Patches& patches, const std::vector<float>& exposed, const SetLight& light,
+         const std::array<Irradiance, 2>& halves)
+        : emission(light.shot.emission), world(glm::pi<float>() * light.worldRadiance) {
+        auto of = [&](const Irradiance& irradiance) {
+            return std::make_unique<SentLight>(patches, light.shot, irradiance, exposed,
+                                               SentLight::Of::BEYOND_FIRST_SHOT);
+        };
+        by[0] = of(light.irradiance);
+        for (size_t h = 0; h < 2; ++h) by[1 + h] = of(halves[h]);
+    }
+
+    const std::vector<glm::vec3>& emission;        // per side, W/m^2
+    const glm::vec3 world;                         // exitance, W/m^2
+    std::array<std::unique_ptr<SentLight>, 3> by;  // of all, of each half
+};
+
+// What rays brought: sums, W/m^2.
+struct Brought {
+    glm::vec3 carried{0.0f}, reflected{0.0f};
+};
+
+// Brings an estimate by so many lines together with what rays brought.
+void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought, float rays,
+           const glm::vec3& alreadyIndirect) {
+    if (!(rays > 0)) return;
+    const float share = 1 / (lines + kLinesOfRay * rays);
+    const glm::vec3 carried = light.direct[side] - light.gathered[side];
+    const glm::vec3 reflected = light.indirect[side] - alreadyIndirect;
+    light.direct[side] =
+        light.gathered[side] + share * (lines * carried + kLinesOfRay * brought.carried);
+    light.indirect[side] =
+        alreadyIndirect + share * (lines * reflected + kLinesOfRay * brought.reflected);
+}
+
+}  // namespace
+
+void addExtraRays(const Patches& patches, const Visibility& visibility, float touchDistance,
+                  const std::vector<float>& exposed, const std::vector<ExtraRays>& wanted,
+                  const std::vector<std::array<float, 2>>& lines, uint32_t seed, SetLights& lights,
+                  std::vector<std::array<Irradiance, 2>>& halves) {
+    std::vector<Sent> sent;
+    for (size_t k = 0; k < lights.size(); ++k)
+        sent.emplace_back(patches, exposed, lights[k], halves[k]);
+    // All that is met is read before anything is changed.
+    std::vector<std::array<Brought, 3>> brought(wanted.size() * lights.size());
+    std::vector<std::array<float, 2>> counted(wanted.size(), {0, 0});
+    parallelFor(size_t(0), wanted.size(), [&](size_t w) {
+        const ExtraRays& own = wanted[w];
+        const SobolPoints points(hash(seed, own.side));
+        for (uint32_t i = 0; i < own.rays; ++i) {
+            throwIfCancelledAt(i);
+            const glm::vec4 u = points[i];
+            const glm::vec3 direction = cosineDirection(patches.normal(own.side), {u.z, u.w});
+            float distance = 0;
+            const auto hit = visibility.firstHit(own.side, patches.point(own.side / 2, {u.x, u.y}),
+                                                 direction, &distance);
+            if (hit && isCovered(patches, own.side, *hit, direction, distance, touchDistance))
+                continue;
+            if (hit && !(std::min(lines[*hit][0], lines[*hit][1]) > 0)) continue;
+            // The first points and the last are each stratified by themselves.
+            const size_t half = 2 * i < own.rays ? 0 : 1;
+            ++counted[w][half];
+            for (size_t k = 0; k < lights.size(); ++k)
+                for (const size_t of : {size_t(0), 1 + half}) {
+                    Brought& sum = brought[w * lights.size() + k][of];
+                    sum.carried += hit ? sent[k].emission[*hit] : sent[k].world;
+                    if (hit) sum.reflected += sent[k].by[of]->towards(*hit, -direction);
+                }
+        }
+    });
+    for (size_t w = 0; w < wanted.size(); ++w) {
+        const ExtraRays& own = wanted[w];
+        for (size_t k = 0; k < lights.size(); ++k) {
+            const FirstShot& shot = lights[k].shot;
+            const glm::vec3 already = shot.indirect.empty() || !(exposed[own.side] > 0)
+                                          ? glm::vec3(0.0f)
+                                          : shot.indirect[own.side] / exposed[own.side];
+            const std::array<Brought, 3>& by = brought[w * lights.size() + k];
+            const std::array<float, 2>& met = lines[own.side];
+            blend(lights[k].irradiance, own.side, met[0] + met[1], by[0],
+                  counted[w][0] + counted[w][1], already);
+            for (size_t h = 0; h < 2; ++h)
+                blend(halves[k][h], own.side, met[h], by[1 + h], counted[w][h], already);
+        }
+    }
+}
+
+}  // namespace raybundle

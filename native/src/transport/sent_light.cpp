@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "transport/sent_light.h"
+
+#include "transport/scattered_light.h"
+#include "transport/translucence.h"
+
+namespace raybundle {
+
+SentLight::SentLight(const Patches& patches, const FirstShot& shot, const Irradiance& irradiance,
+                     const std::vector<float>& exposed, Of of)
+    : irradiance(irradiance),
+      exposed(exposed),
+      mean(patches.sideCount()),
+      directed(patches, shot, of) {
+    const bool isBeyond = of == Of::BEYOND_FIRST_SHOT && !shot.unshot.empty();
+    for (size_t side = 0; side < mean.size(); ++side) {
+        glm::vec3 arriving =
+            irradiance.direct[side] - irradiance.gathered[side] + irradiance.indirect[side];
+        glm::vec3 sent = shotReflectance(patches, shot, side) * irradiance.gathered[side];
+        if (isBeyond) {
+            const float concentrated = exposed[side] > 0 ? 1 / exposed[side] : 0;
+            arriving -= concentrated * shot.indirect[side];
+            sent = concentrated * shot.unshot[side];
+        }
+        mean[side] = sent + patches.reflectance[side] * arriving +
+                     passedOn(patches, exposed, side, irradiance.all(side ^ 1));
+    }
+    for (size_t side = 0; side < irradiance.byAngle.size(); ++side)
+        mean[side] += irradiance.byAngle[side];
+}
+
+glm::vec3 SentLight::towards(uint32_t side, const glm::vec3& direction) const {
+    glm::vec3 sent = mean[side];
+    if (directed.hasLayers()) sent += directed.layer(side, direction) * mean[side];
+    if (!directed.isNone(side) && exposed[side] > 0)
+        sent += directed.towards(side, direction) / exposed[side];
+    if (irradiance.scattered && !irradiance.scattered->isNone(side))
+        sent += irradiance.scattered->towards(side, direction);
+    return sent;
+}
+
+}  // namespace raybundle

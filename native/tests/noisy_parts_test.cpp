@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Noise where it is seen: that of each object, relative to its own light.
+#include "bake/noisy_parts.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "bake/bake.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+constexpr int kSmallThings = 4;
+
+// A room with a lamp, behind a screen that keeps its light from one half, and small boxes in both.
+Scene roomOfSmallThings() {
+    Scene scene;
+    place(scene, box("room", glm::vec3(0), glm::vec3(4, 2, 2), true), grey("walls", 0.6f));
+    place(scene, box("screen", {2, 0, 0}, {2.1f, 2, 1.4f}, false), grey("screen", 0.6f));
+    for (int k = 0; k < kSmallThings; ++k) {
+        const glm::vec3 low(0.6f + 0.9f * float(k), 0.7f, 0.3f);
+        place(scene, box("thing", low, low + glm::vec3(0.1f, 0.12f, 0.07f), false),
+              grey("thing", 0.6f));
+    }
+    scene.addLight(areaLight({1, 1, 1.9}, {0.2, 0, 0}, {0, -0.2, 0}, glm::dvec3(10)));
+    return scene;
+}
+
+// Of the corners of an object, the RMS of the difference relative to the light there, where that is
+// more than a twentieth of the mean.
+double differenceOf(int32_t instance, const Bake& bake, const Bake& reference) {
+    const std::vector<glm::vec3> found = cornerLight(bake, instance, RB_OUTPUT_LIGHTING);
+    const std::vector<glm::vec3> right = cornerLight(reference, instance, RB_OUTPUT_LIGHTING);
+    float mean = 0;
+    const std::vector<glm::vec3> ofRoom = cornerLight(reference, 0, RB_OUTPUT_LIGHTING);
+    for (const glm::vec3& light : ofRoom) mean += light.x / float(ofRoom.size());
+    double squares = 0;
+    for (size_t c = 0; c < found.size(); ++c)
+        squares +=
+            std::pow(double((found[c].x - right[c].x) / std::max(right[c].x, 0.05f * mean)), 2);
+    return std::sqrt(squares / double(found.size()));
+}
+
+size_t sidesWithRays(const Bake& bake) {
+    const Json report = reportOf(bake);
+    for (const auto& skip : report["skipped"])
+        if (std::string(skip["why"]).find("cast rays") != std::string::npos) return skip["count"];
+    return 0;
+}
+
+TEST(NoisyParts, SmallAndDarkThingsAreAsCleanAsWalls) {
+    const Scene scene = roomOfSmallThings();
+    Bake reference;
+    reference.settings.minBundles = reference.settings.maxBundles = 16384;
+    reference.settings.targetError = 0.002f;
+    reference.settings.seed = 1000;
+    reference.run(scene);
+    Bake bake;
+    bake.run(scene);
+    EXPECT_GT(sidesWithRays(bake), 0u);
+    const int bundles = reportOf(bake)["bundles"];
+    EXPECT_LT(bundles, 4096);
+    // As many bundles without rays.
+    Bake lines;
+    lines.settings.minBundles = lines.settings.maxBundles = bundles;
+    lines.run(scene);
+    EXPECT_EQ(sidesWithRays(lines), 0u);
+    double most = 0, mostOfLines = 0;
+    for (int32_t instance = 2; instance < 2 + kSmallThings; ++instance) {
+        most = std::max(most, differenceOf(instance, bake, reference));
+        mostOfLines = std::max(mostOfLines, differenceOf(instance, lines, reference));
+    }
+    // The target, and as much again: the noise of a part is known to a third, and that of a box's 24
+    // corners, one bake's, differs as much from bake to bake.
+    EXPECT_LT(most, 2 * 0.02);
+    // What is dark gains most: half of its noise, measured at seeds 0 to 4.
+    EXPECT_LT(most, 0.75 * mostOfLines);
+}
+
+TEST(NoisyParts, StatedNoiseIsThatWithRays) {
+    const Scene scene = roomOfSmallThings();
+    Bake one, two;
+    two.settings.seed = 1;
+    for (Bake* bake : {&one, &two}) bake->run(scene);
+    std::vector<glm::vec3> a, b;
+    for (int32_t instance = 0; instance < int32_t(scene.instances.size()); ++instance)
+        for (const auto& [bake, all] : {std::pair{&one, &a}, std::pair{&two, &b}}) {
+            const auto own = cornerLight(*bake, instance, RB_OUTPUT_LIGHTING);
+            all->insert(all->end(), own.begin(), own.end());
+        }
+    const double found = noise(a, b) / std::sqrt(2.0);
+    const double stated = std::hypot(reportOf(one)["error"]["noise"].get<double>(),
+                                     reportOf(two)["error"]["noise"].get<double>()) /
+                          std::sqrt(2.0);
+    // One pair of bakes, whose bundles err alike on whole walls; all corners weigh the same here.
+    EXPECT_LT(found, 2.5 * stated);
+    EXPECT_GT(found, stated / 2.5);
+}
+
+TEST(NoisyParts, RaysFollowFromTheLightAlone) {
+    // The same light has the same rays, whatever was baked before.
+    Scene scene = roomOfSmallThings();
+    Bake fresh, again;
+    again.run(scene);
+    scene.lights[0].strength *= 2.0;
+    again.run(scene);
+    fresh.run(scene);
+    EXPECT_GT(sidesWithRays(fresh), 0u);
+    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-2);
+}
+
+}  // namespace
+}  // namespace raybundle
