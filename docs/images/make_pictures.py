@@ -19,6 +19,7 @@ sys.path.insert(0, str(ROOT / "addon"))
 
 import attribute_picture  # noqa: E402
 import raybundle  # noqa: E402
+from raybundle.material_export import SlotMaterial  # noqa: E402
 from raybundle.material_export import MaterialExporter  # noqa: E402
 from raybundle.scene_data import SceneData, Warnings  # noqa: E402
 
@@ -29,7 +30,7 @@ def show_own_colors(objects: list[bpy.types.Object]) -> None:
     """Replaces the baked light by the front's reflectance, constant per object."""
     exporter = MaterialExporter(SceneData(), Warnings())
     for item in objects:
-        index = exporter.export(item.material_slots[0].material).index
+        index = exporter.export(SlotMaterial(item.material_slots[0].material)).index
         color = np.append(exporter.scene.materials[index].reflectance[0], 1.0)
         data = item.data.color_attributes[ATTRIBUTE].data
         data.foreach_set('color', np.tile(color, len(data)).astype(np.float32))

@@ -509,7 +509,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     uint32_t wanted = std::max(transport.bundleCount(),
                                std::min(most, (uint32_t(settings.minBundles) + 1) & ~1u));
     const double target = settings.targetError;
-    // Who fixes the number of bundles wants what these tell.
+    // Who fixes or limits the number of bundles wants what these tell.
     const bool castsRays =
         noisyParts && settings.skipBundles && settings.minBundles < settings.maxBundles;
     Report finish;           // what the last solve says
@@ -543,7 +543,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         isReached = excess <= 1 && settings.skipBundles;
         if (isReached || bundles >= most) {
             finish = finishSolve(transports, lights, shown, errors.front());
-            if (castsRays && castRays(*noisyParts, lights, halves, finish)) {
+            if (castsRays && isReached && castRays(*noisyParts, lights, halves, finish)) {
                 SetNoise withRays({}, errorOfSets, tileWeight, tiles.patches());
                 withRays.look(seen(), bundles, transport.bias());
                 const double before = left;

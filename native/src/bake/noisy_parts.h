@@ -22,9 +22,9 @@ namespace raybundle {
 
 class NoisyParts {
   public:
-    // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has a result. isGathered: per side of the
-    // patches, whether its corners gather instead of showing its light: rays do not help there. The
-    // tiles must outlive the object.
+    // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has
+    // a result. isGathered: per side of the patches, whether its corners gather instead of showing
+    // its light: rays do not help there. The tiles must outlive the object.
     NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& before,
                const std::vector<float>& weight, const std::vector<bool>& isGathered);
 
