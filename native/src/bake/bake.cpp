@@ -486,7 +486,8 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     std::optional<NoisyParts> noisyParts;
     const bool countsLines = settings.solver == "LINE_REUSE";
     if (countsLines)
-        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), gatheredSides(shown, n));
+        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), gatheredSides(shown, n),
+                           patches.sheets);
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     std::vector<std::array<Irradiance, 2>> halves(lights.size());  // as they arrive

@@ -7,8 +7,8 @@
 // Source: none; the thesis judges the whole scene (section 4.3.3).
 // - Half the difference of the halves at a cell is one sample of its noise. Those of a part are
 //   pooled, those of its object count a little too, and what the looks before have told.
-// - A bundle takes time for each line, wherever that goes. While the parts that need more of them get
-//   more than a tenth of all lines, another bundle is cheaper; when they get less, rays are.
+// - A bundle takes time for each line, wherever that goes, and for each face. While the parts that need
+//   more of them get so many of the lines that rays would take longer, another bundle is cheaper.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +24,11 @@ class NoisyParts {
   public:
     // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has
     // a result. isGathered: per side of the patches, whether its corners gather instead of showing
-    // its light: rays do not help there. The tiles must outlive the object.
+    // its light: rays do not help there. sheets: of the patches, as they are projected. The tiles must
+    // outlive the object.
     NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& before,
-               const std::vector<float>& weight, const std::vector<bool>& isGathered);
+               const std::vector<float>& weight, const std::vector<bool>& isGathered,
+               const Sheets& sheets);
 
     // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
     // those of all sides, not shown ones included.
@@ -73,6 +75,7 @@ class NoisyParts {
     // Per instance: how much the variance grows from the means of cells to corners, as far as it is
     // random within them.
     std::vector<double> growth;
+    double projections = 0;  // of sheets and single faces, in each bundle
     double allLines = 0;
     uint32_t bundles = 0;
 };
