@@ -32,6 +32,9 @@ constexpr double kLineOverRays = 0.15;
 // In each bundle, a face that is projected by itself takes the time of so many lines (2 us
 // among windows of finer lines, measured on 24,000 leaves; a million triangles without windows 0.3 us).
 constexpr double kLinesOfFace = 30;
+// Rays lose and make light by their noise, which lines do not: what gets more than this share of all lines
+// is left to these.
+constexpr double kMostByRays = 0.4;
 // Rays of a side: those that are fewer tell nothing, and those that are more do not end.
 constexpr double kFewestRays = 8, kMostRays = 512;
 // Share of the parts of an object that rays are to have made clean.
@@ -176,11 +179,11 @@ double NoisyParts::excess(double target) const {
     std::stable_sort(noisiest.begin(), noisiest.end(),
                      [](const Part* a, const Part* b) { return a->squares > b->squares; });
     const double timeOfBundles = allLines + kLinesOfFace * projections * bundles;  // in lines
+    const double most = std::min(kLineOverRays * timeOfBundles, kMostByRays * allLines);
     double lines = 0;
     for (const Part* part : noisiest) {
         lines += part->lines;
-        if (part->isGathered || lines > kLineOverRays * timeOfBundles)
-            return std::sqrt(part->squares) / target;
+        if (part->isGathered || lines > most) return std::sqrt(part->squares) / target;
     }
     return 0;
 }
