@@ -5,7 +5,7 @@
         [SCENE ...] [--target 0.02 ...] [--seeds 1] [--converged 0.0015] [--work build/cleanliness]
 
 Of LIGHTING, at the corners of each object: the difference between a bake and one that has converged
-(--converged, another seed; kept in --work until the library changes), relative to the light there;
+(--converged, another seed; kept in --work until it is deleted), relative to the light there;
 light below 5 % of the scene's mean counts as 5 %. Printed are the 95th percentiles of all objects
 together, of the worst and how many objects are above 3 and 4 %. SCENE: a name of scenes/, a file,
 or room:NAME (lamp_rooms.py); without any, all of scenes/.
@@ -29,6 +29,7 @@ sys.dont_write_bytecode = True
 
 import lamp_rooms  # noqa: E402
 import raybundle  # noqa: E402
+from object_light import SCENES, open_file  # noqa: E402
 from surface_error import corner_areas, read_colors  # noqa: E402
 
 DARK = 0.05  # of the scene's mean: what is darker counts as that
@@ -46,7 +47,7 @@ class Baked:
 
 
 def bake(scene: str, target: float, seed: int, settings: dict[str, str]) -> Baked:
-    open_scene(scene)
+    open_file(scene, lamp_rooms.FINE)
     started = time.perf_counter()
     report = raybundle.bake(bpy.context, output='LIGHTING', domain='CORNER', target_error=target,
                             seed=seed, **settings)
@@ -56,15 +57,6 @@ def bake(scene: str, target: float, seed: int, settings: dict[str, str]) -> Bake
     return Baked({item.name: read_colors(item).astype(float) for item in items},
                  {item.name: corner_areas(item) for item in items}, report.bundles, seconds,
                  report.error['noise'])
-
-
-def open_scene(name: str) -> None:
-    kind, _, room = name.partition(":")
-    if kind == "room":
-        lamp_rooms.build(room, lamp_rooms.FINE)
-        return
-    path = ROOT / "scenes" / f"{name}.blend"
-    bpy.ops.wm.open_mainfile(filepath=str(path if path.is_file() else Path(name).resolve()))
 
 
 def converged(scene: str, target: float, settings: dict[str, str], work: Path
@@ -103,7 +95,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "cleanliness")
     options = parser.parse_args(arguments)
     settings = dict(text.split("=", 1) for text in options.set)
-    scenes = options.scenes or sorted(path.stem for path in (ROOT / "scenes").glob("*.blend"))
+    scenes = options.scenes or sorted(path.stem for path in SCENES.glob("*.blend"))
     if not hasattr(bpy.types.Scene, "raybundle"):
         raybundle.register()
     print("| scene | target | seconds | bundles | noise stated | all | worst | above 3 % | above 4 % |"

@@ -40,14 +40,14 @@ _covered: dict[str, dict[str, np.ndarray]] = {}  # by scene
 
 def open_scene(name: str, cells: int = lamp_rooms.FINE) -> None:
     """As it is, but that its faces remember whether they are covered."""
-    _open_file(name, cells)
+    open_file(name, cells)
     bpy.context.view_layer.update()
     if name not in _covered:
         _covered[name] = covered_faces(mesh_items())
     mark_covered(_covered[name])
 
 
-def _open_file(name: str, cells: int) -> None:
+def open_file(name: str, cells: int) -> None:
     kind, _, room = name.partition(":")
     if kind == "room":
         lamp_rooms.build(room, cells)

@@ -107,10 +107,7 @@ TEST(BakeEnergy, IsBalancedInClosedScenes) {
             bake.run(scene);
             const Json energy = reportOf(bake)["energy"];
             EXPECT_GT(energy["emitted"].get<double>(), 0);
-            // Bundles alone lose nothing. Where noisy sides cast rays, these have noise of their
-            // own: 2 % on a seventh of the sides at most, which is 0.02 % of some hundred, and more
-            // where the sides are as bright as those beside a lamp.
-            EXPECT_LT(energy["balance_error"].get<double>(), isFixed ? 1e-3 : 2e-3)
+            EXPECT_LT(energy["balance_error"].get<double>(), 1e-3)
                 << "kind " << kind << ": " << energy;
             EXPECT_LT(energy["escaped"].get<double>(), 1e-3 * energy["emitted"].get<double>())
                 << "kind " << kind;

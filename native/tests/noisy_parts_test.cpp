@@ -115,7 +115,9 @@ TEST(NoisyParts, RaysFollowFromTheLightAlone) {
     again.run(scene);
     fresh.run(scene);
     EXPECT_GT(sidesWithRays(fresh), 0u);
-    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-2);
+    // The halves are solved to their tolerance from where the bake before left them, so that a side
+    // may cast two rays of some hundred more or less.
+    EXPECT_LT(difference(everything(again), everything(fresh)), 1e-3);
 }
 
 }  // namespace

@@ -85,13 +85,6 @@ std::vector<float> wantedArea(const Patches& patches, const ShownLight& shown) {
     return area;
 }
 
-// Per side: whether its corners gather instead of showing its light.
-std::vector<bool> gatheredSides(const ShownLight& shown, size_t sides) {
-    std::vector<bool> result(sides);
-    for (size_t side = 0; side < sides; ++side) result[side] = shown.isGathered(side);
-    return result;
-}
-
 // Whether no light is left after the first shot: nothing reflects it, and lines bring none of the
 // world's or of dim emission.
 bool isFirstShotAll(const Patches& patches, const SetLights& lights) {
@@ -486,8 +479,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     std::optional<NoisyParts> noisyParts;
     const bool countsLines = settings.solver == "LINE_REUSE";
     if (countsLines)
-        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), gatheredSides(shown, n),
-                           patches.sheets);
+        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), shown, patches.sheets);
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     std::vector<std::array<Irradiance, 2>> halves(lights.size());  // as they arrive

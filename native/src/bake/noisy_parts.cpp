@@ -44,7 +44,7 @@ constexpr double kOfLooksBefore = 0.5;
 }  // namespace
 
 NoisyParts::NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& before,
-                       const std::vector<float>& weight, const std::vector<bool>& isGathered,
+                       const std::vector<float>& weight, const ShownLight& shown,
                        const Sheets& sheets)
     : tiles(tiles), before(before), partOf(tiles.sideCount(), kNone) {
     const Patches& patches = tiles.patches();
@@ -73,7 +73,7 @@ NoisyParts::NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& befo
         Part& part = parts[cells[cell].part];
         part.instance = parent.instance;
         ++part.sides;
-        if (isGathered[tiles.firstSide(side)]) part.isGathered = true;
+        if (shown.isGathered(tiles.firstSide(side))) part.isGathered = true;
     }
     projections = double(sheets.loose.size() + sheets.sheets.size());
     growth.assign(scene.instances.size(), kGrowthOfGrid);

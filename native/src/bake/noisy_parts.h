@@ -16,6 +16,7 @@
 
 #include "bake/noise.h"
 #include "patches/tiles.h"
+#include "reconstruction/shown_light.h"
 #include "transport/extra_rays.h"
 
 namespace raybundle {
@@ -23,12 +24,10 @@ namespace raybundle {
 class NoisyParts {
   public:
     // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has
-    // a result. isGathered: per side of the patches, whether its corners gather instead of showing
-    // its light: rays do not help there. sheets: of the patches, as they are projected. The tiles must
-    // outlive the object.
+    // a result. shown: where corners gather instead of showing their side's light, rays do not help.
+    // sheets: of the patches, as they are projected. The tiles must outlive the object.
     NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& before,
-               const std::vector<float>& weight, const std::vector<bool>& isGathered,
-               const Sheets& sheets);
+               const std::vector<float>& weight, const ShownLight& shown, const Sheets& sheets);
 
     // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
     // those of all sides, not shown ones included.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "bake/noise.h"
 #include "scene/channels.h"
@@ -124,8 +125,8 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
             std::make_shared<const DirectedLight>(patches, shot, DirectedLight::Of::ALL);
     const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707);
     const DirectLight light(scene, patches, exchange, seed, input.settings, std::move(spots));
-    const StandIns alone(patches, nullptr);
-    const StandIns& standIns = input.standIns ? *input.standIns : alone;
+    std::optional<StandIns> alone;
+    const StandIns& standIns = input.standIns ? *input.standIns : alone.emplace(patches, nullptr);
     const std::vector<uint32_t>& gatherers = standIns.gatherers();
     const std::vector<Gathered> results = light.gather(
         gatherers.size(),

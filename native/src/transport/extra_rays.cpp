@@ -32,22 +32,44 @@ struct Sent {
     std::array<std::unique_ptr<SentLight>, 3> by;  // of all, of each half
 };
 
+// What the first shot has already brought of reflected light to the exposed part of a side, W/m^2.
+glm::vec3 alreadyIndirect(const FirstShot& shot, const std::vector<float>& exposed, uint32_t side) {
+    return shot.indirect.empty() || !(exposed[side] > 0) ? glm::vec3(0.0f)
+                                                         : shot.indirect[side] / exposed[side];
+}
+
 // What rays brought: sums, W/m^2.
 struct Brought {
     glm::vec3 carried{0.0f}, reflected{0.0f};
 };
 
+// So many lines tell the mean of what meets them to about 0.5 %.
+constexpr double kTellingLines = 40000;
+
+// What of the light of some sides is absorbed, W, without that which lines do not bring.
+glm::dvec3 absorbed(const Patches& patches, const std::vector<float>& exposed,
+                    const std::vector<ExtraRays>& sides, const FirstShot& shot,
+                    const Irradiance& light) {
+    glm::dvec3 sum(0.0);
+    for (const ExtraRays& own : sides) {
+        const double area = double(patches.area[own.side / 2] * exposed[own.side]);
+        const glm::vec3 brought = light.all(own.side) - light.gathered[own.side] -
+                                  alreadyIndirect(shot, exposed, own.side);
+        sum += area * glm::dvec3((1.0f - patches.reflectance[own.side]) * brought);
+    }
+    return sum;
+}
+
 // Brings an estimate by so many lines together with what rays brought.
 void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought, float rays,
-           const glm::vec3& alreadyIndirect) {
+           const glm::vec3& already) {
     if (!(rays > 0)) return;
     const float share = 1 / (lines + kLinesOfRay * rays);
     const glm::vec3 carried = light.direct[side] - light.gathered[side];
-    const glm::vec3 reflected = light.indirect[side] - alreadyIndirect;
+    const glm::vec3 reflected = light.indirect[side] - already;
     light.direct[side] =
         light.gathered[side] + share * (lines * carried + kLinesOfRay * brought.carried);
-    light.indirect[side] =
-        alreadyIndirect + share * (lines * reflected + kLinesOfRay * brought.reflected);
+    light.indirect[side] = already + share * (lines * reflected + kLinesOfRay * brought.reflected);
 }
 
 }  // namespace
@@ -86,20 +108,38 @@ void addExtraRays(const Patches& patches, const Visibility& visibility, float to
                 }
         }
     });
-    for (size_t w = 0; w < wanted.size(); ++w) {
-        const ExtraRays& own = wanted[w];
-        for (size_t k = 0; k < lights.size(); ++k) {
-            const FirstShot& shot = lights[k].shot;
-            const glm::vec3 already = shot.indirect.empty() || !(exposed[own.side] > 0)
-                                          ? glm::vec3(0.0f)
-                                          : shot.indirect[own.side] / exposed[own.side];
-            const std::array<Brought, 3>& by = brought[w * lights.size() + k];
-            const std::array<float, 2>& met = lines[own.side];
-            blend(lights[k].irradiance, own.side, met[0] + met[1], by[0],
-                  counted[w][0] + counted[w][1], already);
-            for (size_t h = 0; h < 2; ++h)
-                blend(halves[k][h], own.side, met[h], by[1 + h], counted[w][h], already);
-        }
+    double met = 0;
+    for (const ExtraRays& own : wanted)
+        met += double(lines[own.side][0]) + double(lines[own.side][1]);
+    for (size_t k = 0; k < lights.size(); ++k) {
+        const FirstShot& shot = lights[k].shot;
+        // of: 0 for the light itself, 1 and 2 for the halves.
+        auto bring = [&](Irradiance& light, size_t of) {
+            const glm::dvec3 before = absorbed(patches, exposed, wanted, shot, light);
+            for (size_t w = 0; w < wanted.size(); ++w) {
+                const uint32_t side = wanted[w].side;
+                const std::array<float, 2>&l = lines[side], &rays = counted[w];
+                blend(light, side, of == 0 ? l[0] + l[1] : l[of - 1],
+                      brought[w * lights.size() + k][of],
+                      of == 0 ? rays[0] + rays[1] : rays[of - 1],
+                      alreadyIndirect(shot, exposed, side));
+            }
+            if (met < kTellingLines) return;
+            // No power is lost or made among all these sides: lines keep it, rays only to their noise.
+            const glm::dvec3 after = absorbed(patches, exposed, wanted, shot, light);
+            glm::vec3 factor(1.0f);
+            for (int c = 0; c < 3; ++c)
+                if (after[c] > 0) factor[c] = float(before[c] / after[c]);
+            for (const ExtraRays& own : wanted) {
+                const glm::vec3 already = alreadyIndirect(shot, exposed, own.side);
+                glm::vec3 &direct = light.direct[own.side], &indirect = light.indirect[own.side];
+                const glm::vec3& gathered = light.gathered[own.side];
+                direct = gathered + factor * (direct - gathered);
+                indirect = already + factor * (indirect - already);
+            }
+        };
+        bring(lights[k].irradiance, 0);
+        for (size_t h = 0; h < 2; ++h) bring(halves[k][h], 1 + h);
     }
 }
 

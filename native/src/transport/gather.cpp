@@ -105,8 +105,8 @@ FirstShot gather(const FirstShotInput& input) {
     const DirectLight& light = input.light;
     const Patches& patches = input.patches;
     const size_t n = patches.sideCount();
-    const StandIns alone(patches, nullptr);
-    const StandIns& standIns = input.standIns ? *input.standIns : alone;
+    std::optional<StandIns> alone;
+    const StandIns& standIns = input.standIns ? *input.standIns : alone.emplace(patches, nullptr);
     const std::vector<uint32_t>& gatherers = standIns.gatherers();
     FirstShot shot;
     shot.emission = light.bundledEmission();
