@@ -479,7 +479,10 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     std::optional<NoisyParts> noisyParts;
     const bool countsLines = settings.solver == "LINE_REUSE";
     if (countsLines)
-        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), shown, patches.sheets);
+        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), shown,
+                           trace->density.windows.empty() ? 0.0
+                                                          : double(patches.sheets.loose.size() +
+                                                                   patches.sheets.sheets.size()));
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     std::vector<std::array<Irradiance, 2>> halves(lights.size());  // as they arrive

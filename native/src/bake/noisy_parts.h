@@ -7,8 +7,9 @@
 // Source: none; the thesis judges the whole scene (section 4.3.3).
 // - Half the difference of the halves at a cell is one sample of its noise. Those of a part are
 //   pooled, those of its object count a little too, and what the looks before have told.
-// - A bundle takes time for each line, wherever that goes, and for each face. While the parts that need
-//   more of them get so many of the lines that rays would take longer, another bundle is cheaper.
+// - A bundle takes time for each line, wherever that goes, and for each face in its windows. While
+//   the parts that need more of them get so many of the lines that rays would take longer, another
+//   bundle is cheaper.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +26,10 @@ class NoisyParts {
   public:
     // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has
     // a result. shown: where corners gather instead of showing their side's light, rays do not help.
-    // sheets: of the patches, as they are projected. The tiles must outlive the object.
+    // projections: of sheets and single faces, of each bundle, where there are windows of finer lines;
+    // else 0. The tiles must outlive the object.
     NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& before,
-               const std::vector<float>& weight, const ShownLight& shown, const Sheets& sheets);
+               const std::vector<float>& weight, const ShownLight& shown, double projections);
 
     // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
     // those of all sides, not shown ones included.
@@ -74,7 +76,7 @@ class NoisyParts {
     // Per instance: how much the variance grows from the means of cells to corners, as far as it is
     // random within them.
     std::vector<double> growth;
-    double projections = 0;  // of sheets and single faces, in each bundle
+    const double projections;
     double allLines = 0;
     uint32_t bundles = 0;
 };
