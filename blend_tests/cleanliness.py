@@ -115,4 +115,5 @@ def main() -> None:
                       f"| {above[1]} |", flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()

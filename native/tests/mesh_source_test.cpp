@@ -147,6 +147,45 @@ TEST(MeshSource, HasTheClosedFormOfTheSumOverItsFaces) {
     }
 }
 
+// Of each patch side another colour, some of them black: the sum over all patches but for what the
+// expansion of clusters leaves out.
+TEST(MeshSource, HasNearlyTheClosedFormWhereItsEmissionVaries) {
+    for (const Lamp& lamp : lamps()) {
+        Scene scene;
+        place(scene, lamp.mesh, grey("", 0, 5));
+        const Patches patches = subdivide(scene, 0.05f, kMany);
+        std::mt19937 random(1);
+        std::uniform_real_distribution<float> brightness(-1, 4);
+        std::vector<glm::vec3> emission(patches.sideCount(), glm::vec3(0.0f));
+        for (uint32_t p = 0; p < patches.count(); ++p)
+            for (int c = 0; c < 3; ++c) emission[2 * p][c] = std::max(0.0f, brightness(random));
+        const MeshSource source(patches, allParents(patches), 0, glm::vec3(5.0f), &emission);
+        double errors = 0, light = 0;
+        for (int k = 0; k < 200; ++k) {
+            const glm::vec3 point = 2.0f * anywhere(random), up = glm::normalize(anywhere(random));
+            glm::dvec3 exact(0.0);
+            for (uint32_t p = 0; p < patches.count(); ++p) {
+                const Parent& parent = patches.parents[patches.parentOf[p]];
+                if (glm::dot(point - parent.origin, parent.normal) <= 0) continue;
+                const glm::dvec3 o(patches.point(p, {0, 0})), a(patches.point(p, {1, 0})),
+                    b(patches.point(p, {0, 1}));
+                const glm::dvec3 polygon[4] = {o, a, parent.isTriangle ? b : a + b - o, b};
+                exact += glm::dvec3(emission[2 * p]) / kPi *
+                         polygonIrradiance(point, up, polygon, parent.isTriangle ? 3 : 4);
+            }
+            const auto found = source.irradiance(point, up);
+            ASSERT_TRUE(found) << lamp.name;
+            for (int c = 0; c < 3; ++c) {
+                EXPECT_NEAR(double((*found)[c]), exact[c], 1e-4 + 0.01 * exact[c])
+                    << lamp.name << ", " << k;
+                errors += std::pow(double((*found)[c]) - exact[c], 2);
+                light += exact[c] * exact[c];
+            }
+        }
+        EXPECT_LT(std::sqrt(errors / light), 2e-3) << lamp.name;
+    }
+}
+
 // The mean of many samples is the closed form, wherever the receiver is.
 TEST(MeshSource, SamplesHaveTheExpectationOfTheClosedForm) {
     constexpr uint32_t kSamples = 1 << 14;

@@ -75,7 +75,10 @@ MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& pare
     collectFaces(parents, back);
     tree = LightTree(faces);
     for (const LightFace& face : faces) shapes.push_back(shapeOf(face));
-    if (!sideEmission) outline = MeshOutline(patches, parents, back == 1, wholeExtent);
+    if (!sideEmission)
+        outline = MeshOutline(patches, parents, back == 1, wholeExtent);
+    else if (!directed && faces.size() <= FaceClusters::kMostFaces)
+        clusters = makeClusters();
 }
 
 // Sphere around the source.
@@ -135,6 +138,16 @@ MeshSource::FaceShape MeshSource::shapeOf(const LightFace& face) const {
             index};
 }
 
+FaceClusters MeshSource::makeClusters() const {
+    std::vector<glm::vec3> radiance;
+    std::vector<Plane> planes;
+    for (const FaceShape& shape : shapes) {
+        radiance.push_back(shape.radiance);
+        planes.push_back(shape.plane);
+    }
+    return FaceClusters(faces, radiance, planes);
+}
+
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
                                glm::vec2 uv) const {
     const LightTree::Choice choice = tree.choose(point, receiver, uv.x);
@@ -171,6 +184,7 @@ glm::vec3 MeshSource::shareTowards(uint32_t side, const glm::vec3& direction) co
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
                                                 const glm::vec3& receiver) const {
+    if (!clusters.isEmpty()) return clusters.irradiance(point, receiver);
     if (outline.isEmpty()) return std::nullopt;
     return emission * float(outline.irradiance(point, receiver) / glm::pi<double>());
 }

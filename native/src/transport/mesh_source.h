@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The fronts or the backs of the emissive faces of one object and material as a source of light.
-// What a receiver gets without occluders has a closed form (transport/mesh_outline.h); which of it is
-// seen, samples tell, whose faces are chosen by a tree (transport/light_tree.h).
+// What a receiver gets without occluders has a closed form (transport/mesh_outline.h) or, where the
+// emission varies, nearly one (transport/face_clusters.h); which of it is seen, samples tell, whose
+// faces are chosen by a tree (transport/light_tree.h).
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "transport/enclosing.h"
+#include "transport/face_clusters.h"
 #include "transport/light_source.h"
 #include "transport/light_tree.h"
 #include "transport/mesh_outline.h"
@@ -19,8 +21,8 @@ class MeshSource : public LightSource {
   public:
     // parents: into Patches::parents; back: 0 for their fronts, 1 for their backs; emission: of
     // those, W/m^2. `patches` must outlive it. Where the emission varies, sideEmission holds it per
-    // side of all patches, W/m^2 of the whole patch, must outlive the source too, and there is no
-    // closed form. whole: what the faces are part of; isEnclosed: the light does not get out of that.
+    // side of all patches, W/m^2 of the whole patch, and must outlive the source too. whole: what
+    // the faces are part of; isEnclosed: the light does not get out of that.
     // directed: what sides send towards a direction beyond that, if emission varies; or null.
     MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission = nullptr,
@@ -83,9 +85,11 @@ class MeshSource : public LightSource {
         }
     };
     FaceShape shapeOf(const LightFace& face) const;
+    FaceClusters makeClusters() const;
     std::vector<FaceShape> shapes;
     LightTree tree;
-    MeshOutline outline;
+    MeshOutline outline;    // where the emission is even
+    FaceClusters clusters;  // where it varies
 };
 
 }  // namespace raybundle
