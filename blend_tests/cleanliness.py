@@ -49,8 +49,8 @@ class Baked:
 def bake(scene: str, target: float, seed: int, settings: dict[str, str]) -> Baked:
     open_file(scene, lamp_rooms.FINE)
     started = time.perf_counter()
-    report = raybundle.bake(bpy.context, output='LIGHTING', domain='CORNER', target_error=target,
-                            seed=seed, **settings)
+    report = raybundle.bake(bpy.context, **{'output': 'LIGHTING', 'domain': 'CORNER',
+                                            'target_error': target, 'seed': seed, **settings})
     seconds = time.perf_counter() - started
     items = [bpy.data.objects[entry.name] for entry in report.objects
              if entry.status.startswith('baked')]
@@ -91,7 +91,7 @@ def main() -> None:
     parser.add_argument("--target", type=float, nargs="+", default=[0.02])
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--converged", type=float, default=0.0015)
-    parser.add_argument("--set", nargs="*", default=[], help="NAME=VALUE of both bakes")
+    parser.add_argument("--set", nargs="*", default=[], help="NAME=VALUE of both bakes, as output=DIRECT")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "cleanliness")
     options = parser.parse_args(arguments)
     settings = dict(text.split("=", 1) for text in options.set)

@@ -262,7 +262,8 @@ struct BenchScene {
 std::string reference(const BenchScene& scene, const Settings& run, const Options& options) {
     std::ostringstream key;
     key << scene.text << '\n'
-        << run.patchSize << ' ' << run.maxPatches << ' ' << options.referenceBundles;
+        << run.patchSize << ' ' << run.maxPatches << ' ' << run.contacts << ' '
+        << options.referenceBundles;
     std::ostringstream path;
     path << (options.work / scene.name).string() << '-' << std::hex << fnv1a(key.str()) << ".light";
     if (fs::exists(path.str())) return path.str();

@@ -119,6 +119,7 @@ PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles)
     Bake bake;
     bake.settings.patchSize = like.patchSize;
     bake.settings.maxPatches = like.maxPatches;
+    bake.settings.contacts = like.contacts;
     bake.settings.minBundles = bake.settings.maxBundles = bundles;
     bake.settings.targetError = kReferenceShotError;
     bake.settings.seed = kReferenceSeed;

@@ -102,6 +102,24 @@ TEST_P(BrightSpots, AreNoneWhereALampIsFarFromWalls) {
     EXPECT_EQ(spotsOf(bake), 0u);
 }
 
+// Something dark far below, of 16 times the area of the room, leaves the same spots and the same light.
+TEST_P(BrightSpots, AreTheSameWithSomethingDarkFarAway) {
+    for (const double distance : {0.01, 1.0}) {
+        Bake bakes[2];
+        for (const bool hasFar : {false, true}) {
+            Scene scene = roomWithLampAtWall(distance, GetParam());
+            if (hasFar)
+                place(scene, box("far", {-4, -4, -308}, {4, 4, -300}, false), grey("far", 0.5f),
+                      glm::dmat4(1), RB_ROLE_OCCLUDE);
+            Bake& bake = bakes[hasFar];
+            bake.settings.patchSize = 0.1f;
+            bake.run(scene);
+        }
+        EXPECT_EQ(spotsOf(bakes[0]), spotsOf(bakes[1])) << distance;
+        EXPECT_EQ(spotsOf(bakes[0]) > 0, distance < 0.1);
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, BrightSpots, testing::Bool(), [](const auto& test) {
     return test.param ? "RoughWalls" : "LambertsWalls";
 });

@@ -129,6 +129,22 @@ TEST(LineWindows, CountsAreSymmetricAndAddUp) {
     }
 }
 
+// A wall of 10 m with 10^8 lines a bundle, in windows of half the pixels four times as many: of each
+// half, half of the bundles, 2^32 can be counted.
+TEST(LineWindows, NoMoreBundlesAreTracedThanCanBeCounted) {
+    Scene scene;
+    place(scene, rectangle("wall", {0, 0, 0}, {10, 0, 0}, {0, 10, 0}), grey("", 0.5f));
+    const Patches patches = subdivide(scene, 100, kMany);
+    LineDensity density;
+    density.pixelSize = 1e-3f;
+    EXPECT_NEAR(mostBundles(patches, density), 0x1p32 / 1e8, 1.5);
+    density.windows = {{{0, 0, 0}, {1, 1, 1}, 1}};
+    EXPECT_NEAR(mostBundles(patches, density), 0x1p32 / 4e8, 1.5);
+    density.windows.clear();
+    density.pixelSize = 0.1f;
+    EXPECT_GT(mostBundles(patches, density), 100000u);
+}
+
 TEST(LineWindows, TheNumberOfThreadsDoesNotMatter) {
     const Patches patches = subdivide(hallWithSmallThings(0.5f), 2, kMany);
     auto traceWith = [&](int threads) {

@@ -121,5 +121,20 @@ TEST(Multipath, RefusesDirectionsThatAreNotIndependent) {
     }
 }
 
+TEST(Multipath, ThePseudoCodeOfTheThesisRefusesWeights) {
+    Bake bake;
+    bake.settings.solver = "MULTIPATH";
+    bake.settings.directions = "ADAPTIVE";
+    bake.settings.thesisLiteral = 1;
+    try {
+        bake.run(litRoom());
+        FAIL();
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code, RB_ERROR_INVALID_ARGUMENT);
+        EXPECT_NE(std::string(error.what()).find("choose directions RANDOM"), std::string::npos)
+            << error.what();
+    }
+}
+
 }  // namespace
 }  // namespace raybundle

@@ -497,11 +497,8 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         }
         return result;
     };
-    const uint32_t most =
-        std::max(2u, uint32_t(std::min(settings.maxBundles, trace->density.windows.empty()
-                                                                ? settings.maxBundles
-                                                                : trace->density.mostBundles)) &
-                         ~1u);
+    const uint32_t counted = mostBundles(patches, trace->density);
+    const uint32_t most = std::min(uint32_t(settings.maxBundles), counted) & ~1u;
     uint32_t wanted = std::max(transport.bundleCount(),
                                std::min(most, (uint32_t(settings.minBundles) + 1) & ~1u));
     const double target = settings.targetError;
@@ -554,7 +551,11 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         if (bundles >= most) {
             const int32_t set = lights[size_t(worst - errors.begin())].set;
             report.warnings.push_back(
-                "max_bundles was reached at " + std::to_string(bundles) + " bundles: the noise " +
+                (counted < uint32_t(settings.maxBundles)
+                     ? "the lines of more than " + std::to_string(bundles) +
+                           " bundles cannot be counted, which fewer lines_per_bundle allow: "
+                     : "max_bundles was reached at " + std::to_string(bundles) + " bundles: ") +
+                "the noise " +
                 (set == kNoLightSet ? "" : "of light set \"" + scene.lightSets[set] + "\" ") +
                 "is " + percent(*worst) +
                 (noisyParts ? ", " + percent(excess * target) + " where it is most," : "") +

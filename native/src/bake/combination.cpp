@@ -66,11 +66,18 @@ void checkCombination(const Settings& settings, size_t lightSetCount) {
     const Solver& solver =
         *std::find_if(std::begin(kSolvers), std::end(kSolvers),
                       [&](const Solver& s) { return settings.solver == s.name; });
-    Names directions;
+    Names directions, equallyWeighted;
     for (const DirectionKind& kind : directionKinds())
         if ((kind.isIndependent || !solver.needsIndependence) &&
-            (!kind.isWeighted || !solver.needsEqualWeights))
+            (!kind.isWeighted || !solver.needsEqualWeights)) {
             directions.push_back(kind.name);
+            if (!kind.isWeighted) equallyWeighted.push_back(kind.name);
+        }
+    if (settings.thesisLiteral && contains(directions, settings.directions) &&
+        !contains(equallyWeighted, settings.directions))
+        refuse("thesis_literal does not work with directions " + settings.directions,
+               "the pseudo-code of the thesis knows no weights",
+               "directions " + join(equallyWeighted));
     if (!contains(directions, settings.directions))
         refuse(
             "solver " + settings.solver + " does not work with directions " + settings.directions,

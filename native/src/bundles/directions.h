@@ -41,8 +41,8 @@ class DirectionSequence {
     // Direction `index` on the hemisphere; `random` is for this direction alone.
     virtual Direction at(uint32_t index, std::mt19937_64& random) = 0;
 
-    // Tells how much power the bundle along a direction transported, W. Not called by transports
-    // that transport nothing while they trace.
+    // Tells how much power the bundle along a direction transported, W, without the weight it had.
+    // Not called by transports that transport nothing while they trace.
     virtual void learn(const glm::dvec3& /*direction*/, double /*power*/) {}
 };
 

@@ -459,11 +459,20 @@ LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pi
     }
     if (all.windows.empty()) all.windowOf.clear();
     fillClusters(all.windowOf);
-    int finest = 0;
-    for (const LineWindow& window : all.windows) finest = std::max(finest, window.level);
-    const double units = std::ldexp(largest / (pixel * pixel), 2 * finest);
-    all.mostBundles = int(std::min(double(kMostWindowBundles), 0x1p32 / units));
     return all;
+}
+
+uint32_t mostBundles(const Patches& patches, const LineDensity& density) {
+    int finest = 0;
+    for (const LineWindow& window : density.windows) finest = std::max(finest, window.level);
+    double largest = 0;  // m^2
+    for (uint32_t p = 0; p < patches.count(); ++p)
+        largest = std::max(largest, double(patches.area[p]));
+    // Of a half: half of the bundles. A line counts as many as there are finest ones in its pixel.
+    const double pixel = double(density.pixelSize);
+    const double units = std::ldexp(largest / (pixel * pixel), 2 * finest);
+    const double most = density.windows.empty() ? 0x1p30 : double(kMostWindowBundles);
+    return std::max(2u, uint32_t(std::min(most, 0x1p32 / units)));
 }
 
 }  // namespace raybundle

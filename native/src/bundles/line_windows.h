@@ -29,7 +29,7 @@ struct LineWindow {
     int level;            // its pixels are 2^level times smaller, 1 or more
 };
 
-// The most bundles with which the counts of finest lines fit into 31 bits.
+// Where there are windows; their levels are chosen so that at least about so many can be counted.
 constexpr int kMostWindowBundles = 1 << 16;
 
 struct LineDensity {
@@ -37,7 +37,6 @@ struct LineDensity {
     std::vector<LineWindow> windows;
     // Per parent: the innermost window that was made for it, or -1; empty without windows.
     std::vector<int32_t> windowOf;
-    int mostBundles = kMostWindowBundles;  // fewer where patches far away are vast
 };
 
 // Windows for patches that pixels of one size would starve, in each island (patches/patch_size.h)
@@ -48,5 +47,9 @@ struct LineDensity {
 // of its windows, metres.
 LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pixelSizes,
                             float pixelsPerPatch, const std::vector<float>& leastPixelSizes);
+
+// The most bundles with which the counts of the lines of each half fit into 32 bits on every patch:
+// many, unless lines are very dense or a patch is vast beside the finest of them.
+uint32_t mostBundles(const Patches& patches, const LineDensity& density);
 
 }  // namespace raybundle

@@ -20,6 +20,10 @@ constexpr double kMostArea = 0.05;
 // the patches): they are worth it where they spare more.
 constexpr double kWorthwhileBundles = 50;
 
+// An island with less light than this share of the brightest one's, by the mean, takes no part: what
+// is left over far below a room does not make its walls bright spots.
+constexpr double kDarkIsland = 0.01;
+
 // Points of a side at which is looked whether another surface lies on it.
 constexpr uint32_t kLooks = 16;
 
@@ -46,6 +50,13 @@ glm::vec3 reflected(const Patches& patches, const FirstShot& shot, size_t side) 
     return shotReflectance(patches, shot, side) * shot.irradiance[side];
 }
 
+// What the sides of an island (Patches::islands) send after the first shot.
+struct IslandLight {
+    double power = 0, reflectance = 0, area = 0;  // W, m^2, m^2
+
+    double mean() const { return area > 0 ? power / area : 0; }  // W/m^2
+};
+
 // Per side: its reflected light if it is a bright spot, else 0.
 EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchange,
                           const LineDensity& density, const FirstShot& shot) {
@@ -53,35 +64,47 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
     const size_t n = patches.sideCount();
     EmissionSplit spots;
     std::vector<double> exitance(n, 0.0);  // of the brightest channel, W/m^2
-    double power = 0, reflectance = 0;
+    std::vector<IslandLight> islands(patches.islands.size());
     for (size_t side = 0; side < n; ++side) {
         const Parent& parent = patches.parentAt(uint32_t(side));
+        IslandLight& island = islands[parent.island];
+        if (side % 2 == 0) island.area += double(patches.area[side / 2]);
         // What is inside of a solid, such as the body of a lamp, stays there.
         const bool isInside = parent.isSolid && !parent.isInward && side % 2 == 1;
         if (!parent.exchanges || isInside) continue;
         const double area = double(patches.area[side / 2]);
         exitance[side] = double(brightest(reflected(patches, shot, side)));
-        power += area * (exitance[side] + double(brightest(shot.emission[side])));
-        if (side % 2 == 0) reflectance += area * double(brightest(patches.reflectance[side]));
+        island.power += area * (exitance[side] + double(brightest(shot.emission[side])));
+        if (side % 2 == 0)
+            island.reflectance += area * double(brightest(patches.reflectance[side]));
     }
-    if (!(patches.totalArea > 0)) return spots;
+    double most = 0;
+    for (const IslandLight& island : islands) most = std::max(most, island.mean());
+    IslandLight all;
+    for (IslandLight& island : islands) {
+        if (island.mean() < kDarkIsland * most) island = {};
+        all.power += island.power;
+        all.reflectance += island.reflectance;
+        all.area += island.area;
+    }
+    if (!(all.area > 0)) return spots;
     // All bounces included, as far as they stay in the scene.
-    const double mean =
-        power / patches.totalArea / std::max(0.05, 1 - reflectance / patches.totalArea);
+    const double mean = all.mean() / std::max(0.05, 1 - all.reflectance / all.area);
     if (!(mean > 0)) return spots;
     // What sides of any exitance do to the noise of others is in proportion to the square of their
     // contrast, to their area, and to the area that a line stands for.
     double inSpots = 0, inRest = 0, areaOfSpots = 0;
     for (size_t side = 0; side < n; ++side) {
+        if (islands[patches.parentAt(uint32_t(side)).island].area == 0) continue;
         const double area = double(patches.area[side / 2]);
         const bool isBright = exitance[side] > kBright * mean;
         (isBright ? inSpots : inRest) += area * std::pow(exitance[side] / mean - 1, 2) *
                                          lineShare(density, patches.parentOf[side / 2]);
         if (isBright) areaOfSpots += area;
     }
-    if (areaOfSpots > kMostArea * patches.totalArea) return spots;
+    if (areaOfSpots > kMostArea * all.area) return spots;
     auto bundlesFor = [&](double squares) {
-        return std::pow(std::sqrt(squares / patches.totalArea) / double(input.settings.targetError),
+        return std::pow(std::sqrt(squares / all.area) / double(input.settings.targetError),
                         1 / kNoiseSlope);
     };
     if (!(bundlesFor(inSpots + inRest) - bundlesFor(inRest) > kWorthwhileBundles)) return spots;

@@ -120,7 +120,7 @@ class Multipath : public Transport {
             };
             parallelInvoke([&] { advanceHalf(0); }, [&] { advanceHalf(1); });
             for (size_t k = 0; k < traced.size(); ++k)
-                input.tracer.learn(traced[k].bundle, power[k]);
+                input.tracer.learn(traced[k].bundle, power[k] / traced[k].bundle.weight);
             done += step;
         }
         progress.report(RB_STAGE_BUNDLES, 1);
@@ -181,7 +181,7 @@ class Multipath : public Transport {
     }
 
   private:
-    // Moves the power of one bundle; returns what arrived, W times the bundles.
+    // Moves the power of one bundle; returns what arrived, W times the bundles and its weight.
     double exchange(Estimate& e, const TracedBundle& traced) const {
         const float weight = float(traced.bundle.weight);
         auto meet = [&](uint32_t side, uint32_t lines) {
