@@ -5,8 +5,9 @@
 
 bake_packages=(blender python3-numpy g++ cmake ninja-build libembree-dev libglm-dev libopenmesh-dev libtbb-dev
     libeigen3-dev nlohmann-json3-dev)
-# The window of the UI test is drawn by Mesa in software.
-test_packages=(libgtest-dev librapidcheck-dev python3-pytest xvfb xauth xdotool libgl1-mesa-dri libegl-mesa0)
+# The window of the UI test is drawn by Mesa in software, figures by Matplotlib.
+test_packages=(libgtest-dev librapidcheck-dev python3-pytest python3-matplotlib xvfb xauth xdotool libgl1-mesa-dri
+    libegl-mesa0)
 # Clang's sanitizers, and what names the lines in their reports.
 sanitizer_packages=(clang libclang-rt-14-dev llvm)
 

@@ -23,9 +23,10 @@ namespace {
 constexpr float kUnlit = 0.01f;
 constexpr char kMagic[8] = {'r', 'b', 'l', 'i', 'g', 'h', 't', '1'};
 
-// Of the reference: samples per side and source (more where it is
-// partly visible), points of closed forms, and a seed that no run has.
-constexpr uint32_t kFirstSamples = 1024, kSamples = 8192, kClosedSamples = 256;
+// Of the reference: samples per side and source where it is partly visible, of which an eighth tells
+// whether it is (as many as there are bundles, at most this); points of closed forms; and a seed that no
+// run has.
+constexpr uint32_t kMostSamples = 8192, kClosedSamples = 256;
 // A surface no further away than this share of a patch lies against it.
 constexpr float kTouchOfPatch = 1e-3f;
 constexpr int kReferenceSeed = 1 << 30;
@@ -41,13 +42,14 @@ bool isBaked(const Scene& scene, const Patches& patches, size_t side) {
     return instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side);
 }
 
-// Mean irradiance of a side from a source. A share below one in kFirstSamples may be overlooked.
+// Mean irradiance of a side from a source. A share below eight in `samples` may be overlooked.
 glm::dvec3 sampledIrradiance(const LightSource& source, const Patches& patches,
-                             const Visibility& visibility, uint32_t side, uint32_t seed) {
+                             const Visibility& visibility, uint32_t side, uint32_t seed,
+                             uint32_t samples) {
     const glm::vec3 normal = patches.normal(side);
     glm::dvec3 mean(0.0);
     uint32_t open = 0, blocked = 0, k = 0;
-    for (; k < kSamples && (k < kFirstSamples || (open > 0 && blocked > 0)); ++k) {
+    for (; k < samples && (k < samples / 8 || (open > 0 && blocked > 0)); ++k) {
         const glm::vec4 u = sobolPoint(k, seed);
         const glm::vec3 point = patches.point(side / 2, {u.x, u.y});
         const LightSample sample = source.sample(point, normal, {u.z, u.w});
@@ -131,6 +133,7 @@ PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles)
     const Visibility visibility(patches);
     const DirectLight directLight(scene, patches, visibility, uint32_t(kReferenceSeed));
     const auto& sources = directLight.lightSources();
+    const uint32_t samples = std::min(kMostSamples, uint32_t(bundles));
     std::vector<uint32_t> sides;
     for (size_t side = 0; side < patches.sideCount(); ++side)
         if (isBaked(scene, patches, side)) sides.push_back(uint32_t(side));
@@ -138,8 +141,9 @@ PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles)
         const uint32_t side = sides[i];
         glm::dvec3 gathered(0.0);
         for (size_t k = 0; k < sources.size(); ++k)
-            gathered += sampledIrradiance(*sources[k], patches, visibility, side,
-                                          hash(uint32_t(kReferenceSeed), hash(side, uint32_t(k))));
+            gathered +=
+                sampledIrradiance(*sources[k], patches, visibility, side,
+                                  hash(uint32_t(kReferenceSeed), hash(side, uint32_t(k))), samples);
         // All light comes in through the exposed part.
         light.exposed[i] = exposedShare(patches, visibility, side);
         const double concentrated = light.exposed[i] > 0 ? 1 / double(light.exposed[i]) : 0;

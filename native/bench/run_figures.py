@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import time
@@ -19,6 +20,7 @@ COMPARE = ROOT / "build/release/native/bench/compare"
 EXPORT = ROOT / "blend_tests/export_scene.py"
 # At least 10 times the bundles of any run that is nearly as good.
 REFERENCE_BUNDLES = 8192
+SMOKE_REFERENCE_BUNDLES = 64
 SECONDS_PER_BAKE = 60
 
 
@@ -28,7 +30,7 @@ def export(name: str, folder: Path) -> Path:
     source, target = ROOT / f"scenes/{blend}.blend", folder / f"{name}.json"
     if target.exists() and target.stat().st_mtime > source.stat().st_mtime:
         return target
-    command = ["blender", "-b", "--factory-startup", "--python-exit-code", "1", str(source), "-P",
+    command = [os.environ.get("BLENDER", "blender"), "-b", "--factory-startup", "--python-exit-code", "1", str(source), "-P",
                str(EXPORT), "--", str(target)]
     command += ["--show", *show] if show else []
     command += ["--hide", *hide] if hide else []
@@ -38,17 +40,23 @@ def export(name: str, folder: Path) -> Path:
     return target
 
 
-def compare(figure: Figure, folder: Path) -> bool:
+def first_of_each_curve(runs: list[str]) -> list[str]:
+    return list({line.split()[0]: line for line in reversed(runs)}.values())
+
+
+def compare(figure: Figure, folder: Path, is_smoke: bool) -> bool:
     """Writes FOLDER/NAME.jsonl; returns whether every run went well."""
     runs, results = folder / f"{figure.name}.runs", folder / f"{figure.name}.jsonl"
-    runs.write_text("\n".join(figure.runs) + "\n")
+    lines = first_of_each_curve(figure.runs) if is_smoke else figure.runs
+    runs.write_text("\n".join(lines) + "\n")
     results.unlink(missing_ok=True)
     scenes = [str(export(name, folder)) for name in figure.scenes]
     code = subprocess.run([
-        str(COMPARE), *scenes, "--runs", str(runs), "--seeds", str(figure.seeds), "--tag",
-        figure.name, "--work", str(folder / "references"), "--out", str(results),
-        "--reference-bundles", str(REFERENCE_BUNDLES), "--limit", str(SECONDS_PER_BAKE)]
-    ).returncode
+        str(COMPARE), *scenes, "--runs", str(runs), "--seeds",
+        str(1 if is_smoke else figure.seeds), "--tag", figure.name, "--work",
+        str(folder / "references"), "--out", str(results), "--reference-bundles",
+        str(SMOKE_REFERENCE_BUNDLES if is_smoke else REFERENCE_BUNDLES), "--limit",
+        str(SECONDS_PER_BAKE)]).returncode
     if code > 1:
         sys.exit(f"figures: {figure.name} failed")
     return code == 0
@@ -63,6 +71,8 @@ def main() -> None:
                         help=" ".join(names))
     parser.add_argument("--images", type=Path, default=ROOT / "docs/images",
                         help="folder of the pictures")
+    parser.add_argument("--smoke", action="store_true",
+                        help="one run of each curve, to see that all of them go: no figures to use")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     all_well = True
@@ -71,7 +81,7 @@ def main() -> None:
         if figure.name not in arguments.only:
             continue
         before = time.monotonic()
-        all_well &= compare(figure, arguments.out)
+        all_well &= compare(figure, arguments.out, arguments.smoke)
         now = time.monotonic()
         print(f"{figure.name}: {now - before:.0f} s ({now - started:.0f} s so far)", flush=True)
     draw(arguments.out, arguments.images, arguments.only)
