@@ -30,8 +30,8 @@ def export(name: str, folder: Path) -> Path:
     source, target = ROOT / f"scenes/{blend}.blend", folder / f"{name}.json"
     if target.exists() and target.stat().st_mtime > source.stat().st_mtime:
         return target
-    command = [os.environ.get("BLENDER", "blender"), "-b", "--factory-startup", "--python-exit-code", "1", str(source), "-P",
-               str(EXPORT), "--", str(target)]
+    command = [os.environ.get("BLENDER", "blender"), "-b", "--factory-startup",
+               "--python-exit-code", "1", str(source), "-P", str(EXPORT), "--", str(target)]
     command += ["--show", *show] if show else []
     command += ["--hide", *hide] if hide else []
     done = subprocess.run(command, capture_output=True, text=True)
