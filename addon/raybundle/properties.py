@@ -77,9 +77,11 @@ enum_solver = (
     ('LINE_REUSE', "Line Reuse",
      "Keep all lines as a sparse matrix and solve on it to convergence"),
     ('MULTIPATH', "Multipath",
-     "Each bundle passes on a part of the light that is still to be distributed"),
+     "Each bundle passes on a part of the light that is still to be distributed. Two chains, each "
+     "of half of the bundles, tell the noise"),
     ('STOCHASTIC_ITERATION', "Stochastic Iteration",
-     "Each bundle reflects all the light that the one before brought; the result is the mean"),
+     "Each bundle reflects all the light that the one before brought; the result is the mean. Two "
+     "chains, each of half of the bundles, tell the noise"),
     ('RANDOM_WALK', "Random Walk",
      "Light walks along local rays from surface to surface; there are no bundles"),
 )

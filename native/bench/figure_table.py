@@ -185,6 +185,14 @@ def projectors(counts: tuple[int, ...]) -> list[str]:
     return runs
 
 
+def projectors_after_a_shot() -> list[str]:
+    runs = []
+    for label, kind in (("painter", 'PAINTER'), ("plane", 'PLANE')):
+        runs += over_bundles(label, f"{SHARED} {MULTIPATH} projector={kind} first_shot=SHOOT "
+                             "local_rays=100000", (100, 200, 400, 800, 1600))
+    return runs
+
+
 def coherence() -> list[str]:
     runs = []
     for label, coherent in (("without_coherence", 0), ("with_coherence", 1)):
@@ -266,6 +274,9 @@ FIGURES: tuple[Figure, ...] = (
            "the same error per bundle, a little more at contacts; 7 times faster on hardware",
            ('big_room',), projectors((50, 100, 200, 400, 800, 1600)), ERROR_AND_TIME,
            error=INDIRECT, seeds=2),
+    Figure('fig_6_6_shot', "Fig. 6.6 with the noise of a first shot of 100,000 rays",
+           "the same error per bundle",
+           ('big_room',), projectors_after_a_shot(), (Panel('bundles', 'noise'),), seeds=3),
     Figure('fig_6_8', "Fig. 6.8: one representative plane against the painter",
            "6 times faster on hardware",
            ('office_down',), projectors((100, 300, 1000)), ERROR_AND_TIME, error=INDIRECT,
