@@ -46,8 +46,10 @@ constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e
 constexpr double kFarAway = 2.5;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 // So many times the target may be left where sides cast rays: else what these met is too noisy, and
-// more bundles are worth their time as long as they take it down to this share of what it was.
-constexpr double kLeftWithRays = 2, kWorthMore = 0.75;
+// more bundles are worth their time as long as they take it down to this share of what it was. If so
+// many times the target are left at first, as between the books of a shelf, that would take dozens of
+// times the bundles, and all rays again with each doubling.
+constexpr double kLeftWithRays = 2, kWorthMore = 0.75, kOutOfReach = 8;
 
 class Stopwatch {
   public:
@@ -541,7 +543,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                 withRays.look(seen(), bundles, transport.bias());
                 const double before = left;
                 left = noisyParts->excessWithRays(withRays, target);
-                if (left > kLeftWithRays && left < kWorthMore * before) {
+                if (left > kLeftWithRays && left < std::min(kWorthMore * before, kOutOfReach)) {
                     excess = left / kLeftWithRays;
                     isReached = false;
                 }
