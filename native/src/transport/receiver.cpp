@@ -14,7 +14,7 @@ constexpr float kMostLaxity = 3;
 constexpr double kLaxShare = 0.25;
 // A shadow's edge lies between two neighbours where so much more of the light is visible to one, or
 // where one has more of its contrast by so many times the error that it may have.
-constexpr float kStep = 0.33f, kEdgeTimes = 6;
+constexpr float kStep = 0.15f, kEdgeTimes = 2;
 
 // How many times these tolerances the errors may be, so that all of them together are no more than
 // `most` at each receiver that has light: where few receivers have any, each may have more. Of
