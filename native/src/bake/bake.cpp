@@ -49,7 +49,7 @@ constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the tar
 // more bundles are worth their time as long as they take it down to this share of what it was. If so
 // many times the target are left at first, as between the books of a shelf, that would take dozens of
 // times the bundles, and all rays again with each doubling.
-constexpr double kLeftWithRays = 2, kWorthMore = 0.75, kOutOfReach = 8;
+constexpr double kLeftWithRays = 2, kWorthMore = 0.75, kOutOfReach = 12;
 
 class Stopwatch {
   public:
