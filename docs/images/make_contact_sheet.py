@@ -28,7 +28,6 @@ import raybundle  # noqa: E402
 ATTRIBUTE = "Radiosity"
 SCENES_A_ROW = 2
 GAP = 4  # pixels
-QUALITY = 90
 
 
 def open_scene(path: Path, width: int) -> bpy.types.Scene:
@@ -86,7 +85,6 @@ def write(tiles: list[np.ndarray], path: Path) -> None:
     image = bpy.data.images.new("sheet", sheet.shape[1], sheet.shape[0])
     image.pixels.foreach_set(sheet.ravel())
     image.filepath_raw, image.file_format = str(path), 'JPEG'
-    bpy.context.scene.render.image_settings.quality = QUALITY
     image.save()
 
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "transport/mesh_outline.h"
+#include "bake/cancellation.h"
 
 namespace raybundle {
 namespace {
@@ -41,102 +41,67 @@ float FaceClusters::DistantLight::irradiance(const glm::vec3& point,
     return std::max(0.0f, (even + ofBend + ofSpread) * perSquare * perSquare);
 }
 
-FaceClusters::FaceClusters(const std::vector<LightFace>& faces,
-                           const std::vector<glm::vec3>& radiance,
-                           const std::vector<Plane>& planes) {
-    if (faces.empty()) return;
-    for (size_t k = 0; k < faces.size(); ++k) {
-        const LightFace& face = faces[k];
-        const glm::dvec3 o(face.origin), a(face.a), b(face.b);
-        Face shape{{o, o + a, o + b, o}, 3, radiance[k], planes[k]};
-        if (!face.isTriangle) shape = {{o, o + a, o + a + b, o + b}, 4, radiance[k], planes[k]};
-        shapes.push_back(shape);
-    }
-    nodes.reserve(2 * faces.size());
-    build(faces, radiance, 0, uint32_t(faces.size()));
-}
-
-// Halves as LightTree has them, so that those of a cluster lie together.
-void FaceClusters::build(const std::vector<LightFace>& faces,
-                         const std::vector<glm::vec3>& radiance, uint32_t first, uint32_t count) {
-    const uint32_t index = uint32_t(nodes.size());
-    Node node{};
-    glm::dvec3 low(INFINITY), high(-INFINITY), normals(0.0);
-    // By channel, relative to `about`.
+FaceClusters::FaceClusters(const LightTree& tree, const std::vector<LightFace>& faces,
+                           const std::vector<glm::vec3>& radiance) {
+    // Relative to the first face of a cluster.
     struct Sum {
         double power = 0;
         glm::dvec3 vector{0.0}, place{0.0};
         glm::dmat3 squares{0.0}, products{0.0};
     };
-    std::array<Sum, 3> sums;
-    const glm::dvec3 about(faces[first].origin);
-    for (uint32_t k = first; k < first + count; ++k) {
-        for (int c = 0; c < shapes[k].count; ++c) {
-            low = glm::min(low, shapes[k].corners[size_t(c)]);
-            high = glm::max(high, shapes[k].corners[size_t(c)]);
+    for (const LightTree::Node& node : tree.clusters()) {
+        std::array<Sum, 3> sums;
+        const glm::dvec3 about(faces[node.first].origin);
+        for (uint32_t k = node.first; k < node.first + node.count; ++k) {
+            throwIfCancelledAt(k);
+            const LightFace& face = faces[k];
+            const glm::dvec3 normal(face.normal), place = glm::dvec3(face.middle()) - about;
+            const glm::dmat3 products = glm::outerProduct(normal, place);
+            const glm::dmat3 squares = square(place) + spreadOf(face);
+            for (int c = 0; c < 3; ++c) {
+                Sum& sum = sums[size_t(c)];
+                const double own = double(radiance[k][c] * face.area());
+                sum.power += own;
+                sum.vector += own * normal;
+                sum.place += own * place;
+                sum.squares += own * squares;
+                sum.products += own * products;
+            }
         }
-        normals += glm::dvec3(faces[k].normal);
-        const glm::dvec3 normal(faces[k].normal), place = glm::dvec3(faces[k].middle()) - about;
-        for (int c = 0; c < 3; ++c) {
-            Sum& sum = sums[size_t(c)];
-            const double own = double(radiance[k][c] * faces[k].area());
-            sum.power += own;
-            sum.vector += own * normal;
-            sum.place += own * place;
-            sum.squares += own * (square(place) + spreadOf(faces[k]));
-            sum.products += own * glm::outerProduct(normal, place);
+        std::array<DistantLight, 3>& own = light.emplace_back();
+        for (size_t c = 0; c < 3; ++c) {
+            const Sum& sum = sums[c];
+            if (!(sum.power > 0)) continue;
+            const glm::dvec3 middle = sum.place / sum.power;
+            own[c] = {glm::vec3(sum.vector), glm::vec3(about + middle),
+                      glm::mat3(sum.squares / sum.power - square(middle)),
+                      glm::mat3(sum.products - glm::outerProduct(sum.vector, middle))};
         }
     }
-    node.centre = glm::vec3(0.5 * (low + high));
-    node.radius = float(0.5 * glm::length(high - low));
-    const bool hasAxis = glm::length(normals) > 1e-3 * double(count);
-    node.axis = hasAxis ? glm::vec3(glm::normalize(normals)) : glm::vec3(0, 0, 1);
-    node.cosine = 1;
-    for (uint32_t k = first; k < first + count; ++k)
-        node.cosine = std::min(node.cosine, glm::dot(node.axis, faces[k].normal));
-    node.sine = node.cosine > 0 ? std::sqrt(std::max(0.0f, 1 - node.cosine * node.cosine)) : 1;
-    node.face = count == 1 ? first : kNoFace;
-    for (size_t c = 0; c < 3; ++c) {
-        const Sum& sum = sums[c];
-        if (!(sum.power > 0)) continue;
-        const glm::dvec3 middle = sum.place / sum.power;
-        node.light[c] = {glm::vec3(sum.vector), glm::vec3(about + middle),
-                         glm::mat3(sum.squares / sum.power - square(middle)),
-                         glm::mat3(sum.products - glm::outerProduct(sum.vector, middle))};
-    }
-    nodes.push_back(node);
-    if (count > 1) {
-        build(faces, radiance, first, count / 2);
-        build(faces, radiance, first + count / 2, count - count / 2);
-    }
-    nodes[index].next = uint32_t(nodes.size());
 }
 
-glm::vec3 FaceClusters::irradiance(const glm::vec3& point, const glm::vec3& normal) const {
+glm::vec3 FaceClusters::irradiance(const LightTree& tree, const glm::vec3& point,
+                                   const glm::vec3& normal,
+                                   const std::function<glm::vec3(uint32_t)>& ofFace) const {
+    const std::vector<LightTree::Node>& nodes = tree.clusters();
     glm::vec3 sum(0.0f);
-    for (uint32_t k = 0; k < nodes.size();) {
-        const Node& node = nodes[k];
+    for (size_t k = 0; k < nodes.size();) {
+        const LightTree::Node& node = nodes[k];
+        const size_t next = k + 2 * node.count - 1;  // after all within it
         const glm::vec3 d = node.centre - point;
-        const float height = glm::dot(d, normal), distance2 = glm::dot(d, d);
-        const float distance = std::sqrt(distance2);
-        // What its normals lack to a right angle to the receiver, less what cone and sphere take.
-        const float slant = -glm::dot(node.axis, d), spread = node.sine * distance + node.radius;
+        const float distance = glm::length(d), height = glm::dot(d, normal);
+        // Normals in a cone of more than half a turn face any way.
+        const float opening = node.cosine > 0 ? node.sine : 1;
+        const float slant = -glm::dot(node.axis, d), spread = opening * distance + node.radius;
         if (height <= -node.radius || slant <= -spread) {
-            k = node.next;
-            continue;
+            k = next;
+        } else if (distance > kFar * node.radius && height > node.radius && slant > spread) {
+            for (size_t c = 0; c < 3; ++c) sum[int(c)] += light[k][c].irradiance(point, normal);
+            k = next;
+        } else {
+            if (node.count == 1) sum += ofFace(node.first);
+            ++k;
         }
-        if (distance > kFar * node.radius && height > node.radius && slant > spread) {
-            for (size_t c = 0; c < 3; ++c) sum[int(c)] += node.light[c].irradiance(point, normal);
-            k = node.next;
-            continue;
-        }
-        if (node.face != kNoFace) {
-            const Face& face = shapes[node.face];
-            if (face.plane.side(point) == PlaneSide::FRONT)
-                sum += face.radiance *
-                       float(polygonIrradiance(point, normal, face.corners.data(), face.count));
-        }
-        ++k;
     }
     return sum;
 }

@@ -14,10 +14,10 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "patches/plane.h"
 #include "transport/light_tree.h"
 
 namespace raybundle {
@@ -25,17 +25,17 @@ namespace raybundle {
 class FaceClusters {
   public:
     FaceClusters() = default;
-    // faces: in the order of a LightTree. Per face: its radiance, W/(m^2 sr), and its plane with
-    // the normal where the light goes.
-    FaceClusters(const std::vector<LightFace>& faces, const std::vector<glm::vec3>& radiance,
-                 const std::vector<Plane>& planes);
+    // faces: in the order of the tree. Per face: its radiance, W/(m^2 sr).
+    FaceClusters(const LightTree& tree, const std::vector<LightFace>& faces,
+                 const std::vector<glm::vec3>& radiance);
 
-    // Of more it is not worth its memory, about 1 kB a face.
+    // Of more it is not worth its memory, about 600 bytes a face.
     static constexpr size_t kMostFaces = 1 << 15;
 
-    bool isEmpty() const { return nodes.empty(); }
-    // At a point with a unit normal, W/m^2.
-    glm::vec3 irradiance(const glm::vec3& point, const glm::vec3& normal) const;
+    bool isEmpty() const { return light.empty(); }
+    // At a point with a unit normal, W/m^2. ofFace: that of one face, which is close by.
+    glm::vec3 irradiance(const LightTree& tree, const glm::vec3& point, const glm::vec3& normal,
+                         const std::function<glm::vec3(uint32_t face)>& ofFace) const;
 
   private:
     // Moments of the light of a cluster in one channel.
@@ -50,28 +50,7 @@ class FaceClusters {
         // At a point with a unit normal, W/m^2.
         float irradiance(const glm::vec3& point, const glm::vec3& normal) const;
     };
-    // Those of a cluster follow each other; of its two halves the first follows it.
-    struct Node {
-        glm::vec3 centre;                   // of a sphere around it, metres
-        float radius;                       // metres
-        glm::vec3 axis;                     // of the cone of normals
-        float cosine, sine;                 // of half its opening
-        uint32_t next;                      // node after all in this one
-        uint32_t face;                      // of a cluster of one face; else kNoFace
-        std::array<DistantLight, 3> light;  // by channel
-    };
-    static constexpr uint32_t kNoFace = ~0u;
-    struct Face {
-        std::array<glm::dvec3, 4> corners;  // a triangle's last one is not used
-        int count;
-        glm::vec3 radiance;
-        Plane plane;
-    };
-    void build(const std::vector<LightFace>& faces, const std::vector<glm::vec3>& radiance,
-               uint32_t first, uint32_t count);
-
-    std::vector<Node> nodes;
-    std::vector<Face> shapes;
+    std::vector<std::array<DistantLight, 3>> light;  // per cluster of the tree, by channel
 };
 
 }  // namespace raybundle

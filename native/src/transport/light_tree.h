@@ -37,6 +37,19 @@ class LightTree {
     // Brings the faces into its own order.
     explicit LightTree(std::vector<LightFace>& faces);
 
+    // A cluster of faces. Those within it follow it: first its first half, then its second.
+    struct Node {
+        glm::vec3 centre;       // of a sphere around it, metres
+        float radius;           // metres
+        glm::vec3 axis;         // of the cone of normals
+        float cosine, sine;     // of half its opening
+        float power;            // sum of the channels, W
+        uint32_t first, count;  // of the faces; a leaf has one
+        uint32_t second;        // the second child; the first one follows
+    };
+    // The whole first; empty without faces. A cluster of n faces has 2 n - 1, itself included.
+    const std::vector<Node>& clusters() const { return nodes; }
+
     struct Choice {
         uint32_t face;  // into the faces
         float weight;   // one over its probability; 0: none gives anything
@@ -53,15 +66,6 @@ class LightTree {
   private:
     Choice chooseOfMany(const glm::vec3& point, const glm::vec3& normal, float u) const;
 
-    struct Node {
-        glm::vec3 centre;       // of a sphere around it, metres
-        float radius;           // metres
-        glm::vec3 axis;         // of the cone of normals
-        float cosine, sine;     // of half its opening
-        float power;            // sum of the channels, W
-        uint32_t first, count;  // of the faces; a leaf has one
-        uint32_t second;        // the second child; the first one follows
-    };
     uint32_t build(std::vector<LightFace>& faces, uint32_t first, uint32_t count);
     static float importance(const Node& node, const glm::vec3& point, const glm::vec3& normal);
 

@@ -2,6 +2,7 @@
 #include "transport/mesh_source.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
@@ -78,7 +79,7 @@ MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& pare
     if (!sideEmission)
         outline = MeshOutline(patches, parents, back == 1, wholeExtent);
     else if (!directed && faces.size() <= FaceClusters::kMostFaces)
-        clusters = makeClusters();
+        clusters = FaceClusters(tree, faces, radiances());
 }
 
 // Sphere around the source.
@@ -138,14 +139,21 @@ MeshSource::FaceShape MeshSource::shapeOf(const LightFace& face) const {
             index};
 }
 
-FaceClusters MeshSource::makeClusters() const {
-    std::vector<glm::vec3> radiance;
-    std::vector<Plane> planes;
-    for (const FaceShape& shape : shapes) {
-        radiance.push_back(shape.radiance);
-        planes.push_back(shape.plane);
-    }
-    return FaceClusters(faces, radiance, planes);
+std::vector<glm::vec3> MeshSource::radiances() const {
+    std::vector<glm::vec3> result;
+    for (const FaceShape& shape : shapes) result.push_back(shape.radiance);
+    return result;
+}
+
+glm::vec3 MeshSource::irradianceOf(uint32_t index, const glm::vec3& point,
+                                   const glm::vec3& receiver) const {
+    const LightFace& face = faces[index];
+    const FaceShape& shape = shapes[index];
+    if (shape.plane.side(point) != PlaneSide::FRONT) return glm::vec3(0.0f);
+    const glm::dvec3 o(face.origin), a(face.a), b(face.b);
+    const std::array<glm::dvec3, 4> corners{o, o + a, face.isTriangle ? o + b : o + a + b, o + b};
+    return shape.radiance *
+           float(polygonIrradiance(point, receiver, corners.data(), face.isTriangle ? 3 : 4));
 }
 
 LightSample MeshSource::sample(const glm::vec3& point, const glm::vec3& receiver,
@@ -184,7 +192,10 @@ glm::vec3 MeshSource::shareTowards(uint32_t side, const glm::vec3& direction) co
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
                                                 const glm::vec3& receiver) const {
-    if (!clusters.isEmpty()) return clusters.irradiance(point, receiver);
+    if (!clusters.isEmpty())
+        return clusters.irradiance(tree, point, receiver, [&](uint32_t face) {
+            return irradianceOf(face, point, receiver);
+        });
     if (outline.isEmpty()) return std::nullopt;
     return emission * float(outline.irradiance(point, receiver) / glm::pi<double>());
 }

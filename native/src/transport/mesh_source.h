@@ -85,7 +85,9 @@ class MeshSource : public LightSource {
         }
     };
     FaceShape shapeOf(const LightFace& face) const;
-    FaceClusters makeClusters() const;
+    std::vector<glm::vec3> radiances() const;  // per face, W/(m^2 sr)
+    // That of one face in closed form, W/m^2.
+    glm::vec3 irradianceOf(uint32_t face, const glm::vec3& point, const glm::vec3& receiver) const;
     std::vector<FaceShape> shapes;
     LightTree tree;
     MeshOutline outline;    // where the emission is even
