@@ -95,6 +95,34 @@ TEST_P(BrightSpots, LeaveNoNoiseToTheRoom) {
     EXPECT_LT(noise(light[0], light[1]), 2 * std::sqrt(2.0) * 0.02);
 }
 
+// Bars a millimetre before the bright wall, as a fork on a lit table: all that their sides get comes
+// from between them.
+TEST_P(BrightSpots, LightSmallThingsBesideThem) {
+    std::vector<glm::vec3> light[2];
+    for (int seed = 0; seed < 2; ++seed) {
+        Scene scene = roomWithLampAtWall(0.05, GetParam());
+        for (int k = 0; k < 6; ++k) {
+            const float x = 0.85f + 0.008f * float(k);
+            place(scene, box("bar", {x, 0.001f, 0.9f}, {x + 0.004f, 0.003f, 1.0f}, false),
+                  grey("bar", 0.5f));
+        }
+        Bake bake;
+        bake.settings.patchSize = 0.1f;
+        bake.settings.targetError = 0.005f;
+        bake.settings.seed = seed;
+        bake.run(scene);
+        EXPECT_GT(spotsOf(bake), 0u);
+        const Patches& patches = bake.patches();
+        const Irradiance& found = bake.patchIrradiance();
+        for (uint32_t side = 0; side < patches.sideCount(); side += 2)
+            if (patches.parentAt(side).instance > 0 && std::abs(patches.normal(side).x) > 0.9f)
+                light[seed].push_back(found.direct[side] + found.indirect[side]);
+    }
+    // Two bakes differ by sqrt(2) of the noise. Measured 0.006, and 0.017 where walls are rough: these
+    // have no closed form to compare samples with.
+    EXPECT_LT(noise(light[0], light[1]), 0.02);
+}
+
 TEST_P(BrightSpots, AreNoneWhereALampIsFarFromWalls) {
     Bake bake;
     bake.settings.patchSize = 0.1f;

@@ -186,6 +186,37 @@ TEST(MeshSource, HasNearlyTheClosedFormWhereItsEmissionVaries) {
     }
 }
 
+// Close to a surface of many faces most of its light is that of the nearest ones: a tenth of a face's
+// width over it, looking along it, down, or a little up.
+TEST(MeshSource, SamplesFindTheNearestOfManyFaces) {
+    constexpr uint32_t kSamples = 64;
+    constexpr int kPoints = 200;
+    for (const glm::dmat4& turn : {glm::dmat4(1), kTurn}) {
+        Scene scene;
+        place(scene, grid("lamp", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 50, 50), grey("", 0, 5), turn);
+        const Patches patches = subdivide(scene, 10, kMany);
+        const MeshSource source(patches, allParents(patches), 0, glm::vec3(5.0f));
+        std::mt19937 random(3);
+        std::uniform_real_distribution<float> within(-0.9f, 0.9f);
+        double squares = 0;
+        for (int k = 0; k < kPoints; ++k) {
+            const double slope = k % 3 == 0 ? 0 : k % 3 == 1 ? -1 : 0.5, angle = k;
+            const glm::dvec4 at(within(random), within(random), 4e-3, 1);
+            const glm::vec3 point(glm::dvec3(turn * at) - patches.centre);
+            const glm::vec3 up = glm::normalize(
+                glm::vec3(turn * glm::dvec4(std::cos(angle), std::sin(angle), slope, 0)));
+            double sum = 0;
+            for (uint32_t i = 0; i < kSamples; ++i) {
+                const glm::vec4 u = sobolPoint(i, uint32_t(k));
+                sum += double(source.sample(point, up, {u.x, u.y}).irradiance.x) / kSamples;
+            }
+            squares += std::pow(sum / double(source.irradiance(point, up)->x) - 1, 2) / kPoints;
+        }
+        // Measured 0.09 and 0.12; where halves of the grid were chosen by their spheres, 1.1 and 2.1.
+        EXPECT_LT(std::sqrt(squares), 0.2);
+    }
+}
+
 // The mean of many samples is the closed form, wherever the receiver is.
 TEST(MeshSource, SamplesHaveTheExpectationOfTheClosedForm) {
     constexpr uint32_t kSamples = 1 << 14;

@@ -22,6 +22,8 @@ constexpr size_t kWideCluster = 128, kNearCluster = 16;
 constexpr float kNearPower = 0.9f;
 // Of more receivers than this what they see is not kept: 130 bytes each, and 2 kB a cluster.
 constexpr size_t kMostLookingAround = 1 << 19;
+// What finds a shadow's edge may have neighbours that have missed it too: so many times at most.
+constexpr int kMostPasses = 16;
 // Points of a source by which its light at the corners of a face is compared: the same for all.
 constexpr uint32_t kSlopeSamples = 32;
 // For the power balance: rays of all sources together, and of each at least.
@@ -80,7 +82,8 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<
 
 void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                                 const std::function<Receiver(size_t)>& receiverAt,
-                                const std::function<void(double)>& progress, bool hasNeighbours,
+                                const std::function<void(double)>& progress,
+                                const std::vector<ReceiverPair>& neighbours,
                                 LightBySource* bySource, std::vector<Sightings>* sightings) const {
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
@@ -89,9 +92,12 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
             double(patches.area[side / 2] * brightest(split->bundled[side])) / patches.totalArea;
     if (sources.empty()) return;
     Seen seen(sources.size());
-    const Aim aim{INFINITY, hasNeighbours ? kNeighbourSamples : kFirstSamples, false};
-    gatherThese(coarse.gathered, these, receiverAt, std::vector<Aim>(these.size(), aim), seen,
-                progress, bySource, sightings);
+    std::vector<bool> hasNeighbour(coarse.gathered.size(), false);
+    for (const auto& [a, b] : neighbours) hasNeighbour[a] = hasNeighbour[b] = true;
+    std::vector<Aim> aims;
+    for (uint32_t k : these)
+        aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples});
+    gatherThese(coarse.gathered, these, receiverAt, aims, seen, progress, bySource, sightings);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }
 
@@ -105,7 +111,7 @@ std::vector<Gathered> DirectLight::gather(
         first.gathered.resize(count);
         std::vector<uint32_t> these(count);
         std::iota(these.begin(), these.end(), 0u);
-        shootCoarsely(first, these, receiverAt, progress, !neighbours.empty(), bySource,
+        shootCoarsely(first, these, receiverAt, progress, neighbours, bySource,
                       sightings.empty() ? nullptr : &sightings);
     }
     std::vector<Gathered> results = std::move(first.gathered);
@@ -115,9 +121,23 @@ std::vector<Gathered> DirectLight::gather(
 
     Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
     const auto outlooks = lookAround(further, results, receiverAt, std::move(sightings));
-    gatherThese(
-        results, further.receivers, receiverAt, further.aims, seen,
-        [&](double done) { progress(0.5 + done); }, bySource, nullptr);
+    std::vector<Aim> last(neighbours.empty() ? 0 : count);  // of each receiver
+    for (int pass = 0; pass < kMostPasses && !further.receivers.empty(); ++pass) {
+        gatherThese(
+            results, further.receivers, receiverAt, further.aims, seen,
+            [&](double done) { progress(pass == 0 ? 0.5 + done : 1.0); }, bySource, nullptr);
+        if (neighbours.empty()) break;  // nobody tells of the edge of a shadow
+        for (size_t k = 0; k < further.receivers.size(); ++k)
+            last[further.receivers[k]] = further.aims[k];
+        further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
+        further.keep([&](uint32_t k, const Aim& aim) {
+            const float told = last[k].besideShadow;
+            const bool isFiner = results[k].contrast == 0 && aim.besideShadow < 0.5f * told;
+            return aim.besideShadow > 0 && (told == 0 || isFiner);
+        });
+        for (size_t k = 0; k < further.receivers.size(); ++k)
+            further.aims[k].outlook = last[further.receivers[k]].outlook;
+    }
     return results;
 }
 
@@ -166,16 +186,11 @@ std::vector<Gathered> DirectLight::scale(const LightBySource& before,
     // Those that took as many samples as they may did so before.
     const std::vector<Gathered> then = before.asItWas();
     Aims further = aimsAfter(results, patches, receiverAt, {}, targetError);
-    size_t count = 0;
-    for (size_t k = 0; k < further.receivers.size(); ++k) {
-        const Gathered &now = results[further.receivers[k]], &was = then[further.receivers[k]];
+    further.keep([&](uint32_t k, const Aim&) {
+        const Gathered &now = results[k], &was = then[k];
         const float light = brightest(now.irradiance), lightThen = brightest(was.irradiance);
-        if (now.variance * lightThen * lightThen <= kSameError * was.variance * light * light)
-            continue;
-        further.receivers[count] = further.receivers[k];
-        further.aims[count++] = further.aims[k];
-    }
-    further.receivers.resize(count);
+        return now.variance * lightThen * lightThen > kSameError * was.variance * light * light;
+    });
     Seen seen(sources.size());
     for (std::atomic<bool>& source : seen) source = true;
     gatherThese(results, further.receivers, receiverAt, further.aims, seen, progress, nullptr,

@@ -69,7 +69,7 @@ class DirectLight {
     // coarsely first, then those again whose error is too large beside the mean light.
     // Of a source that surrounds them (transport/outlook.h) they then sample what is seen there.
     // `progress` gets the share that is done. coarse: what is known of all receivers, or empty.
-    // neighbours: if there are any, half as many samples do at first, and receivers whose
+    // neighbours: of receivers that have any half as many samples do at first, and those whose
     // neighbours disagree with them about a shadow take more. bySource: gets what came from each
     // source; null, or of `count` receivers, all of which are gathered here.
     std::vector<Gathered> gather(size_t count, const std::function<Receiver(size_t)>& receiverAt,
@@ -86,11 +86,12 @@ class DirectLight {
                                 float targetError,
                                 const std::function<void(double)>& progress) const;
 
-    // The first, coarse pass of that, to begin with: gathers at `these` receivers. sightings: per
-    // receiver, to be filled; or null.
+    // The first, coarse pass of that, to begin with: gathers at `these` receivers. neighbours: as
+    // above. sightings: per receiver, to be filled; or null.
     void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                        const std::function<Receiver(size_t)>& receiverAt,
-                       const std::function<void(double)>& progress, bool hasNeighbours = false,
+                       const std::function<void(double)>& progress,
+                       const std::vector<ReceiverPair>& neighbours = {},
                        LightBySource* bySource = nullptr,
                        std::vector<Sightings>* sightings = nullptr) const;
 

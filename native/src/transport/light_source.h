@@ -139,6 +139,10 @@ class LightSource {
     // A lower bound of the distance from a point to the source, metres.
     virtual float distance(const glm::vec3& point) const = 0;
 
+    // A patch smaller than this share of its distance from the source needs one point of the closed
+    // form only: the error is a quarter of the square of that, and of one sign under a lamp.
+    virtual float farPatch() const { return 0.05f; }
+
     // Most shadow rays that a receiver needs.
     virtual int mostSamples() const { return 256; }
 

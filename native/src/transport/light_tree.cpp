@@ -24,11 +24,23 @@ Angle rest(const Angle& x, const Angle& y) {
     return {x.cosine * y.cosine + x.sine * y.sine, x.sine * y.cosine - x.cosine * y.sine};
 }
 
+// As the rows of a matrix: along its first edge, across that, and its normal.
+glm::mat3 axesOf(const LightFace& face) {
+    const glm::vec3 along = glm::normalize(face.a);
+    const glm::vec3 normal = glm::normalize(glm::cross(face.a, face.b));
+    return glm::transpose(glm::mat3(along, glm::cross(normal, along), normal));
+}
+
 }  // namespace
 
 LightTree::LightTree(std::vector<LightFace>& faces) {
     nodes.reserve(2 * faces.size());
-    if (!faces.empty()) build(faces, 0, uint32_t(faces.size()));
+    if (!faces.empty()) {
+        axes = axesOf(*std::max_element(
+            faces.begin(), faces.end(),
+            [](const LightFace& a, const LightFace& b) { return a.area() < b.area(); }));
+        build(faces, 0, uint32_t(faces.size()));
+    }
     powerBefore.push_back(0);
     for (const LightFace& face : faces) {
         const double power = double(face.strength * face.area());
@@ -51,18 +63,21 @@ uint32_t LightTree::build(std::vector<LightFace>& faces, uint32_t first, uint32_
         const glm::vec3 across = face.origin + face.a + face.b;
         for (const glm::vec3& corner : {face.origin, face.origin + face.a, face.origin + face.b,
                                         face.isTriangle ? face.origin : across}) {
-            low = glm::min(low, corner);
-            high = glm::max(high, corner);
+            low = glm::min(low, axes * corner);
+            high = glm::max(high, axes * corner);
         }
-        middleLow = glm::min(middleLow, face.middle());
-        middleHigh = glm::max(middleHigh, face.middle());
+        const glm::vec3 middle = axes * face.middle();
+        middleLow = glm::min(middleLow, middle);
+        middleHigh = glm::max(middleHigh, middle);
         sum += face.normal;
         power += double(face.strength * face.area());
     }
     Node node{};
-    node.centre = 0.5f * (low + high);
-    node.radius = 0.5f * glm::length(high - low);
+    node.centre = glm::transpose(axes) * (0.5f * (low + high));
+    node.half = 0.5f * (high - low);
+    node.radius = glm::length(node.half);
     node.axis = glm::length(sum) > 1e-3f * float(count) ? glm::normalize(sum) : glm::vec3(0, 0, 1);
+    node.depth = glm::dot(glm::abs(axes * node.axis), node.half);
     node.cosine = 1;
     for (uint32_t k = first; k < first + count; ++k)
         node.cosine = std::min(node.cosine, glm::dot(node.axis, faces[k].normal));
@@ -78,7 +93,7 @@ uint32_t LightTree::build(std::vector<LightFace>& faces, uint32_t first, uint32_
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     // By place, then by normal, so that the order of the faces in the mesh does not matter.
     auto key = [&](const LightFace& face) {
-        const glm::vec3 at = face.middle(), n = face.normal;
+        const glm::vec3 at = axes * face.middle(), n = axes * face.normal;
         return std::array<float, 6>{at[axis], at.x, at.y, n.x, n.y, n.z};
     };
     const auto begin = faces.begin() + first;
@@ -91,22 +106,39 @@ uint32_t LightTree::build(std::vector<LightFace>& faces, uint32_t first, uint32_
 
 // About what the cluster gives to a plane with that normal at a point, an upper bound of it in angle:
 // 0 only where it gives nothing.
-float LightTree::importance(const Node& node, const glm::vec3& point, const glm::vec3& normal) {
+float LightTree::importance(const Node& node, const glm::vec3& point, const glm::vec3& normal,
+                            const glm::vec3& boxNormal) const {
     const glm::vec3 d = node.centre - point;
     const float r2 = node.radius * node.radius, distance2 = glm::dot(d, d);
-    if (distance2 <= r2) return node.power / std::max(r2, 1e-30f);
-    const float distance = std::sqrt(distance2);
-    const glm::vec3 towards = d / distance;
-    // Half the angle under which the sphere is seen.
-    const float sinSphere = node.radius / distance;
-    const Angle sphere{sineOf(sinSphere), sinSphere};
-    const float c = glm::dot(normal, towards);
-    const float received = rest({c, sineOf(c)}, sphere).cosine;
-    if (received <= 0) return 0;
-    // From the cone's axis to the receiver, less the cone, less the sphere.
-    const float e = -glm::dot(node.axis, towards);
-    const float emitted = rest(rest({e, sineOf(e)}, {node.cosine, node.sine}), sphere).cosine;
-    return emitted <= 0 ? 0 : node.power * emitted * received / distance2;
+    float received = 1, emitted = 1;
+    if (distance2 > r2) {
+        const float distance = std::sqrt(distance2);
+        const glm::vec3 towards = d / distance;
+        // Half the angle under which the sphere is seen.
+        const float sinSphere = node.radius / distance;
+        const Angle sphere{sineOf(sinSphere), sinSphere};
+        const float c = glm::dot(normal, towards);
+        received = rest({c, sineOf(c)}, sphere).cosine;
+        // From the cone's axis to the receiver, less the cone, less the sphere.
+        const float e = -glm::dot(node.axis, towards);
+        emitted = rest(rest({e, sineOf(e)}, {node.cosine, node.sine}), sphere).cosine;
+        if (received <= 0 || emitted <= 0) return 0;
+    }
+    // No cosine is more than the height over the face, or over the receiver, over the distance.
+    const glm::vec3 away = axes * d;
+    const float nearest = glm::length(glm::max(glm::abs(away) - node.half, 0.0f));
+    if (nearest > 0) {
+        const float before = glm::dot(glm::abs(boxNormal), node.half) + glm::dot(normal, d);
+        received = std::min(received, before / nearest);
+        if (node.cosine > 0) {
+            const float height = -glm::dot(node.axis, d) + node.depth;
+            const float above = height * (height > 0 ? 1 : node.cosine) +
+                                node.sine * (std::sqrt(distance2) + node.radius);
+            emitted = std::min(emitted, above / nearest);
+        }
+        if (received <= 0 || emitted <= 0) return 0;
+    }
+    return node.power * emitted * received / std::max({distance2, r2, 1e-30f});
 }
 
 bool LightTree::isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal) {
@@ -144,14 +176,15 @@ LightTree::Choice LightTree::byPower(const Node& node, double u, double weight) 
 LightTree::Choice LightTree::chooseOfMany(const glm::vec3& point, const glm::vec3& normal,
                                           float u) const {
     if (nodes.empty()) return {0, 0, u};
+    const glm::vec3 boxNormal = axes * normal;
     uint32_t index = 0;
     double left = double(u), weight = 1;
     while (nodes[index].count > 1) {
         if (isEven(nodes[index], point, normal))
             return index == 0 ? chooseByPower(left) : byPower(nodes[index], left, weight);
         const uint32_t first = index + 1, second = nodes[index].second;
-        const double a = double(importance(nodes[first], point, normal));
-        const double b = double(importance(nodes[second], point, normal));
+        const double a = double(importance(nodes[first], point, normal, boxNormal));
+        const double b = double(importance(nodes[second], point, normal, boxNormal));
         if (!(a + b > 0)) return {0, 0, u};
         const double at = left * (a + b);
         const bool isFirst = at < a || !(b > 0);

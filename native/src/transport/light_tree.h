@@ -7,6 +7,9 @@
 // (2018): the bounds of a cluster's light by its sphere and by the cone of its normals.
 // Differs:
 // - One sample goes to one face: clusters are not split for a receiver.
+// - Cosines are bounded by heights over the box of a cluster, too: right beside a surface of many
+//   faces the spheres of large clusters say nothing of which of them hold the nearest ones, whose
+//   light is nearly all there is.
 // - Of a flat cluster far enough before the receiver a face is chosen by its power alone: its bounds
 //   would hardly say more, and take most of the time.
 // - Clusters are halved at the middle of their longer side instead of where the surface area
@@ -39,9 +42,11 @@ class LightTree {
 
     // A cluster of faces. Those within it follow it: first its first half, then its second.
     struct Node {
-        glm::vec3 centre;       // of a sphere around it, metres
-        float radius;           // metres
+        glm::vec3 centre;       // of a box around it, metres
+        glm::vec3 half;         // half the size of that, along the axes of the tree, metres
+        float radius;           // of the sphere around the box, metres
         glm::vec3 axis;         // of the cone of normals
+        float depth;            // half the size of the box along that, metres
         float cosine, sine;     // of half its opening
         float power;            // sum of the channels, W
         uint32_t first, count;  // of the faces; a leaf has one
@@ -67,7 +72,9 @@ class LightTree {
     Choice chooseOfMany(const glm::vec3& point, const glm::vec3& normal, float u) const;
 
     uint32_t build(std::vector<LightFace>& faces, uint32_t first, uint32_t count);
-    static float importance(const Node& node, const glm::vec3& point, const glm::vec3& normal);
+    // boxNormal: along the axes.
+    float importance(const Node& node, const glm::vec3& point, const glm::vec3& normal,
+                     const glm::vec3& boxNormal) const;
 
     // Whether its faces give the plane about what their powers say.
     static bool isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal);
@@ -76,6 +83,7 @@ class LightTree {
     // The face in which the power of all before comes to `at`, W; all: of those it was chosen among.
     Choice chosen(uint32_t face, double at, double all) const;
 
+    glm::mat3 axes{1.0f};             // rows: of all boxes, those of the largest face
     std::vector<double> powerBefore;  // per face, and of all: sum of the channels, W
     std::vector<double> perPower;     // per face: one over its own, 1/W
     // Of as many equal shares of the power as there are faces: the face that each starts in.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <glm/gtc/constants.hpp>
 
 #include "bake/cancellation.h"
@@ -192,10 +193,11 @@ glm::vec3 MeshSource::shareTowards(uint32_t side, const glm::vec3& direction) co
 
 std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
                                                 const glm::vec3& receiver) const {
-    if (!clusters.isEmpty())
-        return clusters.irradiance(tree, point, receiver, [&](uint32_t face) {
-            return irradianceOf(face, point, receiver);
-        });
+    if (!clusters.isEmpty()) {
+        const auto ofFace = [&](uint32_t face) { return irradianceOf(face, point, receiver); };
+        // By reference, for a std::function with all this in it allocates memory at every point.
+        return clusters.irradiance(tree, point, receiver, std::cref(ofFace));
+    }
     if (outline.isEmpty()) return std::nullopt;
     return emission * float(outline.irradiance(point, receiver) / glm::pi<double>());
 }

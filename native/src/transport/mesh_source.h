@@ -33,6 +33,8 @@ class MeshSource : public LightSource {
                        glm::vec2 uv) const override;
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& receiver) const override;
+    // By clusters a point takes as long as many shadow rays.
+    float farPatch() const override { return clusters.isEmpty() ? LightSource::farPatch() : 0.1f; }
     bool staysInside() const override { return isEnclosed; }
     bool isOutOfSight(const ReceiverPlace& place) const override;
     float distance(const glm::vec3& point) const override {

@@ -28,6 +28,7 @@ struct Receiver {
     bool passingOnly = false;
     float errorFactor = 1;  // its error may be so many times that of others
     bool isShown = true;    // whether its light is shown, and not only that of what it lights
+    float otherLight = 0;   // what it gets beside that, of the brightest channel, W/m^2
 };
 
 struct Outlook;
@@ -60,9 +61,11 @@ struct Gathered {
     glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
     float variance = 0;          // of the brightest channel
     float contrast = 0;          // sums over the sources: of theirs
+    float shadowContrast = 0;    // of theirs, of those that do not surround the receiver
     glm::vec4 angles{0.0f};      // of theirs
     float brightness = 0;        // of their brightest channels
-    float unblockedLight = 0;    // of their brightest channels, if nothing was in between
+    float lampLight = 0;         // of those of sources that do not surround the receiver
+    float unblockedLight = 0;    // the same if nothing was in between
     Incoming incoming;           // of theirs, by brightness
     uint32_t noisiest = 0;       // of them: the one with the most variance
     float mostVariance = 0;      // of that one
@@ -91,8 +94,9 @@ struct Gathered {
         incoming.add(part.incoming, sampled / all, random);
         incoming.weight = all / brightness;
     }
-    // Share of the light that nothing stops on its way; 1 where there is none.
-    float visibleShare() const { return unblockedLight > 0 ? brightness / unblockedLight : 1.0f; }
+    // Share of the light of sources that do not surround the receiver that nothing stops on its
+    // way; 1 where there is none.
+    float visibleShare() const { return unblockedLight > 0 ? lampLight / unblockedLight : 1.0f; }
     // Means of angleTerms.
     glm::vec4 meanAngles() const { return brightness > 0 ? angles / brightness : kEverywhere; }
 };
@@ -105,7 +109,10 @@ constexpr float kDirectShare = 0.75f;
 struct Aim {
     float tolerance = INFINITY;  // standard error, W/m^2
     int samples = 0;             // of each source, at least
-    bool isBesideShadow = false;
+    int mostGrowth = 1;          // at most, so many times the samples that a source otherwise takes
+    // Where a shadow's edge may have been missed: the least contrast that a neighbour has more,
+    // W/m^2; infinite if all such neighbours see far more or less of the light; 0 elsewhere.
+    float besideShadow = 0;
     // On the source that surrounds the receiver, if that is known.
     const Outlook* outlook = nullptr;
 };
@@ -118,13 +125,26 @@ struct Aim {
 struct Aims {
     std::vector<uint32_t> receivers;
     std::vector<Aim> aims;
+
+    // Those alone of which isKept(receiver, aim) is true.
+    template <class IsKept>
+    void keep(const IsKept& isKept) {
+        size_t count = 0;
+        for (size_t k = 0; k < receivers.size(); ++k) {
+            if (!isKept(receivers[k], aims[k])) continue;
+            receivers[count] = receivers[k];
+            aims[count++] = aims[k];
+        }
+        receivers.resize(count);
+        aims.resize(count);
+    }
 };
 Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
                const std::function<Receiver(size_t)>& receiverAt,
                const std::vector<ReceiverPair>& neighbours, float targetError);
 
-// Shadow rays per receiver and source at first: of those that can tell from their neighbours whether
-// they are enough, and of others.
+// Shadow rays per receiver and source at first: of those that can tell from their neighbours
+// whether they are enough, and of others.
 constexpr int kNeighbourSamples = 8, kFirstSamples = 16;
 
 }  // namespace raybundle

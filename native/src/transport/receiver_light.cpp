@@ -21,17 +21,27 @@ constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
 // What n samples tell nothing of: a part s of a source is missed by all with the probability
 // (1 - s)^n, and then s is wrong; this over n at most, in the mean.
 constexpr float kMissed = 0.37f;
-// The same beside the edge of a shadow, where most receivers are wholly lit or dark after all: the
-// true error is 0.8 of the stated one in the edge of a plate's shadow (first_shot_test.cpp).
-constexpr float kMissedEdge = 0.2f;
+// The same beside the edge of a shadow, where most receivers are wholly lit or dark after all; and
+// the root of the probability that one has what its neighbour has. The true error is 0.47 of the
+// stated one in the edge of a plate's shadow, steps of samples included (first_shot_test.cpp).
+constexpr float kMissedEdge = 0.2f, kAsNeighbour = 0.5f;
+// Where part of the samples is blocked: stratified samples of a straight edge are alike in all
+// blocks, though they tell its place no better than to this share of one of them.
+constexpr float kStepOfSamples = 0.6f;
 // A receiver that is in the dark after so many samples of a source that surrounds it stays there.
 // One whose neighbours are too, after fewer.
 constexpr int kDarkSamples = 256, kDarkSamplesOfDark = 64;
 // A closed form whose largest value is so many times its smallest on a patch takes more points.
 constexpr float kSmooth = 1.1f;
-// A patch smaller than this share of its distance from a source needs one point only: the error is
-// about a quarter of its square, 0.3 %.
-constexpr float kFar = 0.1f;
+
+// Share of a source that n samples may have missed of which all are blocked, or none, where a
+// neighbour has so much contrast, as a share of the source: as much as that neighbour sees of it,
+// or does not see, with the probability that all miss it.
+float missedBeside(float contrast, float n) {
+    const float half = std::min(contrast, 0.5f);
+    const float step = 0.5f * (1 - std::sqrt(1 - 4 * half * half));
+    return std::max(kMissedEdge / n, kAsNeighbour * step * std::exp(-0.5f * n * step));
+}
 
 }  // namespace
 
@@ -118,7 +128,7 @@ AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) c
     return factors;
 }
 
-// Each source takes samples until its standard error is below `tolerance`.
+// Each source takes samples until its standard error is below its share of the tolerance.
 Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,
                              Sightings* sightings) const {
     Gathered sum;
@@ -131,6 +141,11 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
             continue;
         const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
         Aim own = aim;
+        // The variance that the receiver may have is shared out by that, or evenly: what is bright
+        // may be hidden. Of few sources seldom more than one has noise.
+        if (sources.size() > kFewSources)
+            own.tolerance *=
+                std::sqrt(std::max(weights.empty() ? 0 : share, 1 / float(sources.size())));
         if (share < kSmallShare)
             own.samples = kFewSamples;
         else if (share < kMiddleShare)
@@ -171,14 +186,14 @@ std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, cons
     return sum / float(grid.patchCount() * points);
 }
 
-// Mean of the closed form over a patch, if the source does not know it, by Gauss quadrature (degree 3 on a parallelogram, 2 on a
-// triangle), on more parts where it varies much: beside a source it falls from a finite value
-// at the common edge with an infinite slope.
+// Mean of the closed form over a patch, if the source does not know it, by Gauss quadrature (degree
+// 3 on a parallelogram, 2 on a triangle), on more parts where it varies much: beside a source it
+// falls from a finite value at the common edge with an infinite slope.
 std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, const Place& place,
                                                  float tolerance, float& error) const {
     glm::vec3 low, high;
     error = 0;
-    if (place.radius == 0 || place.radius < kFar * source.distance(place.centroid()))
+    if (place.radius == 0 || place.radius < source.farPatch() * source.distance(place.centroid()))
         return source.irradiance(place.centroid(), place.normal);
     if (const auto mean = source.meanIrradiance(place)) return mean;
     const auto coarse = quadrature(source, place, 1, low, high);
@@ -196,9 +211,9 @@ std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, cons
     return finest;
 }
 
-// Takes the first `count` samples, or doubles those in `blocks` until there are so many: powers of two.
-// Each block has consecutive ones, from a multiple of their number on, so that it is stratified like
-// all of them: of others the blocks would differ by more than their mean is off.
+// Takes the first `count` samples, or doubles those in `blocks` until there are so many: powers of
+// two. Each block has consecutive ones, from a multiple of their number on, so that it is
+// stratified like all of them: of others the blocks would differ by more than their mean is off.
 template <class SampleAt>
 void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleAt,
                               const SobolPoints& points, uint32_t side, const Place& place,
@@ -267,13 +282,15 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
                                   Gathered& sum) const {
     const float tolerance = aim.tolerance;
     const LightSource& source = *sources[index];
+    const int mostSamples = aim.mostGrowth * source.mostSamples();
     const bool hasParts = !source.parts().empty();
     const Outlook* const outlook = hasParts ? aim.outlook : nullptr;
-    const int darkSamples = outlook && outlook->isDark ? kDarkSamplesOfDark : kDarkSamples;
+    const int darkSamples =
+        aim.mostGrowth * (outlook && outlook->isDark ? kDarkSamplesOfDark : kDarkSamples);
     const bool isGuided = outlook && !outlook->seen.empty();
-    // Among receivers that look alike a part that one alone sees is missed there alone, and one that
-    // all see is missed by all their samples: in the mean of squares over so many, what is missed is
-    // less by their number at least.
+    // Among receivers that look alike a part that one alone sees is missed there alone, and one
+    // that all see is missed by all their samples: in the mean of squares over so many, what is
+    // missed is less by their number at least.
     const float alike = outlook ? float(outlook->receivers) : 1.0f;
     if (isOutOfSight(source, place)) {
         ++sum.hidden;
@@ -308,23 +325,26 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
             (brightest(all.open) <= 0 || brightest(all.visible) > 0))
             closed = closedMean(source, place, tolerance, closedError);
         // No sample faced the receiver: few of them may, beside a source of many faces.
-        if (brightest(all.open) <= 0 && all.count < source.mostSamples() &&
+        if (brightest(all.open) <= 0 && all.count < mostSamples &&
             (source.isNarrow || (closed && brightest(*closed) > 0))) {
             next = 4 * all.count;
             continue;
         }
         const bool isLit = all.visible == all.open, isDark = brightest(all.visible) <= 0;
-        const float part = isInside                                  ? 0
-                           : source.surrounds()                      ? kMissed
-                           : aim.isBesideShadow && (isLit || isDark) ? kMissedEdge
-                                                                     : 0;
-        const float missed = part * brightest(all.open) / (float(all.count) * float(all.count));
+        const float n = float(all.count);
+        const float open = brightest(all.open) / n;
+        const float part = isInside             ? 0
+                           : source.surrounds() ? kMissed / n
+                           : aim.besideShadow > 0 && (isLit || isDark)
+                               ? missedBeside(aim.besideShadow / open, n)
+                               : 0;
+        const float missed = part * open;
         if (isDark) {
             if (missed > tolerance && all.count < darkSamples && seen[index]) {
                 next = 4 * all.count;
                 continue;
             }
-            sum.unblockedLight += brightest(all.open) / float(all.count);
+            if (!source.surrounds()) sum.unblockedLight += open;
             return {glm::vec3(0.0f), missed * missed / alike, 0, glm::vec4(0.0f), {}};
         }
         // By the first pass alone, so that the order of the receivers does not matter.
@@ -340,8 +360,13 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
             variance += d * d / (kBlocks * (kBlocks - 1));
             wanted += d * d / (kBlocks * (kBlocks - 1));
         }
+        if (!isLit) {
+            const float step = kStepOfSamples * open / n;
+            variance += step * step;
+            wanted += step * step;
+        }
         if (all.count >= aim.samples &&
-            (wanted <= tolerance * tolerance || all.count >= source.mostSamples()))
+            (wanted <= tolerance * tolerance || all.count >= mostSamples))
             break;
         next = all.count < aim.samples ? aim.samples
                                        : (isGuided || source.surrounds() ? 2 : 4) * all.count;
@@ -353,9 +378,13 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const 
         origins.incoming.weight =
             brightest(all.visible) / (float(all.count) * brightest(irradiance));
     const float open = brightest(closed ? *closed : all.open / float(all.count));
-    sum.unblockedLight += open;
-    return {irradiance, variance + closedError * closedError,
-            open * std::sqrt(visible * (1 - visible)),
+    const float contrast = open * std::sqrt(visible * (1 - visible));
+    if (!source.surrounds()) {
+        sum.unblockedLight += open;
+        sum.lampLight += brightest(irradiance);
+        sum.shadowContrast += contrast;
+    }
+    return {irradiance, variance + closedError * closedError, contrast,
             brightest(irradiance) * all.meanAngles(blocks), origins.incoming};
 }
 
