@@ -331,5 +331,35 @@ TEST(Reconstruction, FacesWithoutHeightChangeNothing) {
     }
 }
 
+// Exposure is measured by lines, and where it is a little other, so is the light at corners: bounds
+// by what is half covered, or nearly open, came and went. Beside light of 1 to 2, a row of patches
+// is dark or brighter, and is exposed by a hundredth more from step to step.
+TEST(Reconstruction, CornersFollowExposure) {
+    for (const float rowLight : {0.0f, 3.0f}) {
+        Surface surface(grid("floor", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 2, 2), 0.125f);
+        auto cornersAt = [&](float share) {
+            std::vector<glm::vec3> field(surface.patches.sideCount());
+            for (uint32_t p = 0; p < surface.patches.count(); ++p) {
+                const glm::vec3 at(glm::dvec3(surface.patches.point(p, {0.5f, 0.5f})) +
+                                   surface.patches.centre);
+                const bool isInRow = at.y > 0.5f && at.y < 0.75f;
+                field[2 * p] = glm::vec3(isInRow ? rowLight : 1 + at.x);
+                surface.exposed[2 * p] = isInRow ? share : at.y > 0.75f ? 0.0f : 1.0f;
+            }
+            return surface.reconstruct(field, kRegularization);
+        };
+        float most = 0;
+        std::vector<glm::vec3> before = cornersAt(0.05f);
+        for (int k = 6; k <= 100; ++k) {
+            const std::vector<glm::vec3> now = cornersAt(0.01f * float(k));
+            for (size_t c = 0; c < now.size(); ++c)
+                most = std::max(most, std::abs(now[c].x - before[c].x));
+            before = now;
+        }
+        // Measured 0.16; 0.47 and 0.38 when what was half covered had no say.
+        EXPECT_LT(most, 0.25f) << "row of " << rowLight;
+    }
+}
+
 }  // namespace
 }  // namespace raybundle

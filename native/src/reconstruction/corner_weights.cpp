@@ -9,8 +9,10 @@
 namespace raybundle {
 namespace {
 
-// A corner's own side of a wall tells nothing if less than this share of it is exposed.
-constexpr float kLeastExposed = 0.1f;
+// A corner's own side of a wall tells nothing if less than the first share of it is exposed, and
+// all from the second on: between them the other side counts in part, so that exposure, which lines
+// have measured, changes the light at the corner by little where it changes by little.
+constexpr float kLeastExposed = 0.05f, kEnoughExposed = 0.15f;
 // A face more of which is inside of a solid has the dark of that at its corners there.
 constexpr float kMostInside = 0.5f;
 // A place in a patch, off its edges and its diagonal.
@@ -24,7 +26,9 @@ glm::vec2 middleOf(const Parent& parent) {
 
 CornerWeights::CornerWeights(const Patches& patches, const InstanceRange& range, rb_side side,
                              const std::vector<float>& exposed)
-    : patches(patches), first(range.firstParent), seen(range.lastParent - range.firstParent, 15) {
+    : patches(patches),
+      first(range.firstParent),
+      counts(range.lastParent - range.firstParent, {1, 1, 1, 1}) {
     // Per cell that walls cut, and corner: what of its own side there is, and is exposed, m^2.
     struct Support {
         std::array<float, 4> all{}, exposed{};
@@ -34,7 +38,6 @@ CornerWeights::CornerWeights(const Patches& patches, const InstanceRange& range,
         throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
         if (parent.seenCorners == 15) continue;
-        seen[p - first] = parent.seenCorners;
         Support& support = supports[parent.cell];
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t patch = parent.firstPatch + k;
@@ -50,11 +53,15 @@ CornerWeights::CornerWeights(const Patches& patches, const InstanceRange& range,
     }
     if (supports.empty()) return;
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
-        const auto support = supports.find(patches.parents[p].cell);
-        if (support == supports.end()) continue;
+        const Parent& parent = patches.parents[p];
+        if (parent.seenCorners == 15) continue;
+        const Support& support = supports.at(parent.cell);
         for (size_t a = 0; a < 4; ++a)
-            if (!(support->second.exposed[a] > kLeastExposed * support->second.all[a]))
-                seen[p - first] |= uint8_t(1u << a);
+            if (!(parent.seenCorners >> a & 1) && support.all[a] > 0)
+                counts[p - first][a] -=
+                    std::clamp((support.exposed[a] / support.all[a] - kLeastExposed) /
+                                   (kEnoughExposed - kLeastExposed),
+                               0.0f, 1.0f);
     }
 }
 
@@ -66,7 +73,7 @@ CornerWeights::OfPatch CornerWeights::of(uint32_t index, uint32_t patchInParent)
     if (!isParted(index)) return weights;
     weights.all = 0;
     for (size_t k = 0; k < 4; ++k) {
-        if (!(seen[index - first] >> k & 1)) weights.corner[k] = 0;
+        weights.corner[k] *= counts[index - first][k];
         weights.all += weights.corner[k];
     }
     if (weights.all > 0)

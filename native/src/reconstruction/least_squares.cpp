@@ -13,11 +13,11 @@
 namespace raybundle {
 namespace {
 
-// Of patches more covered than this, the light of the exposed share is too uncertain to bound
-// others.
-constexpr float kHalfCovered = 0.5f;
-// A face with more than this share exposed touches nothing.
-constexpr double kOpen = 0.99;
+// The light of a patch bounds that at its nodes, of one that is exposed by less than this share of
+// what the most exposed one there is, not at all: what is exposed of it is too uncertain.
+constexpr float kLeastBounding = 0.4f;
+// A face with less than this share exposed touches something.
+constexpr double kTouched = 0.9;
 constexpr double kTolerance = 1e-6;
 constexpr Eigen::Index kMaxIterations = 2000;
 // Relative residual of a fit that is shown.
@@ -82,8 +82,8 @@ EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
 }
 
 // openness: per cell from range.firstCell on, the share of its area that is exposed, and not parted
-// from the rest by a wall. Light on the two sides of a covered strip (a wall on a floor) has nothing to
-// do with each other.
+// from the rest by a wall. Light on the two sides of a covered strip (a wall on a floor) has
+// nothing to do with each other.
 void addRegularization(const Patches& patches, const InstanceRange& range,
                        const SmoothRegions& regions, const std::vector<double>& openness,
                        double weight, FitTerms& terms) {
@@ -134,6 +134,28 @@ struct Range {
     }
 };
 
+// A patch side at a node, and the share of it that is exposed and counts there.
+struct PatchAtNode {
+    uint32_t node = 0, side = 0;
+    float share = 0;
+};
+
+// About the mean at each node, what its patches add to that, of those that are little exposed a
+// part. Where exposure is a little other, as lines have measured it, the range is too.
+Range rangeAround(const Eigen::VectorXd& mean, const std::vector<PatchAtNode>& patchesAt,
+                  const std::vector<float>& mostExposed, const std::vector<glm::vec3>& field,
+                  int channel) {
+    Range range(mean.size());
+    for (const PatchAtNode& one : patchesAt) {
+        const double share = std::max(one.share / mostExposed[one.node] - kLeastBounding, 0.0f) /
+                             (1 - kLeastBounding);
+        const double from = mean[one.node],
+                     value = from + share * (double(field[one.side][channel]) - from);
+        range.add(one.node, std::min(from, value), std::max(from, value));
+    }
+    return range;
+}
+
 // That of the patches of all cells that share a node with the cells of a node.
 Range around(const Range& range, const std::vector<std::array<uint32_t, 4>>& cells) {
     Range wide = range;
@@ -159,8 +181,8 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
     if (nodes == 0) return {std::vector<std::vector<glm::vec3>>(fields.size())};
     FitTerms terms(regions.nodeCount);
     Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));
-    // Of the well exposed patches of the cells at each node.
-    std::vector<Range> seen(columns, Range(nodes));
+    std::vector<PatchAtNode> patchesAt;
+    std::vector<float> mostExposed(size_t(nodes), 0.0f);
     std::vector<double> openness;
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
         openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);  // nothing covers slivers
@@ -172,21 +194,23 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
         const std::array<uint32_t, 4> node = nodesOf(cell, regions);
+        const std::array<float, 4>& counts = weights.countsAt(p);
+        const double joined = double(*std::min_element(counts.begin(), counts.end()));
         std::array<std::array<double, 4>, 4> square{};
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
             const auto [w, all] = weights.of(p, k);
             const float open = std::max(exposed[index], kLeastExposure);
             const double weight = double(patches.area[index / 2]) * open * double(all);
-            if (!weights.isParted(p))
-                openness[parent.cell - range.firstCell] += weight / cell.area();
+            openness[parent.cell - range.firstCell] += joined * weight / cell.area();
             for (int a = 0; a < 4; ++a) {
                 for (int b = 0; b < 4; ++b) square[a][b] += weight * w[a] * w[b];
                 if (w[a] == 0) continue;
+                patchesAt.push_back({node[a], index, open * counts[size_t(a)]});
+                mostExposed[node[a]] = std::max(mostExposed[node[a]], patchesAt.back().share);
                 for (size_t c = 0; c < columns; ++c) {
                     const double value = double((*fields[c / 3])[index][int(c % 3)]);
                     rhs(node[a], Eigen::Index(c)) += weight * w[a] * value;
-                    if (open > kHalfCovered) seen[c].add(node[a], value, value);
                 }
             }
         }
@@ -196,9 +220,9 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
     const Eigen::SparseMatrix<double> matrix = terms.matrix();
     throwIfCancelled();
 
-    // Least exposed share of the faces at each node. At a contact the exposed part of a face is small,
-    // and its slope uncertain: no value is above what is seen around it, and the more is covered, the
-    // less it is below.
+    // Least exposed share of the faces at each node. At a contact the exposed part of a face is
+    // small, and its slope uncertain: no value is above what is seen around it, and the more is
+    // covered, the less it is below.
     std::vector<double> openAt(size_t(nodes), 1.0);
     std::vector<std::array<uint32_t, 4>> cells;
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
@@ -213,19 +237,21 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
     std::atomic<bool> isSolved = true;
     parallelFor(size_t(0), columns, [&](size_t c) {
         throwIfCancelled();
-        const Range wide = around(seen[c], cells);
-        throwIfCancelled();
         // Start from the area-weighted mean; nodes without a patch (degenerate faces) keep zero.
         Eigen::VectorXd mean = Eigen::VectorXd::Zero(nodes), low = mean;
         Eigen::VectorXd high = Eigen::VectorXd::Constant(nodes, INFINITY);
-        for (Eigen::Index v = 0; v < nodes; ++v) {
+        for (Eigen::Index v = 0; v < nodes; ++v)
             if (terms.areas()[v] > 0) mean[v] = rhs(v, Eigen::Index(c)) / terms.areas()[v];
-            const double least = seen[c].least[v], most = seen[c].most[v];
+        const Range seen = rangeAround(mean, patchesAt, mostExposed, *fields[c / 3], int(c % 3));
+        const Range wide = around(seen, cells);
+        throwIfCancelled();
+        for (Eigen::Index v = 0; v < nodes; ++v) {
+            const double least = seen.least[v], most = seen.most[v];
             if (!(least <= most)) continue;
             const double open = openAt[size_t(v)];
             const double below = kBeyond * std::max(0.0, 2 * open - 1) * (wide.most[v] - least);
-            const double above =
-                open < kOpen ? 0.0 : std::min(kBeyond * (most - wide.least[v]), kMostAbove * most);
+            const double above = std::clamp((open - kTouched) / (1 - kTouched), 0.0, 1.0) *
+                                 std::min(kBeyond * (most - wide.least[v]), kMostAbove * most);
             low[v] = std::min(std::max(least - below, 0.0), mean[v]);
             high[v] = std::max(most + above, mean[v]);
         }
