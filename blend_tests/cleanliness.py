@@ -47,7 +47,7 @@ class Baked:
     seconds: float
     noise: float
     noisiest: tuple[float, str]  # what the report states of an object, which
-    said: str  # first warning of noise
+    said: str  # first warning of noise, or of what is noisy
 
 
 def bake(scene: str, target: float, seed: int, settings: dict[str, str]) -> Baked:
@@ -62,7 +62,7 @@ def bake(scene: str, target: float, seed: int, settings: dict[str, str]) -> Bake
                  {item.name: corner_areas(item) for item in items}, report.bundles, seconds,
                  report.error['noise'],
                  max((entry.error['noise'], entry.name) for entry in report.objects if entry.error),
-                 next((text for text in report.warnings if "noise" in text), ""))
+                 next((text for text in report.warnings if "nois" in text), ""))
 
 
 def converged(scene: str, target: float, settings: dict[str, str], work: Path

@@ -19,6 +19,7 @@ import raybundle
 from build.construction import (Diffuse, Emission, Sum, add_mesh, box, grid, material, room, smooth,
                                 uv_sphere)
 from cleanliness import DARK, MOST
+from object_light import open_file
 from surface_error import corner_areas, read_colors
 
 TARGET = 0.02  # the default
@@ -44,21 +45,42 @@ def _bake(seed: int) -> tuple[raybundle.BakeReport, dict[str, np.ndarray]]:
                     for entry in report.objects}
 
 
+def _differences(first: dict[str, np.ndarray], second: dict[str, np.ndarray]
+                 ) -> dict[str, tuple[float, float]]:
+    """The noise of one bake on each object: root mean square relative to its light, and the 95th
+    percentile at the corners relative to the light there."""
+    areas = {name: corner_areas(bpy.data.objects[name]) for name in first}
+    mean = sum(areas[name] @ first[name].mean(axis=1) for name in first) / sum(
+        area.sum() for area in areas.values())
+    found = {}
+    for name, light in first.items():
+        off = (light - second[name]) / np.sqrt(2)
+        seen = np.abs(off).max(axis=1) / np.maximum(light.max(axis=1), DARK * mean)
+        found[name] = (np.sqrt((areas[name] @ off ** 2).sum() / (areas[name] @ light ** 2).sum()),
+                       np.percentile(seen, 95))
+    return found
+
+
 def test_a_smooth_sphere_in_a_room_is_not_mottled():
     _room_with_props()
     report, first = _bake(1)
     _, second = _bake(2)
-    areas = {name: corner_areas(bpy.data.objects[name]) for name in first}
-    mean = sum(areas[name] @ first[name].mean(axis=1) for name in first) / sum(
-        area.sum() for area in areas.values())
+    differences = _differences(first, second)
     for entry in report.objects:
-        name = entry.name
-        off = (first[name] - second[name]) / np.sqrt(2)
-        true = np.sqrt((areas[name] @ off ** 2).sum() / (areas[name] @ first[name] ** 2).sum())
-        stated = entry.error['noise']
-        seen = np.abs(off).max(axis=1) / np.maximum(first[name].max(axis=1), DARK * mean)
-        worst = np.percentile(seen, 95)
+        name, stated = entry.name, entry.error['noise']
+        true, worst = differences[name]
         assert true < 1.5 * max(stated, 0.005), (name, true, stated)
         assert stated < TARGET or any(f'"{name}"' in text and "noise" in text
                                       for text in report.warnings), (name, stated)
         assert worst < MOST, (name, worst)
+
+
+def test_a_room_lit_through_its_windows_is_clean():
+    """Few lines of the sunny plain around go through them, and what the rays of the furniture meet
+    is noisy itself. Measured at five pairs of seeds: 3.8 to 6.3 % on the worst object; with one pass of
+    rays 9.9 to 14.2."""
+    open_file('house_on_plain', 1)
+    (_, first), (_, second) = _bake(1), _bake(2)
+    differences = _differences(first, second)
+    for name in first:
+        assert differences[name][1] < 0.08, (name, differences[name])

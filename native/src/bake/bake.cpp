@@ -21,6 +21,7 @@
 #include "bake/geometry_hash.h"
 #include "bake/light_hash.h"
 #include "bake/noisy_parts.h"
+#include "bake/object_noise.h"
 #include "bake/threads.h"
 #include "bake/trace.h"
 #include "patches/contacts.h"
@@ -34,6 +35,7 @@
 #include "transport/bright_spots.h"
 #include "transport/extra_rays.h"
 #include "transport/set_light.h"
+#include "transport/sobol.h"
 #include "visibility/embree_device.h"
 
 namespace raybundle {
@@ -50,6 +52,9 @@ constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the tar
 // many times the target are left at first, as between the books of a shelf, that would take dozens of
 // times the bundles, and all rays again with each doubling.
 constexpr double kLeftWithRays = 2, kWorthMore = 0.75, kOutOfReach = 12;
+
+// Rays of a side in the first pass, which each further pass may double.
+constexpr uint32_t kRaysOfFirstPass = 512, kMostPasses = 5;
 
 class Stopwatch {
   public:
@@ -205,7 +210,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
             report.skipped.push_back({"bundles and solve", "there is no light to exchange", 1});
         } else if (settings.skipReflection && isFirstShotAll(patches, lights)) {
             report.skipped.push_back({"bundles and solve", "no surface reflects light", 1});
-            noise = keepFirstShot(tiles, shown, lights, report);
+            noise = keepFirstShot(scene, tiles, shown, lights, report);
         } else {
             std::vector<TransportInput> inputs;
             for (const SetLight& light : lights)
@@ -233,7 +238,8 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         const std::vector<float> weight = exposedArea(patches, exposed);
         const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
         stateErrors(scene, tiles, ranges, meanOver(tiles, shown.of(lights, exposed), weight),
-                    {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct},
+                    {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct,
+                     noise.ofObjects},
                     settings.targetError, settings.hasIndependentDirections(), made, report);
         fillLeftOutCorners(patches, ranges, made, report);
         checkFinite(made);
@@ -403,8 +409,8 @@ SetLights Bake::shootSources(const Scene& scene, const ShownLight& shown,
 }
 
 // The result where bundles have nothing to bring; some of them tell what is covered.
-SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLights& lights,
-                              Report& report) {
+SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
+                              SetLights& lights, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
     const Patches& patches = trace->patches;
     exposed = trace->surrounding.exposed;
@@ -432,7 +438,10 @@ SideNoise Bake::keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLi
     report.error.noise = noise.shown();
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
-    return noise.perSide();
+    SideNoise result = noise.perSide();
+    result.ofObjects = noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(),
+                                      cornerGrowth(scene, tiles.patches()));
+    return result;
 }
 
 // Solves for all bundles there are. error: of the light, relative. Returns what is to be said of it.
@@ -448,16 +457,25 @@ Report Bake::finishSolve(const Transports& transports, SetLights& lights, const 
     return report;
 }
 
-// Whether sides are noisy enough to cast rays of their own. halves: of each light, as they arrive.
-bool Bake::castRays(const NoisyParts& noisyParts, SetLights& lights,
-                    std::vector<std::array<Irradiance, 2>>& halves, Report& report) const {
-    const std::vector<std::array<float, 2>> lines = trace->linesByHalf();
-    const std::vector<ExtraRays> rays = noisyParts.rays(settings.targetError, lines);
-    addExtraRays(trace->patches, trace->visibility, trace->touchDistance, trace->exposedShare(),
-                 rays, lines, uint32_t(settings.seed), lights, halves);
-    report.skipped.push_back(
-        {"bundles", "few lines would meet what is noisy: its sides cast rays", rays.size()});
-    return !rays.empty();
+// Noisy sides cast rays of their own, and more of them as long as that helps. halves: of each light,
+// as they arrive. look: at them with these rays. Returns what is left, see NoisyParts::lookWithRays.
+double Bake::castRays(NoisyParts& noisyParts, SetLights& lights,
+                      std::vector<std::array<Irradiance, 2>>& halves,
+                      const std::function<double(uint32_t)>& look, Report& report) const {
+    std::vector<std::array<float, 2>> samples = trace->linesByHalf();
+    double left = 0;
+    for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
+        const std::vector<ExtraRays> rays = noisyParts.rays(samples, kRaysOfFirstPass << pass);
+        if (pass == 0)
+            report.skipped.push_back({"bundles",
+                                      "few lines would meet what is noisy: its sides cast rays",
+                                      rays.size()});
+        if (rays.empty()) break;
+        addExtraRays(trace->patches, trace->visibility, trace->touchDistance, trace->exposedShare(),
+                     rays, hash(uint32_t(settings.seed), pass), samples, lights, halves);
+        left = look(kMostPasses - 1 - pass);
+    }
+    return left;
 }
 
 // Adds bundles until the difference of the two halves' estimates meets the target, in
@@ -477,14 +495,16 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     std::vector<float> tileWeight(tiles.sideCount(), 0);
     SetNoise noise(trace->looks, errorOfSets, tileWeight, tiles.patches());
 
+    const std::vector<double> growth = cornerGrowth(scene, tiles.patches());
     // Which parts of objects are noisy is known by the lines that met them.
     std::optional<NoisyParts> noisyParts;
     const bool countsLines = settings.solver == "LINE_REUSE";
     if (countsLines)
-        noisyParts.emplace(scene, tiles, trace->looks, tiles.sum(area), shown,
-                           trace->density.windows.empty() ? 0.0
-                                                          : double(patches.sheets.loose.size() +
-                                                                   patches.sheets.sheets.size()));
+        noisyParts.emplace(tiles, trace->looks, tiles.sum(area), shown, growth,
+                           trace->density.windows.empty()
+                               ? 0.0
+                               : double(patches.sheets.loose.size() + patches.sheets.sheets.size()),
+                           settings.targetError);
 
     std::vector<double> errors;  // relative: of the light of all, then of each light set
     std::vector<std::array<Irradiance, 2>> halves(lights.size());  // as they arrive
@@ -508,7 +528,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     const bool castsRays =
         noisyParts && settings.skipBundles && settings.minBundles < settings.maxBundles;
     Report finish;           // what the last solve says
-    double left = INFINITY;  // see NoisyParts::excessWithRays
+    double left = INFINITY;  // see NoisyParts::lookWithRays
     bool isReached = false;
     for (;;) {
         if (wanted > transport.bundleCount()) {
@@ -534,15 +554,20 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         }
 
         const auto worst = std::max_element(errors.begin(), errors.end());
-        double excess = noisyParts ? noisyParts->excess(target) : noise.excess(target);
+        double excess = noisyParts ? noisyParts->excess() : noise.excess(target);
         isReached = excess <= 1 && settings.skipBundles;
         if (isReached || bundles >= most) {
             finish = finishSolve(transports, lights, shown, errors.front());
-            if (castsRays && isReached && castRays(*noisyParts, lights, halves, finish)) {
-                SetNoise withRays({}, errorOfSets, tileWeight, tiles.patches());
-                withRays.look(seen(), bundles, transport.bias());
+            if (castsRays && isReached) {
                 const double before = left;
-                left = noisyParts->excessWithRays(withRays, target);
+                left = castRays(
+                    *noisyParts, lights, halves,
+                    [&](uint32_t furtherPasses) {
+                        SetNoise withRays({}, errorOfSets, tileWeight, tiles.patches());
+                        withRays.look(seen(), bundles, transport.bias());
+                        return noisyParts->lookWithRays(withRays, furtherPasses);
+                    },
+                    finish);
                 if (left > kLeftWithRays && left < std::min(kWorthMore * before, kOutOfReach)) {
                     excess = left / kLeftWithRays;
                     isReached = false;
@@ -609,7 +634,9 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
     progress.report(RB_STAGE_SOLVE, 1);
-    return noise.perSide();
+    SideNoise result = noise.perSide();
+    result.ofObjects = noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(), growth);
+    return result;
 }
 
 const Patches& Bake::patches() const { return trace->patches; }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <string>
@@ -61,12 +62,13 @@ class Bake {
     std::vector<CoarseShot> shootCoarsely(const Scene& scene, Report& report);
     SetLights shootSources(const Scene& scene, const ShownLight& shown,
                            const std::vector<CoarseShot>& coarse, Report& report);
-    SideNoise keepFirstShot(const Tiles& tiles, const ShownLight& shown, SetLights& lights,
-                            Report& report);
+    SideNoise keepFirstShot(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
+                            SetLights& lights, Report& report);
     Report finishSolve(const Transports& transports, SetLights& lights, const ShownLight& shown,
                        double error) const;
-    bool castRays(const NoisyParts& noisyParts, SetLights& lights,
-                  std::vector<std::array<Irradiance, 2>>& halves, Report& report) const;
+    double castRays(NoisyParts& noisyParts, SetLights& lights,
+                    std::vector<std::array<Irradiance, 2>>& halves,
+                    const std::function<double(uint32_t)>& look, Report& report) const;
     SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
                             SetLights& lights, const Transports& transports, Report& report);
 

@@ -91,6 +91,7 @@ void Noise::measure(const std::array<Irradiance, 2>& half) {
         shownSquares += noise + (kCornersOfMeans - 1) * random;
         shownVariance += cell.direct / cell.weight;
         ofCells[c] = {cell.weight, noise / cell.weight, random / cell.weight,
+                      cell.direct / (cell.weight * cell.weight),
                       glm::dot(cell.light, cell.light) / (cell.weight * cell.weight)};
     }
     const double scale = signal > 0 ? 1 / signal : 0;
@@ -146,10 +147,14 @@ double Noise::excess(double target) const {
 
 Looks Noise::looks() const { return {looked, bundles, bundleNoise > 0 ? pooled / bundleNoise : 1}; }
 
+double Noise::scale() const {
+    return bundleNoise > 0 ? factor() * factor() * pooled / bundleNoise : 0;
+}
+
 std::vector<glm::vec3> Noise::perSide() const {
-    const float scale = bundleNoise > 0 ? float(factor() * std::sqrt(pooled / bundleNoise)) : 0.0f;
+    const float factor = float(std::sqrt(scale()));
     std::vector<glm::vec3> result = difference;
-    for (glm::vec3& d : result) d *= scale;
+    for (glm::vec3& d : result) d *= factor;
     return result;
 }
 

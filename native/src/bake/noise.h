@@ -56,13 +56,16 @@ class Noise {
     // on the sides.
     double excess(double target) const;
     Looks looks() const;
+    // So many times the last look's squares are the noise of bundles, by the looks before it too.
+    double scale() const;
     // Per side: half the difference of the halves, brought to the stated size, W/m^2.
     std::vector<glm::vec3> perSide() const;
     // Of one side of a cell, of the last look: the noise of bundles in its mean, what of that is
-    // because patches differ at random, and the light; squares summed over RGB, (W/m^2)^2.
+    // because patches differ at random, that of the first shot, and the light; squares summed over RGB,
+    // (W/m^2)^2.
     struct OfCell {
         double area = 0;  // exposed, m^2; 0: it has no result
-        double noise = 0, random = 0, light = 0;
+        double noise = 0, random = 0, direct = 0, light = 0;
     };
     // Two a cell.
     const std::vector<OfCell>& cells() const { return ofCells; }
@@ -91,6 +94,7 @@ struct SideNoise {
 
     std::vector<glm::vec3> ofBundles;  // a sample of it, see Noise::perSide, W/m^2
     std::vector<float> direct;         // standard error of the first shot, W/m^2
+    std::vector<double> ofObjects;     // per instance: see noiseOfObjects; empty: there is no light
 };
 
 // The noise of the light of all, and that of each light set.

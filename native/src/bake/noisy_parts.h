@@ -10,6 +10,8 @@
 // - A bundle takes time for each line, wherever that goes, and for each face in its windows. While
 //   the parts that need more of them get so many of the lines that rays would take longer, another
 //   bundle is cheaper.
+// - Rays come in passes. What a pass leaves on an object is seen in its halves; each sees what those
+//   before have brought.
 #pragma once
 
 #include <cstdint>
@@ -27,9 +29,11 @@ class NoisyParts {
     // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has
     // a result. shown: where corners gather instead of showing their side's light, rays do not help.
     // projections: of sheets and single faces, of each bundle, where there are windows of finer lines;
-    // else 0. The tiles must outlive the object.
-    NoisyParts(const Scene& scene, const Tiles& tiles, const Looks& before,
-               const std::vector<float>& weight, const ShownLight& shown, double projections);
+    // else 0. target: relative. growth: per instance, see cornerGrowth; it and the tiles must outlive
+    // the object.
+    NoisyParts(const Tiles& tiles, const Looks& before, const std::vector<float>& weight,
+               const ShownLight& shown, const std::vector<double>& growth, double projections,
+               double target);
 
     // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
     // those of all sides, not shown ones included.
@@ -37,18 +41,19 @@ class NoisyParts {
 
     // See Looks::shareOfParts.
     std::vector<double> shares() const;
-    // So many times too large for a relative target is the noise at corners where more bundles are
+    // So many times too large for the target is the noise at corners where more bundles are
     // the cheapest remedy.
-    double excess(double target) const;
-    // So many times too large is what is left when sides have cast rays, on the object where that is
-    // most: of nine parts of ten of it. It is the noise of the light that rays met, and their own.
-    // noise: as of one look at the halves with rays.
-    double excessWithRays(const SetNoise& noise, double target) const;
+    double excess() const;
     // For each side of the patches that has too few samples for the target: rays. By the last look
-    // alone: the same light has the same ones, whatever was baked before. lines: per side and half,
-    // how many have met it.
-    std::vector<ExtraRays> rays(double target,
-                                const std::vector<std::array<float, 2>>& lines) const;
+    // alone: the same light has the same ones, whatever was baked before. samples: per side and half,
+    // how many lines have met it, and rays by what they tell. most: of a side.
+    std::vector<ExtraRays> rays(const std::vector<std::array<float, 2>>& samples,
+                                uint32_t most) const;
+    // As of a look at the halves with these rays: objects that they made cleaner, but not clean, are to
+    // have more if furtherPasses of twice as many each may clean them. Returns how many times too large
+    // is what is left, on the object where that is most: of nine parts of ten of it. It is the noise of
+    // the light that rays met, and their own.
+    double lookWithRays(const SetNoise& noise, uint32_t furtherPasses);
 
   private:
     struct Part {
@@ -58,6 +63,10 @@ class NoisyParts {
         // Squares of the noise at corners over the light there: by the last look, and pooled with those
         // before.
         double last = 0, squares = 0;
+        // Whether rays are worth their time; so many times the samples that the last look foretells are
+        // to be had.
+        bool wantsRays = true;
+        double wanting = 1;
     };
     struct SeenCell {
         uint32_t number;  // two a cell, as Noise has them
@@ -67,16 +76,17 @@ class NoisyParts {
     // Squares over the light of one noise, per part.
     std::vector<double> squaresOf(const Noise& noise) const;
     std::vector<double> squaresOf(const SetNoise& noise) const;  // the largest of all lights
+    // Per instance: of nine parts of ten of it. squares: per part.
+    std::vector<double> squaresOfObjects(const std::vector<double>& squares) const;
 
     const Tiles& tiles;
     const Looks before;
     std::vector<uint32_t> partOf;  // per side of the tiles; kNone: has no result
     std::vector<SeenCell> cells;   // of those with a result
     std::vector<Part> parts;
-    // Per instance: how much the variance grows from the means of cells to corners, as far as it is
-    // random within them.
-    std::vector<double> growth;
-    const double projections;
+    const std::vector<double>& growth;
+    std::vector<double> ofObjects;  // per instance, with the rays there are: see squaresOfObjects
+    const double projections, target;
     double allLines = 0;
     uint32_t bundles = 0;
 };

@@ -50,8 +50,6 @@ struct Squares {
     }
     // The residual without the noise in it.
     double mesh(double noiseScale) const { return std::max(0.0, residual - noiseScale * ripple); }
-    // The noise without what is not shown of it.
-    double shownNoise() const { return noise - ripple; }
     // The surplus over the signal, squares; by chance steps may be below zero.
     double smoothShare() const { return known > 0 ? smooth / known : 0; }
     double stepShare() const { return known > 0 ? std::max(step, 0.0) / known : 0; }
@@ -232,11 +230,10 @@ class InstanceErrors {
     double corners = 0;  // about, of the cells with a result
 };
 
-// shownScale: of the shown noise's squares.
-Report::Errors relative(const Squares& s, double noiseScale, double shownScale,
-                        double discretisation) {
+// noise: what is shown of that of the patches, relative.
+Report::Errors relative(const Squares& s, double noiseScale, double noise, double discretisation) {
     if (!(s.signal > 0)) return {};
-    return {s.shown > 0 ? std::sqrt((shownScale * s.shownNoise() + s.gathered) / s.shown) : 0,
+    return {std::hypot(noise, s.shown > 0 ? std::sqrt(s.gathered / s.shown) : 0),
             std::sqrt(discretisation), std::sqrt(s.mesh(noiseScale) / s.signal),
             std::sqrt(noiseScale * s.noise / s.signal)};
 }
@@ -322,10 +319,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     const double noiseScale =
         all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
     // As the bake has measured what is shown of it, relative to what is shown.
-    const double measured = report.error.noise,
-                 shown = all.shown > 0 ? measured * std::sqrt(all.signal / all.shown) : 0;
-    const double shownScale =
-        all.shownNoise() > 0 ? measured * measured * all.signal / all.shownNoise() : 0;
+    const double shown = all.shown > 0 ? report.error.noise * std::sqrt(all.signal / all.shown) : 0;
     const double limit = std::max(kCoarse, kCoarseTargets * double(targetError));
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;
@@ -337,9 +331,10 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         const Squares& known = own.knownArea >= kKnownShare * own.area ? own : all;
         const double smooth = known.smoothShare(), step = known.stepShare();
         discretisation += (smooth + step) * own.signal / all.signal;
-        report.objects[i].error = relative(own, noiseScale, shownScale, smooth + step);
-        if (errsAlike && own.signal > 0)
-            report.objects[i].error.noise = std::max(report.objects[i].error.noise, shown);
+        // What corners gather is the light of many patches, wherever these are.
+        const double ofPatches =
+            light[i].gatheredNoise ? shown : std::max(sides.ofObjects[i], errsAlike ? shown : 0);
+        report.objects[i].error = relative(own, noiseScale, ofPatches, smooth + step);
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         if (!(own.signal / own.area > kDark * all.signal / all.area)) continue;
         const double noise = report.objects[i].error.noise;
@@ -350,8 +345,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     }
     warnOfNoise(std::move(noisy), double(targetError), report);
     warnOf(std::move(coarse), report);
-    report.error = relative(all, noiseScale, shownScale, discretisation);
-    report.error.noise = std::hypot(shown, all.shown > 0 ? std::sqrt(all.gathered / all.shown) : 0);
+    report.error = relative(all, noiseScale, shown, discretisation);
     report.error.ofPatches = report.estimatedError;
 }
 

@@ -76,7 +76,7 @@ void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought
 
 void addExtraRays(const Patches& patches, const Visibility& visibility, float touchDistance,
                   const std::vector<float>& exposed, const std::vector<ExtraRays>& wanted,
-                  const std::vector<std::array<float, 2>>& lines, uint32_t seed, SetLights& lights,
+                  uint32_t seed, std::vector<std::array<float, 2>>& samples, SetLights& lights,
                   std::vector<std::array<Irradiance, 2>>& halves) {
     std::vector<Sent> sent;
     for (size_t k = 0; k < lights.size(); ++k)
@@ -96,7 +96,7 @@ void addExtraRays(const Patches& patches, const Visibility& visibility, float to
                                                  direction, &distance);
             if (hit && isCovered(patches, own.side, *hit, direction, distance, touchDistance))
                 continue;
-            if (hit && !(std::min(lines[*hit][0], lines[*hit][1]) > 0)) continue;
+            if (hit && !(std::min(samples[*hit][0], samples[*hit][1]) > 0)) continue;
             // The first points and the last are each stratified by themselves.
             const size_t half = 2 * i < own.rays ? 0 : 1;
             ++counted[w][half];
@@ -110,7 +110,7 @@ void addExtraRays(const Patches& patches, const Visibility& visibility, float to
     });
     double met = 0;
     for (const ExtraRays& own : wanted)
-        met += double(lines[own.side][0]) + double(lines[own.side][1]);
+        met += double(samples[own.side][0]) + double(samples[own.side][1]);
     for (size_t k = 0; k < lights.size(); ++k) {
         const FirstShot& shot = lights[k].shot;
         // of: 0 for the light itself, 1 and 2 for the halves.
@@ -118,7 +118,7 @@ void addExtraRays(const Patches& patches, const Visibility& visibility, float to
             const glm::dvec3 before = absorbed(patches, exposed, wanted, shot, light);
             for (size_t w = 0; w < wanted.size(); ++w) {
                 const uint32_t side = wanted[w].side;
-                const std::array<float, 2>&l = lines[side], &rays = counted[w];
+                const std::array<float, 2>&l = samples[side], &rays = counted[w];
                 blend(light, side, of == 0 ? l[0] + l[1] : l[of - 1],
                       brought[w * lights.size() + k][of],
                       of == 0 ? rays[0] + rays[1] : rays[of - 1],
@@ -141,6 +141,8 @@ void addExtraRays(const Patches& patches, const Visibility& visibility, float to
         bring(lights[k].irradiance, 0);
         for (size_t h = 0; h < 2; ++h) bring(halves[k][h], 1 + h);
     }
+    for (size_t w = 0; w < wanted.size(); ++w)
+        for (size_t h = 0; h < 2; ++h) samples[wanted[w].side][h] += kLinesOfRay * counted[w][h];
 }
 
 }  // namespace raybundle

@@ -36,12 +36,13 @@ struct ExtraRays {
 };
 
 // Adds what the rays of some sides bring to the light of each set, and to the estimates of its two
-// halves, all as they arrive. lines: per side and half, how many have met it. Rays do not count that
+// halves, all as they arrive. samples: per side and half, how many lines have met it; these rays are
+// added to them, by what they tell. Rays do not count that
 // start where the side is covered, by a surface not further than touchDistance (m), or meet a side of
 // which a half knows nothing. exposed: per side, the share of it that nothing covers.
 void addExtraRays(const Patches& patches, const Visibility& visibility, float touchDistance,
                   const std::vector<float>& exposed, const std::vector<ExtraRays>& wanted,
-                  const std::vector<std::array<float, 2>>& lines, uint32_t seed, SetLights& lights,
+                  uint32_t seed, std::vector<std::array<float, 2>>& samples, SetLights& lights,
                   std::vector<std::array<Irradiance, 2>>& halves);
 
 }  // namespace raybundle
