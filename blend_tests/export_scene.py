@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scene as the native library gets it, as JSON for the programs of native/bench.
 
-    blender -b --factory-startup FILE.blend -P blend_tests/export_scene.py -- OUT.json \\
-        [--show COLLECTION ...] [--hide COLLECTION ...]
+    blender -b --factory-startup [FILE.blend] -P blend_tests/export_scene.py -- OUT.json \\
+        [--show COLLECTION ...] [--hide COLLECTION ...] [--room NAME]
 
 The scene is exported by the add-on itself. --show and --hide include and exclude collections of the
-view layer first: scenes/office.blend has its lamps in lamps_up and lamps_down. The .blend file is
-never saved. The format, read by native/bench/scene_file.cpp, is that of SceneData: one list per
-kind, arrays flat, indices are positions in the lists; fields that are None are left out.
+view layer first: scenes/office.blend has its lamps in lamps_up and lamps_down. --room exports one of
+lamp_rooms.py instead of a file. The .blend file is never saved. The format, read by
+native/bench/scene_file.cpp, is that of SceneData: one list per kind, arrays flat, indices are
+positions in the lists; fields that are None are left out.
 """
 
 from __future__ import annotations
@@ -21,9 +22,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "addon"))
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import lamp_rooms  # noqa: E402
 import raybundle  # noqa: E402
 from raybundle.scene_data import (AreaLightData, PointLightData, SceneData,  # noqa: E402
                                   SunLightData)
@@ -71,7 +74,10 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--show", nargs="*", default=[], metavar="COLLECTION")
     parser.add_argument("--hide", nargs="*", default=[], metavar="COLLECTION")
+    parser.add_argument("--room", choices=list(lamp_rooms.ROOMS))
     arguments = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
+    if arguments.room:
+        lamp_rooms.build(arguments.room)
     show_collections(bpy.context.view_layer.layer_collection, arguments.show, arguments.hide)
     export = export_scene(bpy.context)
     for warning in export.warnings:

@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "scenes"))
 from build.construction import (  # noqa: E402
     Diffuse, Emission, FaceBlock, Shape, Sum, add_mesh, add_object, add_point_light, box, cylinder,
     grid, material, room, set_world, uv_sphere)
+from surface_error import corner_vertices  # noqa: E402
 
 SIZE = (4.0, 4.0, 3.0)
 WALL, LAMP_REFLECTANCE = 0.6, 0.5
@@ -127,6 +128,35 @@ def _subdivided() -> None:
         modifier.levels = modifier.render_levels = levels
 
 
+def coloured_dots(texels: int) -> np.ndarray:
+    """(texels, texels, 3) 8 x 8 of them, linear colours; texels: a multiple of 8."""
+    dots = np.random.default_rng(1).random((8, 8, 3)) ** 3
+    return dots.repeat(texels // 8, axis=0).repeat(texels // 8, axis=1)
+
+
+def shine_by_image(item: bpy.types.Object, pixels: np.ndarray, places: np.ndarray) -> None:
+    """Gives the emission of an object's first material the colours of an image. pixels: (height,
+    width, 3) by row from below, linear; places: (vertices, 2) in the image, 0 to 1."""
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new("screen", width, height, float_buffer=True)  # of linear colours
+    image.pixels = np.concatenate([pixels, np.ones((height, width, 1))], axis=2).ravel()
+    image.pack()
+    item.data.uv_layers.new().data.foreach_set(
+        'uv', places[corner_vertices(item.data)].astype(np.float32).ravel())
+    tree = item.data.materials[0].node_tree
+    texture = tree.nodes.new('ShaderNodeTexImage')
+    texture.image = image
+    emission = next(node for node in tree.nodes if node.type == 'EMISSION')
+    tree.links.new(texture.outputs['Color'], emission.inputs['Color'])
+
+
+def _screen() -> None:
+    """In front of the wall, it shines to the room."""
+    shape = grid((-0.6, 1.9, 1.0), (0, 0, 0.8), (1.2, 0, 0), 1, 1).flipped()
+    item = _mesh_lamp(shape, 40.0)
+    shine_by_image(item, coloured_dots(32), (shape.vertices[:, [0, 2]] - (-0.6, 1.0)) / (1.2, 0.8))
+
+
 def _part_of_wall() -> None:
     wall = bpy.data.objects["wall_north"].data
     wall.materials.append(material("lamp", Emission((1, 1, 1), 10.0)))
@@ -187,4 +217,5 @@ ROOMS: dict[str, Callable[[], object]] = {
     "ring": _ring,
     "wavy_panel": _wavy_panel,
     "subdivided": _subdivided,
+    "screen": _screen,
 }

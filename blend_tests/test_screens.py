@@ -11,9 +11,11 @@ corners.
 from __future__ import annotations
 
 import bpy
+import lamp_rooms  # by which the construction of scenes is found too
 import numpy as np
 import pytest
 import raybundle
+from build.construction import Emission, material
 from conftest import create_material, create_object
 from cycles_comparison import square
 from surface_error import corner_vertices, read_colors, world_positions
@@ -34,7 +36,7 @@ CLOSE = 0.3  # metres
 def _image(name: str) -> np.ndarray:
     """Texels by row from below, linear colours."""
     if name == "coloured dots":
-        return np.random.default_rng(1).random((8, 8, 3)).repeat(8, axis=0).repeat(8, axis=1) ** 3
+        return lamp_rooms.coloured_dots(TEXELS)
     bounds = (0, TEXELS * 20 // 64, TEXELS * 44 // 64, TEXELS)
     pixels = np.zeros((TEXELS, TEXELS, 3))
     for k, color in enumerate(STRIPES[name]):
@@ -45,22 +47,9 @@ def _image(name: str) -> np.ndarray:
 def _screen(pixels: np.ndarray, height: float) -> bpy.types.Object:
     """2 x 2 m in the plane y = 1.5, which shines both ways; on a floor of 6 x 6 m."""
     floor = create_object("floor", *square(6.0, 24), create_material("floor", (0.8,) * 3))
-    image = bpy.data.images.new("screen", TEXELS, TEXELS, float_buffer=True)  # of linear colours
-    image.pixels = np.concatenate([pixels, np.ones((TEXELS, TEXELS, 1))], axis=2).ravel()
-    image.pack()
-    material = bpy.data.materials.new("screen")
-    material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
-    texture, emission, output = (nodes.new(f'ShaderNode{kind}')
-                                 for kind in ('TexImage', 'Emission', 'OutputMaterial'))
-    texture.image = image
-    emission.inputs['Strength'].default_value = STRENGTH
-    links.new(texture.outputs['Color'], emission.inputs['Color'])
-    links.new(emission.outputs[0], output.inputs['Surface'])
-    screen = create_object("screen", *square(2.0, 4), material)
-    places = world_positions(screen)[corner_vertices(screen.data), :2] / 2 + 0.5
-    screen.data.uv_layers.new().data.foreach_set('uv', places.astype(np.float32).ravel())
+    screen = create_object("screen", *square(2.0, 4),
+                           material("screen", Emission((1, 1, 1), STRENGTH)))
+    lamp_rooms.shine_by_image(screen, pixels, world_positions(screen)[:, :2] / 2 + 0.5)
     screen.location, screen.rotation_euler = (0, 1.5, height), (np.pi / 2, 0, 0)
     bpy.context.view_layer.update()
     return floor

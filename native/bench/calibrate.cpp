@@ -11,7 +11,9 @@
 //   shadow rays; the mean of the product of the two differences is the square of the error without
 //   the reference's own noise. Not where patches of some objects are much finer than those of
 //   others: a third of the largest edge would be no reference for them.
-// Both by exposed area.
+// - True noise of an object: the light at its corners against the mean over all seeds at the same
+//   target, which has the same faults otherwise.
+// All by exposed area.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -49,6 +51,8 @@ constexpr char kUsage[] =
 constexpr int kReferenceSeeds[2] = {1 << 29, 1 << 30};
 // The largest patches' edge over the finest ones', up to which there is a surface error.
 constexpr float kMostSizes = 4;
+// Objects whose RMS light is less than this share of the brightest one's are black.
+constexpr double kBlack = 1e-4;
 // Relative standard error of the direct light of each half of the reference.
 constexpr float kReferenceShotError = 0.01f;
 
@@ -205,6 +209,74 @@ double noise(const SideLight& one, const std::vector<glm::dvec3>& mean) {
     return signal > 0 ? std::sqrt(squares / signal) : 0;
 }
 
+// What one object shows, at its corners.
+struct CornerLight {
+    std::vector<glm::dvec3> light;  // W/m^2
+    std::vector<double> area;       // exposed, m^2
+};
+
+// Of each instance that is baked, by its number.
+std::vector<CornerLight> cornerLights(const Scene& scene, const Bake& bake) {
+    const Patches& patches = bake.patches();
+    std::vector<CornerLight> result(scene.instances.size());
+    for (size_t i = 0; i < result.size(); ++i) {
+        if (scene.instances[i].role != RB_ROLE_BAKE) continue;
+        const InstanceLight& shown = bake.instanceLight(int32_t(i));
+        for (size_t c = 0; c < shown.direct.size(); ++c)
+            result[i].light.push_back(glm::dvec3(shown.direct[c] + shown.indirect[c]));
+        result[i].area.assign(shown.direct.size(), 0);
+    }
+    for (uint32_t patch = 0; patch < patches.count(); ++patch) {
+        const auto side = bakedSide(scene, patches, patch);
+        if (!side) continue;
+        const Parent& parent = patches.parents[patches.parentOf[patch]];
+        const Cell& cell = patches.cells[parent.cell];
+        const double area = double(patches.area[patch] * bake.exposedShare()[*side]);
+        for (const int32_t corner : cell.corner)
+            if (corner >= 0)
+                result[parent.instance].area[size_t(corner)] += area / cell.cornerCount();
+    }
+    return result;
+}
+
+// Notes in the rows of bakes of one target the stated and the true noise of each object. seen: per
+// bake and instance.
+void compareObjects(const std::vector<std::vector<CornerLight>>& seen,
+                    const std::vector<Json>& reports, std::vector<Json>& rows) {
+    const double count = double(seen.size());
+    auto meanSquare = [](const CornerLight& object) {
+        double squares = 0, area = 0;
+        for (size_t c = 0; c < object.light.size(); ++c) {
+            squares += object.area[c] * glm::dot(object.light[c], object.light[c]);
+            area += object.area[c];
+        }
+        return area > 0 ? squares / area : 0;
+    };
+    double brightest = 0;
+    for (const CornerLight& object : seen.front())
+        brightest = std::max(brightest, meanSquare(object));
+    for (size_t i = 0; i < seen.front().size(); ++i) {
+        if (!(meanSquare(seen.front()[i]) > kBlack * kBlack * brightest)) continue;
+        std::vector<glm::dvec3> mean(seen.front()[i].light.size(), glm::dvec3(0.0));
+        for (const auto& bake : seen)
+            for (size_t c = 0; c < mean.size(); ++c) mean[c] += bake[i].light[c] / count;
+        for (size_t k = 0; k < seen.size(); ++k) {
+            const Json& entry = reports[k].at("objects").at(i);
+            double squares = 0, signal = 0;
+            for (size_t c = 0; c < mean.size(); ++c) {
+                const glm::dvec3 off = seen[k][i].light[c] - mean[c];
+                squares += seen[k][i].area[c] * glm::dot(off, off);
+                signal += seen[k][i].area[c] * glm::dot(mean[c], mean[c]);
+            }
+            const double noise = std::sqrt(squares / signal / (1 - 1 / count));
+            rows[rows.size() - seen.size() + k]["objects"].push_back(
+                {{"name", entry.at("name")},
+                 {"stated", entry.at("error").at("noise")},
+                 {"true", noise}});
+        }
+    }
+}
+
 // ------------------------------------------------------------------------------------------------
 
 void calibrate(const std::string& path, const Options& options, std::ostream& out) {
@@ -213,7 +285,9 @@ void calibrate(const std::string& path, const Options& options, std::ostream& ou
     std::vector<Json> rows;
     std::vector<SideLight> lights;
     std::vector<Point> points;
-    for (float target : options.targets)
+    for (float target : options.targets) {
+        std::vector<std::vector<CornerLight>> seen;
+        std::vector<Json> reports;
         for (int seed = 1; seed <= options.seeds; ++seed) {
             Bake bake;
             bake.settings.patchSize = options.patchSize;
@@ -224,19 +298,24 @@ void calibrate(const std::string& path, const Options& options, std::ostream& ou
             if (points.empty() && isUniform)
                 points = reference(scene, bake.patches().size, options);
             const Json report = Json::parse(bake.reportJson());
+            Json stated = report.at("error");
+            stated["patches"] = report.at("estimated_error");
             rows.push_back({{"scene", name},
                             {"target", target},
                             {"seed", seed},
                             {"patches", report.at("patches")},
                             {"bundles", report.at("bundles")},
                             {"seconds", report.at("seconds")},
-                            {"estimated_error", report.at("estimated_error")},
-                            {"stated", report.at("error")},
+                            {"stated", stated},
                             {"warnings", report.at("warnings").size()},
                             {"true", Json::object()}});
             if (isUniform) rows.back()["true"]["surface"] = surfaceError(points, bake);
             lights.push_back(sideLight(scene, bake));
+            seen.push_back(cornerLights(scene, bake));
+            reports.push_back(report);
         }
+        if (options.seeds > 1) compareObjects(seen, reports, rows);
+    }
     std::vector<glm::dvec3> mean(lights.back().light.size(), glm::dvec3(0.0));
     const size_t firstOfLeast = lights.size() - size_t(options.seeds);
     for (size_t k = firstOfLeast; k < lights.size(); ++k)

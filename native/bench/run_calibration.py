@@ -27,6 +27,8 @@ from plot import COLORS, MARKERS, STYLE, plain_ticks  # noqa: E402
 from run_figures import ROOT, export  # noqa: E402
 
 CALIBRATE = ROOT / "build/release/native/bench/calibrate"
+# Of blend_tests/lamp_rooms.py: props under a box that shines, a sky in the window, a screen.
+ROOMS = ("room_box", "room_sky", "room_screen")
 # A bake is covered if its true error is at most so many times the stated one.
 COVERING = 1.25
 # Errors below are nothing, as in a furnace: not drawn, and covered.
@@ -36,7 +38,7 @@ NOTHING = 1e-5
 REFERENCE_BUNDLES = {'facing_squares': 20000}
 # Title of each diagram -> the stated and the true error that it compares.
 KINDS = {
-    "noise of the light on patches": ('noise', 'noise'),
+    "noise of the light on patches": ('patches', 'noise'),
     "surface error, all parts": ('total', 'surface'),
 }
 
@@ -65,6 +67,13 @@ def errors(rows: list[dict], kind: str) -> tuple[np.ndarray, np.ndarray]:
 
 def is_covered(stated: np.ndarray, true: np.ndarray) -> np.ndarray:
     return true <= np.maximum(COVERING * stated, NOTHING)
+
+
+def covered_objects(objects: list[dict]) -> str:
+    """The share of objects, each in each bake, whose stated noise covers their true one."""
+    stated, true = (np.array([entry[key] for entry in objects]) for key in ('stated', 'true'))
+    covered = is_covered(stated, true)
+    return f"{100 * covered.mean():.1f} % of {len(covered)}" if len(covered) else ""
 
 
 def draw(rows: list[dict], path: Path) -> None:
@@ -102,13 +111,14 @@ def draw(rows: list[dict], path: Path) -> None:
 def print_table(rows: list[dict]) -> None:
     """Markdown: means over the seeds in per cent, and the share of bakes that are covered."""
     print("| scene | target | noise: stated, true | covered | discretisation | mesh "
-          "| surface: stated, true | covered |")
-    print("|---|---|---|---|---|---|---|---|")
+          "| surface: stated, true | covered | noise of objects: covered |")
+    print("|---|---|---|---|---|---|---|---|---|")
     groups: dict[tuple[str, float], list[dict]] = {}
     for row in rows:
         groups.setdefault((row['scene'], row['target']), []).append(row)
     for (scene, target), group in groups.items():
         cells = [f"`{scene}`", f"{100 * target:.2g} %"]
+        objects = [entry for row in group for entry in row.get('objects', [])]
         for kind in KINDS:
             stated, true = errors(group, kind)
             if kind != next(iter(KINDS)):
@@ -117,7 +127,10 @@ def print_table(rows: list[dict]) -> None:
             cells += ([f"{100 * stated.mean():.2f}, {100 * true.mean():.2f}",
                        f"{is_covered(stated, true).sum()} of {len(group)}"] if len(true)
                       else ["", ""])
+        cells.append(covered_objects(objects))
         print("| " + " | ".join(cells) + " |")
+    objects = [entry for row in rows for entry in row.get('objects', [])]
+    print(f"\nnoise of objects: {covered_objects(objects)} are covered")
     for kind in KINDS:
         stated, true = errors(rows, kind)
         shown = stated > NOTHING
@@ -131,7 +144,8 @@ def main() -> None:
     parser.add_argument("out", nargs="?", type=Path, default=ROOT / "build/calibration",
                         help="folder of scenes and results")
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--scenes", nargs="+", choices=list(SCENES), default=list(SCENES))
+    parser.add_argument("--scenes", nargs="+", choices=[*SCENES, *ROOMS],
+                        default=[*SCENES, *ROOMS])
     parser.add_argument("--draw", action="store_true")
     parser.add_argument("--images", type=Path, default=ROOT / "docs/images")
     arguments = parser.parse_args()

@@ -25,15 +25,19 @@ SECONDS_PER_BAKE = 60
 
 
 def export(name: str, folder: Path) -> Path:
-    """The scene as JSON, made again if its .blend is newer."""
-    blend, show, hide = SCENES[name]
-    source, target = ROOT / f"scenes/{blend}.blend", folder / f"{name}.json"
+    """The scene, or room_NAME of lamp_rooms.py, as JSON, made again if its file is newer."""
+    target = folder / f"{name}.json"
+    if name in SCENES:
+        blend, show, hide = SCENES[name]
+        source = ROOT / f"scenes/{blend}.blend"
+        opened, options = [str(source)], ["--show", *show, "--hide", *hide]
+    else:
+        source, opened = ROOT / "blend_tests/lamp_rooms.py", []
+        options = ["--room", name.removeprefix("room_")]
     if target.exists() and target.stat().st_mtime > source.stat().st_mtime:
         return target
     command = [os.environ.get("BLENDER", "blender"), "-b", "--factory-startup",
-               "--python-exit-code", "1", str(source), "-P", str(EXPORT), "--", str(target)]
-    command += ["--show", *show] if show else []
-    command += ["--hide", *hide] if hide else []
+               "--python-exit-code", "1", *opened, "-P", str(EXPORT), "--", str(target), *options]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"figures: cannot export {name}:\n{done.stdout}{done.stderr}")

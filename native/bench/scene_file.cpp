@@ -53,6 +53,12 @@ Material material(const Json& item) {
         made.image = item.at("image");
         made.imageWeight = vectorAt<glm::vec3>(item.at("image_weight"));
     }
+    if (item.contains("emission_image")) {
+        made.emissionImage = item.at("emission_image");
+        for (size_t side = 0; side < 2; ++side)
+            made.emissionImageWeight[side] =
+                vectorAt<glm::vec3>(item.at("emission_image_weight"), 3 * side);
+    }
     if (item.contains("color_weight")) {
         made.usesCornerColors = true;
         made.cornerColorWeight = vectorAt<glm::vec3>(item.at("color_weight"));
