@@ -538,23 +538,30 @@ TEST_P(Studio, SendsOnAnEvenSky) {
     scene.lights.clear();
     scene.instances.erase(scene.instances.begin() + 2);
     scene.worldRadiance = glm::vec3(1);
-    Bake bake;
-    bake.settings.patchSize = 0.1f;
-    bake.settings.targetError = 0.003f;
-    bake.run(scene);
+    constexpr int kSeeds = 4;
     double reflected = 0, toWall = 0;
-    const Patches& patches = bake.patches();
-    const Irradiance& light = bake.patchIrradiance();
-    for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
-        const double area = double(patches.area[side / 2]);
-        const uint32_t instance = patches.parentAt(side).instance;
-        if (instance == 0) reflected += double(kReflected) * area * double(light.direct[side].x);
-        if (instance == 1) toWall += area * double(light.indirect[side].x);
+    for (int seed = 0; seed < kSeeds; ++seed) {
+        Bake bake;
+        bake.settings.patchSize = 0.1f;
+        bake.settings.targetError = 0.003f;
+        bake.settings.seed = seed;
+        bake.run(scene);
+        const Patches& patches = bake.patches();
+        const Irradiance& light = bake.patchIrradiance();
+        for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
+            const double area = double(patches.area[side / 2]);
+            const uint32_t instance = patches.parentAt(side).instance;
+            if (instance == 0)
+                reflected += double(kReflected) * area * double(light.direct[side].x);
+            if (instance == 1) toWall += area * double(light.indirect[side].x);
+        }
     }
     const Bsdf bsdf = GetParam() ? burley(1) : ggx(kRoughness, 1);
     const double share = GetParam() ? 1 : double(kMirrored / kReflected);
     const double expected = skyToWallBehind(share, bsdf);
-    // The noise is 0.2 %. Cells do not tell Burley's rise at grazing angles: 0.003.
+    // The noise of each seed is 0.8 %, of the lines that stand for all. Patches of 0.1 m and cells
+    // of directions are 1.8 % off with all lines, patches of 0.05 m 0.3 %; cells do not tell
+    // Burley's rise at grazing angles: 0.003.
     EXPECT_NEAR(toWall / reflected, expected, 0.005);
     EXPECT_GT(std::abs(expected - skyToWallBehind(0, bsdf)), GetParam() ? 0.005 : 0.05);
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <random>
 
 namespace raybundle {
 namespace {
@@ -58,7 +59,8 @@ TEST(LineRows, RepeatedPairsAreJoined) {
     for (int k = 0; k < 100; ++k) rows.append({&bundle});
     EXPECT_LE(rows.entryCount(), 4 * 380u);
     for (const auto& [side, lines] : row(rows, 7)) EXPECT_EQ(lines, 200u) << side;
-    EXPECT_LE(rows.byteCount(), 4 * 380u * 4 + 21 * sizeof(size_t));
+    constexpr size_t kEntries = 4 * 380;
+    EXPECT_LE(rows.byteCount(), 4 * kEntries + 21 * sizeof(size_t) + 4 * (kEntries / 64 + 1));
 }
 
 TEST(LineRows, RepeatedPairsAreJoinedWhereOneSideOfAllPatchesSeesNothing) {
@@ -71,6 +73,46 @@ TEST(LineRows, RepeatedPairsAreJoinedWhereOneSideOfAllPatchesSeesNothing) {
         for (int k = 0; k < 100; ++k) rows.append({&bundle});
         EXPECT_LE(rows.entryCount(), 4 * 128 * 20u) << parity;
     }
+}
+
+// Some lines of a row of 400 sides with one line each and one with 200: all are as often met as
+// others, and the many lines count each time for what they are, to within a step.
+TEST(LineRows, SomeLinesStandForAll) {
+    constexpr uint32_t kOthers = 400, kMany = 200, kEnough = 60, kTimes = 2000;
+    BundleLines bundle;
+    for (uint32_t side = 2; side < kOthers + 2; ++side) bundle.exchanges.push_back({0, side, 1});
+    bundle.exchanges.push_back({0, 1, kMany});
+    bundle.exchanges.push_back({5, 6, 3});
+    LineRows rows(kOthers + 2);
+    rows.append({&bundle});
+    std::mt19937 random;
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    auto within = [&](size_t) { return unit(random); };
+    constexpr double kStep = double(kOthers + kMany) / kEnough;
+    std::vector<double> sum(kOthers + 2, 0);
+    for (uint32_t k = 0; k < kTimes; ++k) {
+        double all = 0, ofMany = 0;
+        size_t visits = 0;
+        rows.visitSome(0, kEnough, within, [&](uint32_t side, float lines) {
+            ++visits;
+            all += double(lines);
+            if (side == 1) ofMany += double(lines);
+            sum[side] += double(lines) / kTimes;
+        });
+        EXPECT_LE(visits, kEnough);
+        EXPECT_NEAR(all, kOthers + kMany, 0.01);
+        EXPECT_NEAR(ofMany, kMany, kStep);
+    }
+    EXPECT_NEAR(sum[1], kMany, 0.05 * kStep);
+    // Each is met by one in ten, with ten lines: in the mean over 2000 times 1 +- 0.07.
+    for (uint32_t side = 2; side < sum.size(); ++side) EXPECT_NEAR(sum[side], 1, 0.3) << side;
+
+    double exact = 0;
+    rows.visitSome(0, kOthers + 200, within, [&](uint32_t side, float lines) {
+        exact += double(lines);
+        EXPECT_TRUE(side == 1 || lines == 1) << side;
+    });
+    EXPECT_EQ(exact, kOthers + kMany);
 }
 
 }  // namespace

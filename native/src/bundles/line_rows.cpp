@@ -56,10 +56,11 @@ void forEachEntry(const BundleLines& bundle, const Visit& visit) {
 }  // namespace
 
 LineRows::LineRows(size_t sideCount)
-    : begin(sideCount + 1, 0), entries(uninitialised<uint32_t>(0)) {}
+    : begin(sideCount + 1, 0), entries(uninitialised<uint32_t>(0)), marks(1, 0) {}
 
 size_t LineRows::byteCount() const {
-    return entryCount() * sizeof(uint32_t) + begin.size() * sizeof(begin[0]);
+    return entryCount() * sizeof(uint32_t) + begin.size() * sizeof(begin[0]) +
+           marks.size() * sizeof(marks[0]);
 }
 
 std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bundles) {
@@ -125,7 +126,24 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
         joinRepeated();
         leastRepetition = repetition();
     }
+    mark();
     return got;
+}
+
+uint32_t LineRows::linesBefore(size_t entry) const {
+    const LinesOf<uint32_t>& lines = linesOf<uint32_t>();
+    uint32_t sum = marks[entry / kMark];
+    for (size_t k = entry / kMark * kMark; k < entry; ++k) sum += lines[entries[k] & 255];
+    return sum;
+}
+
+void LineRows::mark() {
+    const LinesOf<uint32_t>& lines = linesOf<uint32_t>();
+    marks.assign(entryCount() / kMark + 1, 0);
+    parallelFor(size_t(1), marks.size(), [&](size_t m) {
+        for (size_t k = (m - 1) * kMark; k < m * kMark; ++k) marks[m] += lines[entries[k] & 255];
+    });
+    std::partial_sum(marks.begin(), marks.end(), marks.begin());
 }
 
 double LineRows::repetition() const {

@@ -41,6 +41,13 @@ class LineRows {
     const uint32_t* first(uint32_t i) const { return entries.get() + begin[i]; }
     const uint32_t* last(uint32_t i) const { return entries.get() + begin[i + 1]; }
 
+    // Visits entries of row i that stand for all of its lines: visit(side, lines). All entries if
+    // there are no more than `enough`; else those of one line of each of so many equal steps
+    // through the lines of the row: within(step) says where in a step, 0 to 1 (less). (Of each so
+    // many-th entry, one that has a third of all lines would count for nearly all, or not at all.)
+    template <class Within, class Visit>
+    void visitSome(uint32_t i, size_t enough, const Within& within, const Visit& visit) const;
+
     // Of all rows.
     size_t entryCount() const { return begin.back(); }
     size_t byteCount() const;
@@ -50,10 +57,15 @@ class LineRows {
     // Entries of a row over the different sides in it, by some of the rows.
     double repetition() const;
     void joinRepeated();
+    void mark();
+    // Lines of all entries before one, modulo 2^32.
+    uint32_t linesBefore(size_t entry) const;
 
     std::vector<size_t> begin;  // per side, into the entries; one more at the end
     std::unique_ptr<uint32_t[]> entries;
-    double leastRepetition = 1;  // after the last joining
+    static constexpr size_t kMark = 64;
+    std::vector<uint32_t> marks;  // linesBefore each kMark-th entry, and all
+    double leastRepetition = 1;   // after the last joining
 };
 
 template <class Number>
@@ -65,6 +77,38 @@ inline const LineRows::LinesOf<Number>& LineRows::linesOf() {
         return lines;
     }();
     return table;
+}
+
+template <class Within, class Visit>
+inline void LineRows::visitSome(uint32_t i, size_t enough, const Within& within,
+                                const Visit& visit) const {
+    const LinesOf<uint32_t>& lines = linesOf<uint32_t>();
+    const size_t first = begin[i], last = begin[i + 1];
+    if (last - first <= enough) {
+        for (size_t k = first; k < last; ++k)
+            visit(sideOf(entries[k]), float(lines[entries[k] & 255]));
+        return;
+    }
+    const uint32_t start = linesBefore(first);
+    const double step = double(linesBefore(last) - start) / double(enough);
+    size_t at = first;
+    uint32_t before = 0;  // lines of the row before entry `at`
+    int steps = 0;        // of entry `at`
+    for (size_t s = 0; s < enough; ++s) {
+        const auto line = uint32_t(step * (double(s) + within(s)));
+        if (line - before < lines[entries[at] & 255]) {
+            ++steps;
+            continue;
+        }
+        if (steps > 0) visit(sideOf(entries[at]), float(steps * step));
+        for (size_t m = at / kMark + 1; m * kMark < last && marks[m] - start <= line; ++m) {
+            at = m * kMark;
+            before = marks[m] - start;
+        }
+        for (; line - before >= lines[entries[at] & 255]; ++at) before += lines[entries[at] & 255];
+        steps = 1;
+    }
+    visit(sideOf(entries[at]), float(steps * step));
 }
 
 }  // namespace raybundle

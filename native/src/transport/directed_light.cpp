@@ -153,26 +153,25 @@ glm::vec3 DirectedLight::layer(uint32_t side, const glm::vec3& direction) const 
                                       angleTerms(glm::dot(layer.normal, direction)) - kEverywhere);
 }
 
-glm::vec3 DirectedLight::wayBetween(uint32_t side, uint32_t other) const {
+bool DirectedLight::areNear(uint32_t side, uint32_t other) const {
+    const glm::vec4 &from = middles[side / 2], &to = middles[other / 2];
+    const glm::vec3 way = glm::vec3(to) - glm::vec3(from);
+    const float near = kNear * (from.w + to.w);
+    return glm::dot(way, way) < near * near;
+}
+
+glm::vec3 DirectedLight::middleWay(uint32_t side, uint32_t other) const {
     const glm::vec3 way = glm::vec3(middles[other / 2]) - glm::vec3(middles[side / 2]);
     const float square = glm::dot(way, way);
     return square > 0 ? way / std::sqrt(square) : patches.normal(side);
 }
 
-glm::vec3 DirectedLight::between(uint32_t side, uint32_t other, uint32_t random) const {
-    const glm::vec4 &from = middles[side / 2], &to = middles[other / 2];
-    const glm::vec3 way = glm::vec3(to) - glm::vec3(from);
-    const float square = glm::dot(way, way), near = kNear * (from.w + to.w);
-    if (square < near * near) return betweenNear(side, other, random);
-    return towards(side, way / std::sqrt(square));
-}
-
-// By points on both patches, each pair for the lines that join it.
-glm::vec3 DirectedLight::betweenNear(uint32_t side, uint32_t other, uint32_t random) const {
+// add(weight, way): pairs of points on both patches, each for the lines that join it.
+template <class Add>
+void DirectedLight::forNearWays(uint32_t side, uint32_t other, uint32_t random,
+                                const Add& add) const {
     const glm::vec3 normal = patches.normal(side), otherNormal = patches.normal(other);
     const SobolPoints points(random);
-    glm::vec3 sum(0.0f);
-    float weights = 0;
     for (uint32_t k = 0; k < kNearPairs; ++k) {
         const glm::vec4 u = points[k];
         const glm::vec3 way =
@@ -180,10 +179,31 @@ glm::vec3 DirectedLight::betweenNear(uint32_t side, uint32_t other, uint32_t ran
         const float square = glm::dot(way, way);
         const float cosines = -glm::dot(normal, way) * glm::dot(otherNormal, way);
         if (!(square > 0) || glm::dot(normal, way) <= 0 || cosines <= 0) continue;
-        const float weight = cosines / (square * square);
-        sum += weight * towards(side, way / std::sqrt(square));
-        weights += weight;
+        add(cosines / (square * square), way / std::sqrt(square));
     }
+}
+
+glm::vec3 DirectedLight::wayBetween(uint32_t side, uint32_t other, uint32_t random) const {
+    glm::vec3 chosen = middleWay(side, other);
+    if (!areNear(side, other)) return chosen;
+    float weights = 0;
+    uint32_t draw = random;
+    forNearWays(side, other, random, [&](float weight, const glm::vec3& way) {
+        weights += weight;
+        draw = hash(draw, 0);
+        if (float(draw >> 8) * 0x1p-24f * weights < weight) chosen = way;
+    });
+    return chosen;
+}
+
+glm::vec3 DirectedLight::between(uint32_t side, uint32_t other, uint32_t random) const {
+    if (!areNear(side, other)) return towards(side, middleWay(side, other));
+    glm::vec3 sum(0.0f);
+    float weights = 0;
+    forNearWays(side, other, random, [&](float weight, const glm::vec3& way) {
+        sum += weight * towards(side, way);
+        weights += weight;
+    });
     return weights > 0 ? sum / weights : glm::vec3(0.0f);
 }
 

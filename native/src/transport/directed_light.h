@@ -54,8 +54,9 @@ class DirectedLight {
     glm::vec3 layer(uint32_t side, const glm::vec3& direction) const;
     // Whether it matters at which angle light that was reflected leaves or arrives.
     bool hasAngles() const { return !middles.empty(); }
-    // From the middle of a side's patch to that of another, unit.
-    glm::vec3 wayBetween(uint32_t side, uint32_t other) const;
+    // The way from a side to another patch's, unit: between their middles, or where they are near
+    // the way of one of the lines between the two. random: differs from call to call.
+    glm::vec3 wayBetween(uint32_t side, uint32_t other, uint32_t random) const;
 
   private:
     struct Layer {
@@ -71,7 +72,10 @@ class DirectedLight {
     void findLayers();
     double enoughLines(const FirstShot& shot) const;
     void addParts(uint32_t side, const FirstShot& shot, std::vector<Part>& parts) const;
-    glm::vec3 betweenNear(uint32_t side, uint32_t other, uint32_t random) const;
+    bool areNear(uint32_t side, uint32_t other) const;
+    glm::vec3 middleWay(uint32_t side, uint32_t other) const;
+    template <class Add>
+    void forNearWays(uint32_t side, uint32_t other, uint32_t random, const Add& add) const;
 
     const Patches& patches;
     std::vector<uint32_t> first;  // per side, into all; one more at the end

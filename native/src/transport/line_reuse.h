@@ -96,11 +96,17 @@ class LineReuse {
     std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
 
   private:
-    // The lines of a half to a side, or a share of them that stands for all (of its row as many
-    // entries at least as the target error asks for): add(share, from, entry), where of what leaves
-    // side `from` that share arrives, and entry is one of the row.
+    // Of the entries of a row, so many that stand for all: the larger number.
+    struct Enough {
+        double share = 0;  // of them
+        size_t entries = 0;
+    };
+    // As many at least as the target error asks for.
+    Enough enoughLines(double share = 0) const;
+    // The lines of a half to a side, or enough of them: add(share, from, entry), where of what
+    // leaves side `from` that share arrives, and entry numbers those that were taken.
     template <class Add>
-    void alongLines(Half half, const LineWeights& weights, double share, uint32_t side,
+    void alongLines(Half half, const LineWeights& weights, const Enough& enough, uint32_t side,
                     const Add& add) const;
     // light: per side, W/m^2, of the share that is exposed; power: W.
     void addPower(const std::vector<glm::vec3>& light, const std::vector<float>& exposed,

@@ -28,35 +28,36 @@ namespace {
 // metal, 64 are off by 0.04 to 0.3 % (RMS) from all of a row, 32 by 0.1 to 0.4, 16 by 0.3 to 0.7.
 constexpr float kLeastEntriesTimesError = 0.4f;
 constexpr float kFewestEntries = 16, kMostEntries = 256;
+// Likewise where they tell which of 36 cells of directions are open to the sky.
+constexpr size_t kLeastOpenEntries = 1024;
 constexpr float kMostReflectance = 0.999f;
 constexpr size_t kInTask = 256;  // sides: each takes long
 
 }  // namespace
 
+LineReuse::Enough LineReuse::enoughLines(double share) const {
+    const float entries = kLeastEntriesTimesError / targetError;
+    return {share, size_t(std::clamp(entries, kFewestEntries, kMostEntries))};
+}
+
 template <class Add>
-void LineReuse::alongLines(Half half, const LineWeights& weights, double share, uint32_t side,
-                           const Add& add) const {
-    const LineRows::LinesOf<float>& lines = LineRows::linesOf<float>();
+void LineReuse::alongLines(Half half, const LineWeights& weights, const Enough& enough,
+                           uint32_t side, const Add& add) const {
     if (weights.m[side] == 0) return;
     const float perLine = weights.x[side] / weights.m[side];
-    const auto least =
-        size_t(std::clamp(kLeastEntriesTimesError / targetError, kFewestEntries, kMostEntries));
-    for (size_t h = 0; h < 2; ++h) {
+    uint32_t number = 0;
+    for (uint32_t h = 0; h < 2; ++h) {
         if (half != Half::BOTH && half != Half(h)) continue;
-        const uint32_t* const begin = counts.rows(h).first(side);
-        const size_t count = size_t(counts.rows(h).last(side) - begin);
-        const size_t enough = std::min(count, std::max(least, size_t(share * double(count))));
-        // From the whole row: it may be in the order of the bundles, or of the sides.
-        const float start = float(hash(side, uint32_t(h)) >> 8) * 0x1p-24f;
-        const double step = double(count) / double(enough);
-        auto entry = [&](size_t k) { return begin[size_t((double(k) + double(start)) * step)]; };
-        float taken = 0;
-        for (size_t k = 0; k < enough; ++k) taken += lines[entry(k) & 255];
-        const float all = float(counts.total[side][h] - counts.sky[side][h]);
-        for (size_t k = 0; k < enough; ++k) {
-            const uint32_t from = LineRows::sideOf(entry(k));
-            add(perLine * all / taken * lines[entry(k) & 255] * weights.x[from], from, uint32_t(k));
-        }
+        const LineRows& rows = counts.rows(h);
+        const size_t all = size_t(rows.last(side) - rows.first(side));
+        const uint32_t seed = hash(side, h);
+        rows.visitSome(
+            side, std::max(enough.entries, size_t(enough.share * double(all))),
+            // At random, for bundles follow a pattern.
+            [&](size_t step) { return double(hash(seed, uint32_t(step)) >> 8) * 0x1p-24; },
+            [&](uint32_t from, float lines) {
+                add(perLine * lines * weights.x[from], from, number++);
+            });
     }
 }
 
@@ -64,27 +65,28 @@ std::vector<glm::vec3> LineReuse::directed(Half half, const LineWeights& weights
     if (directedLight.isNone()) return {};
     const std::vector<float> exposed = exposedShare();
     std::vector<glm::vec3> brought(counts.sideCount(), glm::vec3(0.0f));
+    const Enough enough = enoughLines(directedLight.neededLines());
     forEachSide<kInTask>(brought.size(), [&](uint32_t i) {
-        alongLines(half, weights, directedLight.neededLines(), i,
-                   [&](float share, uint32_t from, uint32_t entry) {
-                       if (directedLight.isNone(from) || exposed[from] <= 0) return;
-                       brought[i] +=
-                           share / exposed[from] *
-                           (half == Half::BOTH ? directedLight.between(from, i, hash(i, entry))
-                                               : scatteredOfSources.towards(
-                                                     from, directedLight.wayBetween(from, i)));
-                   });
+        alongLines(half, weights, enough, i, [&](float share, uint32_t from, uint32_t entry) {
+            if (directedLight.isNone(from) || exposed[from] <= 0) return;
+            brought[i] +=
+                share / exposed[from] *
+                (half == Half::BOTH ? directedLight.between(from, i, hash(i, entry))
+                                    : scatteredOfSources.towards(
+                                          from, directedLight.wayBetween(from, i, hash(i, entry))));
+        });
     });
     return brought;
 }
 
 void LineReuse::findOpen(const LineWeights& weights, ScatteredLight& scattered) const {
+    const Enough enough{0, std::max(enoughLines().entries, kLeastOpenEntries)};
     forEachSide<kInTask>(counts.sideCount(), [&](uint32_t i) {
         const float sky = skyShare(weights, i);
         if (scattered.isNone(i) || sky == 0) return;
         ScatteredLight::Hemisphere met{};
-        alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
-            scattered.add(i, -directedLight.wayBetween(from, i), share, met);
+        alongLines(Half::BOTH, weights, enough, i, [&](float share, uint32_t from, uint32_t entry) {
+            scattered.add(i, -directedLight.wayBetween(from, i, hash(i, entry)), share, met);
         });
         scattered.setOpen(i, met, sky);
     });
@@ -120,23 +122,25 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
             terms += brightest(worldExitance) * angles;
             sum += brightest(worldExitance) * share;
         }
-        alongLines(Half::BOTH, weights, 0, i, [&](float share, uint32_t from, uint32_t) {
-            const glm::vec3 way = directedLight.wayBetween(from, i);
-            glm::vec3 all = shot.emission[from] + reflected[from];
-            if (directedLight.hasLayers()) {
-                const glm::vec3 layered = directedLight.layer(from, way) * reflected[from];
-                byAngle.brought[i] += share * layered;
-                all += layered;
-            }
-            if (!scattered.isNone(from)) {
-                if (before) all += before->towards(from, way);
-                if (exposed[from] > 0) all += scatteredOfSources.towards(from, way) / exposed[from];
-            }
-            const float brightness = share * std::max(brightest(all), 0.0f);
-            terms += brightness * angleTerms(-glm::dot(way, normal));
-            sum += brightness;
-            if (scatters) scattered.add(i, -way, share * all, arriving);
-        });
+        alongLines(
+            Half::BOTH, weights, enoughLines(), i, [&](float share, uint32_t from, uint32_t entry) {
+                const glm::vec3 way = directedLight.wayBetween(from, i, hash(i, entry));
+                glm::vec3 all = shot.emission[from] + reflected[from];
+                if (directedLight.hasLayers()) {
+                    const glm::vec3 layered = directedLight.layer(from, way) * reflected[from];
+                    byAngle.brought[i] += share * layered;
+                    all += layered;
+                }
+                if (!scattered.isNone(from)) {
+                    if (before) all += before->towards(from, way);
+                    if (exposed[from] > 0)
+                        all += scatteredOfSources.towards(from, way) / exposed[from];
+                }
+                const float brightness = share * std::max(brightest(all), 0.0f);
+                terms += brightness * angleTerms(-glm::dot(way, normal));
+                sum += brightness;
+                if (scatters) scattered.add(i, -way, share * all, arriving);
+            });
         if (scatters) scattered.set(i, arriving);
         if (byAngle.reflected.empty() || !(sum > 0)) return;
         const glm::vec3 more = sumOfTerms(patches.byAngle[i], terms / sum - kEverywhere);
@@ -151,12 +155,12 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
         all += area * double(brightest(reflected[side]));
         if (!scattered.isNone(side)) bent += area * double(scattered.contrast(side));
     }
-    const double needed = shareOfLines(bent, all);
+    const Enough needed = enoughLines(shareOfLines(bent, all));
     forEachSide<kInTask>(n, [&](uint32_t i) {
-        alongLines(Half::BOTH, weights, needed, i, [&](float share, uint32_t from, uint32_t) {
+        alongLines(Half::BOTH, weights, needed, i, [&](float share, uint32_t from, uint32_t entry) {
             if (scattered.isNone(from)) return;
-            byAngle.brought[i] +=
-                share * scattered.towards(from, directedLight.wayBetween(from, i));
+            const glm::vec3 way = directedLight.wayBetween(from, i, hash(i, entry));
+            byAngle.brought[i] += share * scattered.towards(from, way);
         });
     });
     return all > 0 ? bent / all : 0;
