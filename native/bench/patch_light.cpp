@@ -23,9 +23,9 @@ namespace {
 constexpr float kUnlit = 0.01f;
 constexpr char kMagic[8] = {'r', 'b', 'l', 'i', 'g', 'h', 't', '1'};
 
-// Of the reference: samples per side and source where it is partly visible, of which an eighth tells
-// whether it is (as many as there are bundles, at most this); points of closed forms; and a seed that no
-// run has.
+// Of the reference: samples per side and source where it is partly visible, of which an eighth
+// tells whether it is (as many as there are bundles, at most this); points of closed forms; and a
+// seed that no run has.
 constexpr uint32_t kMostSamples = 8192, kClosedSamples = 256;
 // A surface no further away than this share of a patch lies against it.
 constexpr float kTouchOfPatch = 1e-3f;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The C border under arbitrary calls: bytes become calls with arbitrary numbers, ids, enums, counts
-// and settings, and a small bake. Nothing may crash, hang, leak or give a number that is not finite;
-// every refusal has a message. A libFuzzer target; native/fuzz/replay.cpp runs saved inputs without
-// it.
+// and settings, and a small bake. Nothing may crash, hang, leak or give a number that is not
+// finite; every refusal has a message. A libFuzzer target; native/fuzz/replay.cpp runs saved inputs
+// without it.
 #include <array>
 #include <cmath>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// rb_new_subdivision under arbitrary meshes: it refuses them with a message, or gives triangles with
-// valid indices and weights that sum to 1. A libFuzzer target, as api_fuzzer.cpp.
+// rb_new_subdivision under arbitrary meshes: it refuses them with a message, or gives triangles
+// with valid indices and weights that sum to 1. A libFuzzer target, as api_fuzzer.cpp.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>

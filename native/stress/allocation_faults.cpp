@@ -2,14 +2,15 @@
 //
 // A bake that runs out of memory at its first allocation, at its second, and so on to its last, on
 // whichever thread, for that allocation alone or until it ends: each time it must say so, keep the
-// results of the run before, and be as good as new afterwards. Or it gives the light that it should,
-// where whoever asked does without.
+// results of the run before, and be as good as new afterwards. Or it gives the light that it
+// should, where whoever asked does without.
 //
 //   allocation_faults [STEP [FIRST]]     fails every STEP-th allocation (1) from the FIRST-th on (0)
 //
-// The C library's malloc and its kin, and mmap, are replaced for all libraries, so that what oneTBB,
-// its allocator and Embree take fails too. Each allocation has a process of its own: whatever it
-// breaks is seen. Where STEP is 1 the first bake of a process, which starts oneTBB, is tried too.
+// The C library's malloc and its kin, and mmap, are replaced for all libraries, so that what
+// oneTBB, its allocator and Embree take fails too. Each allocation has a process of its own:
+// whatever it breaks is seen. Where STEP is 1 the first bake of a process, which starts oneTBB, is
+// tried too.
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>

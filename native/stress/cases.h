@@ -27,7 +27,8 @@ struct Case {
     Settings settings;
 
     // What is expected, one of three:
-    // - light: irradiance on every side that is baked, W/m^2, but on what is covered, where it is 0;
+    // - light: irradiance on every side that is baked, W/m^2, but on what is covered, where it is
+    //   0;
     // - like: another scene whose corners have the same light;
     // - neither: whatever keeps the energy balanced.
     std::optional<double> light;

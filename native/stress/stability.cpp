@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Bakes scenes that are hard on numbers and compares each with its exact answer, or with the same
-// room at another size or place. Prints the table of docs/stability.md; exit code 1 if a case fails.
+// room at another size or place. Prints the table of docs/stability.md; exit code 1 if a case
+// fails.
 //
 //   stability [--quick] [--only TEXT]     --only: of the names; --quick: without the long ones
 //
@@ -96,8 +97,8 @@ double worstDeviation(const Bake& bake, const Scene& scene, double light) {
     return worst;
 }
 
-// The same of the light at the corners, interpolated to the middles of these sides: root mean square
-// by exposed area.
+// The same of the light at the corners, interpolated to the middles of these sides: root mean
+// square by exposed area.
 double surfaceDeviation(const Bake& bake, const Scene& scene, double light) {
     const Patches& patches = bake.patches();
     std::vector<std::vector<glm::vec3>> lit;

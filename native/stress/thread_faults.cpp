@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A bake in a process that may start no other thread, one, two or three, of the four that were asked
-// for: it must give its light with those that it gets, and say so.
+// A bake in a process that may start no other thread, one, two or three, of the four that were
+// asked for: it must give its light with those that it gets, and say so.
 //
-// pthread_create is replaced. Each number of threads has a process of its own, since oneTBB keeps the
-// threads that it has started.
+// pthread_create is replaced. Each number of threads has a process of its own, since oneTBB keeps
+// the threads that it has started.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <sys/mman.h>

@@ -120,8 +120,8 @@ double betweenSquares(const glm::dvec3& d) {
     return d.z > 0 ? d.z * std::max(0.0, 1 - x) * std::max(0.0, 1 - y) : 0;
 }
 
-// Over 4000 bundles, those by which they learn included. The ratio is a fifth; 40 seeds tell it to a
-// third of itself.
+// Over 4000 bundles, those by which they learn included. The ratio is a fifth; 40 seeds tell it to
+// a third of itself.
 TEST(AdaptiveDirections, HaveLessThanHalfTheVarianceOfRandomOnesOnABroadLobe) {
     double variance[2];
     for (const bool isAdaptive : {false, true}) {

@@ -211,7 +211,8 @@ TEST(Cancel, AnyStageCanBeCancelledAndRunAgain) {
         }
 }
 
-// Cancels at one call and tells what the process has computed since then, in seconds of its threads.
+// Cancels at one call and tells what the process has computed since then, in seconds of its
+// threads.
 struct CancelAndCount {
     int call = 0, calls = 0;  // from 0; the calls so far
     double at = NAN;
@@ -231,8 +232,8 @@ struct CancelAndCount {
     }
 };
 
-// Land of 6400 faces, or RAYBUNDLE_CANCEL_FACES. The calls come every 20 ms, and where a stage reports
-// by itself: so a cancel comes anywhere.
+// Land of 6400 faces, or RAYBUNDLE_CANCEL_FACES. The calls come every 20 ms, and where a stage
+// reports by itself: so a cancel comes anywhere.
 TEST(Cancel, ComesAnywhereAndSoon) {
     Scene scene;
     scene.worldRadiance = glm::vec3(0.5f);

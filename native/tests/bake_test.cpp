@@ -130,8 +130,9 @@ TEST(BakeEnergy, IsBalancedUnderTheSky) {
     EXPECT_NEAR(roof, 1, 1e-4);
 }
 
-// What no line met gets in the balance what others of its object get: the power that the world sends
-// does not depend on how many patches lines meet. A ball in the sun, whose light is not asked for.
+// What no line met gets in the balance what others of its object get: the power that the world
+// sends does not depend on how many patches lines meet. A ball in the sun, whose light is not asked
+// for.
 TEST(BakeEnergy, HasNoHoleWhereNoLineMetAnything) {
     Scene scene;
     place(scene, icosphere("ball", 1, 5, false), grey("ball", 0.8f),

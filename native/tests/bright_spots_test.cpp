@@ -71,8 +71,8 @@ TEST_P(BrightSpots, GiveTheLightOfVeryManyBundles) {
     bundled.settings.skipBundles = 0;
     bundled.run(scene);
     EXPECT_EQ(spotsOf(bundled), 0u);
-    // One patch has most of the light: 16,384 bundles meet it 33,000 times, 0.6 % of noise by random
-    // lines; the gathered light has 1 % on each of many patches.
+    // One patch has most of the light: 16,384 bundles meet it 33,000 times, 0.6 % of noise by
+    // random lines; the gathered light has 1 % on each of many patches.
     EXPECT_NEAR(lightOfOthers(gathered) / lightOfOthers(bundled), 1, 0.01);
 }
 
@@ -95,8 +95,8 @@ TEST_P(BrightSpots, LeaveNoNoiseToTheRoom) {
     EXPECT_LT(noise(light[0], light[1]), 2 * std::sqrt(2.0) * 0.02);
 }
 
-// Bars a millimetre before the bright wall, as a fork on a lit table: all that their sides get comes
-// from between them.
+// Bars a millimetre before the bright wall, as a fork on a lit table: all that their sides get
+// comes from between them.
 TEST_P(BrightSpots, LightSmallThingsBesideThem) {
     std::vector<glm::vec3> light[2];
     for (int seed = 0; seed < 2; ++seed) {
@@ -118,8 +118,8 @@ TEST_P(BrightSpots, LightSmallThingsBesideThem) {
             if (patches.parentAt(side).instance > 0 && std::abs(patches.normal(side).x) > 0.9f)
                 light[seed].push_back(found.direct[side] + found.indirect[side]);
     }
-    // Two bakes differ by sqrt(2) of the noise. Measured 0.006, and 0.017 where walls are rough: these
-    // have no closed form to compare samples with.
+    // Two bakes differ by sqrt(2) of the noise. Measured 0.006, and 0.017 where walls are rough:
+    // these have no closed form to compare samples with.
     EXPECT_LT(noise(light[0], light[1]), 0.02);
 }
 
@@ -130,7 +130,8 @@ TEST_P(BrightSpots, AreNoneWhereALampIsFarFromWalls) {
     EXPECT_EQ(spotsOf(bake), 0u);
 }
 
-// Something dark far below, of 16 times the area of the room, leaves the same spots and the same light.
+// Something dark far below, of 16 times the area of the room, leaves the same spots and the same
+// light.
 TEST_P(BrightSpots, AreTheSameWithSomethingDarkFarAway) {
     for (const double distance : {0.01, 1.0}) {
         Bake bakes[2];

@@ -136,7 +136,8 @@ TEST(Clusters, LeaveAFurnaceExact) {
     expectFurnace(bake);
 }
 
-// With light of a lamp, gloss that sends it by direction, lines beyond the memory limit, light sets.
+// With light of a lamp, gloss that sends it by direction, lines beyond the memory limit, light
+// sets.
 TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
     for (const float gloss : {0.0f, 0.3f})
         for (const float megabytes : {4096.0f, 0.5f}) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Walls that go through floors or stand on them: patches lie on one side of each, and so does the light
-// at corners. The answer is exact: a sealed room under a sky is dark inside.
+// Walls that go through floors or stand on them: patches lie on one side of each, and so does the
+// light at corners. The answer is exact: a sealed room under a sky is dark inside.
 #include "patches/crossings.h"
 
 #include <gtest/gtest.h>
@@ -20,8 +20,8 @@ namespace {
 
 using namespace test;
 
-// A room of 5 x 5 m within a floor of 8 x 8 m, of planes that are larger than it and go through each
-// other, all white and under a sky of radiance 1.
+// A room of 5 x 5 m within a floor of 8 x 8 m, of planes that are larger than it and go through
+// each other, all white and under a sky of radiance 1.
 struct SealedRoom {
     const char* name = "";
     int floorCells = 16, wallCells = 12;
@@ -182,8 +182,9 @@ TEST(Crossings, WhatAPatchCountsAtCornersIsWhole) {
     EXPECT_GT(parted, 8u);
 }
 
-// In a white furnace everything that is seen has an irradiance of 1. A box covers a corner of the floor,
-// and what lies under it or inside of it, where it is dark, has no say in the light of that corner.
+// In a white furnace everything that is seen has an irradiance of 1. A box covers a corner of the
+// floor, and what lies under it or inside of it, where it is dark, has no say in the light of that
+// corner.
 TEST(Crossings, ACornerUnderABoxHasTheLightOfWhatIsSeen) {
     for (float low : {0.0f, -0.1f})
         for (double turn : {0.0, 0.3})

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Random degenerate meshes against clean ones of the same shape: fillers of T-junctions from a hundredth
-// of their edge down to nothing, T-junctions without fillers, needles, doubled faces, faces without
-// area, split edges; turned by the object's matrix or in the mesh. The light is that of the clean mesh
-// within its stated error, and takes no more than twice its patches, bundles and shadow rays.
+// Random degenerate meshes against clean ones of the same shape: fillers of T-junctions from a
+// hundredth of their edge down to nothing, T-junctions without fillers, needles, doubled faces,
+// faces without area, split edges; turned by the object's matrix or in the mesh. The light is that
+// of the clean mesh within its stated error, and takes no more than twice its patches, bundles and
+// shadow rays.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Where surfaces that are not Lambert's send light: single lobes, what the walls of a black room get
-// from its floor, and what goes up and down between its floor and a white ceiling, against the
+// Where surfaces that are not Lambert's send light: single lobes, what the walls of a black room
+// get from its floor, and what goes up and down between its floor and a white ceiling, against the
 // models as they are published.
 #include <gtest/gtest.h>
 
@@ -412,7 +412,8 @@ UpAndDown upAndDown(double whiteness, double reflectance, double share, const Bs
         return glm::dvec3(double(ceiling % kEdge - floor % kEdge) / kEdge,
                           double(ceiling / kEdge - floor / kEdge) / kEdge, 1);
     };
-    // Scaled, since that of opposite faces of a cube is known, and by so many cells 0.3 % too large.
+    // Scaled, since that of opposite faces of a cube is known, and by so many cells 0.3 % too
+    // large.
     double scale = 1;
     auto factor = [&](const glm::dvec3& d) {
         return scale * kArea / (kPi * std::pow(glm::dot(d, d), 2));

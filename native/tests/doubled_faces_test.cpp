@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Faces that lie on others, and faces without area: the light of a scene without them, and theirs is
-// that of what they lie on.
+// Faces that lie on others, and faces without area: the light of a scene without them, and theirs
+// is that of what they lie on.
 #include "patches/doubled_faces.h"
 
 #include <gtest/gtest.h>
@@ -135,7 +135,8 @@ TEST(DoubledFaces, ABakeThatGoesOnWithTheLastOneFindsThemAnew) {
     for (size_t c = 0; c < fresh.size(); ++c) EXPECT_EQ(again[c], fresh[c]);
 }
 
-// A face of no area along a border: what is shown at its vertices is the mean of their other corners.
+// A face of no area along a border: what is shown at its vertices is the mean of their other
+// corners.
 TEST(DoubledFaces, FacesWithoutAreaDoNotDarkenTheirVertices) {
     std::vector<std::vector<int32_t>> faces{{0, 1, 2, 3}};
     const std::vector<glm::vec3> vertices{

@@ -129,8 +129,8 @@ TEST(LineWindows, CountsAreSymmetricAndAddUp) {
     }
 }
 
-// A wall of 10 m with 10^8 lines a bundle, in windows of half the pixels four times as many: of each
-// half, half of the bundles, 2^32 can be counted.
+// A wall of 10 m with 10^8 lines a bundle, in windows of half the pixels four times as many: of
+// each half, half of the bundles, 2^32 can be counted.
 TEST(LineWindows, NoMoreBundlesAreTracedThanCanBeCounted) {
     Scene scene;
     place(scene, rectangle("wall", {0, 0, 0}, {10, 0, 0}, {0, 10, 0}), grey("", 0.5f));

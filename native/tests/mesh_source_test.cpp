@@ -186,8 +186,8 @@ TEST(MeshSource, HasNearlyTheClosedFormWhereItsEmissionVaries) {
     }
 }
 
-// Close to a surface of many faces most of its light is that of the nearest ones: a tenth of a face's
-// width over it, looking along it, down, or a little up.
+// Close to a surface of many faces most of its light is that of the nearest ones: a tenth of a
+// face's width over it, looking along it, down, or a little up.
 TEST(MeshSource, SamplesFindTheNearestOfManyFaces) {
     constexpr uint32_t kSamples = 64;
     constexpr int kPoints = 200;
@@ -212,7 +212,8 @@ TEST(MeshSource, SamplesFindTheNearestOfManyFaces) {
             }
             squares += std::pow(sum / double(source.irradiance(point, up)->x) - 1, 2) / kPoints;
         }
-        // Measured 0.09 and 0.12; where halves of the grid were chosen by their spheres, 1.1 and 2.1.
+        // Measured 0.09 and 0.12; where halves of the grid were chosen by their spheres, 1.1 and
+        // 2.1.
         EXPECT_LT(std::sqrt(squares), 0.2);
     }
 }
@@ -306,8 +307,8 @@ TEST(MeshSource, FillsTheHemisphereInsideOfItself) {
     }
 }
 
-// Receivers that are told to get nothing do get nothing, at any of their points; and so is a ceiling
-// closely behind a panel, however wide its patches are.
+// Receivers that are told to get nothing do get nothing, at any of their points; and so is a
+// ceiling closely behind a panel, however wide its patches are.
 TEST(MeshSource, WhatIsOutOfItsSightGetsNothing) {
     std::mt19937 random(5);
     for (const bool isPanel : {true, false}) {

@@ -79,8 +79,8 @@ TEST(NoisyParts, SmallAndDarkThingsAreAsCleanAsWalls) {
         most = std::max(most, differenceOf(instance, bake, reference));
         mostOfLines = std::max(mostOfLines, differenceOf(instance, lines, reference));
     }
-    // The target, and as much again: the noise of a part is known to a third, and that of a box's 24
-    // corners, one bake's, differs as much from bake to bake.
+    // The target, and as much again: the noise of a part is known to a third, and that of a box's
+    // 24 corners, one bake's, differs as much from bake to bake.
     EXPECT_LT(most, 2 * 0.02);
     // What is dark gains most: half of its noise, measured at seeds 0 to 4.
     EXPECT_LT(most, 0.75 * mostOfLines);
@@ -134,8 +134,8 @@ TEST(NoisyParts, StatedNoiseOfAnObjectIsThatAtItsCorners) {
             allFound += found;
         }
     }
-    // native/bench/calibration asks for 0.95 of all objects. Here each has a face a side, of which the
-    // halves give a few samples, all low in one bake of the eight: measured 43 of 48.
+    // native/bench/calibration asks for 0.95 of all objects. Here each has a face a side, of which
+    // the halves give a few samples, all low in one bake of the eight: measured 43 of 48.
     EXPECT_GE(covered, int(0.9 * kSeeds * double(objects)));
     // Corners of few faces are stated on the safe side (measured: 2.1 times what they have).
     EXPECT_LT(allStated, 2.5 * allFound);

@@ -127,9 +127,9 @@ TEST(Outlook, ARoomGetsTheSkyOfItsWindow) {
             ++sides;
         }
     }
-    // Errors of some 2000 sides are independent: in the mean of four seeds 0.1 % is left. Sides that
-    // miss the window with all their samples, whose stated error has that, lack half a percent (at
-    // target 0.01 a fifth, at 0.005 nothing).
+    // Errors of some 2000 sides are independent: in the mean of four seeds 0.1 % is left. Sides
+    // that miss the window with all their samples, whose stated error has that, lack half a percent
+    // (at target 0.01 a fifth, at 0.005 nothing).
     EXPECT_NEAR(found / exact, 1, 0.01);
     // The error that a side may have is a share of the light outside, which is 60 times as bright:
     // 1.4 % of that, from 250 rays beside those of the outside. Rays that do not know of the window

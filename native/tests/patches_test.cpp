@@ -332,8 +332,9 @@ TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnTriangles) {
 }
 
 TEST(Subdivide, PiecesThatRoundingKeepsAsLongAreNotCutForEver) {
-    // Pairs of triangles some tens of roundings long, 1 km apart: floats there are 6e-5 m apart. Each
-    // pair is a scene of its own: together they would go through each other, and be cut for that too.
+    // Pairs of triangles some tens of roundings long, 1 km apart: floats there are 6e-5 m apart.
+    // Each pair is a scene of its own: together they would go through each other, and be cut for
+    // that too.
     std::mt19937 random(1);
     std::uniform_real_distribution<float> at(0, 4e-3f), thin(0, 2e-4f);
     size_t parents = 0, count = 0;

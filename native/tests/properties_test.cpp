@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Properties that hold for whatever scene: RapidCheck makes rooms with boxes at random and shrinks
-// those that fail. Most compare two bakes with different lines: what they may differ by is a multiple
-// of what two seeds differ by.
+// those that fail. Most compare two bakes with different lines: what they may differ by is a
+// multiple of what two seeds differ by.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -21,8 +21,8 @@ namespace {
 using namespace test;
 
 // Each case is two or three bakes. The same ones in every run; for others, and more of them:
-// RC_PARAMS="max_success=200" raybundle_tests --gtest_filter='Properties*'. Read by RapidCheck before
-// the first.
+// RC_PARAMS="max_success=200" raybundle_tests --gtest_filter='Properties*'. Read by RapidCheck
+// before the first.
 const bool areFew = setenv("RC_PARAMS", "seed=1 max_success=20 max_size=20", 0) == 0;
 
 constexpr int kBundles = 128;
@@ -117,14 +117,14 @@ double allowed(const Scene& scene, const std::vector<glm::vec3>& light) {
 }
 
 // A second look, with kLooks seeds of each, where the first finds too large a difference. What two
-// seeds differ by says little where a single patch has most of the noise, such as one that is buried
-// but for a sliver, or one number is compared: of three normal numbers, two are by chance over 2.5
-// times as far apart as the third from one of them in 22 % of all cases (as in `allowed`), and two
-// are over 2.5 times as far apart as both together from two more in 2.6 % (as in reciprocity). Here
-// the difference of the means, which has the mean square `variance`, is compared with it. With 14
-// degrees of freedom it is over kDeviations times as large once in 5000 second looks; and that is
-// 2.5 standard deviations of a bake, where the first look allows 3.5, root mean square.
-// first, second: (seed) -> light; share: of the light, that is allowed besides.
+// seeds differ by says little where a single patch has most of the noise, such as one that is
+// buried but for a sliver, or one number is compared: of three normal numbers, two are by chance
+// over 2.5 times as far apart as the third from one of them in 22 % of all cases (as in `allowed`),
+// and two are over 2.5 times as far apart as both together from two more in 2.6 % (as in
+// reciprocity). Here the difference of the means, which has the mean square `variance`, is compared
+// with it. With 14 degrees of freedom it is over kDeviations times as large once in 5000 second
+// looks; and that is 2.5 standard deviations of a bake, where the first look allows 3.5, root mean
+// square. first, second: (seed) -> light; share: of the light, that is allowed besides.
 constexpr int kLooks = 8;
 constexpr double kDeviations = 5;
 

@@ -75,15 +75,16 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
     part.run(scene);
 
     const std::vector<glm::vec3> right = lightAt(fine, corners);
-    // 40 vertices: their RMS varies by a ninth; one of two is 1.5 times the other once in 200 pairs.
+    // 40 vertices: their RMS varies by a ninth; one of two is 1.5 times the other once in 200
+    // pairs.
     const double ofPart = noise(lightAt(part, corners), right),
                  ofWhole = noise(lightAt(whole, corners), right);
     std::printf("[ figures  ] %s: noise %.4f, of all %.4f\n", GetParam(), ofPart, ofWhole);
     EXPECT_LT(ofPart, 1.5 * ofWhole + 0.01);
     const Json less = reportOf(part), more = reportOf(whole);
     const double fewer = less["shadow_rays"].get<double>() / more["shadow_rays"].get<double>();
-    // Of least squares all have the light of patches, and so few gather theirs: for as many rays, but
-    // to less than half the noise. Rays count by the square of that.
+    // Of least squares all have the light of patches, and so few gather theirs: for as many rays,
+    // but to less than half the noise. Rays count by the square of that.
     if (isOfPatches)
         EXPECT_LT(fewer * std::pow(ofPart / ofWhole, 2), 0.7);
     else
@@ -123,7 +124,8 @@ struct SubdividedBall {
 };
 
 TEST(ResultCorners, OfAFinerMeshAreAsRightForNoMoreBundles) {
-    // Chords of the coarser ball, of 1280 faces, are 1 % of its radius inside the finer one, of 20,480.
+    // Chords of the coarser ball, of 1280 faces, are 1 % of its radius inside the finer one, of
+    // 20,480.
     constexpr double kShape = 0.01;
     const SubdividedBall right(5, 0.004f, 1), coarse(3), fine(5);
     EXPECT_LT(noise(coarse.light, right.light), 0.02 + kShape);
@@ -154,8 +156,8 @@ TEST(ResultCorners, StateTheNoiseOfWhatTheyGather) {
     }
     const double found = std::sqrt(squares / signal);
     std::printf("[ figures  ] stated %.4f, found %.4f\n", stated, found);
-    // What is stated is a bound: beside edges of shadows it is as large as the noise, in light as smooth
-    // as here samples converge faster.
+    // What is stated is a bound: beside edges of shadows it is as large as the noise, in light as
+    // smooth as here samples converge faster.
     EXPECT_LT(found, stated);
     EXPECT_LT(stated, 0.03);
 }

@@ -255,8 +255,8 @@ TEST(Sheets, BundlesAreTheSame) {
     expectSameBundles(patches);
 }
 
-// The faces of a floor that a box stands on are cut along its outline, and some tiles are cut; it is
-// one sheet all the same.
+// The faces of a floor that a box stands on are cut along its outline, and some tiles are cut; it
+// is one sheet all the same.
 TEST(Sheets, WhatWallsAndLightCutStaysOne) {
     Scene scene = roomOfGrids();
     const Patches room = subdivide(scene, 0.08f, kMany);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Slivers in a mesh, as booleans leave them and as T-junctions are filled with, cost nothing and change
-// nothing, however thin they are and however the mesh lies: the light, its stated error and the number
-// of bundles are those of a mesh whose slivers are a hundredth of their edge.
+// Slivers in a mesh, as booleans leave them and as T-junctions are filled with, cost nothing and
+// change nothing, however thin they are and however the mesh lies: the light, its stated error and
+// the number of bundles are those of a mesh whose slivers are a hundredth of their edge.
 #include <gtest/gtest.h>
 
 #include <array>

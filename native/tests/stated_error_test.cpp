@@ -298,8 +298,8 @@ TEST(StatedError, CoversTheNoiseOverManySeeds) {
     const std::vector<double> ofSides = ratios(&Light::ofSides, &Light::stated);
     EXPECT_LE(std::count_if(ofSides.begin(), ofSides.end(), [](double r) { return r > 1.25; }),
               kMost);
-    // The cells here are whole walls: their means are few numbers, of which one difference of halves
-    // tells the noise to a half. Root mean square over the seeds it is right.
+    // The cells here are whole walls: their means are few numbers, of which one difference of
+    // halves tells the noise to a half. Root mean square over the seeds it is right.
     double squares = 0;
     for (double r : ratios(&Light::ofCells, &Light::shown)) squares += r * r / kSeeds;
     EXPECT_GT(std::sqrt(squares), 1 / 1.5);

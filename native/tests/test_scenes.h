@@ -36,8 +36,8 @@ inline Mesh rectangle(const std::string& name, const glm::vec3& origin, const gl
 }
 // Six quads, with their fronts inside or outside.
 Mesh box(const std::string& name, const glm::vec3& low, const glm::vec3& high, bool inward);
-// A floor of n x n squares of 1 m from the origin on, every other column of which is cut in half; the
-// T-junctions are filled with slivers, `height` high. The quads come first.
+// A floor of n x n squares of 1 m from the origin on, every other column of which is cut in half;
+// the T-junctions are filled with slivers, `height` high. The quads come first.
 Mesh floorWithSlivers(int n, float height);
 // An icosahedron whose faces are cut in four `levels` times and blown up to a sphere around the
 // origin.

@@ -7,8 +7,8 @@
 
 namespace {
 
-// An array, since there may be no memory for more when it is needed: glibc ends the process where it
-// cannot note the destructor of a thread_local string.
+// An array, since there may be no memory for more when it is needed: glibc ends the process where
+// it cannot note the destructor of a thread_local string.
 thread_local char lastMessage[2048];
 
 }  // namespace

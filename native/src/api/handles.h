@@ -43,8 +43,8 @@ class Handles {
         if (!slot->second.isInUse) last = all.remove(slot);
     }
 
-    // Of Held. Throws INVALID_ARGUMENT for a handle that is not open, INVALID_OPERATION for one that
-    // is in use.
+    // Of Held. Throws INVALID_ARGUMENT for a handle that is not open, INVALID_OPERATION for one
+    // that is in use.
     static Value& take(Handle handle, const char* name) {
         if (!handle) throw invalidArgument(std::string(name) + " must not be NULL");
         Handles& all = instance();
@@ -74,8 +74,8 @@ class Handles {
     };
     using Slots = std::unordered_map<Handle, Slot>;
 
-    // Never destroyed: what the caller did not release must not go when the program ends, after what
-    // it is made of.
+    // Never destroyed: what the caller did not release must not go when the program ends, after
+    // what it is made of.
     static Handles& instance() {
         static Handles* const all = new Handles;
         return *all;

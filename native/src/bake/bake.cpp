@@ -48,9 +48,9 @@ constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e
 constexpr double kFarAway = 2.5;
 constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
 // So many times the target may be left where sides cast rays: else what these met is too noisy, and
-// more bundles are worth their time as long as they take it down to this share of what it was. If so
-// many times the target are left at first, as between the books of a shelf, that would take dozens of
-// times the bundles, and all rays again with each doubling.
+// more bundles are worth their time as long as they take it down to this share of what it was. If
+// so many times the target are left at first, as between the books of a shelf, that would take
+// dozens of times the bundles, and all rays again with each doubling.
 constexpr double kLeftWithRays = 2, kWorthMore = 0.75, kOutOfReach = 12;
 
 // Rays of a side in the first pass, which each further pass may double.
@@ -141,8 +141,9 @@ void checkFinite(const std::vector<InstanceLight>& instances) {
 Bake::Bake() = default;
 Bake::~Bake() = default;
 
-// Where memory runs out or a cancel comes anywhere, patches, lines and solutions may be left half-made,
-// and none of them goes to the next bake. After a cancel between two steps Trace::isWhole tells.
+// Where memory runs out or a cancel comes anywhere, patches, lines and solutions may be left
+// half-made, and none of them goes to the next bake. After a cancel between two steps
+// Trace::isWhole tells.
 void Bake::run(const Scene& scene) {
     checkCombination(settings, scene.lightSets.size());
     makeRoomForTreeBuilders();
@@ -444,7 +445,8 @@ SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, const Show
     return result;
 }
 
-// Solves for all bundles there are. error: of the light, relative. Returns what is to be said of it.
+// Solves for all bundles there are. error: of the light, relative. Returns what is to be said of
+// it.
 Report Bake::finishSolve(const Transports& transports, SetLights& lights, const ShownLight& shown,
                          double error) const {
     Report report;
@@ -457,8 +459,9 @@ Report Bake::finishSolve(const Transports& transports, SetLights& lights, const 
     return report;
 }
 
-// Noisy sides cast rays of their own, and more of them as long as that helps. halves: of each light,
-// as they arrive. look: at them with these rays. Returns what is left, see NoisyParts::lookWithRays.
+// Noisy sides cast rays of their own, and more of them as long as that helps. halves: of each
+// light, as they arrive. look: at them with these rays. Returns what is left, see
+// NoisyParts::lookWithRays.
 double Bake::castRays(NoisyParts& noisyParts, SetLights& lights,
                       std::vector<std::array<Irradiance, 2>>& halves,
                       const std::function<double(uint32_t)>& look, Report& report) const {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Stopping a bake wherever it is. All that a bake does runs under one context of oneTBB; the thread that
-// asked for the bake tells the caller how far it is, and cancels that context where the caller wants to
-// stop. Loops look whether it is: the parallel ones do by themselves, between two pieces of work, and
-// those that take long in one thread by throwIfCancelled().
+// Stopping a bake wherever it is. All that a bake does runs under one context of oneTBB; the thread
+// that asked for the bake tells the caller how far it is, and cancels that context where the caller
+// wants to stop. Loops look whether it is: the parallel ones do by themselves, between two pieces
+// of work, and those that take long in one thread by throwIfCancelled().
 #pragma once
 
 #include <tbb/parallel_for.h>
@@ -44,11 +44,11 @@ void parallelInvoke(const Bodies&... bodies) {
 
 enum class Cancelled { NO, BETWEEN_STEPS, ANYWHERE };
 
-// Runs `work` in a thread of its own, with a progress to report to and a context that is cancelled, while
-// the calling thread passes the reports on to `progress`, and repeats what came last every 20 ms. Where
-// the caller stops the work at a report it ends between two steps, else anywhere: what it works on may
-// then be half-made. Throws what the work throws. Where no thread can be started, or nobody wants to
-// know, the work runs in the calling one.
+// Runs `work` in a thread of its own, with a progress to report to and a context that is cancelled,
+// while the calling thread passes the reports on to `progress`, and repeats what came last every 20
+// ms. Where the caller stops the work at a report it ends between two steps, else anywhere: what it
+// works on may then be half-made. Throws what the work throws. Where no thread can be started, or
+// nobody wants to know, the work runs in the calling one.
 using Work = std::function<void(const Progress& progress, tbb::task_group_context& context)>;
 Cancelled runCancellable(const Progress& progress, const Work& work);
 

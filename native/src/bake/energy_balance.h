@@ -14,8 +14,8 @@ namespace raybundle {
 
 // Compares the power that the lights emit with what surfaces absorb and what leaves the scene: adds
 // those of one light set. exposedShare, openShare: per side, what nothing covers and the share of
-// its lines that leave the scene, as Transport::openShare has it: sides of which nothing is known get
-// what others of their object do by lines, in the mean.
+// its lines that leave the scene, as Transport::openShare has it: sides of which nothing is known
+// get what others of their object do by lines, in the mean.
 void balanceEnergy(const Patches& patches, const SetLight& light,
                    const std::vector<float>& exposedShare, const std::vector<float>& openShare,
                    Report& report);

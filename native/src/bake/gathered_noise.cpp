@@ -7,9 +7,9 @@
 namespace raybundle {
 namespace {
 
-// Of the noise that the patches of a part have in common, what is left at a corner that gathers from
-// many parts, which absorb some of it. Fitted: with it the room `subdivided` of lamp_noise.py states
-// 0.93 and 1.30 times its true noise, at 0.02 and 0.005.
+// Of the noise that the patches of a part have in common, what is left at a corner that gathers
+// from many parts, which absorb some of it. Fitted: with it the room `subdivided` of lamp_noise.py
+// states 0.93 and 1.30 times its true noise, at 0.02 and 0.005.
 constexpr float kShare = 0.3f;
 
 }  // namespace

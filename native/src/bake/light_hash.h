@@ -9,8 +9,8 @@
 
 namespace raybundle {
 
-// Of what decides how many samples GATHER takes, and of which, and what it keeps of them, but for the
-// lights. isShown: per side; hasDirections: whether it keeps where light comes from.
+// Of what decides how many samples GATHER takes, and of which, and what it keeps of them, but for
+// the lights. isShown: per side; hasDirections: whether it keeps where light comes from.
 uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vector<bool>& isShown,
                   bool hasDirections);
 

@@ -12,9 +12,9 @@ constexpr double kSmallSample = 0.15;
 // Bundles may have this share of the target at least: less of theirs would cost many and hardly be
 // seen beside the noise of the first shot.
 constexpr double kLeastOfBundles = 0.6;
-// The values at corners whose interpolation is nearest to the light have so many times the variance of
-// the cells' means, as far as that is random: of a grid, the inverse of the hat functions' mass matrix
-// has sqrt 3 on its diagonal along each axis.
+// The values at corners whose interpolation is nearest to the light have so many times the variance
+// of the cells' means, as far as that is random: of a grid, the inverse of the hat functions' mass
+// matrix has sqrt 3 on its diagonal along each axis.
 constexpr double kCornersOfMeans = 3;
 // Weight of the looks before.
 constexpr double kMemory = 0.5;
@@ -40,8 +40,8 @@ Noise::Noise(const Looks& before, const std::vector<float>& weight,
 void Noise::measure(const std::array<Irradiance, 2>& half) {
     const size_t n = weight.size();
     difference.resize(n);
-    // Sums over the sides of a cell: of the weight, of it times half the difference of the halves, of
-    // its square times the variance of the first shot; and of its square times the powers of the
+    // Sums over the sides of a cell: of the weight, of it times half the difference of the halves,
+    // of its square times the variance of the first shot; and of its square times the powers of the
     // difference, for what differs from side to side.
     struct Cell {
         double weight = 0, direct = 0, sides = 0;

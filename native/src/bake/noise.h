@@ -2,8 +2,8 @@
 //
 // The noise: how far the light on the patch sides, and that which is shown of it, is from that of
 // infinitely many bundles and shadow rays on the same patches. Light is shown interpolated over the
-// cells of the user's faces, so that what differs from patch to patch within a cell is not seen: the
-// shown noise is that of the values at the corners, by that of the cells' means.
+// cells of the user's faces, so that what differs from patch to patch within a cell is not seen:
+// the shown noise is that of the values at the corners, by that of the cells' means.
 //
 // Source: thesis section 4.3.3 (stated error).
 // Differs:
@@ -35,10 +35,10 @@ struct Looks {
 
 class Noise {
   public:
-    // before: of earlier bakes with these lines. weight: per side of tiles, exposed area in m^2 where
-    // the light is a result, else 0. directError: per side, standard error of the first shot, W/m^2,
-    // independent of that of others. cellOf: per side, the cell that shows it. All must outlive the
-    // object.
+    // before: of earlier bakes with these lines. weight: per side of tiles, exposed area in m^2
+    // where the light is a result, else 0. directError: per side, standard error of the first shot,
+    // W/m^2, independent of that of others. cellOf: per side, the cell that shows it. All must
+    // outlive the object.
     Noise(const Looks& before, const std::vector<float>& weight,
           const std::vector<float>& directError, const std::vector<uint32_t>& cellOf);
 
@@ -51,9 +51,9 @@ class Noise {
     double relative() const;
     double shown() const;
     double ofBundles() const;  // without that of the first shot
-    // So many times too large is the noise of bundles for a relative target beside that of the first
-    // shot, which they do not help: beside what is shown of that, where the target is out of reach
-    // on the sides.
+    // So many times too large is the noise of bundles for a relative target beside that of the
+    // first shot, which they do not help: beside what is shown of that, where the target is out of
+    // reach on the sides.
     double excess(double target) const;
     Looks looks() const;
     // So many times the last look's squares are the noise of bundles, by the looks before it too.
@@ -61,8 +61,8 @@ class Noise {
     // Per side: half the difference of the halves, brought to the stated size, W/m^2.
     std::vector<glm::vec3> perSide() const;
     // Of one side of a cell, of the last look: the noise of bundles in its mean, what of that is
-    // because patches differ at random, that of the first shot, and the light; squares summed over RGB,
-    // (W/m^2)^2.
+    // because patches differ at random, that of the first shot, and the light; squares summed over
+    // RGB, (W/m^2)^2.
     struct OfCell {
         double area = 0;  // exposed, m^2; 0: it has no result
         double noise = 0, random = 0, direct = 0, light = 0;

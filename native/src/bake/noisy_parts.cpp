@@ -18,25 +18,25 @@ constexpr double kDark = 0.05;
 // So many cells of the whole object are added to those of a part, as they are without the noisiest
 // ones: a few that are nearly covered say nothing of the others.
 constexpr double kOfObject = 4, kUsual = 0.95;
-// Time that a line takes, projected, kept and solved with, over that of local rays which tell as much
-// (30 ns, and 400 ns a ray; measured in cornell_box).
+// Time that a line takes, projected, kept and solved with, over that of local rays which tell as
+// much (30 ns, and 400 ns a ray; measured in cornell_box).
 constexpr double kLineOverRays = 0.15;
-// Where there are windows of finer lines, a face takes the time of so many lines in each bundle, for it
-// is projected in several of them (1.8 us on 24,000 leaves, most of which lie in some).
+// Where there are windows of finer lines, a face takes the time of so many lines in each bundle,
+// for it is projected in several of them (1.8 us on 24,000 leaves, most of which lie in some).
 constexpr double kLinesOfFace = 30;
-// Rays lose and make light by their noise, which lines do not: what gets more than this share of all lines
-// is left to these.
+// Rays lose and make light by their noise, which lines do not: what gets more than this share of
+// all lines is left to these.
 constexpr double kMostByRays = 0.4;
-// Rays of a side: those that are fewer tell nothing. They are to tell as much as so many times the lines
-// that would do: of parts which only lines clean most are below the target, and the noise of others'
-// rays would be at it everywhere (objects of open_court 5.1 -> 4.4 % at the 95th percentile, of
-// instances 6.5 -> 4.4).
+// Rays of a side: those that are fewer tell nothing. They are to tell as much as so many times the
+// lines that would do: of parts which only lines clean most are below the target, and the noise of
+// others' rays would be at it everywhere (objects of open_court 5.1 -> 4.4 % at the 95th
+// percentile, of instances 6.5 -> 4.4).
 constexpr double kFewestRays = 8, kSamplesByRays = 2;
-// More rays where some have taken an object's noise to less than this share of what it was, and not below
-// so many targets; at most so many times the samples.
+// More rays where some have taken an object's noise to less than this share of what it was, and not
+// below so many targets; at most so many times the samples.
 constexpr double kWorthMoreRays = 0.85, kNearlyClean = 1.25, kMostGrowth = 4;
-// What a pass of twice the rays leaves at best (measured in the rooms of house_on_plain). Objects that
-// all passes to come will not clean get no more.
+// What a pass of twice the rays leaves at best (measured in the rooms of house_on_plain). Objects
+// that all passes to come will not clean get no more.
 constexpr double kLeftByPass = 0.55;
 // A lower target than this has rays where this one has.
 constexpr double kUsualTarget = 0.02;
@@ -94,8 +94,8 @@ std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
     }
     const double allArea = std::accumulate(area.begin(), area.end(), 0.0);
     const double mean = std::accumulate(light.begin(), light.end(), 0.0) / std::max(allArea, 1e-30);
-    // Per part, and of the whole object but for its worst cells: sums of squares, and of cells, which
-    // count by how much of them is to be seen.
+    // Per part, and of the whole object but for its worst cells: sums of squares, and of cells,
+    // which count by how much of them is to be seen.
     std::vector<double> squares(parts.size(), 0), weights(parts.size(), 0);
     std::vector<std::vector<std::pair<double, double>>> ofInstance(growth.size());
     for (const SeenCell& cell : cells) {

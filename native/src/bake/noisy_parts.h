@@ -10,8 +10,8 @@
 // - A bundle takes time for each line, wherever that goes, and for each face in its windows. While
 //   the parts that need more of them get so many of the lines that rays would take longer, another
 //   bundle is cheaper.
-// - Rays come in passes. What a pass leaves on an object is seen in its halves; each sees what those
-//   before have brought.
+// - Rays come in passes. What a pass leaves on an object is seen in its halves; each sees what
+//   those before have brought.
 #pragma once
 
 #include <cstdint>
@@ -26,11 +26,11 @@ namespace raybundle {
 
 class NoisyParts {
   public:
-    // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it has
-    // a result. shown: where corners gather instead of showing their side's light, rays do not help.
-    // projections: of sheets and single faces, of each bundle, where there are windows of finer lines;
-    // else 0. target: relative. growth: per instance, see cornerGrowth; it and the tiles must outlive
-    // the object.
+    // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it
+    // has a result. shown: where corners gather instead of showing their side's light, rays do not
+    // help. projections: of sheets and single faces, of each bundle, where there are windows of
+    // finer lines; else 0. target: relative. growth: per instance, see cornerGrowth; it and the
+    // tiles must outlive the object.
     NoisyParts(const Tiles& tiles, const Looks& before, const std::vector<float>& weight,
                const ShownLight& shown, const std::vector<double>& growth, double projections,
                double target);
@@ -45,14 +45,14 @@ class NoisyParts {
     // the cheapest remedy.
     double excess() const;
     // For each side of the patches that has too few samples for the target: rays. By the last look
-    // alone: the same light has the same ones, whatever was baked before. samples: per side and half,
-    // how many lines have met it, and rays by what they tell. most: of a side.
+    // alone: the same light has the same ones, whatever was baked before. samples: per side and
+    // half, how many lines have met it, and rays by what they tell. most: of a side.
     std::vector<ExtraRays> rays(const std::vector<std::array<float, 2>>& samples,
                                 uint32_t most) const;
-    // As of a look at the halves with these rays: objects that they made cleaner, but not clean, are to
-    // have more if furtherPasses of twice as many each may clean them. Returns how many times too large
-    // is what is left, on the object where that is most: of nine parts of ten of it. It is the noise of
-    // the light that rays met, and their own.
+    // As of a look at the halves with these rays: objects that they made cleaner, but not clean,
+    // are to have more if furtherPasses of twice as many each may clean them. Returns how many
+    // times too large is what is left, on the object where that is most: of nine parts of ten of
+    // it. It is the noise of the light that rays met, and their own.
     double lookWithRays(const SetNoise& noise, uint32_t furtherPasses);
 
   private:
@@ -60,11 +60,11 @@ class NoisyParts {
         uint32_t instance = 0;
         bool isGathered = false;
         double sides = 0, lines = 0;
-        // Squares of the noise at corners over the light there: by the last look, and pooled with those
-        // before.
+        // Squares of the noise at corners over the light there: by the last look, and pooled with
+        // those before.
         double last = 0, squares = 0;
-        // Whether rays are worth their time; so many times the samples that the last look foretells are
-        // to be had.
+        // Whether rays are worth their time; so many times the samples that the last look foretells
+        // are to be had.
         bool wantsRays = true;
         double wanting = 1;
     };

@@ -3,10 +3,10 @@
 // The noise at the corners of each object, which is what it shows.
 //
 // Source: none; what the halves tell of the whole scene (bake/noise.h), by object.
-// - Values at corners whose interpolation is nearest to the light have more variance than the
-//   means of cells, as far as that is random within these: 3 times in a grid, where there is one
-//   corner a cell (the diagonal of the inverse of the hat functions' mass matrix), and 16 times on a
-//   quad by itself, which has four of them.
+// - Values at corners whose interpolation is nearest to the light have more variance than the means
+//   of cells, as far as that is random within these: 3 times in a grid, where there is one corner a
+//   cell (the diagonal of the inverse of the hat functions' mass matrix), and 16 times on a quad by
+//   itself, which has four of them.
 // - Few cells are few samples: their noise is stated higher, by the chance that they agree.
 #pragma once
 
@@ -18,8 +18,8 @@
 
 namespace raybundle {
 
-// The noise at corners over what is foretold of it (measured in cornell_box, two_rooms and big_room:
-// 0.9 to 1.7). Samples of direct light end when they agree, also where that is by chance.
+// The noise at corners over what is foretold of it (measured in cornell_box, two_rooms and
+// big_room: 0.9 to 1.7). Samples of direct light end when they agree, also where that is by chance.
 constexpr double kAtCorners = 1.4;
 
 // Per instance: how much the variance grows from the means of cells to corners, as far as it is
@@ -30,9 +30,9 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches);
 // look. growth: of its instance.
 double bundlesAtCorners(const Noise::OfCell& cell, double growth);
 
-// Per instance, relative to the RMS of its light, which is taken to be a hundredth of the scene's at
-// least: the noise at corners, that of the first shot included. tiles: whose cells these are; growth:
-// per instance.
+// Per instance, relative to the RMS of its light, which is taken to be a hundredth of the scene's
+// at least: the noise at corners, that of the first shot included. tiles: whose cells these are;
+// growth: per instance.
 std::vector<double> noiseOfObjects(const Scene& scene, const Patches& tiles, const Noise& noise,
                                    const std::vector<double>& growth);
 

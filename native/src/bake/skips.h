@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Work that a bake leaves out where the scene does not need it. Each skip can be switched off by the
-// setting "skip.NAME", to test that the result stays the same and to measure what it saves; all are
-// on by default.
+// Work that a bake leaves out where the scene does not need it. Each skip can be switched off by
+// the setting "skip.NAME", to test that the result stays the same and to measure what it saves; all
+// are on by default.
 #pragma once
 
 namespace raybundle {

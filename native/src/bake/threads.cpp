@@ -29,8 +29,8 @@ bool prepare() noexcept {
 }
 const bool isPrepared = prepare();
 
-// Starts threads until there are as many at once, with the caller's, or no more can be. oneTBB keeps
-// those that it has, so that what went once is not tried again.
+// Starts threads until there are as many at once, with the caller's, or no more can be. oneTBB
+// keeps those that it has, so that what went once is not tried again.
 int startable(int wanted) {
     static std::mutex mutex;
     static int known = 1;

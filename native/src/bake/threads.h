@@ -8,8 +8,8 @@
 namespace raybundle {
 
 // The threads of a bake while it lives. oneTBB ends the process where one of its threads cannot
-// start another (2021.8: private_worker::run is noexcept and launches), and so whether as many can be
-// started is tried before; else it gets as many as could.
+// start another (2021.8: private_worker::run is noexcept and launches), and so whether as many can
+// be started is tried before; else it gets as many as could.
 class Threads {
   public:
     // asked: 0 is as many as oneTBB takes, which is also the most.

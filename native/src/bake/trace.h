@@ -58,8 +58,8 @@ struct Trace {
                                            : surrounding.exposed;
     }
 
-    // Per side: the lines that have met it, however dense they are, not where it is covered; and those
-    // of each half.
+    // Per side: the lines that have met it, however dense they are, not where it is covered; and
+    // those of each half.
     std::vector<float> linesMet() const;
     std::vector<std::array<float, 2>> linesByHalf() const;
     double linesMetByAll() const;  // of all sides

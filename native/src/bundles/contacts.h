@@ -20,8 +20,8 @@ namespace raybundle {
 
 class Contacts {
   public:
-    // touchDistance: two surfaces not further apart than this touch, metres; in each island no further than
-    // Island::touchDistance. `patches` must outlive it.
+    // touchDistance: two surfaces not further apart than this touch, metres; in each island no
+    // further than Island::touchDistance. `patches` must outlive it.
     Contacts(const Patches& patches, float touchDistance)
         : patches(patches), touchDistance(double(touchDistance)) {}
 

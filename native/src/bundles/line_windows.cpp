@@ -39,8 +39,8 @@ constexpr double kMostUnits = double(1u << 31) / kMostWindowBundles;
 // The same between islands, and the least bundles that must be possible: a side has half of the
 // units in each bundle at most, so that they need not fit twice.
 constexpr double kLeastMostBundles = 4096, kMostIslandUnits = 0x1p32 / kLeastMostBundles;
-// All islands together may cost so much more than each would alone, as a share of what the first one
-// costs: else the pixels of large ones are coarser.
+// All islands together may cost so much more than each would alone, as a share of what the first
+// one costs: else the pixels of large ones are coarser.
 constexpr double kMostMore = 0.25;
 
 struct Box {
@@ -62,8 +62,8 @@ struct Box {
         return 0.5 * (d.x * d.y + d.y * d.z + d.z * d.x);
     }
     // Of the rectangle around its shadow, which is what a window has, mean over all directions and
-    // turns of the plane, in proportion: for a cube it is the shadow. (Of two axes at right angles at
-    // random |r.x u.x| has the mean 2 / (3 pi), and |r.x u.y| by simulation 0.2705.)
+    // turns of the plane, in proportion: for a cube it is the shadow. (Of two axes at right angles
+    // at random |r.x u.x| has the mean 2 / (3 pi), and |r.x u.y| by simulation 0.2705.)
     double meanRectangle() const {
         if (isEmpty()) return 0;
         const glm::dvec3 d(high - low);
@@ -363,8 +363,8 @@ void findWindows(const Patches& patches, const Clustering& clustering, float pix
     }
 }
 
-// How often the edge of a pixel is halved for an island: of those after the first not at all as long
-// as their patches have pixels enough.
+// How often the edge of a pixel is halved for an island: of those after the first not at all as
+// long as their patches have pixels enough.
 int halvings(const IslandDensity& island, double pixel, bool isFirst) {
     const double finer = std::log2(pixel / double(island.density.pixelSize));
     return isFirst || finer > 1.25 ? std::clamp(int(std::lround(finer)), 0, kMostHalvings) : 0;

@@ -42,9 +42,9 @@ struct LineDensity {
 // Windows for patches that pixels of one size would starve, in each island (patches/patch_size.h)
 // as if it were alone, and around whole islands whose pixels are finer than those of large ones far
 // away. An island without enough starved patches has no windows in it, and its pixels stay as they
-// are. pixelSizes: per island, edge of a pixel by its patches, metres; pixelsPerPatch: pixels that a
-// patch should have outside of windows, by area; leastPixelSizes: per island, of the pixels outside
-// of its windows, metres.
+// are. pixelSizes: per island, edge of a pixel by its patches, metres; pixelsPerPatch: pixels that
+// a patch should have outside of windows, by area; leastPixelSizes: per island, of the pixels
+// outside of its windows, metres.
 LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pixelSizes,
                             float pixelsPerPatch, const std::vector<float>& leastPixelSizes);
 

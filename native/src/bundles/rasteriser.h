@@ -7,13 +7,13 @@
 // every shape and size, and neighbouring faces never both take or both miss a pixel.
 // ROULETTE: see bundles/roulette.h.
 //
-// The plane can be looked at in several views, one after the other: the regions where the shadows of
-// islands are (patches/patch_size.h), with nothing between, and each window with its finer pixels
-// (bundles/line_windows.h). Each point of the plane belongs to one view at most; regions have the
-// pixels that the whole has there.
+// The plane can be looked at in several views, one after the other: the regions where the shadows
+// of islands are (patches/patch_size.h), with nothing between, and each window with its finer
+// pixels (bundles/line_windows.h). Each point of the plane belongs to one view at most; regions
+// have the pixels that the whole has there.
 //
-// Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised, and sheets of
-// them (patches/sheets.h); the patch follows from the affine coordinates.
+// Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised, and sheets
+// of them (patches/sheets.h); the patch follows from the affine coordinates.
 #pragma once
 
 #include <algorithm>

@@ -10,8 +10,8 @@
 
 namespace raybundle {
 
-// Collects the exchanges of neighbouring pixels: pixel after pixel the same pair often occurs again.
-// Keeps its memory.
+// Collects the exchanges of neighbouring pixels: pixel after pixel the same pair often occurs
+// again. Keeps its memory.
 class RunLengths {
   public:
     // slot: small; a pair that occurs again should come with the slot of the last time.

@@ -3,8 +3,8 @@
 // Longest-edge bisection on OpenMesh's half-edges (the rule of its
 // Subdivider::Uniform::LongestEdgeT). Differs: faces keep their source triangle through the splits;
 // edges with more than two faces, which OpenMesh cannot hold, are cut open, and may then be
-// bisected differently on their sides. Slivers, triangles that are flat but for a rounding error, as
-// booleans leave them and as T-junctions are filled with, are taken out before: a short edge is
+// bisected differently on their sides. Slivers, triangles that are flat but for a rounding error,
+// as booleans leave them and as T-junctions are filled with, are taken out before: a short edge is
 // collapsed, else the longest edge is flipped, so that the triangle beyond it gets the sliver's
 // third vertex. Of faces with the same corners one is left.
 #include "patches/conforming_subdivision.h"
@@ -30,8 +30,8 @@ struct Traits : OpenMesh::DefaultTraits {
 using TriMesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 
 constexpr size_t kMaxTriangles = size_t(1) << 26;
-// A triangle is a sliver where its height is less than this share of its longest edge, some times the
-// rounding of what lies ten edges from the origin.
+// A triangle is a sliver where its height is less than this share of its longest edge, some times
+// the rounding of what lies ten edges from the origin.
 constexpr double kFlat = 1e-5;
 // Flips and collapses, for each sliver: those that hang together may turn into each other.
 constexpr size_t kMostSteps = 16;
@@ -124,8 +124,8 @@ void takeOutSlivers(TriMesh& mesh, SourceOf& sourceTriangle) {
     mesh.garbage_collection();
 }
 
-// Faces that have met others with the same corners, in the same order around, as copies of a face and
-// split edges do: they would be cut differently, and lie on each other in pieces.
+// Faces that have met others with the same corners, in the same order around, as copies of a face
+// and split edges do: they would be cut differently, and lie on each other in pieces.
 class Doubles {
   public:
     explicit Doubles(const Mesh& mesh) : mesh(mesh) {

@@ -21,7 +21,8 @@ struct ConformingSubdivision {
 };
 
 // Triangulates a mesh and bisects longest edges until none is longer than maxEdge, in the mesh's
-// units; slivers, and copies of faces, are left out. Throws Error(INVALID_ARGUMENT) if that would take more than 2^26 triangles.
+// units; slivers, and copies of faces, are left out. Throws Error(INVALID_ARGUMENT) if that would
+// take more than 2^26 triangles.
 ConformingSubdivision subdivideConforming(const Mesh& mesh, float maxEdge);
 
 }  // namespace raybundle

@@ -18,8 +18,8 @@
 namespace raybundle {
 namespace {
 
-// Only what is so wide, in edges of a patch of what is cut, goes through something or is gone through:
-// leaves, the legs of chairs and handles let little light through.
+// Only what is so wide, in edges of a patch of what is cut, goes through something or is gone
+// through: leaves, the legs of chairs and handles let little light through.
 constexpr double kLeastWidth = 1;
 // What rises less over a face, in edges of a patch, stops little of the light across it.
 constexpr double kLeastHeight = 0.5;
@@ -72,8 +72,9 @@ bool areInOnePlane(const glm::dvec3& normal, const glm::dvec3& other) {
     return glm::length(glm::cross(normal, other)) <= kLeastTurn;
 }
 
-// Of the cells at an edge: which lie in one plane, by a number of the plane for each. In few planes: of
-// an edge at which many meet those that come late have one each. ofCells: the normals of all cells.
+// Of the cells at an edge: which lie in one plane, by a number of the plane for each. In few
+// planes: of an edge at which many meet those that come late have one each. ofCells: the normals of
+// all cells.
 std::vector<size_t> planesOf(const std::vector<glm::dvec3>& ofCells, const CellEdge* edges,
                              size_t count) {
     constexpr size_t kMostCompared = 64;
@@ -103,8 +104,8 @@ struct Walls {
     double width(uint32_t wall) const { return area[wall] / box[wall].diagonal().norm(); }
 };
 
-// The walls; boxes: per cell. And parts the edges at which cells of one plane meet others that stand on
-// them there, by common vertices.
+// The walls; boxes: per cell. And parts the edges at which cells of one plane meet others that
+// stand on them there, by common vertices.
 Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
                 const CellVertices& vertices, std::map<uint32_t, Crossing>& crossings) {
     const std::vector<CellEdge> edges = sortedEdges(cells, vertices);
@@ -151,8 +152,8 @@ Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
     return walls;
 }
 
-// Visits what is in the parts of a tree whose boxes meet another box. Not by Eigen::BVIntersect, which
-// allocates for each query.
+// Visits what is in the parts of a tree whose boxes meet another box. Not by Eigen::BVIntersect,
+// which allocates for each query.
 template <class Visit>
 void forEachIn(const Tree& tree, Tree::Index part, const Box& box, const Visit& visit) {
     Tree::VolumeIterator inner = nullptr, innerEnd = nullptr;

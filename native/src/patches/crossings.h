@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Crossings: where a wall goes through a face or stands on it, the light on one side has nothing to do
-// with that on the other. A patch that has both would let it through: it receives on one side and
-// sends on the other. So faces are cut along such lines, and values are not joined across edges on
-// which walls stand. What is narrower than a patch (the legs of a chair) cuts nothing.
+// Crossings: where a wall goes through a face or stands on it, the light on one side has nothing to
+// do with that on the other. A patch that has both would let it through: it receives on one side
+// and sends on the other. So faces are cut along such lines, and values are not joined across edges
+// on which walls stand. What is narrower than a patch (the legs of a chair) cuts nothing.
 //
-// Source: discontinuity meshing, here of the discontinuities of the light itself (order 0 in Heckbert,
-// "Discontinuity Meshing for Radiosity", 1992), by a binary partition of the face.
+// Source: discontinuity meshing, here of the discontinuities of the light itself (order 0 in
+// Heckbert, "Discontinuity Meshing for Radiosity", 1992), by a binary partition of the face.
 // Differs: a line cuts a whole piece of the face, and only where it runs along about a patch of it.
 #pragma once
 
@@ -28,8 +28,8 @@ struct Crossings {
     bool isAll = true;                    // whether all that cross were found and cut
 };
 
-// sizes: per cell, edge of a patch where the cell is no smaller, metres. Large cells come first: what
-// exceeds some tests a cell, or a quarter more patches than there are cells, stays whole.
+// sizes: per cell, edge of a patch where the cell is no smaller, metres. Large cells come first:
+// what exceeds some tests a cell, or a quarter more patches than there are cells, stays whole.
 Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double>& sizes,
                         const CellVertices& vertices);
 

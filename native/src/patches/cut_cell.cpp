@@ -7,11 +7,11 @@
 namespace raybundle {
 namespace {
 
-// All as shares of the edge of the largest patch of the cell. What is nearer to a plane or a line lies
-// in it.
+// All as shares of the edge of the largest patch of the cell. What is nearer to a plane or a line
+// lies in it.
 constexpr double kWithin = 0.02;
-// Walls are at least so long, and a line cuts a piece if they stand along so much of it in there, or
-// along most of the piece.
+// Walls are at least so long, and a line cuts a piece if they stand along so much of it in there,
+// or along most of the piece.
 constexpr double kLong = 0.5, kLeastCut = 0.1;
 constexpr double kMostOfPiece = 0.9;
 // What is cut off is at least so wide.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A cell and the lines along which other cells go through it or stand on it (patches/crossings.h): the
-// pieces that these leave of it, by a binary partition of the plane.
+// A cell and the lines along which other cells go through it or stand on it (patches/crossings.h):
+// the pieces that these leave of it, by a binary partition of the plane.
 #pragma once
 
 #include <array>
@@ -26,7 +26,8 @@ struct Crossing {
     uint8_t parted = 0;             // bit k: a wall stands on the edge from corner k on
 };
 
-// Sine of the least angle between planes that cross: of a smaller one the line is a matter of rounding.
+// Sine of the least angle between planes that cross: of a smaller one the line is a matter of
+// rounding.
 constexpr double kLeastTurn = 0.05;
 
 class CutCell {
@@ -80,13 +81,13 @@ class CutCell {
     Line edge(size_t k) const;
     double lengthOf(size_t edge) const;
     void add(const Segment& segment);
-    // Segments along each other are one line. First those with the most walls; those with few are left
-    // out.
+    // Segments along each other are one line. First those with the most walls; those with few are
+    // left out.
     std::vector<Line> lines() const;
     // The corners of the cell that no wall hides from the middle of a piece.
     uint8_t cornersSeenFrom(const Piece& piece, const std::vector<Line>& lines) const;
-    // Cuts a piece if the line runs through enough of it: leaves what is to its left, and returns the
-    // rest.
+    // Cuts a piece if the line runs through enough of it: leaves what is to its left, and returns
+    // the rest.
     std::optional<Piece> cut(Piece& piece, const Line& line) const;
 
     double size;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Doubled faces: two in the same place that look the same way, as a copy that was never moved leaves
-// them. Light sees one of them, and the other lay in its shadow. One stands for both here: the other
-// has no patches, and its corners get the light of the one's.
+// Doubled faces: two in the same place that look the same way, as a copy that was never moved
+// leaves them. Light sees one of them, and the other lay in its shadow. One stands for both here:
+// the other has no patches, and its corners get the light of the one's.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,8 @@
 
 namespace raybundle {
 
-// A corner of a doubled face and the one whose light it gets; instances and corners of their meshes.
+// A corner of a doubled face and the one whose light it gets; instances and corners of their
+// meshes.
 struct DoubledCorner {
     uint32_t instance, corner;
     uint32_t ofInstance, ofCorner;

@@ -33,8 +33,8 @@ constexpr double kMostOfTiny = 2;
 constexpr double kAsImportant = 0.5;
 constexpr size_t kMostImportant = 4;
 constexpr double kMostOfOthers = 0.25;
-// But no patch is more than so many times as large as those of the first island, so that lines can be
-// dense enough for both (bundles/line_windows.h), unless there would be so many times as many.
+// But no patch is more than so many times as large as those of the first island, so that lines can
+// be dense enough for both (bundles/line_windows.h), unless there would be so many times as many.
 constexpr double kLargest = 512, kMostOfVast = 2;
 // More members than these are brought together by a grid before.
 constexpr size_t kMostMembers = 4096;

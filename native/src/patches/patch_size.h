@@ -4,9 +4,9 @@
 //
 // Islands are what empty space sets apart: connected surfaces (patches/welding.h) belong to one
 // island where both together are no longer than the larger one and most of the smaller laid end to
-// end. An island's patches are a 64th of its diagonal, as if it were baked alone, and less for groups
-// of surfaces that are tiny in a vast one. Which object has which faces matters hardly: only what is
-// part of something large.
+// end. An island's patches are a 64th of its diagonal, as if it were baked alone, and less for
+// groups of surfaces that are tiny in a vast one. Which object has which faces matters hardly: only
+// what is part of something large.
 #pragma once
 
 #include <cmath>

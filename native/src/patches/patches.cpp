@@ -166,8 +166,8 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     placed.findIslands(patches);
     cutFaces(scene, placed, patchSize, patches);
 
-    // A parent keeps at least one patch. Where many small ones take most of maxPatches, this part of it
-    // is for the grids of the large ones: a ground under dense props is not to be one patch.
+    // A parent keeps at least one patch. Where many small ones take most of maxPatches, this part
+    // of it is for the grids of the large ones: a ground under dense props is not to be one patch.
     const size_t most = std::max(maxPatches, patches.parents.size() + maxPatches / 8);
     while (numberPatches(patches) > most) {
         coarsen(patches, 1.1);

@@ -144,7 +144,8 @@ struct Patches {
     glm::dvec3 centre{
         0.0};          // world position of the local origin, so that floats stay exact far away
     float radius = 0;  // of a sphere around the centre that holds everything, metres
-    // To the axes along which most faces lie, for boxes that do not depend on how the scene is turned.
+    // To the axes along which most faces lie, for boxes that do not depend on how the scene is
+    // turned.
     glm::mat3 axes{1.0f};
     std::vector<glm::vec3> vertices;  // metres, relative to centre
     std::vector<Island>

@@ -29,7 +29,8 @@ struct Plane {
 
     Plane() = default;
     // a, b: what spans it from the origin on, metres; normal: unit, along their cross product or
-    // against it; extent: radius of what lies in the plane, or of the mesh that it is part of, metres.
+    // against it; extent: radius of what lies in the plane, or of the mesh that it is part of,
+    // metres.
     Plane(const glm::dvec3& origin, const glm::dvec3& a, const glm::dvec3& b,
           const glm::dvec3& normal, double extent)
         : origin(origin),

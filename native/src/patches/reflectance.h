@@ -16,8 +16,8 @@ bool isEmptySpace(const Material& material);
 // its area. Once, before assignMaterials; lines depend on it.
 void assignOpacity(const Scene& scene, Patches& patches);
 
-// Gives every side of every patch its reflectance, by angle too, and its emission. Images and corner
-// colours are averaged over the area of the patch: a lookup at one point would alias.
+// Gives every side of every patch its reflectance, by angle too, and its emission. Images and
+// corner colours are averaged over the area of the patch: a lookup at one point would alias.
 void assignMaterials(const Scene& scene, Patches& patches);
 
 // Per side: how much of its reflectance is diffuse, of the whole patch, what lets light through

@@ -224,7 +224,8 @@ class SheetSearch {
         for (int y = 0; y < height; ++y) addEdge(at(width - 1, y), 1);
         for (int x = width - 1; x >= 0; --x) addEdge(at(x, height - 1), 2);
         for (int y = height - 1; y >= 0; --y) addEdge(at(0, y), 3);
-        // Parents that are one with others along some edges only have vertices of their own elsewhere.
+        // Parents that are one with others along some edges only have vertices of their own
+        // elsewhere.
         for (size_t k = 0; k < sheet.outline.size(); ++k)
             isOne =
                 isOne && sheet.outline[k][1] == sheet.outline[(k + 1) % sheet.outline.size()][0];

@@ -3,8 +3,8 @@
 // Sheets: congruent neighbouring parallelograms of one plane, which are projected as one. A wall of
 // a mesh made for vertex colours has thousands of faces of a few pixels each; as a sheet it is one.
 // The parallelograms are parents, or what walls have cut into several parents
-// (patches/crossings.h): where these, or tiles that are cut, make it uneven, the patch at a point is
-// looked up.
+// (patches/crossings.h): where these, or tiles that are cut, make it uneven, the patch at a point
+// is looked up.
 //
 // Differs from the thesis (section 4.2), which projects each patch by itself: as a parent stands
 // for its patches, a sheet stands for its parents. Its outline is made of the edges of these, so

@@ -17,12 +17,12 @@ namespace {
 // A triangle is bisected along its longest edge while it is longer than this many times its height
 // and than two patches: a grid of n^2 slivers would waste patches.
 constexpr double kMaxElongation = 4.0;
-// More elongated still, it is cut across, into as many pieces as it is long: bisections would end in
-// the power 1.6 of that, one above the other.
+// More elongated still, it is cut across, into as many pieces as it is long: bisections would end
+// in the power 1.6 of that, one above the other.
 constexpr double kNeedle = 16.0;
 // Faces are left out whose height is less than this share of their longest edge; and those that are
-// less high than what rounding makes of their coordinates, by this many epsilons, and so much longer
-// that they are no small faces of a large scene: their normals would be rounding alone.
+// less high than what rounding makes of their coordinates, by this many epsilons, and so much
+// longer that they are no small faces of a large scene: their normals would be rounding alone.
 constexpr double kFlat = 1e-7;
 constexpr double kFlatEpsilons = 4, kSliver = 1e-2;
 // Share of the edge by which the fourth corner of a parallelogram may be off.
@@ -167,7 +167,8 @@ class Subdivision {
                 steps(ofInstance[parent.instance]) << 16 | steps(ofSurface[parent.surface]);
     }
 
-    // Adds the triangles of a face, or the parallelogram that it is; returns whether any has an area.
+    // Adds the triangles of a face, or the parallelogram that it is; returns whether any has an
+    // area.
     bool addCells(uint32_t instance, int32_t face) {
         const Mesh& mesh = scene.meshes[scene.instances[instance].mesh];
         const int32_t begin = mesh.faceOffsets[face], end = mesh.faceOffsets[face + 1];

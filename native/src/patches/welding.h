@@ -2,10 +2,10 @@
 //
 // Welding: a surface whose edges are split, or whose faces are meshes of their own, is one surface
 // still. Vertices on open edges (of one face alone) that lie in the same place become one, of
-// whatever instances, and so light goes on smoothly across (patches/neighbours.h), what is closed is
-// solid (patches/coincidence.h), and patches have the size that they have in one piece
-// (patches/patch_size.h). Edges with two faces stay as they are: boxes that stand against each other
-// are two.
+// whatever instances, and so light goes on smoothly across (patches/neighbours.h), what is closed
+// is solid (patches/coincidence.h), and patches have the size that they have in one piece
+// (patches/patch_size.h). Edges with two faces stay as they are: boxes that stand against each
+// other are two.
 #pragma once
 
 #include <cstdint>

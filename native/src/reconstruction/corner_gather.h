@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Light gathered at the corners of meshes themselves: that of the sources at all of them, and that
-// of other surfaces and the world where interpolation does not follow it (final_gather.h). Of POINT,
-// and of objects whose results are few among the corners of a finer mesh: there the patches, of
-// which most are not seen, would cost more than what is shown of them.
+// of other surfaces and the world where interpolation does not follow it (final_gather.h). Of
+// POINT, and of objects whose results are few among the corners of a finer mesh: there the patches,
+// of which most are not seen, would cost more than what is shown of them.
 #pragma once
 
 #include <memory>
@@ -33,8 +33,8 @@ std::vector<bool> gatheringInstances(const Scene& scene, const Settings& setting
 class CornerGather {
   public:
     // Gathers the light of the sources, of all light sets, on both sides where both show. gathers:
-    // see gatheringInstances. regions: per instance, of those. exposed: per side, the share of it that
-    // nothing covers; surfaces not further apart than touchDistance (m) touch. References must
+    // see gatheringInstances. regions: per instance, of those. exposed: per side, the share of it
+    // that nothing covers; surfaces not further apart than touchDistance (m) touch. References must
     // outlive the object.
     CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
                  float touchDistance, const SetLights& lights, const ShownLight& shown,
@@ -52,7 +52,8 @@ class CornerGather {
     struct NodeLight {
         std::vector<glm::vec3> direct, indirect;
         std::vector<glm::vec3> carried;  // of the direct light what is not from sources
-        // What is shown of the indirect and the carried light, which are as they arrive; empty: all.
+        // What is shown of the indirect and the carried light, which are as they arrive; empty:
+        // all.
         std::vector<glm::vec3> shownShare;
     };
 

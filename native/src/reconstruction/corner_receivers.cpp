@@ -12,8 +12,8 @@ namespace {
 
 // How far inside a face a corner's receiver lies, as a share of the way to the centre.
 constexpr float kTowardsMiddle = 0.01f;
-// Shading normals up to this cosine to a face are as good as at right angles to it, where which side
-// they look at is a matter of rounding: the face's own normal counts then.
+// Shading normals up to this cosine to a face are as good as at right angles to it, where which
+// side they look at is a matter of rounding: the face's own normal counts then.
 constexpr float kUpright = 1e-3f;
 // Gaps of so many times that width are narrow; there a receiver lies inside by a share of the gap.
 // At the edges of two plates as long as wide it then gets 3 % less of the light around them.

@@ -57,8 +57,8 @@ class FitTerms {
         double weight;  // m^2
     };
 
-    // Calls visit(term, nodes, amounts) for what each term moves to each of its nodes, m^2 times the
-    // values, of those whose nodes are wanted; the amounts of a term sum to zero.
+    // Calls visit(term, nodes, amounts) for what each term moves to each of its nodes, m^2 times
+    // the values, of those whose nodes are wanted; the amounts of a term sum to zero.
     template <class IsWanted, class Visit>
     void forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWanted,
                      const Visit& visit) const;

@@ -165,8 +165,8 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         const bool isGathered = gathers[i];
         if (!isGathered) regionsOf[i] = findRegions(i);
         const SmoothRegions& regions = regionsOf[i];
-        // Three fields of each light, one after the other; where corners gather the colour, and what
-        // is shown of light from everywhere, are the last.
+        // Three fields of each light, one after the other; where corners gather the colour, and
+        // what is shown of light from everywhere, are the last.
         std::vector<const Field*> fields;
         for (const SideLight& light : onSides) {
             fields.push_back(&light.shown.direct);

@@ -52,8 +52,8 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
         if (!mesh.cornerNormals.empty()) return glm::vec3(mesh.cornerNormals[corner]);
         return glm::vec3(cells[cell].normal());
     };
-    // The normal of a sliver is rounding alone: that of what lies beyond its longest edge stands for
-    // it, by its corners.
+    // The normal of a sliver is rounding alone: that of what lies beyond its longest edge stands
+    // for it, by its corners.
     auto isLongest = [&](const HalfEdge& e) {
         const Cell& cell = cells[e.cell];
         const float length = glm::distance(placeOf(cell, e.from), placeOf(cell, e.to));

@@ -18,8 +18,8 @@ struct SmoothEdge {
 
 // The corners of one instance that share a value, as Blender shades them: corners of one vertex
 // belong together where the faces around the vertex join smoothly. Nothing is joined across sharp
-// edges, material borders, mesh borders, edges on which walls stand, and edges with more than two faces
-// or with faces that turn differently.
+// edges, material borders, mesh borders, edges on which walls stand, and edges with more than two
+// faces or with faces that turn differently.
 struct SmoothRegions {
     std::vector<uint32_t> nodeOf;  // per corner of the mesh: its value's index
     uint32_t nodeCount = 0;

@@ -31,11 +31,11 @@ struct SideErrors {
 
 // Adds the errors, and warnings of objects whose mesh is too coarse, to the report, and the error
 // per corner to the light. report.error.noise is the shown noise in all; targetError: that of the
-// settings. ranges: of the patches; irradiance: mean over each tile's side. errsAlike: the directions
-// of bundles are independent, so that all objects get too much light together, or too little: what
-// the halves tell of one object is a single sample then, and none has less noise than all together.
-// Sparse results that are gathered are the light of points (InstanceLight::gatheredNoise), whose error
-// is noise alone.
+// settings. ranges: of the patches; irradiance: mean over each tile's side. errsAlike: the
+// directions of bundles are independent, so that all objects get too much light together, or too
+// little: what the halves tell of one object is a single sample then, and none has less noise than
+// all together. Sparse results that are gathered are the light of points
+// (InstanceLight::gatheredNoise), whose error is noise alone.
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
                  const Irradiance& irradiance, const SideErrors& sides, float targetError,
                  bool errsAlike, std::vector<InstanceLight>& light, Report& report);

@@ -10,7 +10,8 @@ namespace raybundle {
 
 // Sets of indices that are joined in pairs.
 //
-// Source: Tarjan and van Leeuwen, "Worst-Case Analysis of Set Union Algorithms" (1984): paths are halved.
+// Source: Tarjan and van Leeuwen, "Worst-Case Analysis of Set Union Algorithms" (1984): paths are
+// halved.
 class DisjointSets {
   public:
     // Each index by itself.

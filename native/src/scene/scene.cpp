@@ -11,8 +11,8 @@
 namespace raybundle {
 namespace {
 
-// Results are sparse if a corner has one at most of so many of the mesh, and of so many on the faces
-// that have any: those of a copy, as Array makes them, are not.
+// Results are sparse if a corner has one at most of so many of the mesh, and of so many on the
+// faces that have any: those of a copy, as Array makes them, are not.
 constexpr size_t kSparse = 4, kSparseOnFaces = 2;
 
 template <class T>

@@ -142,8 +142,8 @@ struct Instance {
     int32_t lightSet = kNoLightSet;  // of its emission
     bool stopsDirect = true;         // blocks the light of the sources
     bool exchanges = true;           // sends light to other surfaces, and blocks what they send
-    // Where only some corners have a result: per vertex of the mesh, whether one of its corners has,
-    // and per face, whether one of its vertices. Empty: all.
+    // Where only some corners have a result: per vertex of the mesh, whether one of its corners
+    // has, and per face, whether one of its vertices. Empty: all.
     std::vector<uint8_t> resultVertices{}, resultFaces{};
     // Whether these are few among corners without a result, as those of a mesh that a modifier has
     // subdivided.
@@ -156,8 +156,8 @@ struct Instance {
         return role == RB_ROLE_BAKE && (resultFaces.empty() || resultFaces[face]);
     }
 
-    // A mirroring transform turns the winding of faces, but the front stays outside as in Blender. One
-    // that flattens has a determinant of rounding alone, and does not mirror.
+    // A mirroring transform turns the winding of faces, but the front stays outside as in Blender.
+    // One that flattens has a determinant of rounding alone, and does not mirror.
     bool isMirrored() const {
         constexpr double kFlat = 1e-9;  // over the product of the lengths of the columns
         const glm::dmat3 turn(transform);

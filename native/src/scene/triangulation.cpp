@@ -34,8 +34,8 @@ std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& point
     auto turn = [&](int a, int b, int c) {
         return glm::dot(glm::cross(points[b] - points[a], points[c] - points[b]), normal);
     };
-    // Whether the corner turns as the polygon does, by more than rounding does to a straight one: its
-    // triangle would have a normal of rounding alone, or be left out as one without area.
+    // Whether the corner turns as the polygon does, by more than rounding does to a straight one:
+    // its triangle would have a normal of rounding alone, or be left out as one without area.
     auto isConvex = [&](int a, int b, int c) {
         const double diagonal = glm::length(points[c] - points[a]);
         return turn(a, b, c) > area * diagonal * std::max(kStraight * diagonal, rounding);

@@ -17,13 +17,13 @@ namespace {
 constexpr double kBright = 3;
 // Together they have at most this share of all area: of large parts lines bring the light better.
 constexpr double kMostArea = 0.05;
-// Gathering the light of the bright spots of an object takes about as long as so many bundles (both in
-// proportion to the patches): they are worth it where they spare more. (A laid table's dishes, 48 of
-// them, took longer at a target of 0.2 % than the whole bake without.)
+// Gathering the light of the bright spots of an object takes about as long as so many bundles (both
+// in proportion to the patches): they are worth it where they spare more. (A laid table's dishes,
+// 48 of them, took longer at a target of 0.2 % than the whole bake without.)
 constexpr double kWorthwhileBundles = 50;
 
-// An island with less light than this share of the brightest one's, by the mean, takes no part: what
-// is left over far below a room does not make its walls bright spots.
+// An island with less light than this share of the brightest one's, by the mean, takes no part:
+// what is left over far below a room does not make its walls bright spots.
 constexpr double kDarkIsland = 0.01;
 
 // Points of a side at which is looked whether another surface lies on it.

@@ -98,15 +98,16 @@ class DirectLight {
     // An unbiased estimate at a point by one sample of each source, W/m^2; index: of the sample.
     glm::vec3 sample(const Receiver& receiver, uint32_t index) const;
 
-    // What `count` points on a patch side get without occluders, W/m^2: of a source so far away that
-    // it changes by less than a share `even` over the patch, that at its middle.
+    // What `count` points on a patch side get without occluders, W/m^2: of a source so far away
+    // that it changes by less than a share `even` over the patch, that at its middle.
     void unblocked(uint32_t side, const glm::vec3* points, size_t count, float even,
                    glm::vec3* light) const;
 
     // Whether lines that end at the first surface leave out some of the light of a side's sources.
     bool hasPassingLight(uint32_t side) const;
 
-    // Of each source; 0 where it has no power. touchDistance: surfaces not further apart touch, metres.
+    // Of each source; 0 where it has no power. touchDistance: surfaces not further apart touch,
+    // metres.
     std::vector<PowerShares> powerShares(float touchDistance) const;
 
   private:

@@ -23,8 +23,8 @@
 namespace raybundle {
 
 // How much less noise light by direction makes along lines than all reflected light: a share of the
-// lines that is enough for it, 0 to 1. bent: what is sent to where Lambert's law would not, RMS over
-// the directions; reflected: all; W.
+// lines that is enough for it, 0 to 1. bent: what is sent to where Lambert's law would not, RMS
+// over the directions; reflected: all; W.
 double shareOfLines(double bent, double reflected);
 
 class DirectedLight {

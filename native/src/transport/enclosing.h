@@ -29,8 +29,9 @@ Extent boxOf(const Patches& patches, const Parent& parent);
 // Per surface (Parent::surface).
 std::vector<Enclosing> enclosingSurfaces(const Patches& patches);
 
-// Per surface: whether its backs see nothing but each other and are not what is baked. Only asked of
-// surfaces with `emission` (per side) on their backs; false of all others, and empty without any.
+// Per surface: whether its backs see nothing but each other and are not what is baked. Only asked
+// of surfaces with `emission` (per side) on their backs; false of all others, and empty without
+// any.
 std::vector<bool> emptyInsides(const Scene& scene, const Patches& patches,
                                const std::vector<glm::vec3>& emission);
 

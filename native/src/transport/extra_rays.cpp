@@ -125,7 +125,8 @@ void addExtraRays(const Patches& patches, const Visibility& visibility, float to
                       alreadyIndirect(shot, exposed, side));
             }
             if (met < kTellingLines) return;
-            // No power is lost or made among all these sides: lines keep it, rays only to their noise.
+            // No power is lost or made among all these sides: lines keep it, rays only to their
+            // noise.
             const glm::dvec3 after = absorbed(patches, exposed, wanted, shot, light);
             glm::vec3 factor(1.0f);
             for (int c = 0; c < 3; ++c)

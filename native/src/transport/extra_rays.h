@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Local rays beside the lines of bundles, at sides where these leave too much noise: a bundle spreads
-// its lines over the scene by area, and small, dark or contrasty places would need thousands of
-// bundles for what some hundred rays of their own bring.
+// Local rays beside the lines of bundles, at sides where these leave too much noise: a bundle
+// spreads its lines over the scene by area, and small, dark or contrasty places would need
+// thousands of bundles for what some hundred rays of their own bring.
 //
 // Source: thesis section 2.4.2 (local lines, fig. 2.11), as a last bounce of the solved light
 // (Reichert 1992, see reconstruction/final_gather.h).
 // Differs:
 // - Rays leave all over the patch, so that they estimate what lines do, its mean; both are joined,
 //   weighed by how much they tell.
-// - What all these sides absorb together stays what the lines had it, if these are many: they keep the
-//   balance of energy.
-// - Half of the rays of a side sees the light that the first half of the bundles has found, the other
-//   half that of the second: the two halves still err independently, and tell the noise.
+// - What all these sides absorb together stays what the lines had it, if these are many: they keep
+//   the balance of energy.
+// - Half of the rays of a side sees the light that the first half of the bundles has found, the
+//   other half that of the second: the two halves still err independently, and tell the noise.
 #pragma once
 
 #include <array>
@@ -36,10 +36,10 @@ struct ExtraRays {
 };
 
 // Adds what the rays of some sides bring to the light of each set, and to the estimates of its two
-// halves, all as they arrive. samples: per side and half, how many lines have met it; these rays are
-// added to them, by what they tell. Rays do not count that
-// start where the side is covered, by a surface not further than touchDistance (m), or meet a side of
-// which a half knows nothing. exposed: per side, the share of it that nothing covers.
+// halves, all as they arrive. samples: per side and half, how many lines have met it; these rays
+// are added to them, by what they tell. Rays do not count that start where the side is covered, by
+// a surface not further than touchDistance (m), or meet a side of which a half knows nothing.
+// exposed: per side, the share of it that nothing covers.
 void addExtraRays(const Patches& patches, const Visibility& visibility, float touchDistance,
                   const std::vector<float>& exposed, const std::vector<ExtraRays>& wanted,
                   uint32_t seed, std::vector<std::array<float, 2>>& samples, SetLights& lights,

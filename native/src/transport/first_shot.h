@@ -27,8 +27,8 @@ struct FirstShot {
     std::vector<glm::vec3> indirect, unshot;
     std::vector<glm::vec4> angles;   // per side, of GATHER: means of angleTerms; else empty
     std::vector<Incoming> incoming;  // per side, of GATHER, if any surface is not Lambert's
-    // Per side: all that it reflects of the irradiance is in `indirect`, by direction too; empty: of
-    // none.
+    // Per side: all that it reflects of the irradiance is in `indirect`, by direction too; empty:
+    // of none.
     std::vector<bool> sentOn;
     std::vector<float> error;  // per side, standard error of all irradiance, W/m^2
     std::vector<uint32_t>

@@ -64,9 +64,9 @@ std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const St
 
 namespace {
 
-// So many times the error of a result may be that of a side whose light is not shown. What it lights
-// gets it from many such sides, whose errors even out: the variance of their sum goes with the area
-// of each, beside that of all.
+// So many times the error of a result may be that of a side whose light is not shown. What it
+// lights gets it from many such sides, whose errors even out: the variance of their sum goes with
+// the area of each, beside that of all.
 float othersError(const Patches& patches, const StandIns& standIns, uint32_t side) {
     if (patches.reflectance[side] == glm::vec3(0.0f) &&
         patches.translucenceOf(side ^ 1) == glm::vec3(0.0f))

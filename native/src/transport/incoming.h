@@ -4,9 +4,9 @@
 // probability of its share of the light.
 //
 // Source: Vitter, "Random Sampling with a Reservoir" (1985), weighted by the light. Talbot, Cline
-// and Egbert, "Importance Resampling for Global Illumination" (2005): what is chosen of few samples has
-// to be weighted with what they hold in all, or a large source near by seems to be more at its rim,
-// from where less comes.
+// and Egbert, "Importance Resampling for Global Illumination" (2005): what is chosen of few samples
+// has to be weighted with what they hold in all, or a large source near by seems to be more at its
+// rim, from where less comes.
 #pragma once
 
 #include <array>

@@ -409,9 +409,9 @@ uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents, u
     return hasher.value();
 }
 
-// Lamps that are one object are several sources, or few samples would tell what all of them together
-// give, and which one is hidden from a receiver. Of an object with more than kMostOfObject, as a tree
-// full of little lights is, they are one.
+// Lamps that are one object are several sources, or few samples would tell what all of them
+// together give, and which one is hidden from a receiver. Of an object with more than
+// kMostOfObject, as a tree full of little lights is, they are one.
 template <class Groups>
 void joinMany(Groups& groups) {
     Groups joined;

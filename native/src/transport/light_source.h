@@ -30,8 +30,8 @@ struct LightSample {
     glm::vec3 irradiance{0.0f};   // W/m^2, divided by the sample's probability; 0: receives nothing
     uint32_t part = 0;            // of the source, if it has any
     uint32_t parent = kNoParent;  // that the sampled point lies on, if the source is a mesh
-    // This much before the point, along the ray, nothing blocks it any more, metres: what lies in the
-    // plane of the source may stand before it by a rounding error.
+    // This much before the point, along the ray, nothing blocks it any more, metres: what lies in
+    // the plane of the source may stand before it by a rounding error.
     float margin = 0;
 
     // From the receiver's point.
@@ -125,11 +125,12 @@ class LightSource {
         return std::nullopt;
     }
 
-    // Whether the points of a patch to look at its light from are those of placeOn, and not uniform.
+    // Whether the points of a patch to look at its light from are those of placeOn, and not
+    // uniform.
     virtual bool choosesPlaces() const { return false; }
 
-    // Such a point, by uv uniform in [0, 1)^2, and what it counts for in the mean over the patch: most
-    // of the light of a source close by arrives at few points of it.
+    // Such a point, by uv uniform in [0, 1)^2, and what it counts for in the mean over the patch:
+    // most of the light of a source close by arrives at few points of it.
     virtual PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const;
 
     // Whether no point of a receiver can get any of its light, occluders aside. False where that is
@@ -150,8 +151,8 @@ class LightSource {
     // few samples agree means little then.
     virtual bool surrounds() const { return false; }
 
-    // Whether its light stays within what it is part of, as that of the insides of a lamp's body: it
-    // is not dark in there.
+    // Whether its light stays within what it is part of, as that of the insides of a lamp's body:
+    // it is not dark in there.
     virtual bool staysInside() const { return false; }
 
     // Emitted power, W; zero for sources whose power depends on where their light arrives: suns,
@@ -168,8 +169,8 @@ class LightSource {
     bool castsShadows = true;
     // Whether many samples may miss it although it is seen.
     bool isNarrow = false;
-    // What its light is proportional to, by channel, and all else that its light depends on (a hash;
-    // not comparable between two geometries).
+    // What its light is proportional to, by channel, and all else that its light depends on (a
+    // hash; not comparable between two geometries).
     glm::vec3 magnitude{1.0f};
     uint64_t shape = 0;
 

@@ -104,8 +104,8 @@ uint32_t LightTree::build(std::vector<LightFace>& faces, uint32_t first, uint32_
     return index;
 }
 
-// About what the cluster gives to a plane with that normal at a point, an upper bound of it in angle:
-// 0 only where it gives nothing.
+// About what the cluster gives to a plane with that normal at a point, an upper bound of it in
+// angle: 0 only where it gives nothing.
 float LightTree::importance(const Node& node, const glm::vec3& point, const glm::vec3& normal,
                             const glm::vec3& boxNormal) const {
     const glm::vec3 d = node.centre - point;

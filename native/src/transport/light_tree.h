@@ -3,15 +3,15 @@
 // A tree over the emitting faces of a mesh, by which a receiver chooses one about in proportion to
 // the light that it gets from it: whatever their order is in the mesh, and without looking at all.
 //
-// Source: Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting"
-// (2018): the bounds of a cluster's light by its sphere and by the cone of its normals.
+// Source: Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree
+// Splitting" (2018): the bounds of a cluster's light by its sphere and by the cone of its normals.
 // Differs:
 // - One sample goes to one face: clusters are not split for a receiver.
 // - Cosines are bounded by heights over the box of a cluster, too: right beside a surface of many
 //   faces the spheres of large clusters say nothing of which of them hold the nearest ones, whose
 //   light is nearly all there is.
-// - Of a flat cluster far enough before the receiver a face is chosen by its power alone: its bounds
-//   would hardly say more, and take most of the time.
+// - Of a flat cluster far enough before the receiver a face is chosen by its power alone: its
+//   bounds would hardly say more, and take most of the time.
 // - Clusters are halved at the middle of their longer side instead of where the surface area
 //   orientation heuristic has its least: the faces of one mesh are of a kind.
 #pragma once
@@ -62,8 +62,8 @@ class LightTree {
     };
     // By the power alone; u uniform in [0, 1). There must be a face.
     Choice chooseByPower(double u) const;
-    // By the bounds of what a plane with that normal at a point gets from each cluster; u uniform in
-    // [0, 1).
+    // By the bounds of what a plane with that normal at a point gets from each cluster; u uniform
+    // in [0, 1).
     Choice choose(const glm::vec3& point, const glm::vec3& normal, float u) const {
         return nodes.size() == 1 ? Choice{0, 1, u} : chooseOfMany(point, normal, u);
     }
@@ -80,7 +80,8 @@ class LightTree {
     static bool isEven(const Node& node, const glm::vec3& point, const glm::vec3& normal);
     // Of a cluster, itself chosen with that weight.
     Choice byPower(const Node& node, double u, double weight) const;
-    // The face in which the power of all before comes to `at`, W; all: of those it was chosen among.
+    // The face in which the power of all before comes to `at`, W; all: of those it was chosen
+    // among.
     Choice chosen(uint32_t face, double at, double all) const;
 
     glm::mat3 axes{1.0f};             // rows: of all boxes, those of the largest face

@@ -69,9 +69,9 @@ class Lobe {
     static Kind glossOf(rb_masking masking);
     // G / (4 times both cosines), of light that leaves at the cosine `out`.
     float visibility(float out) const;
-    // Towards a direction at a cosine `no` from the normal and `io` from the incoming one: before it
-    // is brought to a mean of 1, without Fresnel's reflectance, and the latter's rise, which only
-    // gloss has.
+    // Towards a direction at a cosine `no` from the normal and `io` from the incoming one: before
+    // it is brought to a mean of 1, without Fresnel's reflectance, and the latter's rise, which
+    // only gloss has.
     std::pair<float, float> shape(float no, float io) const;
     void normalise(float mean, float meanSquare);
     void normalise();

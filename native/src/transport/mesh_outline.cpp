@@ -13,8 +13,8 @@ namespace {
 
 // Edges that follow each other and turn by less are one, radians.
 constexpr double kStraight = 1e-5;
-// Faces of one facet are off its plane by no more than this share of what the plane is thick: what is
-// in front of it is in front of all of them.
+// Faces of one facet are off its plane by no more than this share of what the plane is thick: what
+// is in front of it is in front of all of them.
 constexpr double kFlat = 0.25;
 // Meshes of more parents are not looked at.
 constexpr size_t kMostParents = 1 << 17;
@@ -241,8 +241,8 @@ MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& pa
     if (edges.size() > kMostEdges) edges.clear();
 }
 
-// Per facet: whether it looks at a point (one more for `none`), and the first place where the horizon
-// cuts it, from which the angles of others count.
+// Per facet: whether it looks at a point (one more for `none`), and the first place where the
+// horizon cuts it, from which the angles of others count.
 struct MeshOutline::Facing {
     std::array<bool, kMostFacets + 1> looks;
     std::array<bool, kMostFacets> isCut;
@@ -277,8 +277,8 @@ double MeshOutline::irradiance(const glm::dvec3& point, const glm::dvec3& normal
     return std::max(0.0, -0.5 * sum);
 }
 
-// Where the receiver's horizon cuts facets, the cuts close their outlines: of each along the line in
-// which the two planes meet, from where edges go down to where they come up, whichever belong
+// Where the receiver's horizon cuts facets, the cuts close their outlines: of each along the line
+// in which the two planes meet, from where edges go down to where they come up, whichever belong
 // together. All cuts of a facet lie within half a turn, since the receiver is not in its plane.
 double MeshOutline::clippedTerm(const Edge& edge, Facing& facing, const glm::dvec3& point,
                                 const glm::dvec3& normal) const {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The irradiance that one side of a mesh of even emission gives without occluders, in closed form:
-// Lambert's sum over the edges of each face that looks at the receiver. The edge between two such faces is
-// passed once each way and cancels, so that only the outline of the mesh as it is seen from the
-// receiver is left: of a bulb of hundreds of faces some dozens of edges.
+// Lambert's sum over the edges of each face that looks at the receiver. The edge between two such
+// faces is passed once each way and cancels, so that only the outline of the mesh as it is seen
+// from the receiver is left: of a bulb of hundreds of faces some dozens of edges.
 //
 // Sources: Lambert, "Photometria" (1760), for polygons; the silhouette of a mesh as the edges
 // between faces that look at a point and faces that do not: Appel, "The Notion of Quantitative
@@ -25,8 +25,8 @@ namespace raybundle {
 class MeshOutline {
   public:
     MeshOutline() = default;
-    // Of the fronts of parents (into Patches::parents) or of their backs. extent: radius of what they
-    // are part of, metres: vertices are off by rounding in proportion to it.
+    // Of the fronts of parents (into Patches::parents) or of their backs. extent: radius of what
+    // they are part of, metres: vertices are off by rounding in proportion to it.
     MeshOutline(const Patches& patches, const std::vector<uint32_t>& parents, bool ofBacks,
                 double extent);
 

@@ -18,8 +18,8 @@ namespace {
 
 float strength(const glm::vec3& emission) { return emission.x + emission.y + emission.z; }
 
-// A face that is nearer than so many times its radius is sampled by solid angle: by area, the light of
-// what touches the receiver would have no finite variance.
+// A face that is nearer than so many times its radius is sampled by solid angle: by area, the light
+// of what touches the receiver would have no finite variance.
 constexpr float kNear = 1.5f;
 
 // Uniform by area: the unit square is folded onto a triangle.

@@ -51,8 +51,8 @@ class MeshSource : public LightSource {
         return sideEmission ? (*sideEmission)[side] : emission;
     }
 
-    // By channel: what a side of the source sends towards a direction away from it over what it sends
-    // in the mean.
+    // By channel: what a side of the source sends towards a direction away from it over what it
+    // sends in the mean.
     glm::vec3 shareTowards(uint32_t side, const glm::vec3& direction) const;
 
     const Patches& patches;
@@ -79,8 +79,8 @@ class MeshSource : public LightSource {
         float clearSquare, clearSlope;
         uint32_t parent;  // into Patches::parents
 
-        // Of a point at about that height over the plane, and square of the distance from the middle,
-        // metres and m^2.
+        // Of a point at about that height over the plane, and square of the distance from the
+        // middle, metres and m^2.
         bool isBefore(const glm::vec3& point, float height, float distance2) const {
             return (height > 0 && height * height > clearSquare + clearSlope * distance2) ||
                    plane.side(point) == PlaneSide::FRONT;

@@ -14,9 +14,9 @@
 //   directions have no cosine.
 // - Lines to the sky take their power away, and bring the world's light.
 // - Power per line is s^2 over the number of bundles, whatever the number of lines was to be. What
-//   arrives at a side is in the end divided by the lines that met it, and not by those that were to in
-//   the mean, so that even light is right however many came: a plain under a sky took 87 times the
-//   bundles.
+//   arrives at a side is in the end divided by the lines that met it, and not by those that were to
+//   in the mean, so that even light is right however many came: a plain under a sky took 87 times
+//   the bundles.
 // - The light of the first shot is kept in the result; the figure loses it or counts it twice.
 // - Power still unshot at the end would be missing. It is spread evenly over the sides that light
 //   has reached: the ambient term of Cohen et al., "A Progressive Refinement Approach to Fast

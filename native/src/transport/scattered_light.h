@@ -7,8 +7,8 @@
 // Source: Immel, Cohen and Greenberg, "A Radiosity Method for Non-Diffuse Environments" (1986):
 // exitance by cells of directions.
 // Differs:
-// - Light between patches is solved for as if they were Lambert's, and what they send beyond that is
-//   brought along the same lines, turn by turn.
+// - Light between patches is solved for as if they were Lambert's, and what they send beyond that
+//   is brought along the same lines, turn by turn.
 // - Which cells are open to an even sky follows from what lines to other patches leave of them.
 // - Few and wide cells, of the hemisphere over the side alone, and a byte a channel: what they hold
 //   changes slowly with the direction and is little of the light.

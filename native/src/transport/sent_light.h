@@ -16,8 +16,8 @@ namespace raybundle {
 class SentLight {
   public:
     using Of = DirectedLight::Of;
-    // irradiance: solved with that shot; exposed: per side, the share of it that nothing covers. All
-    // must outlive the object.
+    // irradiance: solved with that shot; exposed: per side, the share of it that nothing covers.
+    // All must outlive the object.
     SentLight(const Patches& patches, const FirstShot& shot, const Irradiance& irradiance,
               const std::vector<float>& exposed, Of of);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Sides that stand for others in the first shot: of the sides of a cluster (patches/clusters.h) whose
-// light is not shown one gathers the light of the sources for all. The other sides of its patches
-// may be shown.
+// Sides that stand for others in the first shot: of the sides of a cluster (patches/clusters.h)
+// whose light is not shown one gathers the light of the sources for all. The other sides of its
+// patches may be shown.
 //
 // Source: face clusters as receivers (Willmott, Heckbert and Garland, "Face Cluster Radiosity",
 // 1999). Differs: one of the faces receives for all, by chance, as likely as it is large: what

@@ -243,8 +243,8 @@ class BundleIteration : public Transport {
         next = 0;
     }
 
-    // Mean irradiance, direct and indirect: by the lines that met the side and not by those that were to
-    // in the mean, so that even light is right however many came.
+    // Mean irradiance, direct and indirect: by the lines that met the side and not by those that
+    // were to in the mean, so that even light is right however many came.
     std::pair<glm::dvec3, glm::dvec3> mean(Half half, size_t side) const {
         glm::dvec3 direct(0.0), indirect(0.0);
         double count = 0;

@@ -126,9 +126,9 @@ class Transport {
     // Relative error that both halves have alike, so that their difference does not show it.
     virtual double bias() const { return 0; }
 
-    // Per side: the share of the lines from it that leave the scene. Where none met it 0, if the power
-    // that it would get went to those that lines met; below 0 if each of these has that of its own
-    // area alone, and nothing is known of this one's.
+    // Per side: the share of the lines from it that leave the scene. Where none met it 0, if the
+    // power that it would get went to those that lines met; below 0 if each of these has that of
+    // its own area alone, and nothing is known of this one's.
     virtual std::vector<float> openShare() const = 0;
 };
 
@@ -146,8 +146,8 @@ std::unique_ptr<Transport> lineReuse(const TransportInput& input);
 // all of them, and advances them with it.
 using Transports = std::vector<std::unique_ptr<Transport>>;
 Transports lineReuseOfMany(const std::vector<TransportInput>& inputs);
-// The same between clusters: all that goes in and comes out is per side of the patches that they are
-// made of, but for the solutions.
+// The same between clusters: all that goes in and comes out is per side of the patches that they
+// are made of, but for the solutions.
 Transports lineReuseOfClusters(const std::vector<TransportInput>& inputs);
 std::unique_ptr<Transport> multipath(const TransportInput& input);
 std::unique_ptr<Transport> stochasticIteration(const TransportInput& input);

@@ -85,8 +85,8 @@ class WorldSource : public LightSource {
     // The light as a plane sees it: neighbouring receivers have it in common.
     struct Facing {
         glm::vec3 normal{0.0f}, irradiance{0.0f};
-        // Per region: the irradiance from it, all channels together, if it is one of those that were
-        // looked at. -1 of all others.
+        // Per region: the irradiance from it, all channels together, if it is one of those that
+        // were looked at. -1 of all others.
         std::vector<float> weight;
         std::vector<uint32_t> looked;
     };

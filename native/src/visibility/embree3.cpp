@@ -6,8 +6,8 @@
 namespace raybundle {
 namespace {
 
-// Of Embree 3's own library, which is loaded with this one; where it is linked in statically, the one
-// that was linked.
+// Of Embree 3's own library, which is loaded with this one; where it is linked in statically, the
+// one that was linked.
 template <class Function>
 Function find(const char* name, Function linked) {
     static void* const library = dlopen("libembree3.so.3", RTLD_LAZY | RTLD_NOLOAD);

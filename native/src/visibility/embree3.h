@@ -5,9 +5,9 @@
 
 namespace raybundle {
 
-// The functions of Embree 3, each found in that very library. Embree 4 has functions of the same names,
-// without versions: in a process that loaded it first, such as official Blender, a plain call would
-// reach those, and end the process.
+// The functions of Embree 3, each found in that very library. Embree 4 has functions of the same
+// names, without versions: in a process that loaded it first, such as official Blender, a plain
+// call would reach those, and end the process.
 struct Embree3 {
     Embree3();
 

@@ -55,8 +55,8 @@ void makeRoomForTreeBuilders() {
     if (!isKnown) ++callers;
     isKnown = true;
 
-    // oneTBB's workers build too. The list doubles whenever it is full: with `room` + 1 threads in it,
-    // it has places for as many again but one.
+    // oneTBB's workers build too. The list doubles whenever it is full: with `room` + 1 threads in
+    // it, it has places for as many again but one.
     const size_t builders = callers + 2 * std::thread::hardware_concurrency();
     size_t room = 1;
     while (room <= builders) room *= 2;

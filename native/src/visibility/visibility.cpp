@@ -27,8 +27,8 @@ float offsetAt(const Patches& patches, uint32_t parent) {
 }
 
 [[noreturn]] void fail(RTCError code, const char* what) {
-    // A tree that is built in several threads knows of an allocation that failed in one of them only
-    // that it was cancelled, which is RTC_ERROR_UNKNOWN; nothing else can fail in it.
+    // A tree that is built in several threads knows of an allocation that failed in one of them
+    // only that it was cancelled, which is RTC_ERROR_UNKNOWN; nothing else can fail in it.
     const bool isMemory = code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_UNKNOWN;
     throw Error(
         isMemory                            ? RB_ERROR_OUT_OF_MEMORY
@@ -239,8 +239,8 @@ struct Start : Query {
     glm::vec3 normal;  // of the side
     float zone;        // height over the side within which a hit coincides with it, metres
     // Of each ray, by its id in the packet: how far behind the surface it starts, metres along it,
-    // and the parent that it ends on. A parent whose corners lie in a plane but for a rounding error
-    // may stand before a point of its plane.
+    // and the parent that it ends on. A parent whose corners lie in a plane but for a rounding
+    // error may stand before a point of its plane.
     std::array<float, Visibility::kPacket> behind;
     std::array<uint32_t, Visibility::kPacket> target;
 };
@@ -386,8 +386,8 @@ void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
     }
     FromSide start(*this, side);
     start.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    // Embree without kernels for eight rays, on a processor without AVX, looks at all of them: those
-    // that are not there end before they start.
+    // Embree without kernels for eight rays, on a processor without AVX, looks at all of them:
+    // those that are not there end before they start.
     alignas(32) int valid[kPacket] = {};
     RTCRay8 packet{};
     std::fill_n(packet.dir_z, kPacket, 1.0f);

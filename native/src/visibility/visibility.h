@@ -39,8 +39,9 @@ class Visibility {
     explicit Visibility(const Patches& patches, Blockers blockers = Blockers::EXCHANGING);
     ~Visibility();
 
-    // Share of the light that comes through along a ray from a side. The far end is kept a little off, since it usually lies on a surface. Of surfaces that
-    // coincide with the patch, those on its other side do not block (see comesBefore).
+    // Share of the light that comes through along a ray from a side. The far end is kept a little
+    // off, since it usually lies on a surface. Of surfaces that coincide with the patch, those on
+    // its other side do not block (see comesBefore).
     float visibleShare(uint32_t side, const ShadowRay& ray) const;
 
     // The same for up to kPacket rays from one side, which is quicker the nearer they lie together.
