@@ -80,7 +80,11 @@ def test_a_room_lit_through_its_windows_is_clean():
     is noisy itself. Measured at five pairs of seeds: 3.8 to 6.3 % on the worst object; with one pass of
     rays 9.9 to 14.2."""
     open_file('house_on_plain', 1)
-    (_, first), (_, second) = _bake(1), _bake(2)
+    (report, first), (_, second) = _bake(1), _bake(2)
+    # The shelf's corners, far from the windows: 6 %.
+    noisy = [entry.name for entry in report.objects if entry.error['noise'] > 2 * TARGET]
+    assert noisy and all(any("noisier" in text and f'"{name}"' in text for text in report.warnings)
+                         for name in noisy)
     differences = _differences(first, second)
     for name in first:
         assert differences[name][1] < 0.08, (name, differences[name])

@@ -240,7 +240,7 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
         stateErrors(scene, tiles, ranges, meanOver(tiles, shown.of(lights, exposed), weight),
                     {tiles.mean(exposed, exposedArea(patches, {})), noise.ofBundles, noise.direct,
-                     noise.ofObjects},
+                     noise.ofObjects, noise.isOutOfReach},
                     settings.targetError, settings.hasIndependentDirections(), made, report);
         fillLeftOutCorners(patches, ranges, made, report);
         checkFinite(made);
@@ -639,6 +639,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     progress.report(RB_STAGE_SOLVE, 1);
     SideNoise result = noise.perSide();
     result.ofObjects = noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(), growth);
+    result.isOutOfReach = isReached && castsRays && left > kLeftWithRays;
     return result;
 }
 

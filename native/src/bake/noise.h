@@ -95,6 +95,8 @@ struct SideNoise {
     std::vector<glm::vec3> ofBundles;  // a sample of it, see Noise::perSide, W/m^2
     std::vector<float> direct;         // standard error of the first shot, W/m^2
     std::vector<double> ofObjects;     // per instance: see noiseOfObjects; empty: there is no light
+    // Whether rays have left more than the target, since more bundles gain little on what they met.
+    bool isOutOfReach = false;
 };
 
 // The noise of the light of all, and that of each light set.

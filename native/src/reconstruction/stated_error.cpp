@@ -19,8 +19,9 @@ namespace {
 constexpr double kCoarse = 0.05, kCoarseTargets = 2;
 // Objects that are named for it.
 constexpr size_t kMostNamed = 6;
-// An object is noisy above so many targets.
-constexpr double kNoisyTargets = 2;
+// An object is noisy above so many targets, unless its mean square light is below this share of the
+// scene's: a room beside a sunny plain is not.
+constexpr double kNoisyTargets = 2, kNearlyBlack = 1e-4;
 // Objects darker than this share of the mean square light are not worth a finer mesh.
 constexpr double kDark = 0.01;
 // An object of whose area less than this is known takes over the surplus of the others.
@@ -252,7 +253,7 @@ double edgeFor(double limit, double smoothShare, double stepShare, double patchE
 
 // Names the noisiest. noises: of those that have too much, relative, with their names.
 void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double target,
-                 Report& report) {
+                 bool isOutOfReach, Report& report) {
     if (noises.empty()) return;
     std::stable_sort(noises.begin(), noises.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -264,7 +265,10 @@ void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double targ
     if (noises.size() > named)
         text += " and " + std::to_string(noises.size() - named) +
                 " more, of which the report has the noise of each";
-    report.warnings.push_back(text + "; lower target_error");
+    report.warnings.push_back(
+        text + (isOutOfReach ? "; few lines bring them light: a lower target_error takes long "
+                               "and gains little there"
+                             : "; lower target_error"));
 }
 
 // A mesh that is too coarse: its squared error, and what to say of it.
@@ -336,14 +340,15 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
             light[i].gatheredNoise ? shown : std::max(sides.ofObjects[i], errsAlike ? shown : 0);
         report.objects[i].error = relative(own, noiseScale, ofPatches, smooth + step);
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
-        if (!(own.signal / own.area > kDark * all.signal / all.area)) continue;
         const double noise = report.objects[i].error.noise;
-        if (!errsAlike && noise > kNoisyTargets * double(targetError))
+        const double brightness = own.signal / own.area * all.area / all.signal;
+        if (!errsAlike && noise > kNoisyTargets * double(targetError) && brightness > kNearlyBlack)
             noisy.push_back({noise, light[i].name});
+        if (!(brightness > kDark)) continue;
         if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
             coarse.push_back(std::move(*mesh));
     }
-    warnOfNoise(std::move(noisy), double(targetError), report);
+    warnOfNoise(std::move(noisy), double(targetError), sides.isOutOfReach, report);
     warnOf(std::move(coarse), report);
     report.error = relative(all, noiseScale, shown, discretisation);
     report.error.ofPatches = report.estimatedError;

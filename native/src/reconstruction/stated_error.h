@@ -27,6 +27,7 @@ struct SideErrors {
     const std::vector<glm::vec3>& noise;    // a sample of that of the bundles, W/m^2; empty: none
     const std::vector<float>& directError;  // standard error of the sources' light, W/m^2
     const std::vector<double>& ofObjects;   // per instance: noise at corners, relative
+    bool isOutOfReach = false;              // see SideNoise
 };
 
 // Adds the errors, and warnings of objects whose mesh is too coarse, to the report, and the error
