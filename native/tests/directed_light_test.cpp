@@ -461,6 +461,13 @@ UpAndDown upAndDown(double whiteness, double reflectance, double share, const Bs
     return mean;
 }
 
+void runFinely(Bake& bake, const Scene& scene, int seed) {
+    bake.settings.patchSize = 0.1f;
+    bake.settings.targetError = 0.003f;
+    bake.settings.seed = seed;
+    bake.run(scene);
+}
+
 TEST_P(Studio, SendsOnWhatOthersSentIt) {
     constexpr float kWhiteness = 0.8f;
     Scene scene = studio(GetParam());
@@ -473,10 +480,7 @@ TEST_P(Studio, SendsOnWhatOthersSentIt) {
     UpAndDown found;
     for (int seed = 0; seed < kSeeds; ++seed) {
         Bake bake;
-        bake.settings.patchSize = 0.1f;
-        bake.settings.targetError = 0.003f;
-        bake.settings.seed = seed;
-        bake.run(scene);
+        runFinely(bake, scene, seed);
         const Patches& patches = bake.patches();
         for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
             const uint32_t instance = patches.parentAt(side).instance;
@@ -543,10 +547,7 @@ TEST_P(Studio, SendsOnAnEvenSky) {
     double reflected = 0, toWall = 0;
     for (int seed = 0; seed < kSeeds; ++seed) {
         Bake bake;
-        bake.settings.patchSize = 0.1f;
-        bake.settings.targetError = 0.003f;
-        bake.settings.seed = seed;
-        bake.run(scene);
+        runFinely(bake, scene, seed);
         const Patches& patches = bake.patches();
         const Irradiance& light = bake.patchIrradiance();
         for (uint32_t side = 0; side < patches.sideCount(); side += 2) {

@@ -15,8 +15,6 @@ constexpr double kGrowthOfGrid = 3, kGrowthPower = 1.2;
 // Of n cells the noise is stated 1 + kFewCells / (n + 2) times as high: the halves of six differ by
 // less than half of what is usual in one bake of twenty.
 constexpr double kFewCells = 3;
-// An object that is darker than this share of the scene's RMS light counts as that.
-constexpr double kNearlyBlack = 0.01;
 
 }  // namespace
 

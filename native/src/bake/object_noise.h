@@ -22,6 +22,9 @@ namespace raybundle {
 // big_room: 0.9 to 1.7). Samples of direct light end when they agree, also where that is by chance.
 constexpr double kAtCorners = 1.4;
 
+// An object that is darker than this share of the scene's RMS light counts as that.
+constexpr double kNearlyBlack = 0.01;
+
 // Per instance: how much the variance grows from the means of cells to corners, as far as it is
 // random within them.
 std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches);
@@ -30,7 +33,7 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches);
 // look. growth: of its instance.
 double bundlesAtCorners(const Noise::OfCell& cell, double growth);
 
-// Per instance, relative to the RMS of its light, which is taken to be a hundredth of the scene's
+// Per instance, relative to the RMS of its light, which is taken to be kNearlyBlack of the scene's
 // at least: the noise at corners, that of the first shot included. tiles: whose cells these are;
 // growth: per instance.
 std::vector<double> noiseOfObjects(const Scene& scene, const Patches& tiles, const Noise& noise,

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "bake/cancellation.h"
+#include "bake/object_noise.h"
 #include "patches/neighbours.h"
 #include "reconstruction/surplus.h"
 
@@ -19,9 +20,9 @@ namespace {
 constexpr double kCoarse = 0.05, kCoarseTargets = 2;
 // Objects that are named for it.
 constexpr size_t kMostNamed = 6;
-// An object is noisy above so many targets, unless its mean square light is below this share of the
-// scene's: a room beside a sunny plain is not.
-constexpr double kNoisyTargets = 2, kNearlyBlack = 1e-4;
+// An object is noisy above so many targets, unless it is kNearlyBlack: a room beside a sunny plain
+// is not.
+constexpr double kNoisyTargets = 2;
 // Objects darker than this share of the mean square light are not worth a finer mesh.
 constexpr double kDark = 0.01;
 // An object of whose area less than this is known takes over the surplus of the others.
@@ -342,7 +343,8 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         const double noise = report.objects[i].error.noise;
         const double brightness = own.signal / own.area * all.area / all.signal;
-        if (!errsAlike && noise > kNoisyTargets * double(targetError) && brightness > kNearlyBlack)
+        if (!errsAlike && noise > kNoisyTargets * double(targetError) &&
+            brightness > kNearlyBlack * kNearlyBlack)
             noisy.push_back({noise, light[i].name});
         if (!(brightness > kDark)) continue;
         if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))

@@ -132,7 +132,7 @@ std::vector<Gathered> DirectLight::gather(
         further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
         further.keep([&](uint32_t k, const Aim& aim) {
             const float told = last[k].besideShadow;
-            const bool isFiner = results[k].contrast == 0 && aim.besideShadow < 0.5f * told;
+            const bool isFiner = results[k].shadowContrast == 0 && aim.besideShadow < 0.5f * told;
             return aim.besideShadow > 0 && (told == 0 || isFiner);
         });
         for (size_t k = 0; k < further.receivers.size(); ++k)
