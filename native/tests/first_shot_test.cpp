@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "test_bakes.h"
 #include "test_scenes.h"
 #include "test_shots.h"
 #include "transport/light_source.h"

@@ -415,8 +415,7 @@ SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, const Show
     Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
     const Patches& patches = trace->patches;
     exposed = trace->surrounding.exposed;
-    if (exposed.empty())
-        exposed = surroundings(trace->exactInput(settings), uint32_t(settings.seed)).exposed;
+    if (exposed.empty()) exposed = trace->surroundingsOf(settings).exposed;
     std::vector<float> weight = wantedArea(patches, shown);
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exposed[side];
     const std::vector<float> tileWeight = tiles.sum(weight);
@@ -540,6 +539,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         }
 
         Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
+        trace->measureExposedShare(uint32_t(settings.seed));
         const uint32_t bundles = transport.bundleCount();
         progress.report(RB_STAGE_SOLVE, std::min(1.0, double(bundles) / settings.maxBundles));
         const std::vector<float> exposed = trace->exposedShare();

@@ -7,6 +7,7 @@
 
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/shown_light.h"
+#include "transport/exposed_share.h"
 
 namespace raybundle {
 namespace {
@@ -84,7 +85,27 @@ void Trace::startLines(const Settings& settings) {
                                             uint32_t(settings.seed), &clusters);
     // Only line reuse on exact projection sees what lies against what while it traces.
     if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact())
-        surrounding = surroundings(exactInput(settings), uint32_t(settings.seed));
+        surrounding = surroundingsOf(settings);
+}
+
+void Trace::measureExposedShare(uint32_t seed) {
+    if (!surrounding.exposed.empty()) return;
+    const std::vector<uint32_t> sides = counts.coveredInPart();
+    const std::vector<float> share =
+        exposedShareOf(sides, visibility, clusters, touchDistance, seed);
+    for (size_t k = 0; k < sides.size(); ++k) counts.setExposedShare(sides[k], share[k]);
+}
+
+Surroundings Trace::surroundingsOf(const Settings& settings) const {
+    const uint32_t seed = uint32_t(settings.seed);
+    Surroundings result = surroundings(exactInput(settings), seed);
+    std::vector<uint32_t> sides;
+    for (uint32_t side = 0; side < result.exposed.size(); ++side)
+        if (result.exposed[side] > 0 && result.exposed[side] < 1) sides.push_back(side);
+    const std::vector<float> share =
+        exposedShareOf(sides, visibility, Clusters(patches), touchDistance, seed);
+    for (size_t k = 0; k < sides.size(); ++k) result.exposed[sides[k]] = share[k];
+    return result;
 }
 
 ProjectorInput Trace::projectorInput(const Settings& settings) const {

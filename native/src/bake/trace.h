@@ -47,6 +47,12 @@ struct Trace {
     // transport uses lines without counting them.
     bool isWhole() const { return tracer && tracer->bundleCount() == counts.bundles; }
 
+    // Measures the exposed share where the lines that were traced tell it to be a part.
+    void measureExposedShare(uint32_t seed);
+
+    // What lines of exact projection meet, with the same measured.
+    Surroundings surroundingsOf(const Settings& settings) const;
+
     // Whether it is of a scene with these hashes.
     bool isOf(uint64_t geometry, uint64_t alike) const {
         return hash == geometry && (likeness == alike || !patches.anyCoincide);

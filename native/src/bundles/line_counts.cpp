@@ -11,11 +11,13 @@ LineCounts::LineCounts(size_t sideCount)
     : sky(sideCount, {0, 0}),
       total(sideCount, {0, 0}),
       touching(sideCount, 0),
-      halves{LineRows(sideCount), LineRows(sideCount)} {}
+      halves{LineRows(sideCount), LineRows(sideCount)},
+      measured(sideCount, -1.0f) {}
 
 size_t LineCounts::byteCount() const {
     return halves[0].byteCount() + halves[1].byteCount() +
-           sideCount() * (2 * sizeof(sky[0]) + sizeof(touching[0])) + met.size() * sizeof(met[0]);
+           sideCount() * (2 * sizeof(sky[0]) + sizeof(touching[0]) + sizeof(measured[0])) +
+           met.size() * sizeof(met[0]);
 }
 
 std::vector<LineCount> LineCounts::row(uint32_t i) const {
@@ -32,9 +34,19 @@ std::vector<float> LineCounts::exposedShare() const {
     std::vector<float> share(sideCount(), 1.0f);
     for (size_t i = 0; i < share.size(); ++i) {
         const float open = float(total[i][0] + total[i][1]);
-        if (touching[i] > 0) share[i] = open / (open + float(touching[i]));
+        if (measured[i] >= 0)
+            share[i] = measured[i];
+        else if (touching[i] > 0)
+            share[i] = open / (open + float(touching[i]));
     }
     return share;
+}
+
+std::vector<uint32_t> LineCounts::coveredInPart() const {
+    std::vector<uint32_t> sides;
+    for (uint32_t i = 0; i < sideCount(); ++i)
+        if (touching[i] > 0 && total[i][0] + total[i][1] > 0 && measured[i] < 0) sides.push_back(i);
+    return sides;
 }
 
 void LineCounts::addTotals(const std::vector<TracedBundle>& traced) {

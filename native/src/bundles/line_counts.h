@@ -53,8 +53,11 @@ class LineCounts {
     std::vector<LineCount> row(uint32_t i) const;
 
     // The share of each side that does not lie against another surface: 0 to 1, and 1 without
-    // lines.
+    // lines. As it was measured, else as the lines tell it.
     std::vector<float> exposedShare() const;
+    // Those sides that lines tell to be covered in part and that were not measured.
+    std::vector<uint32_t> coveredInPart() const;
+    void setExposedShare(uint32_t side, float share) { measured[side] = share; }
 
     // Whether some lines stand for several of the finest ones.
     bool hasDensities() const { return !met.empty(); }
@@ -76,7 +79,8 @@ class LineCounts {
     void countMet(const std::vector<TracedBundle>& traced);
 
     std::array<LineRows, 2> halves;
-    std::vector<uint32_t> met;  // per side: linesMetInAll, if lines have several densities
+    std::vector<uint32_t> met;    // per side: linesMetInAll, if lines have several densities
+    std::vector<float> measured;  // per side: exposed share, below 0 where it was not measured
 };
 
 }  // namespace raybundle

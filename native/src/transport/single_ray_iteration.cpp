@@ -25,7 +25,6 @@ namespace raybundle {
 namespace {
 
 constexpr uint32_t kRaysPerChain = 8192;
-constexpr double kMissing = 1e-3;
 
 class SingleRayIteration : public LocalRayTransport {
   public:

@@ -36,7 +36,6 @@ namespace raybundle {
 namespace {
 
 constexpr uint32_t kBatch = 16;  // bundles of both halves traced at a time
-constexpr double kMissing = 1e-3;
 
 double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
 

@@ -11,6 +11,9 @@
 
 namespace raybundle {
 
+// Share of the light that the first iterate in the mean may lack.
+constexpr double kMissing = 1e-3;
+
 // Largest channel of all reflectances.
 double largestReflectance(const Patches& patches);
 
