@@ -439,8 +439,9 @@ SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, const Show
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
     SideNoise result = noise.perSide();
-    result.ofObjects = noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(),
-                                      cornerGrowth(scene, tiles.patches()));
+    const std::vector<double> growth = cornerGrowth(scene, tiles.patches());
+    result.ofObjects = noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(), growth,
+                                      std::vector<double>(growth.size(), kUsuallyOverForetold));
     return result;
 }
 
@@ -498,11 +499,12 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
     SetNoise noise(trace->looks, errorOfSets, tileWeight, tiles.patches());
 
     const std::vector<double> growth = cornerGrowth(scene, tiles.patches());
+    std::vector<double> overForetold;  // see shownOverForetold
     // Which parts of objects are noisy is known by the lines that met them.
     std::optional<NoisyParts> noisyParts;
     const bool countsLines = settings.solver == "LINE_REUSE";
     if (countsLines)
-        noisyParts.emplace(tiles, trace->looks, tiles.sum(area), shown, growth,
+        noisyParts.emplace(tiles, trace->looks, tiles.sum(area), shown, growth, overForetold,
                            trace->density.windows.empty()
                                ? 0.0
                                : double(patches.sheets.loose.size() + patches.sheets.sheets.size()),
@@ -520,6 +522,15 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
             for (Irradiance& half : result[k]) half = meanOver(tiles, half, weight);
         }
         return result;
+    };
+    // At each look: the same light is to have the same rays, whatever was baked before; and rays
+    // leave noise of another kind than lines.
+    auto measureCorners = [&](const SetNoise& look,
+                              const std::vector<std::array<Irradiance, 2>>& halvesSeen) {
+        overForetold =
+            shownOverForetold(scene, tiles.patches(), look.ofLights().front(), halvesSeen.front(),
+                              tiles.mean(trace->exposedShare(), exposedArea(patches, {})),
+                              settings.regularization, growth);
     };
     const uint32_t counted = mostBundles(patches, trace->density);
     const uint32_t most = std::min(uint32_t(settings.maxBundles), counted) & ~1u;
@@ -548,7 +559,9 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         for (size_t k = 0; k < lights.size(); ++k)
             for (size_t h = 0; h < 2; ++h)
                 halves[k][h] = transports[k]->irradiance(Half(h), kHalfTolerance * float(target));
-        noise.look(seen(), bundles, transport.bias());
+        const std::vector<std::array<Irradiance, 2>> now = seen();
+        noise.look(now, bundles, transport.bias());
+        measureCorners(noise, now);
         errors = noise.relative();
         trace->looks = noise.looks();
         if (noisyParts) {
@@ -567,7 +580,9 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                     *noisyParts, lights, halves,
                     [&](uint32_t furtherPasses) {
                         SetNoise withRays({}, errorOfSets, tileWeight, tiles.patches());
-                        withRays.look(seen(), bundles, transport.bias());
+                        const std::vector<std::array<Irradiance, 2>> withThese = seen();
+                        withRays.look(withThese, bundles, transport.bias());
+                        measureCorners(withRays, withThese);
                         return noisyParts->lookWithRays(withRays, furtherPasses);
                     },
                     finish);
@@ -638,7 +653,8 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         report.lightSets[set].estimatedError = errors[set + 1];
     progress.report(RB_STAGE_SOLVE, 1);
     SideNoise result = noise.perSide();
-    result.ofObjects = noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(), growth);
+    result.ofObjects =
+        noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(), growth, overForetold);
     result.isOutOfReach = isReached && castsRays && left > kLeftWithRays;
     return result;
 }

@@ -18,6 +18,10 @@ constexpr double kDark = 0.05;
 // So many cells of the whole object are added to those of a part, as they are without the noisiest
 // ones: a few that are nearly covered say nothing of the others.
 constexpr double kOfObject = 4, kUsual = 0.95;
+// What the halves tell of a part is a single sample, and a bake ends where it is small: squares
+// count so many times. At a target of 2 % no object of cornell_box, two_rooms and big_room has more
+// than 2.9 % at its 95th percentile then; with 1.5, 3.5 % for a tenth fewer bundles.
+constexpr double kByChance = 1.8;
 // Time that a line takes, projected, kept and solved with, over that of local rays which tell as
 // much (30 ns, and 400 ns a ray; measured in cornell_box).
 constexpr double kLineOverRays = 0.15;
@@ -32,15 +36,15 @@ constexpr double kMostByRays = 0.4;
 // others' rays would be at it everywhere (objects of open_court 5.1 -> 4.4 % at the 95th
 // percentile, of instances 6.5 -> 4.4).
 constexpr double kFewestRays = 8, kSamplesByRays = 2;
-// More rays where some have taken an object's noise to less than this share of what it was, and not
-// below so many targets; at most so many times the samples.
+// More rays where some have taken the noise of an object's noisy parts to less than this share of
+// what it was, for those of them that are above so many targets; at most so many times the samples.
 constexpr double kWorthMoreRays = 0.85, kNearlyClean = 1.25, kMostGrowth = 4;
 // What a pass of twice the rays leaves at best (measured in the rooms of house_on_plain). Objects
 // that all passes to come will not clean get no more.
 constexpr double kLeftByPass = 0.55;
 // A lower target than this has rays where this one has.
 constexpr double kUsualTarget = 0.02;
-// Share of the parts of an object that rays are to have made clean.
+// Share of these parts, and of all of an object, whose noise stands for that of the object.
 constexpr double kMostParts = 0.9;
 constexpr double kOfLooksBefore = 0.5;
 
@@ -48,11 +52,13 @@ constexpr double kOfLooksBefore = 0.5;
 
 NoisyParts::NoisyParts(const Tiles& tiles, const Looks& before, const std::vector<float>& weight,
                        const ShownLight& shown, const std::vector<double>& growth,
-                       double projections, double target)
+                       const std::vector<double>& shownOverForetold, double projections,
+                       double target)
     : tiles(tiles),
       before(before),
       partOf(tiles.sideCount(), kNone),
       growth(growth),
+      shownOverForetold(shownOverForetold),
       projections(projections),
       target(target) {
     const Patches& patches = tiles.patches();
@@ -125,8 +131,8 @@ std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
         // Corners that gather see many parts of their object.
         squares[p] = parts[p].isGathered
                          ? ofObject
-                         : kAtCorners * kAtCorners * (squares[p] + kOfObject * ofObject) /
-                               (weights[p] + kOfObject);
+                         : kByChance * shownOverForetold[parts[p].instance] *
+                               (squares[p] + kOfObject * ofObject) / (weights[p] + kOfObject);
     }
     return squares;
 }
@@ -161,7 +167,7 @@ void NoisyParts::look(const SetNoise& noise, uint32_t count, const std::vector<f
                         : squares[p];
         parts[p].squares = kOfLooksBefore * foretold + (1 - kOfLooksBefore) * squares[p];
     }
-    ofObjects = squaresOfObjects(squares);
+    ofObjects = squaresOfObjects(squares, true);
     allLines = all;
     bundles = count;
 }
@@ -187,10 +193,12 @@ double NoisyParts::excess() const {
     return 0;
 }
 
-std::vector<double> NoisyParts::squaresOfObjects(const std::vector<double>& squares) const {
+std::vector<double> NoisyParts::squaresOfObjects(const std::vector<double>& squares,
+                                                 bool onlyWantingRays) const {
     std::vector<std::vector<double>> ofParts(growth.size());
     for (size_t p = 0; p < parts.size(); ++p)
-        if (!parts[p].isGathered) ofParts[parts[p].instance].push_back(squares[p]);
+        if (!parts[p].isGathered && (parts[p].wantsRays || !onlyWantingRays))
+            ofParts[parts[p].instance].push_back(squares[p]);
     std::vector<double> result(growth.size(), 0);
     for (size_t i = 0; i < result.size(); ++i) {
         std::vector<double>& own = ofParts[i];
@@ -203,19 +211,20 @@ std::vector<double> NoisyParts::squaresOfObjects(const std::vector<double>& squa
 
 double NoisyParts::lookWithRays(const SetNoise& noise, uint32_t furtherPasses) {
     const std::vector<double> squares = squaresOf(noise);
-    const std::vector<double> now = squaresOfObjects(squares);
+    const std::vector<double> now = squaresOfObjects(squares, true);
     const double all = target * target, nearly = kNearlyClean * kNearlyClean * all,
                  inReach = std::pow(kNearlyClean * std::max(target, kUsualTarget), 2) /
                            std::pow(kLeftByPass, 2 * furtherPasses);
     for (size_t p = 0; p < parts.size(); ++p) {
         Part& part = parts[p];
         const double ofObject = now[part.instance], before = ofObjects[part.instance];
-        part.wantsRays = part.wantsRays && squares[p] > nearly && ofObject > nearly &&
-                         ofObject < inReach && ofObject < kWorthMoreRays * kWorthMoreRays * before;
+        part.wantsRays = part.wantsRays && squares[p] > nearly && ofObject < inReach &&
+                         ofObject < kWorthMoreRays * kWorthMoreRays * before;
         if (part.wantsRays) part.wanting *= std::min(squares[p] / all, kMostGrowth);
     }
-    ofObjects = now;
-    return std::sqrt(*std::max_element(now.begin(), now.end())) / target;
+    ofObjects = squaresOfObjects(squares, true);
+    const std::vector<double> left = squaresOfObjects(squares, false);
+    return std::sqrt(*std::max_element(left.begin(), left.end())) / target;
 }
 
 std::vector<ExtraRays> NoisyParts::rays(const std::vector<std::array<float, 2>>& samples,

@@ -29,11 +29,12 @@ class NoisyParts {
     // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it
     // has a result. shown: where corners gather instead of showing their side's light, rays do not
     // help. projections: of sheets and single faces, of each bundle, where there are windows of
-    // finer lines; else 0. target: relative. growth: per instance, see cornerGrowth; it and the
-    // tiles must outlive the object.
+    // finer lines; else 0. target: relative. growth, shownOverForetold: per instance, see
+    // bake/object_noise.h, the second as of the halves that are looked at; they and the tiles must
+    // outlive the object.
     NoisyParts(const Tiles& tiles, const Looks& before, const std::vector<float>& weight,
-               const ShownLight& shown, const std::vector<double>& growth, double projections,
-               double target);
+               const ShownLight& shown, const std::vector<double>& growth,
+               const std::vector<double>& shownOverForetold, double projections, double target);
 
     // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
     // those of all sides, not shown ones included.
@@ -49,8 +50,9 @@ class NoisyParts {
     // half, how many lines have met it, and rays by what they tell. most: of a side.
     std::vector<ExtraRays> rays(const std::vector<std::array<float, 2>>& samples,
                                 uint32_t most) const;
-    // As of a look at the halves with these rays: objects that they made cleaner, but not clean,
-    // are to have more if furtherPasses of twice as many each may clean them. Returns how many
+    // As of a look at the halves with these rays: parts that are not clean yet are to have more if
+    // that has made those of their object cleaner, and furtherPasses of twice as many each may clean
+    // them. Returns how many
     // times too large is what is left, on the object where that is most: of nine parts of ten of
     // it. It is the noise of the light that rays met, and their own.
     double lookWithRays(const SetNoise& noise, uint32_t furtherPasses);
@@ -76,8 +78,10 @@ class NoisyParts {
     // Squares over the light of one noise, per part.
     std::vector<double> squaresOf(const Noise& noise) const;
     std::vector<double> squaresOf(const SetNoise& noise) const;  // the largest of all lights
-    // Per instance: of nine parts of ten of it. squares: per part.
-    std::vector<double> squaresOfObjects(const std::vector<double>& squares) const;
+    // Per instance: of nine parts of ten, of it or of those of it that want rays. squares: per
+    // part.
+    std::vector<double> squaresOfObjects(const std::vector<double>& squares,
+                                         bool onlyWantingRays) const;
 
     const Tiles& tiles;
     const Looks before;
@@ -85,7 +89,9 @@ class NoisyParts {
     std::vector<SeenCell> cells;   // of those with a result
     std::vector<Part> parts;
     const std::vector<double>& growth;
-    std::vector<double> ofObjects;  // per instance, with the rays there are: see squaresOfObjects
+    const std::vector<double>& shownOverForetold;
+    // Per instance, with the rays there are: of the parts that want more, see squaresOfObjects.
+    std::vector<double> ofObjects;
     const double projections, target;
     double allLines = 0;
     uint32_t bundles = 0;

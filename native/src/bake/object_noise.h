@@ -3,6 +3,10 @@
 // The noise at the corners of each object, which is what it shows.
 //
 // Source: none; what the halves tell of the whole scene (bake/noise.h), by object.
+// - What corners show is measured: least squares are fitted to the light of each half as they will
+//   be to all of it. Half of the difference is one sample of the noise at each corner; from cell to
+//   cell it differs by chance, so that of it only the whole object's is taken, and what the means
+//   of cells foretell says how that is spread.
 // - Values at corners whose interpolation is nearest to the light have more variance than the means
 //   of cells, as far as that is random within these: 3 times in a grid, where there is one corner a
 //   cell (the diagonal of the inverse of the hat functions' mass matrix), and 16 times on a quad by
@@ -10,6 +14,7 @@
 // - Few cells are few samples: their noise is stated higher, by the chance that they agree.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "bake/noise.h"
@@ -17,10 +22,6 @@
 #include "scene/scene.h"
 
 namespace raybundle {
-
-// The noise at corners over what is foretold of it (measured in cornell_box, two_rooms and
-// big_room: 0.9 to 1.7). Samples of direct light end when they agree, also where that is by chance.
-constexpr double kAtCorners = 1.4;
 
 // An object that is darker than this share of the scene's RMS light counts as that.
 constexpr double kNearlyBlack = 0.01;
@@ -33,10 +34,22 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches);
 // look. growth: of its instance.
 double bundlesAtCorners(const Noise::OfCell& cell, double growth);
 
+// What is usual of shownOverForetold.
+constexpr double kUsuallyOverForetold = 2;
+
+// Per instance: squares of the noise of bundles that its corners show, over what bundlesAtCorners
+// foretells of them. halves: per side of the tiles, of the noise's last look, W/m^2; exposed,
+// regularization: see leastSquares. Of few cells it is near what is usual.
+std::vector<double> shownOverForetold(const Scene& scene, const Patches& tiles, const Noise& noise,
+                                      const std::array<Irradiance, 2>& halves,
+                                      const std::vector<float>& exposed, float regularization,
+                                      const std::vector<double>& growth);
+
 // Per instance, relative to the RMS of its light, which is taken to be kNearlyBlack of the scene's
 // at least: the noise at corners, that of the first shot included. tiles: whose cells these are;
-// growth: per instance.
+// growth, shown: per instance, see above.
 std::vector<double> noiseOfObjects(const Scene& scene, const Patches& tiles, const Noise& noise,
-                                   const std::vector<double>& growth);
+                                   const std::vector<double>& growth,
+                                   const std::vector<double>& shown);
 
 }  // namespace raybundle

@@ -9,8 +9,8 @@
 // Differs:
 // - Rays leave all over the patch, so that they estimate what lines do, its mean; both are joined,
 //   weighed by how much they tell.
-// - What all these sides absorb together stays what the lines had it, if these are many: they keep
-//   the balance of energy.
+// - What all these sides absorb together stays what the lines had it, up to a ten-thousandth of all
+//   that is absorbed: lines keep the balance of energy.
 // - Half of the rays of a side sees the light that the first half of the bundles has found, the
 //   other half that of the second: the two halves still err independently, and tell the noise.
 #pragma once
