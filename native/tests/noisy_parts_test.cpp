@@ -91,22 +91,17 @@ TEST(NoisyParts, StatedNoiseIsThatWithRays) {
     Bake one, two;
     two.settings.seed = 1;
     for (Bake* bake : {&one, &two}) bake->run(scene);
-    // By area, as the noise is stated: a small thing has as many corners as the room.
     std::vector<glm::vec3> a, b;
-    for (int32_t instance = 0; instance < int32_t(scene.instances.size()); ++instance) {
-        const glm::vec3 size = instance == 0   ? glm::vec3(4, 2, 2)
-                               : instance == 1 ? glm::vec3(0.1f, 2, 1.4f)
-                                               : glm::vec3(0.1f, 0.12f, 0.07f);
-        const float area = size.x * size.y + size.y * size.z + size.z * size.x;
-        for (const auto& [bake, all] : {std::pair{&one, &a}, std::pair{&two, &b}})
-            for (const glm::vec3& light : cornerLight(*bake, instance, RB_OUTPUT_LIGHTING))
-                all->push_back(std::sqrt(area) * light);
-    }
+    for (int32_t instance = 0; instance < int32_t(scene.instances.size()); ++instance)
+        for (const auto& [bake, all] : {std::pair{&one, &a}, std::pair{&two, &b}}) {
+            const auto own = cornerLight(*bake, instance, RB_OUTPUT_LIGHTING);
+            all->insert(all->end(), own.begin(), own.end());
+        }
     const double found = noise(a, b) / std::sqrt(2.0);
     const double stated = std::hypot(reportOf(one)["error"]["noise"].get<double>(),
                                      reportOf(two)["error"]["noise"].get<double>()) /
                           std::sqrt(2.0);
-    // One pair of bakes, whose bundles err alike on whole walls.
+    // One pair of bakes, whose bundles err alike on whole walls; all corners weigh the same here.
     EXPECT_LT(found, 2.5 * stated);
     EXPECT_GT(found, stated / 2.5);
 }
@@ -140,10 +135,10 @@ TEST(NoisyParts, StatedNoiseOfAnObjectIsThatAtItsCorners) {
         }
     }
     // native/bench/calibration asks for 0.95 of all objects. Here each has a face a side, of which
-    // the halves give a few samples, all low in one bake now and then.
+    // the halves give a few samples, all low in one bake of the eight: measured 43 of 48.
     EXPECT_GE(covered, int(0.9 * kSeeds * double(objects)));
-    // Corners of few faces are stated on the safe side (measured: 2.65 times what they have).
-    EXPECT_LT(allStated, 3 * allFound);
+    // Corners of few faces are stated on the safe side (measured: 2.1 times what they have).
+    EXPECT_LT(allStated, 2.5 * allFound);
 }
 
 TEST(NoisyParts, RaysFollowFromTheLightAlone) {

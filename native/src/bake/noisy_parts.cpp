@@ -20,8 +20,8 @@ constexpr double kDark = 0.05;
 constexpr double kOfObject = 4, kUsual = 0.95;
 // What the halves tell of a part is a single sample, and a bake ends where it is small: squares
 // count so many times. At a target of 2 % no object of cornell_box, two_rooms and big_room has more
-// than 2.9 % at its 95th percentile then; with 1.5, 3.5 % for a tenth fewer bundles.
-constexpr double kByChance = 1.8;
+// than 2.8 % at its 95th percentile then (6 seeds); with 1.5, 3.5 % for an eighth fewer bundles.
+constexpr double kByChance = 2;
 // Time that a line takes, projected, kept and solved with, over that of local rays which tell as
 // much (30 ns, and 400 ns a ray; measured in cornell_box).
 constexpr double kLineOverRays = 0.15;

@@ -52,9 +52,8 @@ class NoisyParts {
                                 uint32_t most) const;
     // As of a look at the halves with these rays: parts that are not clean yet are to have more if
     // that has made those of their object cleaner, and furtherPasses of twice as many each may clean
-    // them. Returns how many
-    // times too large is what is left, on the object where that is most: of nine parts of ten of
-    // it. It is the noise of the light that rays met, and their own.
+    // them. Returns how many times too large is what is left, on the object where that is most: of
+    // nine parts of ten of it. It is the noise of the light that rays met, and their own.
     double lookWithRays(const SetNoise& noise, uint32_t furtherPasses);
 
   private:

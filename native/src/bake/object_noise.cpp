@@ -20,7 +20,7 @@ constexpr double kGrowthOfGrid = 3, kGrowthPower = 1.2;
 constexpr double kFewCells = 3;
 // What the halves tell of an object is a single sample of its noise: squares are stated so many
 // times as high.
-constexpr double kStatedOverMeasured = 1.3;
+constexpr double kStatedOverMeasured = 1.1;
 
 }  // namespace
 
