@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 
+#include "reconstruction/reconstruction.h"
 #include "reconstruction/surplus.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
@@ -249,12 +250,12 @@ TEST(StatedError, NamesTheWorstOfManyCoarseObjects) {
     EXPECT_TRUE(mentions(warnings, "4 more objects are too coarse"));
 }
 
-// Of the patch sides, and of the means over cells, which are what is shown.
+// Of the patch sides, and at the corners, which is what is shown.
 TEST(StatedError, CoversTheNoiseOverManySeeds) {
     constexpr int kSeeds = 60, kMost = 8;
     const Scene scene = litRoom();
     struct Light {
-        std::vector<glm::vec3> ofSides, ofCells;  // times the root of the area
+        std::vector<glm::vec3> ofSides, ofCorners;  // times the root of the area
         double stated = 0, shown = 0;
     };
     std::vector<Light> lights(kSeeds);
@@ -269,17 +270,20 @@ TEST(StatedError, CoversTheNoiseOverManySeeds) {
         const Irradiance& found = bake.patchIrradiance();
         const Patches& patches = bake.patches();
         Light& light = lights[size_t(seed)];
-        std::vector<float> areas(patches.cells.size(), 0.0f);
-        light.ofCells.resize(patches.cells.size(), glm::vec3(0.0f));
-        for (uint32_t side = 0; side < found.direct.size(); side += 2) {
-            const float area = patches.area[side / 2];
-            const glm::vec3 all = found.direct[side] + found.indirect[side];
-            light.ofSides.push_back(std::sqrt(area) * all);
-            light.ofCells[patches.parentAt(side).cell] += area * all;
-            areas[patches.parentAt(side).cell] += area;
+        for (uint32_t side = 0; side < found.direct.size(); side += 2)
+            light.ofSides.push_back(std::sqrt(patches.area[side / 2]) *
+                                    (found.direct[side] + found.indirect[side]));
+        const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
+        for (size_t i = 0; i < ranges.size(); ++i) {
+            const auto own = cornerLight(bake, int32_t(i), RB_OUTPUT_LIGHTING);
+            for (uint32_t c = ranges[i].firstCell; c < ranges[i].lastCell; ++c) {
+                const Cell& cell = patches.cells[c];
+                const float area = float(cell.area()) / float(cell.cornerCount());
+                for (const int32_t corner : cell.corner)
+                    if (corner >= 0)
+                        light.ofCorners.push_back(std::sqrt(area) * own[size_t(corner)]);
+            }
         }
-        for (size_t c = 0; c < areas.size(); ++c)
-            if (areas[c] > 0) light.ofCells[c] /= std::sqrt(areas[c]);
         light.stated = reportOf(bake)["estimated_error"];
         light.shown = reportOf(bake)["error"]["noise"];
     }
@@ -298,10 +302,10 @@ TEST(StatedError, CoversTheNoiseOverManySeeds) {
     const std::vector<double> ofSides = ratios(&Light::ofSides, &Light::stated);
     EXPECT_LE(std::count_if(ofSides.begin(), ofSides.end(), [](double r) { return r > 1.25; }),
               kMost);
-    // The cells here are whole walls: their means are few numbers, of which one difference of
-    // halves tells the noise to a half. Root mean square over the seeds it is right.
+    // The cells here are whole walls: there are few corners, of which one difference of halves
+    // tells the noise to a half. Root mean square over the seeds it is right.
     double squares = 0;
-    for (double r : ratios(&Light::ofCells, &Light::shown)) squares += r * r / kSeeds;
+    for (double r : ratios(&Light::ofCorners, &Light::shown)) squares += r * r / kSeeds;
     EXPECT_GT(std::sqrt(squares), 1 / 1.5);
     EXPECT_LT(std::sqrt(squares), 1 / 0.7);
 }

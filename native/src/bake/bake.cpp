@@ -435,13 +435,14 @@ SideNoise Bake::keepFirstShot(const Scene& scene, const Tiles& tiles, const Show
     noise.look(halves, 1, 0);
     const std::vector<double> errors = noise.relative();
     report.estimatedError = errors.front();
-    report.error.noise = noise.shown();
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
     SideNoise result = noise.perSide();
     const std::vector<double> growth = cornerGrowth(scene, tiles.patches());
-    result.ofObjects = noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(), growth,
-                                      std::vector<double>(growth.size(), kUsuallyOverForetold));
+    CornerNoise corners = noiseAtCorners(scene, tiles.patches(), noise.ofLights().front(), growth,
+                                         std::vector<double>(growth.size(), kUsuallyOverForetold));
+    report.error.noise = corners.ofAll;
+    result.ofObjects = std::move(corners.ofObjects);
     return result;
 }
 
@@ -620,9 +621,11 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         noise.lookAgain(seen());
         errors = noise.relative();
     }
+    CornerNoise corners =
+        noiseAtCorners(scene, tiles.patches(), noise.ofLights().front(), growth, overForetold);
     if (isReached && *std::max_element(errors.begin(), errors.end()) > target &&
-        noise.shown() > target)
-        warnOfDirectNoise(scene, patches, lights, area, noise.shown(), target, report);
+        corners.ofAll > target)
+        warnOfDirectNoise(scene, patches, lights, area, corners.ofAll, target, report);
     else if (isReached)
         report.skipped.push_back({"bundles", "the noise is at its target",
                                   most - std::min(most, transport.bundleCount())});
@@ -633,7 +636,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
                                   "the projector AUTO has none");
 
     // What more bundles do not help.
-    double shownNoise = noise.shown(), wrong = trace->tracer->disorderedShare();
+    double shownNoise = corners.ofAll, wrong = trace->tracer->disorderedShare();
     if (settings.smallPatches == "ROULETTE")
         wrong +=
             leakedShare(scene, patches, weight, trace->surrounding.open, transport.openShare());
@@ -653,8 +656,7 @@ SideNoise Bake::solveToTarget(const Scene& scene, const Tiles& tiles, const Show
         report.lightSets[set].estimatedError = errors[set + 1];
     progress.report(RB_STAGE_SOLVE, 1);
     SideNoise result = noise.perSide();
-    result.ofObjects =
-        noiseOfObjects(scene, tiles.patches(), noise.ofLights().front(), growth, overForetold);
+    result.ofObjects = std::move(corners.ofObjects);
     result.isOutOfReach = isReached && castsRays && left > kLeftWithRays;
     return result;
 }

@@ -12,10 +12,6 @@ constexpr double kSmallSample = 0.15;
 // Bundles may have this share of the target at least: less of theirs would cost many and hardly be
 // seen beside the noise of the first shot.
 constexpr double kLeastOfBundles = 0.6;
-// The values at corners whose interpolation is nearest to the light have so many times the variance
-// of the cells' means, as far as that is random: of a grid, the inverse of the hat functions' mass
-// matrix has sqrt 3 on its diagonal along each axis.
-constexpr double kCornersOfMeans = 3;
 // Weight of the looks before.
 constexpr double kMemory = 0.5;
 
@@ -81,24 +77,21 @@ void Noise::measure(const std::array<Irradiance, 2>& half) {
         cell.squares1 += w * w * 0.5 * (a - b);
         cell.squares2 += w * w * 0.25 * glm::dot(a - b, a - b);
     }
-    double shownSquares = 0, shownVariance = 0;
+    double variance = 0;
     ofCells.assign(cells.size(), {});
     for (size_t c = 0; c < cells.size(); ++c) {
         const Cell& cell = cells[c];
         if (!(cell.weight > 0)) continue;
         const double noise = glm::dot(cell.difference, cell.difference) / cell.weight;
-        const double random = cell.random();
-        shownSquares += noise + (kCornersOfMeans - 1) * random;
-        shownVariance += cell.direct / cell.weight;
-        ofCells[c] = {cell.weight, noise / cell.weight, random / cell.weight,
+        variance += cell.direct / cell.weight;
+        ofCells[c] = {cell.weight, noise / cell.weight, cell.random() / cell.weight,
                       cell.direct / (cell.weight * cell.weight),
                       glm::dot(cell.light, cell.light) / (cell.weight * cell.weight)};
     }
     const double scale = signal > 0 ? 1 / signal : 0;
     bundleNoise = squares * scale;
     directNoise = direct * scale;
-    shownOfBundles = shownSquares * scale;
-    shownDirect = shownVariance * scale;
+    directOfCells = variance * scale;
 }
 
 void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double sharedBias) {
@@ -129,12 +122,6 @@ double Noise::relative() const {
     return signal > 0 ? std::hypot(ofBundles(), std::sqrt(directNoise)) : 0;
 }
 
-double Noise::shown() const {
-    if (!(signal > 0)) return 0;
-    const double share = bundleNoise > 0 ? pooled / bundleNoise : 1;
-    return std::sqrt(factor() * factor() * share * shownOfBundles + bias * bias + shownDirect);
-}
-
 double Noise::ofBundles() const {
     return signal > 0 ? std::hypot(factor() * std::sqrt(pooled), bias) : 0;
 }
@@ -142,7 +129,7 @@ double Noise::ofBundles() const {
 double Noise::excess(double target) const {
     const double all = target * target, least = kLeastOfBundles * kLeastOfBundles * all;
     const double left = all - directNoise;
-    return ofBundles() / std::sqrt(left > least ? left : std::max(least, all - shownDirect));
+    return ofBundles() / std::sqrt(left > least ? left : std::max(least, all - directOfCells));
 }
 
 Looks Noise::looks() const { return {looked, bundles, bundleNoise > 0 ? pooled / bundleNoise : 1}; }

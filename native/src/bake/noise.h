@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The noise: how far the light on the patch sides, and that which is shown of it, is from that of
-// infinitely many bundles and shadow rays on the same patches. Light is shown interpolated over the
-// cells of the user's faces, so that what differs from patch to patch within a cell is not seen:
-// the shown noise is that of the values at the corners, by that of the cells' means.
+// The noise: how far the light on the patch sides is from that of infinitely many bundles and shadow
+// rays on the same patches. Light is shown interpolated over the cells of the user's faces, so that
+// what differs from patch to patch within a cell is not seen: that of the cells' means foretells the
+// noise at corners (bake/object_noise.h).
 //
 // Source: thesis section 4.3.3 (stated error).
 // Differs:
@@ -47,13 +47,14 @@ class Noise {
     // Of the same bundles, after what else has made the halves better.
     void lookAgain(const std::array<Irradiance, 2>& half);
 
-    // As of the last look, relative to the RMS of the light: on the sides, and shown.
+    // On the sides, as of the last look, relative to the RMS of the light.
     double relative() const;
-    double shown() const;
     double ofBundles() const;  // without that of the first shot
+    // What the halves have in common, see Transport::bias; relative.
+    double biasOfBoth() const { return bias; }
     // So many times too large is the noise of bundles for a relative target beside that of the
-    // first shot, which they do not help: beside what is shown of that, where the target is out of
-    // reach on the sides.
+    // first shot, which they do not help: beside that of the cells' means, where the target is out
+    // of reach on the sides.
     double excess(double target) const;
     Looks looks() const;
     // So many times the last look's squares are the noise of bundles, by the looks before it too.
@@ -83,7 +84,7 @@ class Noise {
     double bundleNoise = 0;  // relative squares, of the last look
     double pooled = 0;       // the same, averaged with the looks before
     double directNoise = 0, bias = 0, signal = 0;
-    double shownOfBundles = 0, shownDirect = 0;  // relative squares, of the last look
+    double directOfCells = 0;  // relative square, of the cells' means
     uint32_t bundles = 0, looked = 0;
     Looks before;
 };
@@ -94,7 +95,7 @@ struct SideNoise {
 
     std::vector<glm::vec3> ofBundles;  // a sample of it, see Noise::perSide, W/m^2
     std::vector<float> direct;         // standard error of the first shot, W/m^2
-    std::vector<double> ofObjects;     // per instance: see noiseOfObjects; empty: there is no light
+    std::vector<double> ofObjects;     // per instance: see noiseAtCorners; empty: there is no light
     // Whether rays have left more than the target, since more bundles gain little on what they met.
     bool isOutOfReach = false;
 };
@@ -116,8 +117,6 @@ class SetNoise {
 
     // As of the last look, relative: of the light of all, then of each light set.
     std::vector<double> relative() const;
-    // Likewise of the light of all, shown.
-    double shown() const { return noises.front().shown(); }
     // The largest of theirs, see Noise::excess.
     double excess(double target) const;
     // Of the light of all.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "bake/cancellation.h"
 #include "reconstruction/least_squares.h"
@@ -84,9 +85,8 @@ double bundlesAtCorners(const Noise::OfCell& cell, double growth) {
     return cell.noise + std::max(0.0, growth - 1) * cell.random;
 }
 
-std::vector<double> noiseOfObjects(const Scene& scene, const Patches& tiles, const Noise& noise,
-                                   const std::vector<double>& growth,
-                                   const std::vector<double>& shown) {
+CornerNoise noiseAtCorners(const Scene& scene, const Patches& tiles, const Noise& noise,
+                           const std::vector<double>& growth, const std::vector<double>& shown) {
     const std::vector<InstanceRange> ranges = instanceRanges(scene, tiles);
     const std::vector<Noise::OfCell>& cells = noise.cells();
     const double scale = noise.scale();
@@ -96,9 +96,11 @@ std::vector<double> noiseOfObjects(const Scene& scene, const Patches& tiles, con
         allArea += cell.area;
     }
     const double least = allArea > 0 ? kNearlyBlack * kNearlyBlack * allLight / allArea : 0;
-    std::vector<double> result(growth.size(), 0);
-    parallelFor(size_t(0), result.size(), [&](size_t i) {
-        double squares = 0, light = 0, area = 0, count = 0;
+    CornerNoise result{0, std::vector<double>(growth.size(), 0)};
+    std::vector<double> squaresOf(growth.size(), 0);
+    parallelFor(size_t(0), growth.size(), [&](size_t i) {
+        double light = 0, area = 0, count = 0;
+        double& squares = squaresOf[i];
         const size_t end = std::min(2 * size_t(ranges[i].lastCell), cells.size());
         for (size_t c = 2 * size_t(ranges[i].firstCell); c < end; ++c) {
             const Noise::OfCell& cell = cells[c];
@@ -109,11 +111,13 @@ std::vector<double> noiseOfObjects(const Scene& scene, const Patches& tiles, con
             area += cell.area;
             ++count;
         }
+        squares *= kStatedOverMeasured * shown[i];
         light = std::max(light, least * area);
         if (light > 0)
-            result[i] = std::sqrt(kStatedOverMeasured * shown[i] * squares / light) *
-                        (1 + kFewCells / (count + 2));
+            result.ofObjects[i] = std::sqrt(squares / light) * (1 + kFewCells / (count + 2));
     });
+    const double squares = std::accumulate(squaresOf.begin(), squaresOf.end(), 0.0);
+    if (allLight > 0) result.ofAll = std::hypot(std::sqrt(squares / allLight), noise.biasOfBoth());
     return result;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The noise at the corners of each object, which is what it shows.
+// The noise at corners, which is what is shown: that of each object, and of the whole scene.
 //
-// Source: none; what the halves tell of the whole scene (bake/noise.h), by object.
+// Source: none; what the halves tell of the cells' means (bake/noise.h), by object.
 // - What corners show is measured: least squares are fitted to the light of each half as they will
 //   be to all of it. Half of the difference is one sample of the noise at each corner; from cell to
 //   cell it differs by chance, so that of it only the whole object's is taken, and what the means
@@ -45,11 +45,15 @@ std::vector<double> shownOverForetold(const Scene& scene, const Patches& tiles, 
                                       const std::vector<float>& exposed, float regularization,
                                       const std::vector<double>& growth);
 
-// Per instance, relative to the RMS of its light, which is taken to be kNearlyBlack of the scene's
-// at least: the noise at corners, that of the first shot included. tiles: whose cells these are;
-// growth, shown: per instance, see above.
-std::vector<double> noiseOfObjects(const Scene& scene, const Patches& tiles, const Noise& noise,
-                                   const std::vector<double>& growth,
-                                   const std::vector<double>& shown);
+// Relative to the RMS of the light, that of the first shot included.
+struct CornerNoise {
+    double ofAll = 0;
+    // Per instance; its light is taken to be kNearlyBlack of the scene's at least.
+    std::vector<double> ofObjects;
+};
+
+// tiles: whose cells these are; growth, shown: per instance, see above.
+CornerNoise noiseAtCorners(const Scene& scene, const Patches& tiles, const Noise& noise,
+                           const std::vector<double>& growth, const std::vector<double>& shown);
 
 }  // namespace raybundle
