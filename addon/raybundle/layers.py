@@ -12,7 +12,7 @@ Clearcoat is computed, as its formula is. Cycles agrees by light of lamps; its r
 with a density that is not quite its own, and so what they bring of other light depends on the
 colour beneath (over red of 0.8 they bring 3 % of the light less).
 
-Where cloth sends the light of one direction to has formulas (native/src/transport/lobe.h). They are
+Where cloth sends the light of one direction to has formulas (native/src/surfaces/lobe.h). They are
 reciprocal, so that of light by its angle is sent back what is seen at the angle, except for
 microfibers', whose table of it is the integral of the formula.
 

@@ -3,7 +3,7 @@
 
 By the direction it comes from: gloss as GGX mirrors it, cloth (layers.py) and several facets of
 gloss by lobes of their own, the diffuse rest as Burley's or Oren and Nayar's model has it
-(native/src/transport/lobe.h). What differs from Cycles: a surface has one gloss, one lobe of each
+(native/src/surfaces/lobe.h). What differs from Cycles: a surface has one gloss, one lobe of each
 kind and one diffuse model, with the means of the roughnesses that it is mixed of.
 """
 

@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "bake/bake.h"
-#include "bake/error.h"
+#include "job/error.h"
 #include "patches/tiles.h"
 #include "scene_file.h"
 

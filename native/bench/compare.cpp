@@ -29,7 +29,7 @@
 #include <vector>
 
 #include "bake/bake.h"
-#include "bake/error.h"
+#include "job/error.h"
 #include "patch_light.h"
 #include "scene_file.h"
 

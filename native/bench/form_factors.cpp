@@ -6,8 +6,8 @@
 #include <glm/gtc/constants.hpp>
 
 #include "bundles/bundle_tracer.h"
-#include "transport/local_lines.h"
-#include "transport/sphere_sampling.h"
+#include "sampling/sphere_sampling.h"
+#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {

@@ -10,10 +10,10 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "bake/error.h"
-#include "transport/direct_light.h"
-#include "transport/light_source.h"
-#include "transport/sobol.h"
+#include "direct_light/direct_light.h"
+#include "job/error.h"
+#include "lights/light_source.h"
+#include "sampling/sobol.h"
 #include "visibility/visibility.h"
 
 namespace raybundle::bench {

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "bake/error.h"
+#include "job/error.h"
 
 namespace raybundle::bench {
 namespace {

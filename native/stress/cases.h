@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/settings.h"
+#include "job/settings.h"
 #include "scene/scene.h"
 
 namespace raybundle::stress {

@@ -22,8 +22,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bake/bake.h"
-#include "bake/error.h"
 #include "cases.h"
+#include "job/error.h"
 #include "test_scenes.h"
 
 namespace raybundle::stress {

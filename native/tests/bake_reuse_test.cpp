@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "bake/bake.h"
-#include "bake/error.h"
+#include "job/error.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "bake/error.h"
+#include "job/error.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Light that is reflected close to a lamp: gathered, against what very many bundles bring.
-#include "transport/bright_spots.h"
+#include "first_shot/bright_spots.h"
 
 #include <gtest/gtest.h>
 

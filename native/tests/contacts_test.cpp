@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Cuts beside narrow gaps: where they are, and the light in a gap against its exact value.
-#include "patches/contacts.h"
+#include "refinement/contacts.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "lights/mesh_outline.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
-#include "transport/mesh_outline.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {

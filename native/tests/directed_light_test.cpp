@@ -11,10 +11,10 @@
 #include <numeric>
 
 #include "bake/bake.h"
+#include "surfaces/lobe.h"
+#include "surfaces/microfibers.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
-#include "transport/lobe.h"
-#include "transport/microfibers.h"
 
 namespace raybundle {
 namespace {

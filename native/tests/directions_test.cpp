@@ -12,7 +12,7 @@ namespace raybundle {
 namespace {
 
 TEST(Directions, FramesAreOrthonormalAndRightHanded) {
-    for (const DirectionKind& kind : directionKinds())
+    for (const DirectionMethod& kind : directionMethods())
         for (const Bundle& b : Directions(kind.name, 3).next(1000)) {
             EXPECT_NEAR(glm::length(b.right), 1, 1e-6);
             EXPECT_NEAR(glm::length(b.up), 1, 1e-6);
@@ -25,7 +25,7 @@ TEST(Directions, FramesAreOrthonormalAndRightHanded) {
 
 TEST(Directions, LinesAreUniformOverTheSphere) {
     constexpr uint32_t kCount = 4096;
-    for (const DirectionKind& kind : directionKinds())
+    for (const DirectionMethod& kind : directionMethods())
         for (uint32_t seed : {0u, 1u, 2u}) {
             glm::dmat3 second(0.0);
             glm::dvec3 fourth(0.0), rightSecond(0.0);
@@ -53,7 +53,7 @@ TEST(Directions, LinesAreUniformOverTheSphere) {
 }
 
 TEST(Directions, TheSequenceDoesNotDependOnHowItIsRequested) {
-    for (const DirectionKind& kind : directionKinds()) {
+    for (const DirectionMethod& kind : directionMethods()) {
         std::vector<Bundle> parts = Directions(kind.name, 7).next(4);
         for (const Bundle& b : Directions(kind.name, 7, 4).next(4)) parts.push_back(b);
         std::stable_sort(parts.begin(), parts.end(),

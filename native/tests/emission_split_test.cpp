@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transport/emission_split.h"
+#include "direct_light/emission_split.h"
 
 #include <gtest/gtest.h>
 

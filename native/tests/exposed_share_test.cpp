@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // What is covered in part has on the rest of it the light that it has beside.
-#include "transport/exposed_share.h"
+#include "visibility/exposed_share.h"
 
 #include <gtest/gtest.h>
 

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
+#include "lights/mesh_outline.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
-#include "transport/mesh_outline.h"
 
 namespace raybundle {
 namespace {

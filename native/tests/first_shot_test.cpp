@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transport/first_shot.h"
+#include "first_shot/first_shot.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "lights/light_source.h"
+#include "lights/mesh_outline.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/light_source.h"
-#include "transport/mesh_outline.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {

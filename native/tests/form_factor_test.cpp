@@ -6,8 +6,8 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "lights/mesh_outline.h"
 #include "test_scenes.h"
-#include "transport/mesh_outline.h"
 
 namespace raybundle {
 namespace {

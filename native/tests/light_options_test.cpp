@@ -7,11 +7,11 @@
 #include <random>
 
 #include "bundles/directions.h"
+#include "sampling/area_spread.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/area_spread.h"
-#include "transport/local_lines.h"
+#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {

@@ -2,7 +2,7 @@
 //
 // The light of emissive meshes: its closed form against the sum over their faces, its samples
 // against the closed form, and what must not change when a scene is turned.
-#include "transport/mesh_source.h"
+#include "lights/mesh_source.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +11,11 @@
 #include <numeric>
 #include <random>
 
+#include "direct_light/direct_light.h"
+#include "lights/receiver_place.h"
+#include "sampling/sobol.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/direct_light.h"
-#include "transport/receiver_place.h"
-#include "transport/sobol.h"
 
 namespace raybundle {
 namespace {

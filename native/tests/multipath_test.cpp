@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "bake/error.h"
+#include "job/error.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 

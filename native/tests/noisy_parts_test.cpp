@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Noise where it is seen: that of each object, relative to its own light.
-#include "bake/noisy_parts.h"
+#include "stated_error/noisy_parts.h"
 
 #include <gtest/gtest.h>
 

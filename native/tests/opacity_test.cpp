@@ -5,11 +5,11 @@
 
 #include <cmath>
 
-#include "bake/error.h"
+#include "job/error.h"
+#include "lights/mesh_outline.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/mesh_outline.h"
 
 namespace raybundle {
 namespace {

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <random>
 
+#include "direct_light/outlook.h"
+#include "lights/mesh_outline.h"
+#include "lights/world_source.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/mesh_outline.h"
-#include "transport/outlook.h"
-#include "transport/world_source.h"
 
 namespace raybundle {
 namespace {

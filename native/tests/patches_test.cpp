@@ -8,7 +8,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
-#include "bake/error.h"
+#include "job/error.h"
 #include "patches/patch_size.h"
 #include "test_scenes.h"
 

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lights/mesh_outline.h"
 #include "reconstruction/corner_receivers.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
-#include "transport/mesh_outline.h"
 
 namespace raybundle {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Cut tiles as patches, and which tiles refinement cuts.
-#include "patches/refinement.h"
+#include "refinement/refinement.h"
 
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>

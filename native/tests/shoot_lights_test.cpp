@@ -6,9 +6,9 @@
 #include <cmath>
 #include <functional>
 
+#include "first_shot/shoot.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/shoot.h"
 
 namespace raybundle {
 namespace {

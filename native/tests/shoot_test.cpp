@@ -2,7 +2,7 @@
 //
 // The first shot SHOOT: allotment of lines, power, and the variance that it states. Every kind of
 // light: shoot_lights_test.cpp.
-#include "transport/shoot.h"
+#include "first_shot/shoot.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -10,10 +10,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/error.h"
+#include "job/error.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/local_lines.h"
+#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Every skip, on and off: the report says what was skipped, and the light stays the same.
-#include "bake/skips.h"
+#include "job/skips.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 //
 // Sobol's points: stratified wherever in the sequence, of which the bits of an index beyond the
 // first table are part too.
-#include "transport/sobol.h"
+#include "sampling/sobol.h"
 
 #include <gtest/gtest.h>
 

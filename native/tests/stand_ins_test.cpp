@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "transport/stand_ins.h"
+#include "first_shot/stand_ins.h"
 
 #include <gtest/gtest.h>
 

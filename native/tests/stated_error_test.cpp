@@ -8,11 +8,11 @@
 #include <cmath>
 #include <functional>
 
+#include "lights/mesh_outline.h"
 #include "reconstruction/reconstruction.h"
-#include "reconstruction/surplus.h"
+#include "stated_error/surplus.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
-#include "transport/mesh_outline.h"
 
 namespace raybundle {
 namespace {

@@ -6,10 +6,10 @@
 #include <glm/glm.hpp>
 #include <string>
 
-#include "bake/settings.h"
+#include "first_shot/first_shot.h"
+#include "job/settings.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
-#include "transport/first_shot.h"
 #include "visibility/visibility.h"
 
 namespace raybundle::test {

@@ -8,13 +8,13 @@
 #include <functional>
 #include <random>
 
+#include "lights/mesh_outline.h"
+#include "lights/receiver_place.h"
+#include "lights/world_source.h"
+#include "sampling/sphere_sampling.h"
 #include "test_bakes.h"
 #include "test_scenes.h"
 #include "test_shots.h"
-#include "transport/mesh_outline.h"
-#include "transport/receiver_place.h"
-#include "transport/sphere_sampling.h"
-#include "transport/world_source.h"
 
 namespace raybundle {
 namespace {

@@ -368,7 +368,7 @@ RB_API void rb_release_bake(rb_bake bake);
  *   int    skip.NAME       0 does work that the scene does not need, for tests (1). NAME: darkness,
  *                          reflection, geometry, lights, facing, sheets, occluders, lit, weak,
  *                          inside, lamp_insides, clusters, gather, bundles,
- *                          warm_start (bake/skips.h)
+ *                          warm_start (job/skips.h)
  * The first of each choice is the default; docs/method.md says what they do and which work
  * together. rb_execute_bake refuses others with the reason.
  */

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "api/handles.h"
-#include "bake/error.h"
+#include "job/error.h"
 #include "raybundle/raybundle.h"
 #include "scene/scene.h"
 

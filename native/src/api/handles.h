@@ -12,7 +12,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "bake/error.h"
+#include "job/error.h"
 
 namespace raybundle {
 

@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "bake/noise.h"
-#include "bake/progress.h"
-#include "bake/report.h"
-#include "bake/settings.h"
 #include "bundles/line_counts.h"
+#include "job/progress.h"
+#include "job/report.h"
+#include "job/settings.h"
 #include "patches/tiles.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/shown_light.h"
 #include "scene/scene.h"
+#include "stated_error/noise.h"
 #include "transport/set_light.h"
 #include "transport/transport.h"
 #include "visibility/visibility.h"

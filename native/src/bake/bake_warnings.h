@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "bake/report.h"
-#include "bake/settings.h"
+#include "job/report.h"
+#include "job/settings.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "bake/hasher.h"
 #include "patches/reflectance.h"
+#include "sampling/hasher.h"
 
 namespace raybundle {
 namespace {

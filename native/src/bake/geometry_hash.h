@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "bake/settings.h"
+#include "job/settings.h"
 #include "scene/scene.h"
 
 namespace raybundle {

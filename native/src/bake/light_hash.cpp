@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bake/light_hash.h"
 
-#include "bake/hasher.h"
+#include "sampling/hasher.h"
 
 namespace raybundle {
 

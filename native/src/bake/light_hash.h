@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "bake/settings.h"
-#include "transport/direct_light.h"
+#include "direct_light/direct_light.h"
+#include "job/settings.h"
 
 namespace raybundle {
 

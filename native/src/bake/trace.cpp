@@ -7,7 +7,7 @@
 
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/shown_light.h"
-#include "transport/exposed_share.h"
+#include "visibility/exposed_share.h"
 
 namespace raybundle {
 namespace {

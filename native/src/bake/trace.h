@@ -7,16 +7,16 @@
 #include <optional>
 #include <vector>
 
-#include "bake/noise.h"
-#include "bake/report.h"
-#include "bake/settings.h"
 #include "bundles/bundle_tracer.h"
 #include "bundles/line_counts.h"
 #include "bundles/line_windows.h"
+#include "first_shot/first_shot.h"
+#include "job/report.h"
+#include "job/settings.h"
 #include "patches/clusters.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
-#include "transport/first_shot.h"
+#include "stated_error/noise.h"
 #include "transport/transport.h"
 #include "visibility/visibility.h"
 

@@ -3,7 +3,7 @@
 
 #include <numeric>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 

@@ -14,17 +14,17 @@ std::unique_ptr<DirectionSequence> lowDiscrepancyDirections(std::mt19937_64& ran
 std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64& random);
 std::unique_ptr<DirectionSequence> adaptiveDirections(std::mt19937_64& random);
 
-const std::vector<DirectionKind>& directionKinds() {
-    static const std::vector<DirectionKind> table = {
-        // name, factory, independent, weighted
-        {"LOW_DISCREPANCY", lowDiscrepancyDirections, false, false},
-        {"RANDOM", randomDirections, true, false},
-        {"ADAPTIVE", adaptiveDirections, true, true},
-    };
-    return table;
-}
-
 namespace {
+
+struct DirectionKind {
+    const char* name;                                                     // of directionMethods()
+    std::unique_ptr<DirectionSequence> (*make)(std::mt19937_64& random);  // `random`: of the half
+};
+constexpr DirectionKind kKinds[] = {
+    {"LOW_DISCREPANCY", lowDiscrepancyDirections},
+    {"RANDOM", randomDirections},
+    {"ADAPTIVE", adaptiveDirections},
+};
 
 // RANDOM: uniform and independent (thesis section 4.2.1).
 class RandomDirections : public DirectionSequence {
@@ -78,10 +78,9 @@ std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64&) {
 Directions::Directions(const std::string& kind, uint32_t seed, uint32_t first)
     : seed(seed), done(first) {
     assert(first % 2 == 0 && "two halves of equal size");
-    const std::vector<DirectionKind>& table = directionKinds();
-    const auto row = std::find_if(table.begin(), table.end(),
+    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
                                   [&](const DirectionKind& k) { return kind == k.name; });
-    assert(row != table.end() && "settings know the names");
+    assert(row != std::end(kKinds) && "settings know the names");
     for (uint32_t half = 0; half < 2; ++half) {
         std::seed_seq words{seed, half};
         std::mt19937_64 random(words);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Directions of bundles. Each kind is a DirectionSequence in a file of its own and a row of the
-// table in directions.cpp; what all have in common (two independent halves, roll, shift) is here.
+// Directions of bundles. Each kind is a DirectionSequence in a file of its own, a row of the table
+// in directions.cpp, and a row of directionMethods() (job/settings.h), which says what it can do.
+// What all kinds have in common (two independent halves, roll, shift) is here.
 //
 // Sources: thesis sections 4.2.1 (uniform random), 4.5 (adaptive) and 7.3.1 (quasi-Monte Carlo).
 // Differs: a sequence covers a hemisphere, since a line serves both ways.
@@ -9,13 +10,19 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <glm/glm.hpp>
 #include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "sampling/mix_bits.h"
+
 namespace raybundle {
+
+// The noise of what bundles tell falls with their number to about this power.
+constexpr double kNoiseSlope = 0.65;
 
 // One bundle: all lines along `direction`. The orthonormal frame (right, up, direction) carries the
 // random roll; shift in [0, 1)^2 moves the pixel grid, in pixels.
@@ -26,6 +33,19 @@ struct Bundle {
     uint32_t index;     // in the half's sequence
     double weight = 1;  // uniform density of directions over that of the sequence
 };
+
+// The name of its lines, to be joined with a pixel, where patches let lines through by chance
+// (patches/opacity.h).
+inline uint64_t lineName(const Bundle& bundle) {
+    uint64_t name = mixBits(uint64_t(bundle.half) << 32 | bundle.index);
+    // The grid's shift carries the seed of the directions.
+    for (double x : {bundle.shift.x, bundle.shift.y}) {
+        uint64_t bits;
+        std::memcpy(&bits, &x, sizeof bits);
+        name = mixBits(name ^ bits);
+    }
+    return name;
+}
 
 // A direction with its weight (see Bundle).
 struct Direction {
@@ -53,16 +73,8 @@ glm::dvec3 onHemisphere(double u, double v);
 // Shoemake, "Uniform Random Rotations" (Graphics Gems III, 1992).
 glm::dmat3 randomRotation(std::mt19937_64& random);
 
-// A row of the table of sequences.
-struct DirectionKind {
-    const char* name;  // as the setting `directions` has it
-    std::unique_ptr<DirectionSequence> (*make)(std::mt19937_64& random);  // `random`: of the half
-    bool isIndependent;  // each direction is independent of those before
-    bool isWeighted;     // weights differ from 1
-};
-const std::vector<DirectionKind>& directionKinds();
-
-// The bundles of an endless sequence given by kind (a name of the table) and seed.
+// The bundles of an endless sequence given by kind (a name of directionMethods(), job/settings.h)
+// and seed.
 class Directions {
   public:
     Directions(const std::string& kind, uint32_t seed, uint32_t first = 0);

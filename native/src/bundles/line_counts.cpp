@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 

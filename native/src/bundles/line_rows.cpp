@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 namespace {

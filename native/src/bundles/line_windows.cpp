@@ -7,7 +7,8 @@
 #include <limits>
 #include <numeric>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
+#include "job/settings.h"
 
 namespace raybundle {
 namespace {

@@ -29,9 +29,6 @@ struct LineWindow {
     int level;            // its pixels are 2^level times smaller, 1 or more
 };
 
-// Where there are windows; their levels are chosen so that at least about so many can be counted.
-constexpr int kMostWindowBundles = 1 << 16;
-
 struct LineDensity {
     float pixelSize;  // edge of a pixel outside of all windows, metres
     std::vector<LineWindow> windows;

@@ -12,6 +12,7 @@
 
 #include "bundles/directions.h"
 #include "bundles/line_windows.h"
+#include "job/settings.h"
 #include "patches/patches.h"
 #include "visibility/visibility.h"
 
@@ -79,9 +80,6 @@ class Projector {
     // Projects the scene along a bundle and appends its lines to `out`.
     virtual void project(const Bundle& bundle, BundleLines& out) = 0;
 };
-
-enum class SmallPatches { CENTRE_SAMPLING, ROULETTE };
-enum class PlanePlacement { STRATIFIED, SYSTEMATIC, CLOSE_DISTANCE };
 
 // What projectors are made of. References must outlive them.
 struct ProjectorInput {

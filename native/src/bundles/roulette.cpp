@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "transport/sobol.h"
+#include "sampling/sobol.h"
 
 namespace raybundle {
 

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <unordered_map>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 namespace {

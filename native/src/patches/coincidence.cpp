@@ -5,7 +5,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "patches/plane.h"
 
 namespace raybundle {

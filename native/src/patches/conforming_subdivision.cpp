@@ -17,7 +17,7 @@
 #include <queue>
 #include <set>
 
-#include "bake/error.h"
+#include "job/error.h"
 #include "scene/triangulation.h"
 
 namespace raybundle {

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <unsupported/Eigen/BVH>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "scene/disjoint_sets.h"
 
 namespace raybundle {

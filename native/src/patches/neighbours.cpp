@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 namespace {

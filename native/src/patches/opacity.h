@@ -13,32 +13,12 @@
 #include <cstring>
 #include <glm/glm.hpp>
 
-#include "bundles/directions.h"
 #include "patches/patches.h"
+#include "sampling/mix_bits.h"
 
 namespace raybundle {
 
-// Mixes the bits of a number (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number
-// Generators", 2014).
-inline uint64_t mixBits(uint64_t x) {
-    x += 0x9e3779b97f4a7c15ull;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-    return x ^ (x >> 31);
-}
-
-// Names for lines: of a bundle, to be joined with a pixel, and of a ray.
-inline uint64_t lineName(const Bundle& bundle) {
-    uint64_t name = mixBits(uint64_t(bundle.half) << 32 | bundle.index);
-    // The grid's shift carries the seed of the directions.
-    for (double x : {bundle.shift.x, bundle.shift.y}) {
-        uint64_t bits;
-        std::memcpy(&bits, &x, sizeof bits);
-        name = mixBits(name ^ bits);
-    }
-    return name;
-}
-
+// Name of a ray, which is a line.
 inline uint64_t lineName(const glm::vec3& point, const glm::vec3& direction) {
     uint64_t name = 0;
     for (const glm::vec3& v : {point, direction})

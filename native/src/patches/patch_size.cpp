@@ -7,7 +7,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 namespace {

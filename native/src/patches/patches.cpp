@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/cancellation.h"
-#include "bake/error.h"
+#include "job/cancellation.h"
+#include "job/error.h"
+#include "job/settings.h"
 #include "patches/placement.h"
 #include "patches/reflectance.h"
 #include "patches/subdivision.h"

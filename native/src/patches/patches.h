@@ -9,7 +9,7 @@
 // so that whoever meets a parent at a point knows the patch without a search, and projecting the
 // parents costs the same however fine the patches are. A patch of the regular grid is a tile; where
 // the light needs it, a tile is cut once more, into 4^level patches of its own regular grid
-// (patches/refinement.h).
+// (refinement/refinement.h).
 //
 // Differs from the thesis (section 4.2), which projects each patch by itself.
 #pragma once
@@ -28,9 +28,6 @@
 #include "scene/scene.h"
 
 namespace raybundle {
-
-// The number of a side takes 24 bits (bundles/line_rows.h).
-constexpr size_t kMostPatches = size_t(1) << 23;
 
 constexpr uint32_t kNoParent = UINT32_MAX;
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "bake/cancellation.h"
-#include "bake/error.h"
+#include "job/cancellation.h"
+#include "job/error.h"
 #include "patches/coincidence.h"
 
 namespace raybundle {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 namespace {

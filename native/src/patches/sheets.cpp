@@ -10,7 +10,7 @@
 #include <optional>
 #include <unordered_map>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "patches/patches.h"
 
 namespace raybundle {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "patches/coincidence.h"
 #include "patches/crossings.h"
 #include "scene/triangulation.h"

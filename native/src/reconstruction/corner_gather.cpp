@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/cancellation.h"
-#include "transport/local_lines.h"
+#include "job/cancellation.h"
+#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {

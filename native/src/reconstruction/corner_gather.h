@@ -10,8 +10,8 @@
 #include <optional>
 #include <vector>
 
-#include "bake/progress.h"
-#include "bake/settings.h"
+#include "job/progress.h"
+#include "job/settings.h"
 #include "patches/patches.h"
 #include "reconstruction/corner_receivers.h"
 #include "reconstruction/final_gather.h"

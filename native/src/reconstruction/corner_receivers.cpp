@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/cancellation.h"
-#include "transport/sobol.h"
+#include "job/cancellation.h"
+#include "sampling/sobol.h"
 
 namespace raybundle {
 namespace {

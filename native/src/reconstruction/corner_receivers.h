@@ -3,10 +3,10 @@
 
 #include <vector>
 
+#include "direct_light/direct_light.h"
 #include "patches/patches.h"
 #include "reconstruction/least_squares.h"
 #include "scene/scene.h"
-#include "transport/direct_light.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {

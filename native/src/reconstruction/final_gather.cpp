@@ -6,8 +6,8 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
-#include "transport/sobol.h"
-#include "transport/sphere_sampling.h"
+#include "sampling/sobol.h"
+#include "sampling/sphere_sampling.h"
 
 namespace raybundle {
 namespace {

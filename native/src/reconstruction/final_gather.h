@@ -20,13 +20,13 @@
 
 #include <vector>
 
+#include "direct_light/direct_light.h"
 #include "patches/patches.h"
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
-#include "transport/direct_light.h"
+#include "sampling/sobol.h"
 #include "transport/sent_light.h"
 #include "transport/set_light.h"
-#include "transport/sobol.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {

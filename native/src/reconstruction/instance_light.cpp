@@ -3,7 +3,7 @@
 
 #include <glm/gtc/constants.hpp>
 
-#include "bake/error.h"
+#include "job/error.h"
 
 namespace raybundle {
 

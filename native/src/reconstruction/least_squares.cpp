@@ -7,7 +7,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "reconstruction/fit_terms.h"
 
 namespace raybundle {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 namespace {

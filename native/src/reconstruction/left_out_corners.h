@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "bake/report.h"
+#include "job/report.h"
 #include "patches/patches.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/least_squares.h"

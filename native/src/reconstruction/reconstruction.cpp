@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "reconstruction/area_average.h"
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/face_slopes.h"

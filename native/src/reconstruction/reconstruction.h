@@ -14,10 +14,10 @@
 
 #include <vector>
 
-#include "bake/progress.h"
-#include "bake/report.h"
-#include "bake/settings.h"
 #include "bundles/line_counts.h"
+#include "job/progress.h"
+#include "job/report.h"
+#include "job/settings.h"
 #include "patches/patches.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/least_squares.h"

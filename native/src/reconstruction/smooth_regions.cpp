@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "scene/disjoint_sets.h"
 
 namespace raybundle {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
-#include "bake/error.h"
+#include "job/error.h"
 #include "scene/channels.h"
 
 namespace raybundle {

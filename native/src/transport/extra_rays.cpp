@@ -5,11 +5,11 @@
 #include <glm/gtc/constants.hpp>
 #include <memory>
 
-#include "bake/cancellation.h"
-#include "transport/local_lines.h"
+#include "job/cancellation.h"
+#include "sampling/sobol.h"
+#include "sampling/sphere_sampling.h"
 #include "transport/sent_light.h"
-#include "transport/sobol.h"
-#include "transport/sphere_sampling.h"
+#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {

@@ -10,11 +10,11 @@
 #include <functional>
 #include <glm/gtc/constants.hpp>
 
-#include "bake/cancellation.h"
-#include "transport/local_lines.h"
-#include "transport/sobol.h"
-#include "transport/sphere_sampling.h"
-#include "transport/translucence.h"
+#include "job/cancellation.h"
+#include "sampling/sobol.h"
+#include "sampling/sphere_sampling.h"
+#include "surfaces/translucence.h"
+#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {

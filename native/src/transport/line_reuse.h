@@ -31,12 +31,12 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "bake/cancellation.h"
 #include "bundles/line_counts.h"
+#include "first_shot/directed_light.h"
+#include "first_shot/first_shot.h"
+#include "job/cancellation.h"
 #include "patches/clusters.h"
 #include "patches/patches.h"
-#include "transport/directed_light.h"
-#include "transport/first_shot.h"
 #include "transport/scattered_light.h"
 #include "transport/transport.h"
 #include "visibility/visibility.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // LINE_REUSE on surfaces that are not Lambert's: what the lines bring by the direction of the light
-// (transport/directed_light.h), and by the angles at which it leaves and arrives.
+// (first_shot/directed_light.h), and by the angles at which it leaves and arrives.
 //
 // Light of the sources is known before the solve, and what it brings by direction with it.
 // Reflected light is known after it: then the system is solved once more, with what the solution
@@ -15,10 +15,10 @@
 #include <Eigen/Core>
 #include <algorithm>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
+#include "sampling/sobol.h"
 #include "scene/channels.h"
 #include "transport/line_reuse.h"
-#include "transport/sobol.h"
 
 namespace raybundle {
 namespace {

@@ -11,10 +11,10 @@
 #include <glm/gtc/constants.hpp>
 #include <optional>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
+#include "surfaces/translucence.h"
 #include "transport/line_reuse.h"
 #include "transport/streaming_reuse.h"
-#include "transport/translucence.h"
 #include "transport/transport.h"
 
 namespace raybundle {

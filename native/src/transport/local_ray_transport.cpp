@@ -5,7 +5,7 @@
 #include <cassert>
 #include <glm/gtc/constants.hpp>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 
 namespace raybundle {
 namespace {

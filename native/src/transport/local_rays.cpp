@@ -6,7 +6,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "bundles/directions.h"
-#include "transport/sphere_sampling.h"
+#include "sampling/sphere_sampling.h"
 
 namespace raybundle {
 namespace {

@@ -3,7 +3,7 @@
 // Local rays that carry light: from the sources that the first shot left, chosen by power, and on
 // from the sides that they hit. What random walks and the single-ray operator have in common.
 //
-// (Lines whose numbers are allotted to emitters, for first shots: transport/local_lines.h.)
+// (Lines whose numbers are allotted to emitters, for first shots: visibility/local_lines.h.)
 //
 // Sources: thesis sections 2.4.2 (fig. 2.11: rays from a surface) and 2.6 (single-ray operator).
 // Differs:

@@ -32,7 +32,7 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
 #include "transport/transport.h"
 
 namespace raybundle {

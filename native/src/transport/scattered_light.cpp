@@ -11,11 +11,11 @@
 #include <numeric>
 #include <tuple>
 
-#include "bake/cancellation.h"
+#include "job/cancellation.h"
+#include "sampling/sphere_sampling.h"
 #include "scene/channels.h"
-#include "transport/lobe.h"
-#include "transport/side_reflectance.h"
-#include "transport/sphere_sampling.h"
+#include "surfaces/lobe.h"
+#include "surfaces/side_reflectance.h"
 
 namespace raybundle {
 namespace {

@@ -2,7 +2,7 @@
 //
 // What surfaces that are not Lambert's send towards a direction more, or less, than in the mean
 // over all of them, by cells of directions: of the light that other surfaces and an even sky sent
-// them, and roughly of that of the sources, for which transport/directed_light.h is sharper.
+// them, and roughly of that of the sources, for which first_shot/directed_light.h is sharper.
 //
 // Source: Immel, Cohen and Greenberg, "A Radiosity Method for Non-Diffuse Environments" (1986):
 // exitance by cells of directions.
@@ -21,8 +21,8 @@
 #include <utility>
 #include <vector>
 
+#include "first_shot/first_shot.h"
 #include "patches/patches.h"
-#include "transport/first_shot.h"
 
 namespace raybundle {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/sent_light.h"
 
+#include "surfaces/translucence.h"
 #include "transport/scattered_light.h"
-#include "transport/translucence.h"
 
 namespace raybundle {
 

@@ -7,8 +7,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "first_shot/directed_light.h"
 #include "patches/patches.h"
-#include "transport/directed_light.h"
 #include "transport/transport.h"
 
 namespace raybundle {

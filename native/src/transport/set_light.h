@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "direct_light/direct_light.h"
+#include "first_shot/first_shot.h"
 #include "scene/scene.h"
-#include "transport/direct_light.h"
-#include "transport/first_shot.h"
 #include "transport/transport.h"
 
 namespace raybundle {

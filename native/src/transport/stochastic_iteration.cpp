@@ -29,15 +29,14 @@
 #include <cstdio>
 #include <glm/gtc/constants.hpp>
 
-#include "bake/cancellation.h"
-#include "bake/error.h"
+#include "job/cancellation.h"
+#include "job/error.h"
+#include "scene/channels.h"
 
 namespace raybundle {
 namespace {
 
 constexpr uint32_t kBatch = 16;  // bundles of both halves traced at a time
-
-double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
 
 // What sides share in both halves.
 struct Sides {
@@ -182,12 +181,13 @@ class BundleIteration : public Transport {
             const auto [direct, indirect] = mean(Half::BOTH, i);
             const glm::dvec3 light = direct + indirect;
             const double area = double(input.patches.area[i / 2]) * double(input.exposed[i]);
-            arriving += area * sum(light);
+            arriving += area * sumOfChannels(light);
             goingOn += area * std::max(0.0, 1 - double(open[i])) *
-                       sum(glm::dvec3(sides.reflectance[i]) * light);
+                       sumOfChannels(glm::dvec3(sides.reflectance[i]) * light);
             glm::dvec3 fromShot(input.shot.irradiance[i]);
             if (!input.shot.indirect.empty()) fromShot += glm::dvec3(input.shot.indirect[i]);
-            all += area * sum(light) + double(input.patches.area[i / 2]) * sum(fromShot);
+            all += area * sumOfChannels(light) +
+                   double(input.patches.area[i / 2]) * sumOfChannels(fromShot);
         }
         const double n = halves[0].counted();
         if (!(arriving > 0) || n == 0) return 0;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "transport/translucence.h"
+#include "surfaces/translucence.h"
 
 namespace raybundle {
 namespace {

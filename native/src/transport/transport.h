@@ -13,13 +13,13 @@
 #include <string>
 #include <vector>
 
-#include "bake/progress.h"
-#include "bake/report.h"
-#include "bake/settings.h"
 #include "bundles/bundle_tracer.h"
 #include "bundles/line_counts.h"
+#include "first_shot/first_shot.h"
+#include "job/progress.h"
+#include "job/report.h"
+#include "job/settings.h"
 #include "patches/patches.h"
-#include "transport/first_shot.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {

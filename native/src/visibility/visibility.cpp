@@ -9,7 +9,7 @@
 #include <new>
 #include <vector>
 
-#include "bake/error.h"
+#include "job/error.h"
 #include "patches/coincidence.h"
 #include "patches/opacity.h"
 #include "visibility/embree3.h"

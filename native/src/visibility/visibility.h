@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "lights/shadow_ray.h"
 #include "patches/patches.h"
 
 namespace raybundle {
@@ -24,14 +25,6 @@ struct LineHit {
 
 // Which surfaces block: those that light is exchanged with, or those that stop direct light.
 enum class Blockers { EXCHANGING, STOPPING_DIRECT };
-
-// From a point on a side of a patch, relative to Patches::centre.
-struct ShadowRay {
-    glm::vec3 point;
-    glm::vec3 direction;          // unit
-    float distance;               // metres; may be infinite
-    uint32_t target = kNoParent;  // the parent that it ends on, which does not block it
-};
 
 class Visibility {
   public:

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "direct_light/direct_light.h"
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <numeric>
+
+#include "job/cancellation.h"
+#include "lights/receiver_place.h"
+#include "visibility/local_lines.h"
+
+namespace raybundle {
+namespace {
+
+// Of light that was scaled: a squared relative error that has grown by less than this is as it was.
+constexpr float kSameError = 1.1f;
+// Receivers that learn together what they see of such a source: at first, and then by more samples.
+constexpr size_t kWideCluster = 128, kNearCluster = 16;
+constexpr float kNearPower = 0.9f;
+// Of more receivers than this what they see is not kept: 130 bytes each, and 2 kB a cluster.
+constexpr size_t kMostLookingAround = 1 << 19;
+// What finds a shadow's edge may have neighbours that have missed it too: so many times at most.
+constexpr int kMostPasses = 16;
+// Points of a source by which its light at the corners of a face is compared: the same for all.
+constexpr uint32_t kSlopeSamples = 32;
+// For the power balance: rays of all sources together, and of each at least.
+constexpr uint32_t kPowerRays = 16384, kLeastPowerRays = 1024;
+
+bool showAnyByAngle(const Scene& scene) {
+    return std::any_of(scene.materials.begin(), scene.materials.end(),
+                       [](const Material& material) { return material.showsByAngle(); });
+}
+
+}  // namespace
+
+DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                         uint32_t seed, int32_t lightSet, const Skips& skips)
+    : scene(scene),
+      patches(patches),
+      visibility(visibility),
+      seed(seed),
+      skips(skips),
+      showsByAngle(showAnyByAngle(scene)),
+      split(std::make_unique<const EmissionSplit>(
+          splitEmission(scene, patches, visibility, lightSet, seed, skips))),
+      sources(raybundle::lightSources(scene, patches, split->isSource, split->gathered, lightSet)) {
+}
+
+DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                         uint32_t seed, const Skips& skips, EmissionSplit reflected)
+    : scene(scene),
+      patches(patches),
+      visibility(visibility),
+      seed(seed),
+      skips(skips),
+      showsByAngle(showAnyByAngle(scene)),
+      split(std::make_unique<const EmissionSplit>(std::move(reflected))),
+      sources(
+          meshSources(scene, patches, split->isSource, split->gathered, split->directed.get())) {}
+
+void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
+                              const std::function<Receiver(size_t)>& receiverAt,
+                              const std::vector<Aim>& aims, Seen& seen,
+                              const std::function<void(double)>& progress, LightBySource* bySource,
+                              std::vector<Sightings>* sightings) const {
+    constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
+    for (size_t from = 0; from < these.size(); from += kSlice) {
+        progress(0.5 * double(from) / double(these.size()));
+        parallelFor(from, std::min(from + kSlice, these.size()), [&](size_t k) {
+            Gathered& result = results[these[k]];
+            const uint64_t before = result.rays;
+            result = gather(receiverAt(these[k]), aims[k], seen,
+                            bySource ? bySource->of(these[k]) : nullptr,
+                            sightings ? &(*sightings)[these[k]] : nullptr);
+            result.rays += before;
+        });
+    }
+}
+
+void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
+                                const std::function<Receiver(size_t)>& receiverAt,
+                                const std::function<void(double)>& progress,
+                                const std::vector<ReceiverPair>& neighbours,
+                                LightBySource* bySource, std::vector<Sightings>* sightings) const {
+    coarse.seen.resize(sources.size());
+    coarse.bundled = 0;
+    for (size_t side = 0; side < split->bundled.size(); ++side)
+        coarse.bundled +=
+            double(patches.area[side / 2] * brightest(split->bundled[side])) / patches.totalArea;
+    if (sources.empty()) return;
+    Seen seen(sources.size());
+    std::vector<bool> hasNeighbour(coarse.gathered.size(), false);
+    for (const auto& [a, b] : neighbours) hasNeighbour[a] = hasNeighbour[b] = true;
+    std::vector<Aim> aims;
+    for (uint32_t k : these)
+        aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples});
+    gatherThese(coarse.gathered, these, receiverAt, aims, seen, progress, bySource, sightings);
+    for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
+}
+
+std::vector<Gathered> DirectLight::gather(
+    size_t count, const std::function<Receiver(size_t)>& receiverAt, float targetError,
+    const std::function<void(double)>& progress, CoarseShot first,
+    const std::vector<ReceiverPair>& neighbours, LightBySource* bySource) const {
+    std::vector<Sightings> sightings;
+    if (first.gathered.empty()) {
+        if (surrounding() && count <= kMostLookingAround) sightings.resize(count);
+        first.gathered.resize(count);
+        std::vector<uint32_t> these(count);
+        std::iota(these.begin(), these.end(), 0u);
+        shootCoarsely(first, these, receiverAt, progress, neighbours, bySource,
+                      sightings.empty() ? nullptr : &sightings);
+    }
+    std::vector<Gathered> results = std::move(first.gathered);
+    if (sources.empty()) return results;
+    Seen seen(sources.size());
+    for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
+
+    Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
+    const auto outlooks = lookAround(further, results, receiverAt, std::move(sightings));
+    std::vector<Aim> last(neighbours.empty() ? 0 : count);  // of each receiver
+    for (int pass = 0; pass < kMostPasses && !further.receivers.empty(); ++pass) {
+        gatherThese(
+            results, further.receivers, receiverAt, further.aims, seen,
+            [&](double done) { progress(pass == 0 ? 0.5 + done : 1.0); }, bySource, nullptr);
+        if (neighbours.empty()) break;  // nobody tells of the edge of a shadow
+        for (size_t k = 0; k < further.receivers.size(); ++k)
+            last[further.receivers[k]] = further.aims[k];
+        further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
+        further.keep([&](uint32_t k, const Aim& aim) {
+            const float told = last[k].besideShadow;
+            const bool isFiner = results[k].shadowContrast == 0 && aim.besideShadow < 0.5f * told;
+            return aim.besideShadow > 0 && (told == 0 || isFiner);
+        });
+        for (size_t k = 0; k < further.receivers.size(); ++k)
+            further.aims[k].outlook = last[further.receivers[k]].outlook;
+    }
+    return results;
+}
+
+std::array<Outlooks, 2> DirectLight::lookAround(Aims& further, std::vector<Gathered>& results,
+                                                const std::function<Receiver(size_t)>& receiverAt,
+                                                std::vector<Sightings> sightings) const {
+    if (sightings.empty()) return {};
+    const LightSource& source = *surrounding();
+    std::vector<uint32_t> these;
+    std::vector<Aim*> aims;
+    for (size_t k = 0; k < further.aims.size(); ++k)
+        if (sightings[further.receivers[k]].seenShare() < kWellSeen) {
+            these.push_back(further.receivers[k]);
+            aims.push_back(&further.aims[k]);
+        }
+    std::array<Outlooks, 2> outlooks;
+    outlooks[0] =
+        Outlooks(source.parts(), these, receiverAt, patches, sightings, kWideCluster, 0.5f);
+    size_t count = 0;
+    for (size_t k = 0; k < these.size(); ++k) {
+        aims[k]->outlook = outlooks[0].of(k);
+        if (aims[k]->outlook->isDark) continue;
+        these[count] = these[k];
+        aims[count++] = aims[k];
+    }
+    these.resize(count);
+    parallelFor(size_t(0), count, [&](size_t k) {
+        Gathered& result = results[these[k]];
+        sightings[these[k]] = {};
+        look(source, receiverAt(these[k]), *aims[k]->outlook, sightings[these[k]], result);
+    });
+    outlooks[1] =
+        Outlooks(source.parts(), these, receiverAt, patches, sightings, kNearCluster, kNearPower);
+    for (size_t k = 0; k < count; ++k) aims[k]->outlook = outlooks[1].of(k);
+    return outlooks;
+}
+
+std::vector<Gathered> DirectLight::scale(const LightBySource& before,
+                                         const std::vector<LightBySource::Match>& matches,
+                                         const std::function<Receiver(size_t)>& receiverAt,
+                                         float targetError,
+                                         const std::function<void(double)>& progress) const {
+    std::vector<Gathered> results = before.scaled(matches, [&](size_t source, size_t receiver) {
+        return isUnpowered(source, receiverAt(receiver).side);
+    });
+    // Those that took as many samples as they may did so before.
+    const std::vector<Gathered> then = before.asItWas();
+    Aims further = aimsAfter(results, patches, receiverAt, {}, targetError);
+    further.keep([&](uint32_t k, const Aim&) {
+        const Gathered &now = results[k], &was = then[k];
+        const float light = brightest(now.irradiance), lightThen = brightest(was.irradiance);
+        return now.variance * lightThen * lightThen > kSameError * was.variance * light * light;
+    });
+    Seen seen(sources.size());
+    for (std::atomic<bool>& source : seen) source = true;
+    gatherThese(results, further.receivers, receiverAt, further.aims, seen, progress, nullptr,
+                nullptr);
+    return results;
+}
+
+const LightSource* DirectLight::surrounding() const {
+    for (const auto& source : sources)
+        if (!source->parts().empty()) return source.get();
+    return nullptr;
+}
+
+bool DirectLight::isUnpowered(size_t source, uint32_t side) const {
+    return brightest(sources[source]->power()) <= 0 || !sources[source]->castsShadows ||
+           !patches.parentAt(side).stopsDirect;
+}
+
+glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
+    const Place place(patches, receiver);
+    glm::vec3 sum(0.0f);
+    for (size_t k = 0; k < sources.size(); ++k) {
+        const glm::vec4 u = sobolPoint(index, hash(seed, hash(receiver.seed, uint32_t(k))));
+        const glm::vec3 point = place.at({u.x, u.y});
+        const LightSample sample = sources[k]->sample(point, place.normal, {u.z, u.w});
+        if (brightest(sample.irradiance) <= 0) continue;
+        const float share = sources[k]->castsShadows
+                                ? visibility.visibleShare(receiver.side, sample.ray(point))
+                                : 1;
+        sum += share * sample.irradiance;
+    }
+    return sum;
+}
+
+void DirectLight::unblocked(uint32_t side, const glm::vec3* points, size_t count, float even,
+                            glm::vec3* light) const {
+    const Place place(patches, {side, patches.normal(side), std::nullopt, side});
+    std::fill(light, light + count, glm::vec3(0.0f));
+    // The same for all sources, so that sets of them get the same in one bake and in several.
+    const SobolPoints samples(hash(seed, side));
+    for (const auto& source : sources) {
+        if (isOutOfSight(*source, place)) continue;
+        const bool isEven = place.radius < even * source->distance(place.centroid());
+        auto at = [&](const glm::vec3& point) {
+            if (const auto closed = source->irradiance(point, place.normal)) return *closed;
+            glm::vec3 sum(0.0f);
+            for (uint32_t i = 0; i < kSlopeSamples; ++i)
+                sum += source->sample(point, place.normal, {samples[i].z, samples[i].w}).irradiance;
+            return sum / float(kSlopeSamples);
+        };
+        if (isEven) {
+            const glm::vec3 middle = at(place.centroid());
+            for (size_t k = 0; k < count; ++k) light[k] += middle;
+        } else {
+            for (size_t k = 0; k < count; ++k) light[k] += at(points[k]);
+        }
+    }
+}
+
+bool DirectLight::hasPassingLight(uint32_t side) const {
+    if (!patches.parentAt(side).stopsDirect) return !sources.empty();
+    return std::any_of(sources.begin(), sources.end(),
+                       [](const auto& source) { return !source->castsShadows; });
+}
+
+bool DirectLight::isOutOfSight(const LightSource& source, const Place& place) const {
+    return skips.skipFacing && source.isOutOfSight(place);
+}
+
+std::vector<PowerShares> DirectLight::powerShares(float touchDistance) const {
+    std::vector<PowerShares> shares(sources.size());
+    if (sources.empty()) return shares;
+    const uint32_t rays = std::max(kLeastPowerRays, kPowerRays / uint32_t(sources.size()));
+    for (size_t k = 0; k < sources.size(); ++k) {
+        if (brightest(sources[k]->power()) <= 0 || !sources[k]->castsShadows) continue;
+        const uint32_t own = hash(seed, uint32_t(k));
+        const SobolPoints points(own);
+        tbb::enumerable_thread_specific<PowerShares> sums;
+        parallelFor(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
+            for (uint32_t i = range.begin(); i < range.end(); ++i) {
+                glm::vec4 u = points[i];
+                // Of a mesh of 2^n faces all points could lie alike in their faces' shares, as on
+                // their fronts alone.
+                u.x = std::min(glm::fract(u.x + float(hash(own, i)) * 0x1p-32f / float(rays)),
+                               0.9999999f);
+                const EmittedRay ray = sources[k]->emit(u, patches.radius);
+                const glm::dvec3 weight = glm::dvec3(ray.weight) / double(rays);
+                float distance = 0;
+                const auto met =
+                    ray.side ? visibility.firstHit(*ray.side, ray.origin, ray.direction, &distance)
+                             : visibility.firstHit(ray.start(visibility.offset()), ray.direction);
+                if (!met)
+                    sums.local().escaped += weight;
+                else if (ray.side && isCovered(patches, *ray.side, *met, ray.direction, distance,
+                                               touchDistance))
+                    sums.local().covered += weight;
+            }
+        });
+        for (const PowerShares& part : sums) {
+            shares[k].escaped += part.escaped;
+            shares[k].covered += part.covered;
+        }
+    }
+    return shares;
+}
+
+}  // namespace raybundle

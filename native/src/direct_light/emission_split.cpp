@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "direct_light/emission_split.h"
+
+#include <algorithm>
+#include <glm/gtc/constants.hpp>
+#include <random>
+
+#include "bundles/directions.h"
+#include "job/cancellation.h"
+#include "lights/enclosing.h"
+#include "lights/receiver.h"
+#include "sampling/sphere_sampling.h"
+#include "visibility/local_lines.h"
+
+namespace raybundle {
+namespace {
+
+// Emission up to this many times the mean exitance that lines meet is left to the bundles.
+constexpr double kBundledEmission = 1.5;
+// Paths by which the light that leaves the scene is estimated: a share of one half to 2 % of all.
+constexpr uint32_t kPaths = 512;
+
+// The light of a set, as a mean over an island's surfaces, W/m^2. Only orders of magnitude matter.
+struct MeanLight {
+    double area = 0;     // m^2
+    double emitted = 0;  // by surfaces
+    double lamps = 0;
+    double sky = 0;
+    double reflectance = 0;
+
+    // Exitance that lines meet, all bounces included; met: the share of lines from a surface that
+    // meet another one, and not the sky.
+    double exitance(double met) const {
+        return (met * (emitted + lamps) + (1 - met) * sky) / std::max(0.05, 1 - met * reflectance);
+    }
+    double mostExitance() const { return exitance(1) + sky / std::max(0.05, 1 - reflectance); }
+};
+
+// The island that a lamp lies in or nearest to.
+size_t islandNear(const Patches& patches, const glm::dvec3& position) {
+    auto distance = [&](const Island& island) {
+        return glm::distance(glm::dvec3(island.centre), position - patches.centre) -
+               double(island.radius);
+    };
+    const auto nearest = std::min_element(
+        patches.islands.begin(), patches.islands.end(),
+        [&](const Island& a, const Island& b) { return distance(a) < distance(b); });
+    return size_t(nearest - patches.islands.begin());
+}
+
+// Per island: what is bright far away does not make dim what is near.
+std::vector<MeanLight> meanLights(const Scene& scene, const Patches& patches,
+                                  const std::vector<glm::vec3>& emission, int32_t lightSet) {
+    std::vector<MeanLight> means(patches.islands.size());
+    if (means.size() == 1)
+        means.front().area = patches.totalArea;
+    else
+        for (const Parent& parent : patches.parents)
+            means[parent.island].area += double(parent.area());
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        throwIfCancelledAt(side);
+        MeanLight& mean = means[patches.parentAt(side).island];
+        mean.emitted += patches.area[side / 2] * brightest(emission[side]);
+        if (side % 2 == 0)
+            mean.reflectance += patches.area[side / 2] *
+                                brightest(patches.reflectance[side] + patches.translucenceOf(side));
+    }
+    for (const Light& light : scene.lights) {
+        if (light.lightSet != lightSet || means.empty()) continue;
+        const double strength = brightest(light.strength);
+        switch (light.kind) {
+            case Light::Kind::POINT:
+                means[islandNear(patches, light.position)].lamps +=
+                    4 * glm::pi<double>() * strength;
+                break;
+            case Light::Kind::SUN:
+                for (MeanLight& mean : means) mean.lamps += 0.25 * mean.area * strength;
+                break;
+            case Light::Kind::AREA:
+                means[islandNear(patches, light.position)].lamps +=
+                    4 * glm::pi<double>() * strength *
+                    glm::length(glm::cross(light.axisU, light.axisV));
+                break;
+        }
+    }
+    glm::vec3 world = scene.worldRadianceOf(lightSet);
+    if (scene.worldLightSet == lightSet) world += scene.worldImage.meanRadiance();
+    for (MeanLight& mean : means) {
+        mean.emitted /= mean.area;
+        mean.lamps /= mean.area;
+        mean.reflectance /= mean.area;
+        mean.sky = glm::pi<double>() * brightest(world);
+    }
+    return means;
+}
+
+// Share of lines from the surfaces that an island's emission lights which meet a surface.
+double metShare(const Patches& patches, const Visibility& visibility,
+                const std::vector<glm::vec3>& emission, uint32_t island, double power,
+                uint32_t seed) {
+    // From the middle of a side: where it starts matters less than that there are few paths.
+    auto nextHit = [&](uint32_t side, glm::vec2 u) {
+        return visibility.firstHit(side, patches.point(side / 2, glm::vec2(1 / 3.0f)),
+                                   cosineDirection(patches.normal(side), u));
+    };
+    // Sides are in an order, fronts and backs in turns, and so are the points of Sobol's sequence:
+    // equal steps through either could meet fronts alone. A path starts anywhere in its step.
+    std::mt19937_64 random(seed);
+    uint32_t lit = 0, met = 0, path = 0;
+    double sum = 0, start = uniform(random);  // of all, and of the next path: power / kPaths
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        throwIfCancelledAt(side);
+        if (patches.parentAt(side).island != island) continue;
+        sum += patches.area[side / 2] * brightest(emission[side]) / power * kPaths;
+        for (; path < kPaths && start < sum; start = ++path + uniform(random)) {
+            const glm::vec4 u = uniformPoint(random);
+            const auto receiver = nextHit(side, {u.x, u.y});
+            if (!receiver) continue;
+            ++lit;
+            met += nextHit(*receiver, {u.z, u.w}).has_value();
+        }
+    }
+    return lit ? double(met) / lit : 0;
+}
+
+}  // namespace
+
+EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
+                            const Visibility& visibility, int32_t lightSet, uint32_t seed,
+                            const Skips& skips) {
+    const size_t sides = patches.sideCount();
+    EmissionSplit split{patches.emission, std::vector<glm::vec3>(sides),
+                        std::vector<glm::vec3>(sides), std::vector<bool>(sides, false)};
+    for (size_t side = 0; side < sides; ++side) {
+        throwIfCancelledAt(side);
+        const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
+        if (scene.instances[instance].lightSet != lightSet) split.emitted[side] = glm::vec3(0.0f);
+    }
+    if (skips.skipLampInsides) {
+        const std::vector<bool> isEmpty = emptyInsides(scene, patches, split.emitted);
+        for (uint32_t side = 1; side < sides && !isEmpty.empty(); side += 2) {
+            throwIfCancelledAt(side);
+            glm::vec3& emitted = split.emitted[side];
+            if (!isEmpty[patches.parentAt(side).surface] || emitted == glm::vec3(0.0f)) continue;
+            ++split.unseen;
+            split.unseenPower += double(patches.area[side / 2]) * glm::dvec3(emitted);
+            emitted = glm::vec3(0.0f);
+        }
+    }
+    const std::vector<MeanLight> means = meanLights(scene, patches, split.emitted, lightSet);
+    std::vector<double> limits;  // per island
+    for (const MeanLight& mean : means) limits.push_back(kBundledEmission * mean.mostExitance());
+    std::vector<bool> isNear(limits.size(), false);  // whether the share of the sky may matter
+    for (uint32_t side = 0; side < sides; ++side) {
+        throwIfCancelledAt(side);
+        const uint32_t island = patches.parentAt(side).island;
+        const double emission = brightest(split.emitted[side]);
+        if (emission > 0 && emission <= limits[island]) isNear[island] = true;
+    }
+    for (uint32_t k = 0; k < limits.size(); ++k)
+        if (isNear[k])
+            limits[k] = kBundledEmission *
+                        means[k].exitance(metShare(patches, visibility, split.emitted, k,
+                                                   means[k].emitted * means[k].area, seed));
+    for (uint32_t side = 0; side < sides; ++side) {
+        throwIfCancelledAt(side);
+        if (!patches.parentAt(side).exchanges) continue;
+        if (brightest(split.emitted[side]) > limits[patches.parentAt(side).island]) {
+            split.isSource[side] = true;
+            split.gathered[side] = patches.opacityOf(side / 2) * split.emitted[side];
+        } else {
+            split.bundled[side] = split.emitted[side];
+        }
+    }
+    return split;
+}
+
+}  // namespace raybundle

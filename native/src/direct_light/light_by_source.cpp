@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "direct_light/light_by_source.h"
+
+#include <numeric>
+
+namespace raybundle {
+namespace {
+
+constexpr size_t kMostParts = size_t(1) << 21;  // 104 MB
+// A source whose share of the light becomes so many times what it was would have got more samples.
+constexpr double kMostGrowth = 2;
+
+}  // namespace
+
+LightBySource::LightBySource(const std::vector<std::unique_ptr<LightSource>>& sources,
+                             size_t receivers) {
+    if (sources.empty() || receivers > kMostParts / sources.size()) return;
+    for (const auto& source : sources) {
+        shapes.push_back(source->shape);
+        magnitudes.push_back(source->magnitude);
+    }
+    parts.resize(receivers * sources.size());
+}
+
+std::optional<std::vector<LightBySource::Match>> LightBySource::match(
+    const std::vector<std::unique_ptr<LightSource>>& now) const {
+    if (!isWhole) return std::nullopt;
+    // Each is the first that is like it and not taken.
+    std::vector<Match> matches(shapes.size());
+    for (size_t source = 0; source < now.size(); ++source) {
+        size_t k = 0;
+        while (k < shapes.size() && (matches[k].source || shapes[k] != now[source]->shape)) ++k;
+        if (k == shapes.size()) return std::nullopt;
+        matches[k].source = source;
+        for (int c = 0; c < 3; ++c) {
+            if (magnitudes[k][c] > 0)
+                matches[k].factor[c] = now[source]->magnitude[c] / magnitudes[k][c];
+            else if (now[source]->magnitude[c] != 0)
+                return std::nullopt;
+        }
+    }
+
+    // Light of the brightest channel, per source.
+    std::vector<double> before(matches.size(), 0.0), after(before);
+    for (size_t i = 0; i < parts.size(); ++i) {
+        const size_t k = i % matches.size();
+        before[k] += double(brightest(parts[i].irradiance));
+        after[k] += double(brightest(matches[k].factor * parts[i].irradiance));
+    }
+    const double allBefore = std::accumulate(before.begin(), before.end(), 0.0);
+    const double allAfter = std::accumulate(after.begin(), after.end(), 0.0);
+    for (size_t k = 0; k < matches.size(); ++k)
+        if (after[k] * allBefore > kMostGrowth * before[k] * allAfter) return std::nullopt;
+    return matches;
+}
+
+std::vector<Gathered> LightBySource::asItWas() const {
+    std::vector<Match> same(shapes.size());
+    for (Match& match : same) match = {0, glm::vec3(1.0f)};
+    return scaled(same, [](size_t, size_t) { return false; });
+}
+
+}  // namespace raybundle

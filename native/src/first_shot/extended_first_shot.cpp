@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// EXTENDED: after shooting from the sources, the sides that are brighter than the scene will be in
+// the mean shoot what exceeds it, round by round, so that the bundles find light everywhere.
+//
+// Sources: thesis chapter 3, fig. 3.5, eq. 3.1 and 3.2.
+// Differs:
+// - The loops of fig. 3.5 run once too often (`0..numberOfLines`); lines are allotted
+//   systematically here, and all carry about the same power. A side that gets none keeps its light.
+// - A line carries the three channels of its side: one scalar `powerPerLine` cannot.
+// - All shooting of a round reads what was unshot at its start.
+// - Lines that miss the scene take their power from the shooter; it is not booked as escaped here:
+//   the energy balance counts all reflected light by the share of the lines that leave each side.
+// - What stays unshot is handed to the transport apart from the light that has arrived, so that
+//   nothing counts twice.
+// - Sources send all their light in the first step.
+// - Eq. 3.2 grows without bound for white scenes, and nothing would exceed it: the mean reflectance
+//   is capped in it.
+// - In eq. 3.1 f is a share of the scene's area, with which the thesis' examples come out; it is
+//   defined there as an area. The lines it gives carry the light of the sources; those of the
+//   rounds have the same power each and come on top.
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+
+#include "bundles/directions.h"
+#include "first_shot/first_shot.h"
+#include "first_shot/shoot.h"
+#include "sampling/sphere_sampling.h"
+#include "scene/channels.h"
+#include "visibility/local_lines.h"
+
+namespace raybundle {
+namespace {
+
+constexpr int kMaxRounds = 8;
+// With it the threshold is 19 times the light that the sources alone spread over the scene.
+constexpr double kMostReflectance = 0.95;
+// Points to try on a side that is covered in part.
+constexpr int kTries = 8;
+
+// Of both sides, weighted by area.
+glm::dvec3 meanReflectance(const Patches& patches) {
+    glm::dvec3 reflected(0.0);
+    for (size_t side = 0; side < patches.sideCount(); ++side)
+        reflected += double(patches.area[side / 2]) * glm::dvec3(patches.reflectance[side]);
+    return patches.totalArea > 0 ? reflected / (2 * patches.totalArea) : glm::dvec3(0.0);
+}
+
+// The lines to begin with: 0 where they go on to the target error.
+uint64_t sourceLines(const FirstShotInput& input) {
+    const Settings& settings = input.settings;
+    if (settings.localRays > 0) return uint64_t(settings.localRays);
+    if (settings.minBundles != settings.maxBundles || !(input.linesPerBundle > 0)) return 0;
+    const Patches& patches = input.patches;
+    const double radius = double(patches.radius);
+    // Crofton: lines through the bounding sphere meet a surface of area A with probability
+    // A / (2 pi R^2).
+    const double intersections = patches.totalArea / (2 * glm::pi<double>() * radius * radius);
+    const double reflectance = sumOfChannels(meanReflectance(patches)) / 3;
+    const double lines = localToGlobalRatio(intersections, reflectance, reflectance, 1) *
+                         settings.maxBundles * input.linesPerBundle;
+    return uint64_t(std::clamp(lines, 1.0, double(kMostShotLines)));
+}
+
+LineEnd castFrom(uint32_t side, const FirstShotInput& input, std::mt19937_64& random) {
+    const Patches& patches = input.patches;
+    const glm::vec3 normal = patches.normal(side);
+    for (int k = 0; k < kTries; ++k) {
+        const glm::vec4 u = uniformPoint(random);
+        const glm::vec3 direction = cosineDirection(normal, {u.z, u.w});
+        float distance = 0;
+        const Visibility& visibility = input.exchange ? *input.exchange : input.visibility;
+        const auto met =
+            visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}), direction, &distance);
+        if (!met) return {LineEnd::kSky};
+        if (!isCovered(patches, side, *met, direction, distance, input.touchDistance))
+            return {*met};
+    }
+    return {};
+}
+
+}  // namespace
+
+double localToGlobalRatio(double intersections, double meanReflectance, double sourceReflectance,
+                          double share) {
+    const double rs = sourceReflectance;
+    return std::sqrt(intersections * (1 - meanReflectance * meanReflectance) *
+                     (1 - meanReflectance) /
+                     (rs * rs * (1 - meanReflectance) / share + 2 * rs * rs * rs));
+}
+
+FirstShot extendedFirstShot(const FirstShotInput& input) {
+    const Patches& patches = input.patches;
+    const size_t n = patches.sideCount();
+    SourceShot sources = shootSources(input, sourceLines(input));
+    FirstShot shot;
+    shot.emission = input.light.bundledEmission();
+    shot.emitted = sources.emitted;
+    shot.escaped = sources.escaped;
+    shot.rays = sources.lines;
+    shot.irradiance.resize(n);
+    shot.indirect.resize(n);
+    shot.unshot.resize(n);
+
+    glm::dvec3 arrived(0.0);
+    std::vector<glm::dvec3> unshot(n), indirect(n);  // W, per side; reflected and received
+    for (size_t side = 0; side < n; ++side) {
+        const glm::dvec3& received = sources.received[side];
+        shot.irradiance[side] = glm::vec3(received / double(patches.area[side / 2]));
+        if (patches.parentAt(uint32_t(side)).exchanges)
+            unshot[side] = glm::dvec3(patches.reflectance[side]) * received;
+        arrived += received;
+    }
+    const glm::dvec3 reflectance = glm::min(meanReflectance(patches), glm::dvec3(kMostReflectance));
+    const glm::dvec3 threshold =  // W/m^2
+        patches.totalArea > 0 ? reflectance * arrived / (patches.totalArea * (1.0 - reflectance))
+                              : glm::dvec3(0.0);
+
+    const uint32_t seed = uint32_t(input.settings.seed);
+    for (uint32_t round = 0; round < kMaxRounds && sources.powerPerLine > 0; ++round) {
+        input.progress.report(RB_STAGE_FIRST_SHOT, double(round + 1) / (kMaxRounds + 1));
+        std::vector<uint32_t> shooters;
+        std::vector<glm::dvec3> excess;
+        std::vector<double> expected;
+        for (uint32_t side = 0; side < n; ++side) {
+            const glm::dvec3 above = glm::max(
+                unshot[side] - double(patches.area[side / 2]) * threshold, glm::dvec3(0.0));
+            if (!(sumOfChannels(above) > 0)) continue;
+            shooters.push_back(side);
+            excess.push_back(above);
+            expected.push_back(sumOfChannels(above) / sources.powerPerLine);
+        }
+        std::seed_seq seeds{seed, kAllotReflected, round};
+        std::mt19937_64 random(seeds);
+        const std::vector<uint64_t> counts = allotLines(expected, uniform(random));
+        std::vector<glm::dvec3> perLine(shooters.size(), glm::dvec3(0.0));
+        for (size_t k = 0; k < shooters.size(); ++k)
+            if (counts[k] > 0) perLine[k] = excess[k] / double(counts[k]);
+        LocalLines sums(n, shooters.size());
+        sums.cast(
+            counts, perLine,
+            [&](size_t k, std::mt19937_64& r) { return castFrom(shooters[k], input, r); },
+            {seed, kShootReflected, round}, 1,
+            [&] {
+                input.progress.report(RB_STAGE_FIRST_SHOT, double(round + 1) / (kMaxRounds + 1));
+            });
+        if (sums.lines == 0) break;
+        shot.rays += sums.lines;
+        for (size_t k = 0; k < shooters.size(); ++k)
+            unshot[shooters[k]] -= sums.arrived[k] + sums.missed[k];
+        for (size_t side = 0; side < n; ++side) {
+            unshot[side] += glm::dvec3(patches.reflectance[side]) * sums.received[side];
+            indirect[side] += sums.received[side];
+            sources.variance[side] += sums.variance[side];
+        }
+    }
+
+    for (size_t side = 0; side < n; ++side) {
+        const double area = double(patches.area[side / 2]);
+        shot.indirect[side] = glm::vec3(indirect[side] / area);
+        shot.unshot[side] = glm::vec3(glm::max(unshot[side], glm::dvec3(0.0)) / area);
+    }
+    shot.error = standardErrors(patches, sources.variance);
+    input.progress.report(RB_STAGE_FIRST_SHOT, 1);
+    return shot;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// GATHER: the first shot, seen from the receivers: every patch side gathers the light of the
+// sources.
+//
+// Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error).
+// Differs: the thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer
+// it is. Gathering spends its rays where the light is to be known (direct_light/direct_light.h).
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "first_shot/first_shot.h"
+#include "first_shot/stand_ins.h"
+#include "job/cancellation.h"
+#include "patches/neighbours.h"
+
+namespace raybundle {
+namespace {
+
+// So many times the error of a result may be that of light on other sides: what it lights gets it
+// from many of them.
+constexpr float kOthersError = 2;
+// It may be so many times at most, as that of sides that reflect nothing: their light counts in the
+// energy balance alone.
+constexpr float kMostError = 10;
+
+// Of all sides, by themselves.
+std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
+    std::vector<uint32_t> firstOf;  // per tile; one more at the end
+    for (const Parent& parent : patches.parents)
+        for (uint32_t tile = 0; tile < parent.tileCount(); ++tile)
+            firstOf.push_back(parent.firstPatch + parent.firstOf(tile));
+    firstOf.push_back(uint32_t(patches.count()));
+    std::vector<ReceiverPair> pairs;
+    auto add = [&](uint32_t patch, uint32_t other) {
+        for (uint32_t back = 0; back < 2; ++back)
+            pairs.push_back({2 * patch + back, 2 * other + back});
+    };
+    for (const TilePair& tiles : neighbouringTiles(patches, 0, uint32_t(patches.parents.size()))) {
+        const uint32_t a = firstOf[tiles.first], b = firstOf[tiles.second];
+        for (uint32_t p = a; p < firstOf[tiles.first + 1]; ++p) add(p, b);
+        for (uint32_t p = b + 1; p < firstOf[tiles.second + 1]; ++p) add(p, a);
+    }
+    for (size_t tile = 0; tile + 1 < firstOf.size(); ++tile)
+        for (uint32_t p = firstOf[tile] + 1; p < firstOf[tile + 1]; ++p) add(p, p - 1);
+    return pairs;
+}
+
+}  // namespace
+
+std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns) {
+    std::vector<ReceiverPair> pairs;
+    for (const ReceiverPair& sides : neighbouringSides(patches)) {
+        const ReceiverPair pair{standIns.numberOf(sides.first), standIns.numberOf(sides.second)};
+        if (standIns.gatherers()[pair.first] == sides.first &&
+            standIns.gatherers()[pair.second] == sides.second)
+            pairs.push_back(pair);
+    }
+    return pairs;
+}
+
+namespace {
+
+// So many times the error of a result may be that of a side whose light is not shown. What it
+// lights gets it from many such sides, whose errors even out: the variance of their sum goes with
+// the area of each, beside that of all.
+float othersError(const Patches& patches, const StandIns& standIns, uint32_t side) {
+    if (patches.reflectance[side] == glm::vec3(0.0f) &&
+        patches.translucenceOf(side ^ 1) == glm::vec3(0.0f))
+        return kMostError;
+    if (standIns.isForOthers(standIns.numberOf(side))) return kOthersError;
+    const float edge = patches.islandAt(side).size;
+    return kOthersError *
+           std::max(1.0f, edge / std::sqrt(std::max(patches.area[side / 2], 1e-30f)));
+}
+
+// By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
+CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32_t>& gatherers,
+                           const std::function<Receiver(size_t)>& receiverAt,
+                           const std::function<void(double)>& report) {
+    CoarseShot coarse;
+    if (!input.fromTiles) return coarse;
+    const Patches& patches = input.patches;
+    coarse.seen = input.fromTiles->seen;
+    coarse.gathered.resize(gatherers.size());
+    std::vector<uint32_t> cut;
+    for (uint32_t k = 0; k < gatherers.size(); ++k) {
+        throwIfCancelledAt(k);
+        const uint32_t side = gatherers[k];
+        if (patches.level(side / 2) > 0)
+            cut.push_back(k);
+        else
+            coarse.gathered[k] = input.fromTiles->gathered[2 * patches.tileOf(side / 2) + side % 2];
+    }
+    input.light.shootCoarsely(coarse, cut, receiverAt, report);
+    return coarse;
+}
+
+}  // namespace
+
+FirstShot gather(const FirstShotInput& input) {
+    const DirectLight& light = input.light;
+    const Patches& patches = input.patches;
+    const size_t n = patches.sideCount();
+    std::optional<StandIns> alone;
+    const StandIns& standIns = input.standIns ? *input.standIns : alone.emplace(patches, nullptr);
+    const std::vector<uint32_t>& gatherers = standIns.gatherers();
+    FirstShot shot;
+    shot.emission = light.bundledEmission();
+    shot.irradiance.resize(n);
+    shot.angles.resize(n);
+    if (!patches.scattering.empty()) shot.incoming.resize(n);
+    shot.error.resize(n);
+    shot.noisiest.resize(n);
+    auto report = [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); };
+    auto receiverAt = [&](size_t k) {
+        const uint32_t side = gatherers[k];
+        Receiver receiver{side, patches.normal(side), std::nullopt, side};
+        // Most of the error of a cut tile's patches is not in its mean, which keeps twice what
+        // other tiles have.
+        if (const int level = patches.level(side / 2); level > 0)
+            receiver.errorFactor = std::ldexp(1.0f, level);
+        if (input.isShown && !(*input.isShown)[side]) {
+            receiver.isShown = false;
+            receiver.errorFactor =
+                std::min(receiver.errorFactor * othersError(patches, standIns, side), kMostError);
+        }
+        return receiver;
+    };
+    const float target = input.settings.targetError;
+    const auto& sources = light.lightSources();
+    std::vector<PowerShares> shares(sources.size());
+    std::vector<Gathered> results;
+    if (const auto matches = input.before ? input.before->match(sources) : std::nullopt) {
+        results = light.scale(*input.before, *matches, receiverAt, target, report);
+        shot.bySource = input.before;
+        for (size_t k = 0; k < matches->size(); ++k)
+            if (const auto source = (*matches)[k].source)
+                shares[*source] = input.before->powerShares[k];
+    } else {
+        auto bySource = std::make_shared<LightBySource>(sources, gatherers.size());
+        bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
+        results = light.gather(gatherers.size(), receiverAt, target, report,
+                               coarseOfPatches(input, gatherers, receiverAt, report),
+                               neighbouringGatherers(patches, standIns),
+                               bySource->isWhole ? bySource.get() : nullptr);
+        shares = bySource->powerShares = light.powerShares(input.touchDistance);
+        shot.bySource = std::move(bySource);
+    }
+    for (const Gathered& result : results) {
+        shot.rays += result.rays;
+        shot.unblockedSides += result.unblocked;
+        shot.hiddenSides += result.hidden;
+        shot.weakSides += result.weak;
+        shot.insideSides += result.inside;
+    }
+    for (uint32_t side = 0; side < n; ++side) {
+        const Gathered& result = results[standIns.numberOf(side)];
+        shot.irradiance[side] = result.irradiance;
+        shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
+        shot.angles[side] = result.meanAngles();
+        if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
+        shot.error[side] = std::sqrt(result.variance);
+        shot.noisiest[side] = result.noisiest;
+    }
+    shot.sidesByOthers = n - gatherers.size();
+    for (size_t k = 0; k < sources.size(); ++k) {
+        const glm::dvec3 power(sources[k]->power());
+        if (sources[k]->castsShadows) shot.emitted += power * (1.0 - shares[k].covered);
+        shot.escaped += power * shares[k].escaped;
+    }
+    input.progress.report(RB_STAGE_FIRST_SHOT, 1);
+    return shot;
+}
+
+}  // namespace raybundle

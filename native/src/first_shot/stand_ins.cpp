@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "first_shot/stand_ins.h"
+
+#include <cmath>
+#include <numeric>
+
+#include "job/cancellation.h"
+#include "patches/clusters.h"
+#include "sampling/sobol.h"
+
+namespace raybundle {
+
+StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
+    const uint32_t count = uint32_t(patches.sideCount());
+    std::vector<uint32_t> clusters;  // per patch
+    if (isShown) {
+        std::vector<bool> isIn(patches.count());
+        for (size_t patch = 0; patch < isIn.size(); ++patch)
+            isIn[patch] = !(*isShown)[2 * patch] || !(*isShown)[2 * patch + 1];
+        clusters = findClusters(patches, isIn);
+    }
+    // Of a side: that of the side of its cluster.
+    auto clusterOf = [&](uint32_t side) {
+        return (*isShown)[side] || clusters[side / 2] == kNoCluster
+                   ? kNoCluster
+                   : 2 * clusters[side / 2] + side % 2;
+    };
+    struct StandIn {
+        uint32_t side = 0, sides = 0;  // sides: that it stands for
+        float wait = INFINITY;
+    };
+    std::vector<StandIn> standIns;  // per side of a cluster
+    bool isAnyForOthers = false;
+    for (uint32_t side = 0; !clusters.empty() && side < count; ++side) {
+        throwIfCancelledAt(side);
+        const uint32_t cluster = clusterOf(side);
+        if (cluster == kNoCluster) continue;
+        if (cluster >= standIns.size()) standIns.resize(cluster + 1);
+        StandIn& standIn = standIns[cluster];
+        isAnyForOthers |= ++standIn.sides > 1;
+        // The first of events of which each comes as often as the patch is large.
+        const float random = (float(hash(side, 0) >> 8) + 0.5f) * 0x1p-24f;
+        const float wait = -std::log(random) / patches.area[side / 2];
+        if (wait >= standIn.wait) continue;
+        standIn.wait = wait;
+        standIn.side = side;
+    }
+    if (!isAnyForOthers) {
+        sides.resize(count);
+        std::iota(sides.begin(), sides.end(), 0u);
+        return;
+    }
+    numbers.resize(count);
+    for (uint32_t side = 0; side < count; ++side) {
+        const uint32_t cluster = clusterOf(side);
+        if (cluster != kNoCluster && standIns[cluster].side != side) continue;
+        numbers[side] = uint32_t(sides.size());
+        sides.push_back(side);
+        forOthers.push_back(cluster != kNoCluster && standIns[cluster].sides > 1);
+    }
+    for (uint32_t side = 0; side < count; ++side)
+        if (const uint32_t cluster = clusterOf(side); cluster != kNoCluster)
+            numbers[side] = numbers[standIns[cluster].side];
+}
+
+}  // namespace raybundle

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "job/cancellation.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <system_error>
+#include <thread>
+
+namespace raybundle {
+namespace {
+
+constexpr std::chrono::milliseconds kEvery(20);
+
+// What the thread that works and the one that asked for it tell each other.
+class Watch {
+  public:
+    explicit Watch(const Progress& progress) : progress(progress) {}
+
+    // From the working thread: a rb_progress_function, which waits for the answer.
+    static bool ask(void* user, rb_stage stage, double fraction) {
+        Watch& watch = *static_cast<Watch*>(user);
+        std::unique_lock lock(watch.mutex);
+        watch.last = {stage, fraction};
+        watch.isAsked = watch.isBegun = true;
+        watch.changed.notify_all();
+        watch.changed.wait(lock, [&] { return !watch.isAsked; });
+        return watch.cancelled == Cancelled::NO;
+    }
+
+    void work(const Work& body) {
+        try {
+            body(Progress(&Watch::ask, this), context);
+        } catch (...) {
+            thrown = std::current_exception();
+        }
+        std::unique_lock lock(mutex);
+        isDone = true;
+        changed.notify_all();
+    }
+
+    // Until the work is done.
+    Cancelled answer() {
+        std::unique_lock lock(mutex);
+        while (!isDone) {
+            const bool isDue = !changed.wait_for(lock, kEvery, [&] { return isAsked || isDone; });
+            if (isDone || (isDue && !isBegun) || cancelled != Cancelled::NO) {
+                isAsked = false;
+                changed.notify_all();
+                continue;
+            }
+            const auto [stage, fraction] = last;
+            const bool wasAsked = isAsked;
+            lock.unlock();
+            const bool goesOn = progress.tell(stage, fraction);
+            lock.lock();
+            if (!goesOn) {
+                cancelled = wasAsked ? Cancelled::BETWEEN_STEPS : Cancelled::ANYWHERE;
+                if (!wasAsked) context.cancel_group_execution();
+            }
+            if (wasAsked) isAsked = false;
+            changed.notify_all();
+        }
+        if (thrown && cancelled == Cancelled::NO) std::rethrow_exception(thrown);
+        return cancelled;
+    }
+
+  private:
+    const Progress& progress;
+    tbb::task_group_context context;
+    std::mutex mutex;
+    std::condition_variable changed;
+    std::pair<rb_stage, double> last{RB_STAGE_PATCHES, 0};
+    bool isAsked = false, isBegun = false, isDone = false;
+    Cancelled cancelled = Cancelled::NO;
+    std::exception_ptr thrown;
+};
+
+struct Joined {
+    std::thread& thread;
+    ~Joined() { thread.join(); }
+};
+
+}  // namespace
+
+Cancelled runCancellable(const Progress& progress, const Work& work) {
+    tbb::task_group_context untouched;
+    if (!progress.isHeard()) {
+        work(progress, untouched);
+        return Cancelled::NO;
+    }
+    Watch watch(progress);
+    std::thread thread;
+    try {
+        thread = std::thread([&] { watch.work(work); });
+    } catch (const std::system_error&) {
+        work(progress, untouched);
+        return Cancelled::NO;
+    }
+    const Joined joined{thread};
+    return watch.answer();
+}
+
+}  // namespace raybundle

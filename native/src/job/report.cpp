@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "job/report.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+namespace raybundle {
+namespace {
+
+// Of the whole process so far.
+int64_t peakMemoryBytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return int64_t(usage.ru_maxrss) * 1024;
+}
+
+// Text of strings and numbers by nlohmann; objects and arrays are put together here, since its own
+// allocate when they are destroyed: without memory the process would end.
+template <class T>
+std::string text(const T& value) {
+    // Names that are not UTF-8 must not lose the report.
+    return nlohmann::json(value).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string listed(const std::vector<std::string>& items, char first, char last) {
+    std::string joined(1, first);
+    for (const std::string& item : items) joined += (joined.size() > 1 ? ",\n" : "") + item;
+    return joined + last;
+}
+
+// Keys with the text of their values.
+std::string object(const std::vector<std::pair<const char*, std::string>>& members) {
+    std::vector<std::string> items;
+    for (const auto& [key, value] : members) items.push_back(text(key) + ": " + value);
+    return listed(items, '{', '}');
+}
+
+template <class Items, class TextOf>
+std::string array(const Items& items, const TextOf& textOf) {
+    std::vector<std::string> texts;
+    for (const auto& item : items)
+        if (std::string one = textOf(item); !one.empty()) texts.push_back(std::move(one));
+    return listed(texts, '[', ']');
+}
+
+std::string errors(const Report::Errors& error) {
+    return object({{"noise", text(error.noise)},
+                   {"discretisation", text(error.discretisation)},
+                   {"mesh", text(error.mesh)},
+                   {"total", text(error.total())}});
+}
+
+}  // namespace
+
+double Report::Errors::total() const {
+    const double most = std::max(noise, ofPatches);
+    return std::sqrt(most * most + discretisation * discretisation + mesh * mesh);
+}
+
+double Report::balanceError() const {
+    return emitted > 0 ? std::abs(emitted - absorbed - escaped) / emitted : 0;
+}
+
+std::string Report::json() const {
+    return object(
+        {{"seconds", object({{"total", text(totalSeconds)},
+                             {"patches", text(seconds[RB_STAGE_PATCHES])},
+                             {"first_shot", text(seconds[RB_STAGE_FIRST_SHOT])},
+                             {"bundles", text(seconds[RB_STAGE_BUNDLES])},
+                             {"solve", text(seconds[RB_STAGE_SOLVE])},
+                             {"reconstruction", text(seconds[RB_STAGE_RECONSTRUCTION])}})},
+         {"patches", text(patches)},
+         {"refined", array(cuts,
+                           [](const Cut& cut) {
+                               return cut.tiles == 0 ? ""
+                                                     : object({{"why", text(cut.why)},
+                                                               {"tiles", text(cut.tiles)}});
+                           })},
+         {"bundles", text(bundles)},
+         {"lines", text(lines)},
+         {"exchanges", text(exchanges)},
+         {"shadow_rays", text(shadowRays)},
+         {"estimated_error", text(estimatedError)},
+         {"error", errors(error)},
+         {"energy", object({{"emitted", text(emitted)},
+                            {"absorbed", text(absorbed)},
+                            {"escaped", text(escaped)},
+                            {"balance_error", text(balanceError())}})},
+         {"peak_memory_bytes", text(peakMemoryBytes())},
+         {"light_sets", array(lightSets,
+                              [](const LightSet& set) {
+                                  return object({{"name", text(set.name)},
+                                                 {"estimated_error", text(set.estimatedError)}});
+                              })},
+         {"objects", array(objects,
+                           [](const Object& one) {
+                               return object({{"name", text(one.name)},
+                                              {"corners", text(one.corners)},
+                                              {"status", text(one.status)},
+                                              {"error", errors(one.error)}});
+                           })},
+         {"warnings", array(warnings, [](const std::string& warning) { return text(warning); })},
+         {"skipped", array(skipped, [](const Skip& skip) {
+              return skip.count == 0 ? ""
+                                     : object({{"what", text(skip.what)},
+                                               {"why", text(skip.why)},
+                                               {"count", text(skip.count)}});
+          })}});
+}
+
+}  // namespace raybundle

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "lights/spot_cone.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+
+#include "sampling/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+constexpr int kGrid = 64;        // points each way, to know the mean of a deformed cone
+constexpr int kBisections = 40;  // to invert the integral
+
+}  // namespace
+
+SpotCone::SpotCone(const Light& light)
+    : toLocal(light.worldToCone),
+      fromLocal(glm::inverse(light.worldToCone)),
+      edge(std::cos(0.5 * light.coneAngle)),
+      soft((1 - edge) * light.coneBlend),
+      dims(light.coneDims) {
+    total = integral(1);
+    if (!(total > 0) || glm::determinant(toLocal) == 0) return;  // nothing comes out
+    double sum = 0, low = INFINITY, high = 0;
+    for (int i = 0; i < kGrid; ++i)
+        for (int j = 0; j < kGrid; ++j) {
+            const double s = stretch(local((glm::vec2(i, j) + 0.5f) / float(kGrid)));
+            sum += s;
+            low = std::min(low, s);
+            high = std::max(high, s);
+        }
+    meanStretch = sum / (kGrid * kGrid);
+    isDeformed = high > (1 + 1e-5) * low;
+    mean = float(0.5 * total * meanStretch);
+}
+
+float SpotCone::share(const glm::vec3& direction) const {
+    return float(shareAt(-glm::normalize(toLocal * glm::dvec3(direction)).z));
+}
+
+double SpotCone::shareAt(double cosine) const {
+    if (cosine <= edge) return 0;
+    const double t = soft > 0 ? std::min(1.0, (cosine - edge) / soft) : 1;
+    return t * t * (3 - 2 * t) * (dims ? std::max(0.0, cosine) : 1);
+}
+
+// Of the share, over the cosine from the rim on.
+double SpotCone::integral(double cosine) const {
+    auto primitive = [&](double z) {
+        const double t = soft > 0 ? std::clamp((z - edge) / soft, 0.0, 1.0) : 0;
+        const double full = edge + soft;  // where the light has its whole strength
+        const double t3 = t * t * t, flat = t3 * (1 - 0.5 * t);
+        if (!dims) return soft * flat + std::max(0.0, z - full);
+        const double sloped = t3 * t * (0.75 - 0.4 * t);
+        return soft * (edge * flat + soft * sloped) + 0.5 * std::max(0.0, z * z - full * full);
+    };
+    const double least = dims ? std::max(edge, 0.0) : edge;
+    return cosine > least ? primitive(cosine) - primitive(least) : 0;
+}
+
+// A direction in the space in which the cone looks along -z, drawn by the share.
+glm::dvec3 SpotCone::local(glm::vec2 uv) const {
+    const glm::dvec2 d(onDisk(uv));
+    const double r2 = glm::dot(d, d), wanted = (1 - r2) * total;
+    double low = edge, high = 1;
+    for (int k = 0; k < kBisections; ++k) {
+        const double middle = 0.5 * (low + high);
+        (integral(middle) < wanted ? low : high) = middle;
+    }
+    const double z = 0.5 * (low + high);
+    const double scale = r2 > 0 ? std::sqrt(std::max(0.0, 1 - z * z) / r2) : 0;
+    return {scale * d.x, scale * d.y, -z};
+}
+
+// Solid angle in the world over that in the cone's space.
+double SpotCone::stretch(const glm::dvec3& local) const {
+    return std::abs(glm::determinant(fromLocal)) / std::pow(glm::length(fromLocal * local), 3);
+}
+
+SpotCone::Ray SpotCone::emit(glm::vec2 uv) const {
+    const glm::dvec3 drawn = local(uv);
+    return {glm::vec3(glm::normalize(fromLocal * drawn)),
+            isDeformed ? float(stretch(drawn) / meanStretch) : 1.0f};
+}
+
+}  // namespace raybundle

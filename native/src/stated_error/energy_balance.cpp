@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "stated_error/energy_balance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+
+#include "scene/channels.h"
+#include "surfaces/translucence.h"
+
+namespace raybundle {
+namespace {
+
+double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
+
+glm::dvec3 power(const Patches& patches, size_t side, const glm::vec3& perArea) {
+    return double(patches.area[side / 2]) * glm::dvec3(perArea);
+}
+
+// What lines bring the sides of an object that they met, in the mean.
+struct BroughtByLines {
+    double area = 0;        // m^2, that is exposed
+    glm::dvec3 power{0.0};  // W
+    double open = 0;        // area times the share of lines that leave the scene, m^2
+};
+
+glm::vec3 byLines(const Irradiance& irradiance, size_t side) {
+    return irradiance.all(side) - irradiance.gathered[side];
+}
+
+size_t objectSide(const Patches& patches, size_t side) {
+    return 2 * patches.parentAt(uint32_t(side)).instance + side % 2;
+}
+
+// Per instance, its fronts and its backs.
+std::vector<BroughtByLines> broughtByLines(const Patches& patches, const Irradiance& irradiance,
+                                           const std::vector<float>& exposedShare,
+                                           const std::vector<float>& openShare) {
+    std::vector<BroughtByLines> brought;  // for as many instances as have patches
+    for (size_t side = 0; side < patches.sideCount(); ++side) {
+        const size_t of = objectSide(patches, side);
+        brought.resize(std::max(brought.size(), of + 1));
+        if (openShare[side] < 0) continue;
+        const double area = double(exposedShare[side]) * double(patches.area[side / 2]);
+        brought[of].area += area;
+        brought[of].power += area * glm::dvec3(byLines(irradiance, side));
+        brought[of].open += area * double(openShare[side]);
+    }
+    return brought;
+}
+
+}  // namespace
+
+void balanceEnergy(const Patches& patches, const SetLight& light,
+                   const std::vector<float>& exposedShare, const std::vector<float>& openShare,
+                   Report& report) {
+    const FirstShot& shot = light.shot;
+    const Irradiance& irradiance = light.irradiance;
+    const glm::vec3 worldExitance = glm::pi<float>() * light.worldRadiance;
+    const std::vector<BroughtByLines> brought =
+        broughtByLines(patches, irradiance, exposedShare, openShare);
+    // What the insides of lamps emit they absorb.
+    glm::dvec3 emitted = shot.emitted + light.direct.unseenPower();
+    glm::dvec3 absorbed = light.direct.unseenPower(), escaped = shot.escaped;
+    for (size_t side = 0; side < patches.sideCount(); ++side) {
+        const double exposed = double(exposedShare[side]);
+        if (!patches.parentAt(uint32_t(side)).exchanges) {
+            absorbed += exposed * power(patches, side, irradiance.gathered[side]);
+            continue;
+        }
+        const BroughtByLines& others = brought[objectSide(patches, side)];
+        float open = openShare[side];
+        glm::vec3 ofLines = byLines(irradiance, side);
+        if (open < 0 && others.area > 0) {
+            open = float(others.open / others.area);
+            // Unless local rays brought it something.
+            if (ofLines == glm::vec3(0.0f)) ofLines = glm::vec3(others.power / others.area);
+        }
+        open = std::max(0.0f, open);
+        glm::vec3 reflected = patches.reflectance[side] * ofLines +
+                              shotReflectance(patches, shot, side) * irradiance.gathered[side] +
+                              passedOn(patches, exposedShare, side, irradiance.all(side ^ 1));
+        if (!irradiance.byAngle.empty()) reflected += irradiance.byAngle[side];
+        emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
+        absorbed += exposed * power(patches, side, irradiance.gathered[side] + ofLines - reflected);
+        escaped += exposed * power(patches, side, open * (shot.emission[side] + reflected));
+    }
+    // In a closed scene that is noise, and stays in the balance.
+    if (sum(escaped) > sum(shot.escaped)) escaped -= irradiance.redirected;
+    report.emitted += sum(emitted);
+    report.absorbed += sum(absorbed);
+    report.escaped += sum(escaped);
+}
+
+double leakedShare(const Scene& scene, const Patches& patches, const std::vector<float>& weight,
+                   const std::vector<float>& exactOpen, const std::vector<float>& open) {
+    std::vector<double> difference(2 * scene.instances.size(), 0);
+    double total = 0;
+    for (size_t side = 0; side < weight.size(); ++side) {
+        if (open[side] < 0) continue;
+        difference[objectSide(patches, side)] +=
+            double(weight[side] * (open[side] - exactOpen[side]));
+        total += double(weight[side]);
+    }
+    double sum = 0;
+    for (double d : difference) sum += std::abs(d);
+    return total > 0 ? sum / total : 0;
+}
+
+double errorByWrongExchanges(const Patches& patches, double share) {
+    double reflectance = 0, area = 0;
+    for (size_t side = 0; side < patches.sideCount(); ++side) {
+        const glm::vec3 rho = patches.reflectance[side] + patches.translucenceOf(side);
+        reflectance += double(patches.area[side / 2] * brightest(rho));
+        area += double(patches.area[side / 2]);
+    }
+    return area > 0 ? share / (1 - reflectance / area * (1 - share)) : 0;
+}
+
+}  // namespace raybundle

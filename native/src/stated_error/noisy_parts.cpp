@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "stated_error/noisy_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "job/cancellation.h"
+#include "patches/parts.h"
+#include "stated_error/object_noise.h"
+
+namespace raybundle {
+namespace {
+
+constexpr uint32_t kNone = UINT32_MAX;
+// What is darker than this share of the mean, of the scene and of its island, counts as that.
+constexpr double kDarkPart = 0.05;
+// So many cells of the whole object are added to those of a part, as they are without the noisiest
+// ones: a few that are nearly covered say nothing of the others.
+constexpr double kOfObject = 4, kUsual = 0.95;
+// What the halves tell of a part is a single sample, and a bake ends where it is small: squares
+// count so many times. At a target of 2 % no object of cornell_box, two_rooms and big_room has more
+// than 2.8 % at its 95th percentile then (6 seeds); with 1.5, 3.5 % for an eighth fewer bundles.
+constexpr double kByChance = 2;
+// Time that a line takes, projected, kept and solved with, over that of local rays which tell as
+// much (30 ns, and 400 ns a ray; measured in cornell_box).
+constexpr double kLineOverRays = 0.15;
+// Where there are windows of finer lines, a face takes the time of so many lines in each bundle,
+// for it is projected in several of them (1.8 us on 24,000 leaves, most of which lie in some).
+constexpr double kLinesOfFace = 30;
+// Rays lose and make light by their noise, which lines do not: what gets more than this share of
+// all lines is left to these.
+constexpr double kMostByRays = 0.4;
+// Rays of a side: those that are fewer tell nothing. They are to tell as much as so many times the
+// lines that would do: of parts which only lines clean most are below the target, and the noise of
+// others' rays would be at it everywhere (objects of open_court 5.1 -> 4.4 % at the 95th
+// percentile, of instances 6.5 -> 4.4).
+constexpr double kFewestRays = 8, kSamplesByRays = 2;
+// More rays where some have taken the noise of an object's noisy parts to less than this share of
+// what it was, for those of them that are above so many targets; at most so many times the samples.
+constexpr double kWorthMoreRays = 0.85, kNearlyClean = 1.25, kMostGrowth = 4;
+// What a pass of twice the rays leaves at best (measured in the rooms of house_on_plain). Objects
+// that all passes to come will not clean get no more.
+constexpr double kLeftByPass = 0.55;
+// A lower target than this has rays where this one has.
+constexpr double kUsualTarget = 0.02;
+// Share of these parts, and of all of an object, whose noise stands for that of the object.
+constexpr double kMostParts = 0.9;
+constexpr double kOfLooksBefore = 0.5;
+
+}  // namespace
+
+NoisyParts::NoisyParts(const Tiles& tiles, const Looks& before, const std::vector<float>& weight,
+                       const ShownLight& shown, const std::vector<double>& growth,
+                       const std::vector<double>& shownOverForetold, double projections,
+                       double target)
+    : tiles(tiles),
+      before(before),
+      partOf(tiles.sideCount(), kNone),
+      growth(growth),
+      shownOverForetold(shownOverForetold),
+      projections(projections),
+      target(target) {
+    const Patches& patches = tiles.patches();
+    std::vector<uint32_t> sides;
+    for (uint32_t side = 0; side < weight.size(); ++side)
+        if (weight[side] > 0) sides.push_back(side);
+    const Parts found = partsOf(patches, sides, true);
+    std::vector<uint32_t> cellNumbers(2 * patches.cells.size(), kNone);
+    std::vector<uint32_t> partNumbers(found.count, kNone);
+    for (size_t k = 0; k < sides.size(); ++k) {
+        const uint32_t side = sides[k];
+        const Parent& parent = patches.parentAt(side);
+        uint32_t& cell = cellNumbers[2 * parent.cell + side % 2];
+        if (cell == kNone) {
+            // A cell is of the part that its first side is of.
+            uint32_t& part = partNumbers[found.of[k]];
+            if (part == kNone) {
+                part = uint32_t(parts.size());
+                parts.emplace_back();
+            }
+            cell = uint32_t(cells.size());
+            cells.push_back({2 * parent.cell + side % 2, part, parent.island,
+                             patches.cells[parent.cell].area()});
+        }
+        partOf[side] = cells[cell].part;
+        Part& part = parts[cells[cell].part];
+        part.instance = parent.instance;
+        ++part.sides;
+        if (shown.isGathered(tiles.firstSide(side))) part.isGathered = true;
+    }
+}
+
+std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
+    const std::vector<Noise::OfCell>& of = noise.cells();
+    std::vector<double> light(tiles.patches().islands.size(), 0), area(light.size(), 0);
+    for (const SeenCell& cell : cells) {
+        light[cell.island] += of[cell.number].area * of[cell.number].light;
+        area[cell.island] += of[cell.number].area;
+    }
+    const double allArea = std::accumulate(area.begin(), area.end(), 0.0);
+    const double mean = std::accumulate(light.begin(), light.end(), 0.0) / std::max(allArea, 1e-30);
+    // Per part, and of the whole object but for its worst cells: sums of squares, and of cells,
+    // which count by how much of them is to be seen.
+    std::vector<double> squares(parts.size(), 0), weights(parts.size(), 0);
+    std::vector<std::vector<std::pair<double, double>>> ofInstance(growth.size());
+    for (const SeenCell& cell : cells) {
+        const Noise::OfCell& own = of[cell.number];
+        const double dark =
+            kDarkPart * kDarkPart * std::min(mean, light[cell.island] / area[cell.island]);
+        if (!(own.area > 0) || !(std::max(own.light, dark) > 0)) continue;
+        const size_t instance = parts[cell.part].instance;
+        const double share = bundlesAtCorners(own, growth[instance]) / std::max(own.light, dark);
+        const double weight = std::min(1.0, own.area / cell.area);
+        squares[cell.part] += weight * share;
+        weights[cell.part] += weight;
+        ofInstance[instance].push_back({share, weight});
+    }
+    std::vector<double> usual(growth.size(), 0);
+    for (size_t i = 0; i < usual.size(); ++i) {
+        std::vector<std::pair<double, double>>& all = ofInstance[i];
+        std::sort(all.begin(), all.end());
+        double sum = 0, weight = 0;
+        for (size_t k = 0; k < size_t(std::ceil(kUsual * double(all.size()))); ++k) {
+            sum += all[k].first * all[k].second;
+            weight += all[k].second;
+        }
+        if (weight > 0) usual[i] = sum / weight;
+    }
+    for (size_t p = 0; p < parts.size(); ++p) {
+        const double ofObject = usual[parts[p].instance];
+        // Corners that gather see many parts of their object.
+        squares[p] = parts[p].isGathered
+                         ? ofObject
+                         : kByChance * shownOverForetold[parts[p].instance] *
+                               (squares[p] + kOfObject * ofObject) / (weights[p] + kOfObject);
+    }
+    return squares;
+}
+
+std::vector<double> NoisyParts::squaresOf(const SetNoise& noise) const {
+    std::vector<double> squares(parts.size(), 0);
+    for (const Noise& one : noise.ofLights()) {
+        const std::vector<double> own = squaresOf(one);
+        for (size_t p = 0; p < parts.size(); ++p) squares[p] = std::max(squares[p], own[p]);
+    }
+    return squares;
+}
+
+void NoisyParts::look(const SetNoise& noise, uint32_t count, const std::vector<float>& lines,
+                      double all) {
+    const std::vector<double> squares = squaresOf(noise);
+    for (Part& part : parts) part.lines = 0;
+    for (size_t side = 0; side < partOf.size(); ++side)
+        if (partOf[side] != kNone) parts[partOf[side]].lines += double(lines[side]);
+    const bool isSeenBefore =
+        bundles == 0 && count == before.bundles && before.shareOfParts.size() == parts.size();
+    for (size_t p = 0; p < parts.size(); ++p) {
+        parts[p].last = squares[p];
+        parts[p].wanting = kSamplesByRays;
+        parts[p].wantsRays = squares[p] > target * target;
+        if (isSeenBefore) {
+            parts[p].squares = before.shareOfParts[p] * squares[p];
+            continue;
+        }
+        const double foretold =
+            bundles > 0 ? parts[p].squares * std::pow(double(bundles) / count, 2 * kNoiseSlope)
+                        : squares[p];
+        parts[p].squares = kOfLooksBefore * foretold + (1 - kOfLooksBefore) * squares[p];
+    }
+    ofObjects = squaresOfObjects(squares, true);
+    allLines = all;
+    bundles = count;
+}
+
+std::vector<double> NoisyParts::shares() const {
+    std::vector<double> result;
+    for (const Part& part : parts) result.push_back(part.last > 0 ? part.squares / part.last : 1);
+    return result;
+}
+
+double NoisyParts::excess() const {
+    std::vector<const Part*> noisiest;
+    for (const Part& part : parts) noisiest.push_back(&part);
+    std::stable_sort(noisiest.begin(), noisiest.end(),
+                     [](const Part* a, const Part* b) { return a->squares > b->squares; });
+    const double timeOfBundles = allLines + kLinesOfFace * projections * bundles;  // in lines
+    const double most = std::min(kLineOverRays * timeOfBundles, kMostByRays * allLines);
+    double lines = 0;
+    for (const Part* part : noisiest) {
+        lines += part->lines;
+        if (part->isGathered || lines > most) return std::sqrt(part->squares) / target;
+    }
+    return 0;
+}
+
+std::vector<double> NoisyParts::squaresOfObjects(const std::vector<double>& squares,
+                                                 bool onlyWantingRays) const {
+    std::vector<std::vector<double>> ofParts(growth.size());
+    for (size_t p = 0; p < parts.size(); ++p)
+        if (!parts[p].isGathered && (parts[p].wantsRays || !onlyWantingRays))
+            ofParts[parts[p].instance].push_back(squares[p]);
+    std::vector<double> result(growth.size(), 0);
+    for (size_t i = 0; i < result.size(); ++i) {
+        std::vector<double>& own = ofParts[i];
+        if (own.empty()) continue;
+        std::sort(own.begin(), own.end());
+        result[i] = own[size_t(kMostParts * double(own.size() - 1))];
+    }
+    return result;
+}
+
+double NoisyParts::lookWithRays(const SetNoise& noise, uint32_t furtherPasses) {
+    const std::vector<double> squares = squaresOf(noise);
+    const std::vector<double> now = squaresOfObjects(squares, true);
+    const double all = target * target, nearly = kNearlyClean * kNearlyClean * all,
+                 inReach = std::pow(kNearlyClean * std::max(target, kUsualTarget), 2) /
+                           std::pow(kLeftByPass, 2 * furtherPasses);
+    for (size_t p = 0; p < parts.size(); ++p) {
+        Part& part = parts[p];
+        const double ofObject = now[part.instance], before = ofObjects[part.instance];
+        part.wantsRays = part.wantsRays && squares[p] > nearly && ofObject < inReach &&
+                         ofObject < kWorthMoreRays * kWorthMoreRays * before;
+        if (part.wantsRays) part.wanting *= std::min(squares[p] / all, kMostGrowth);
+    }
+    ofObjects = squaresOfObjects(squares, true);
+    const std::vector<double> left = squaresOfObjects(squares, false);
+    return std::sqrt(*std::max_element(left.begin(), left.end())) / target;
+}
+
+std::vector<ExtraRays> NoisyParts::rays(const std::vector<std::array<float, 2>>& samples,
+                                        uint32_t most) const {
+    std::vector<ExtraRays> result;
+    for (uint32_t tile = 0; tile < partOf.size(); ++tile) {
+        throwIfCancelledAt(tile);
+        if (partOf[tile] == kNone) continue;
+        const Part& part = parts[partOf[tile]];
+        if (part.isGathered || !part.wantsRays) continue;
+        const double enough =
+            part.wanting * part.last / (target * target) * part.lines / part.sides;
+        const uint32_t first = tiles.firstSide(tile);
+        for (uint32_t k = 0; k < tiles.patchCount(tile / 2); ++k) {
+            const uint32_t side = first + 2 * k;
+            const double met = double(samples[side][0] + samples[side][1]);
+            const double missing = std::ldexp(enough, -2 * tiles.level(tile / 2)) - met;
+            if (!(missing > 0)) continue;
+            const double rays = std::clamp(missing / kLinesOfRay, kFewestRays, double(most));
+            result.push_back({side, 2 * uint32_t(std::ceil(rays / 2))});
+        }
+    }
+    return result;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "stated_error/object_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "job/cancellation.h"
+#include "reconstruction/least_squares.h"
+#include "reconstruction/reconstruction.h"
+#include "reconstruction/smooth_regions.h"
+
+namespace raybundle {
+namespace {
+
+// What is usual of shownOverForetold counts as much as so many cells of an object.
+constexpr double kUsualCells = 4;
+constexpr double kGrowthOfGrid = 3, kGrowthPower = 1.2;
+// Of n cells the noise is stated 1 + kFewCells / (n + 2) times as high: the halves of six differ by
+// less than half of what is usual in one bake of twenty.
+constexpr double kFewCells = 3;
+// What the halves tell of an object is a single sample of its noise: squares are stated so many
+// times as high.
+constexpr double kStatedOverMeasured = 1.1;
+
+}  // namespace
+
+std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches) {
+    std::vector<double> growth(scene.instances.size(), kGrowthOfGrid);
+    const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
+    parallelFor(size_t(0), growth.size(), [&](size_t i) {
+        const InstanceRange& range = ranges[i];
+        if (scene.instances[i].role != RB_ROLE_BAKE || range.firstCell == range.lastCell) return;
+        const uint32_t corners = smoothRegions(scene.meshes[scene.instances[i].mesh], patches.cells,
+                                               range.firstCell, range.lastCell)
+                                     .nodeCount;
+        growth[i] *= std::pow(double(corners) / (range.lastCell - range.firstCell), kGrowthPower);
+    });
+    return growth;
+}
+
+std::vector<double> shownOverForetold(const Scene& scene, const Patches& tiles, const Noise& noise,
+                                      const std::array<Irradiance, 2>& halves,
+                                      const std::vector<float>& exposed, float regularization,
+                                      const std::vector<double>& growth) {
+    const std::vector<InstanceRange> ranges = instanceRanges(scene, tiles);
+    const std::vector<Noise::OfCell>& cells = noise.cells();
+    std::array<std::vector<glm::vec3>, 2> light = {halves[0].direct, halves[1].direct};
+    for (size_t h = 0; h < 2; ++h)
+        for (size_t side = 0; side < light[h].size(); ++side)
+            light[h][side] += halves[h].indirect[side];
+    std::vector<double> result(growth.size(), kUsuallyOverForetold);
+    parallelFor(size_t(0), result.size(), [&](size_t i) {
+        const Instance& instance = scene.instances[i];
+        const InstanceRange& range = ranges[i];
+        if (instance.role != RB_ROLE_BAKE || range.firstCell == range.lastCell) return;
+        const SmoothRegions regions = smoothRegions(scene.meshes[instance.mesh], tiles.cells,
+                                                    range.firstCell, range.lastCell);
+        const LeastSquaresFit fit = leastSquares(tiles, range, regions, instance.side, exposed,
+                                                 regularization, {&light[0], &light[1]});
+        double shown = 0, foretold = 0, count = 0;
+        for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+            for (uint32_t back = 0; back < 2; ++back) {
+                const size_t number = 2 * size_t(c) + back;
+                if (number >= cells.size() || !(cells[number].area > 0)) continue;
+                double squares = 0;
+                for (const int32_t corner : tiles.cells[c].corner) {
+                    if (corner < 0) continue;
+                    const uint32_t node = regions.nodeOf[size_t(corner)];
+                    const glm::dvec3 half(0.5f * (fit.fields[0][node] - fit.fields[1][node]));
+                    squares += glm::dot(half, half);
+                }
+                shown += cells[number].area * squares / tiles.cells[c].cornerCount();
+                foretold += cells[number].area * bundlesAtCorners(cells[number], growth[i]);
+                ++count;
+            }
+        if (!fit.isSolved || !(foretold > 0)) return;
+        result[i] =
+            (count * shown / foretold + kUsualCells * kUsuallyOverForetold) / (count + kUsualCells);
+    });
+    return result;
+}
+
+double bundlesAtCorners(const Noise::OfCell& cell, double growth) {
+    return cell.noise + std::max(0.0, growth - 1) * cell.random;
+}
+
+CornerNoise noiseAtCorners(const Scene& scene, const Patches& tiles, const Noise& noise,
+                           const std::vector<double>& growth, const std::vector<double>& shown) {
+    const std::vector<InstanceRange> ranges = instanceRanges(scene, tiles);
+    const std::vector<Noise::OfCell>& cells = noise.cells();
+    const double scale = noise.scale();
+    double allLight = 0, allArea = 0;
+    for (const Noise::OfCell& cell : cells) {
+        allLight += cell.area * cell.light;
+        allArea += cell.area;
+    }
+    const double least = allArea > 0 ? kNearlyBlack * kNearlyBlack * allLight / allArea : 0;
+    CornerNoise result{0, std::vector<double>(growth.size(), 0)};
+    std::vector<double> squaresOf(growth.size(), 0);
+    parallelFor(size_t(0), growth.size(), [&](size_t i) {
+        double light = 0, area = 0, count = 0;
+        double& squares = squaresOf[i];
+        const size_t end = std::min(2 * size_t(ranges[i].lastCell), cells.size());
+        for (size_t c = 2 * size_t(ranges[i].firstCell); c < end; ++c) {
+            const Noise::OfCell& cell = cells[c];
+            if (!(cell.area > 0)) continue;
+            squares += cell.area * (scale * bundlesAtCorners(cell, growth[i]) +
+                                    std::max(1.0, growth[i]) * cell.direct);
+            light += cell.area * cell.light;
+            area += cell.area;
+            ++count;
+        }
+        squares *= kStatedOverMeasured * shown[i];
+        light = std::max(light, least * area);
+        if (light > 0)
+            result.ofObjects[i] = std::sqrt(squares / light) * (1 + kFewCells / (count + 2));
+    });
+    const double squares = std::accumulate(squaresOf.begin(), squaresOf.end(), 0.0);
+    if (allLight > 0) result.ofAll = std::hypot(std::sqrt(squares / allLight), noise.biasOfBoth());
+    return result;
+}
+
+}  // namespace raybundle

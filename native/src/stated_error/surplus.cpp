@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "stated_error/surplus.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "job/cancellation.h"
+#include "patches/neighbours.h"
+
+namespace raybundle {
+namespace {
+
+// The light of a patch more covered than this is too uncertain to compare.
+constexpr float kHalfCovered = 0.5f;
+// Patches less high than this share of their longest edge say nothing: their neighbours lie at no
+// distance, or far away.
+constexpr float kThin = 0.02f;
+// Mean squares of second derivatives times edges to mean squares of distance. Two of four
+// neighbours lie along each axis, and both see the mixed derivative.
+constexpr float kStraight = 1.0f / 360, kMixed = 1.0f / 144;
+constexpr float kStep = 17.0f / 144 / 0.0933f;
+// Change of light per radian that the surface turns, over the light; and the mean square of a
+// coordinate over a patch of edge 1.
+constexpr float kTurn = 0.5f, kSpread = 1.0f / 12;
+// What counts of the disagreement where there is only noise, over the mean variance of two patches
+// in a row of patches: the disagreement has 1.25 of it, the change of the gradients 1.
+constexpr float kDisagreementNoise = 0.85f;
+// Neighbours in directions nearer to one line than this give no gradient.
+constexpr float kLeastSpread = 0.05f;
+
+// Light as seen in the plane of a patch.
+struct Gradient {
+    glm::vec3 alongA{0.0f}, alongB{0.0f};  // per axis: change of RGB per metre
+};
+
+// A patch and what its neighbours say about the light on it.
+struct Site {
+    glm::vec3 centre{0.0f}, axisA{0.0f}, axisB{0.0f};
+    bool isUsed = false, hasGradient = false;
+    int neighbours = 0, wanted = 0;
+    // Normal equations of the gradients of all light and of that of the sources.
+    float aa = 0, ab = 0, bb = 0;
+    std::array<glm::vec3, 2> ra{glm::vec3(0.0f), glm::vec3(0.0f)};
+    std::array<glm::vec3, 2> rb{glm::vec3(0.0f), glm::vec3(0.0f)};
+    std::array<Gradient, 2> gradient;
+    // Sums over pairs with neighbours.
+    int pairs = 0;
+    float straight = 0, mixed = 0, step = 0, turn = 0;
+
+    bool isInside() const { return hasGradient && neighbours == wanted; }
+
+    // Offset of another site, unfolded into the plane of this one, metres.
+    glm::vec2 offset(const Site& other) const {
+        const glm::vec3 d = other.centre - centre;
+        const glm::vec2 flat(glm::dot(d, axisA), glm::dot(d, axisB));
+        const float length = glm::length(flat);
+        return length > 0 ? flat * (glm::length(d) / length) : flat;
+    }
+
+    void solve() {
+        const float det = aa * bb - ab * ab;
+        hasGradient = det > kLeastSpread * 0.25f * (aa + bb) * (aa + bb);
+        if (!hasGradient) return;
+        for (size_t f = 0; f < 2; ++f)
+            gradient[f] = {(bb * ra[f] - ab * rb[f]) / det, (aa * rb[f] - ab * ra[f]) / det};
+    }
+};
+
+glm::vec3 slope(const Gradient& g, glm::vec2 direction) {
+    return direction.x * g.alongA + direction.y * g.alongB;
+}
+
+}  // namespace
+
+std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uint32_t lastParent,
+                               rb_side side, const Irradiance& irradiance,
+                               const std::vector<float>& exposed,
+                               const std::vector<float>& directError) {
+    if (firstParent >= lastParent) return {};
+    const uint32_t first = patches.parents[firstParent].firstPatch;
+    const Parent& last = patches.parents[lastParent - 1];
+    std::vector<Site> sites(last.firstPatch + last.patchCount() - first);
+    for (uint32_t p = firstParent; p < lastParent; ++p) {
+        throwIfCancelledAt(p);
+        const Parent& parent = patches.parents[p];
+        const glm::vec3 axisA = glm::normalize(parent.a);
+        const glm::vec3 axisB = glm::cross(parent.normal, axisA);
+        const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
+        const float longest =
+            std::max({glm::length(parent.a), glm::length(parent.b),
+                      parent.isTriangle ? glm::distance(parent.a, parent.b) : 0.0f});
+        const bool isThin = glm::length(glm::cross(parent.a, parent.b)) < kThin * longest * longest;
+        for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+            const uint32_t patch = parent.firstPatch + k;
+            Site& site = sites[patch - first];
+            site.centre = parent.position(parent.pointOn(k, middle));
+            site.axisA = axisA;
+            site.axisB = axisB;
+            site.isUsed = !isThin && exposed[2 * patch + uint32_t(side)] > kHalfCovered;
+            site.wanted = parent.isTriangle ? 3 : 4;
+        }
+    }
+
+    auto lightAt = [&](size_t field, uint32_t patch) {
+        const uint32_t at = 2 * patch + uint32_t(side);
+        return field == 0 ? irradiance.direct[at] + irradiance.indirect[at]
+                          : irradiance.gathered[at];
+    };
+    std::vector<TilePair> pairs = neighbouringTiles(patches, firstParent, lastParent);
+    pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                               [&](const TilePair& pair) {
+                                   return !sites[pair.first - first].isUsed ||
+                                          !sites[pair.second - first].isUsed;
+                               }),
+                pairs.end());
+    size_t looked = 0;
+    for (const TilePair& pair : pairs) {
+        throwIfCancelledAt(looked++);
+        for (const auto& [a, b] :
+             {std::make_pair(pair.first, pair.second), std::make_pair(pair.second, pair.first)}) {
+            Site& site = sites[a - first];
+            const glm::vec2 d = site.offset(sites[b - first]);
+            // All neighbours count alike, however far.
+            const float weight = 1 / std::max(glm::dot(d, d), 1e-30f);
+            ++site.neighbours;
+            site.aa += weight * d.x * d.x;
+            site.ab += weight * d.x * d.y;
+            site.bb += weight * d.y * d.y;
+            for (size_t f = 0; f < 2; ++f) {
+                const glm::vec3 change = lightAt(f, b) - lightAt(f, a);
+                site.ra[f] += weight * d.x * change;
+                site.rb[f] += weight * d.y * change;
+            }
+        }
+    }
+    for (Site& site : sites) site.solve();
+
+    for (const TilePair& pair : pairs) {
+        throwIfCancelledAt(looked++);
+        Site& a = sites[pair.first - first];
+        Site& b = sites[pair.second - first];
+        // A gradient at the border looks to one side only: beside another one it says nothing.
+        if (!a.hasGradient || !b.hasGradient || (!a.isInside() && !b.isInside())) continue;
+        const glm::vec2 dA = a.offset(b), dB = -b.offset(a);
+        const glm::vec2 acrossA(-dA.y, dA.x), acrossB(-dB.y, dB.x);
+        const glm::vec3 straight = slope(b.gradient[0], dB) - slope(a.gradient[0], dA);
+        const glm::vec3 mixed = slope(b.gradient[0], acrossB) - slope(a.gradient[0], acrossA);
+        const float cosine =
+            glm::dot(patches.normal(2 * pair.first), patches.normal(2 * pair.second));
+        // The square of the angle.
+        const float turn = 2 * std::max(0.0f, 1 - cosine);
+        float step = 0;
+        if (a.isInside() && b.isInside()) {
+            const glm::vec3 foretold = 0.5f * (slope(a.gradient[1], dA) + slope(b.gradient[1], dB));
+            const glm::vec3 off = lightAt(1, pair.second) - lightAt(1, pair.first) - foretold;
+            const float errorA = directError[2 * pair.first + uint32_t(side)];
+            const float errorB = directError[2 * pair.second + uint32_t(side)];
+            // The error is that of the brightest channel.
+            const glm::vec3 bend = slope(b.gradient[1], dB) - slope(a.gradient[1], dA);
+            step = std::max(0.0f, glm::dot(off, off) - glm::dot(bend, bend)) -
+                   3 * kDisagreementNoise * 0.5f * (errorA * errorA + errorB * errorB);
+        }
+        for (Site* site : {&a, &b}) {
+            ++site->pairs;
+            site->straight += glm::dot(straight, straight);
+            site->mixed += glm::dot(mixed, mixed);
+            site->turn += turn;
+            // Each patch has half of what lies between two.
+            site->step += 0.5f * step;
+        }
+    }
+
+    std::vector<Surplus> result(sites.size());
+    for (size_t k = 0; k < sites.size(); ++k) {
+        const Site& site = sites[k];
+        if (site.pairs == 0) continue;
+        const glm::vec3 light = lightAt(0, first + uint32_t(k));
+        // Half of the neighbours along each of the two axes.
+        const float turn = kTurn * kTurn * kSpread * 2 * site.turn / float(site.pairs);
+        result[k] = {true,
+                     (kStraight * site.straight + kMixed * site.mixed) / float(site.pairs) +
+                         turn * glm::dot(light, light),
+                     kStep * site.step};
+    }
+    return result;
+}
+
+}  // namespace raybundle
