@@ -105,7 +105,7 @@ def test_report(name):
     for entry in report["objects"]:
         assert set(entry) >= {"name", "corners", "status"} and entry["status"]
     for entry in report["skipped"]:
-        assert set(entry) >= {"what", "why", "count"}
+        assert set(entry) >= {"id", "what", "why", "count"}
 
 
 @pytest.mark.parametrize("name", NAMES)

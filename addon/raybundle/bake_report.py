@@ -36,16 +36,19 @@ class BakeReport:
     light_sets: list[dict] = field(default_factory=list)  # name, attribute, estimated_error
     objects: list[ObjectReport] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    skipped: list[dict] = field(default_factory=list)  # what, why, count
+    # What the library's warnings are of, for programs: "MAX_BUNDLES" and so on, each once.
+    warning_ids: list[str] = field(default_factory=list)
+    skipped: list[dict] = field(default_factory=list)  # id, what, why, count
 
     @classmethod
     def from_native(cls, values: dict) -> BakeReport:
         report = cls()
         for name in ('seconds', 'patches', 'refined', 'bundles', 'lines', 'exchanges',
                      'shadow_rays', 'estimated_error', 'error', 'energy', 'peak_memory_bytes',
-                     'light_sets', 'warnings', 'skipped'):
+                     'light_sets', 'warnings', 'warning_ids', 'skipped'):
             if name in values:
                 setattr(report, name, values[name])
+        report.warning_ids = list(dict.fromkeys(report.warning_ids))
         return report
 
     def to_json(self, indent: int | None = None) -> str:

@@ -31,13 +31,7 @@ Scene roomWithLampAtWall(double distance, bool isRough = false) {
     return scene;
 }
 
-size_t spotsOf(const Bake& bake) {
-    const Json report = reportOf(bake);
-    for (const auto& skip : report["skipped"])
-        if (std::string(skip["why"]).find("bright sides") != std::string::npos)
-            return skip["count"];
-    return 0;
-}
+size_t spotsOf(const Bake& bake) { return skippedCount(reportOf(bake), SkippedWork::BRIGHT_SPOTS); }
 
 // Mean irradiance of the fronts of all patches but those of the wall at the lamp.
 double lightOfOthers(const Bake& bake) {

@@ -109,7 +109,7 @@ TEST(Clusters, AreAsManyHoweverManyFacesThereAre) {
         bake.settings.patchSize = 0.3f;
         bake.run(scene);
         const Json report = reportOf(bake);
-        EXPECT_TRUE(mentions(report["skipped"], "exchange it as clusters"));
+        EXPECT_TRUE(skips(report, SkippedWork::CLUSTERED_PATCHES));
         patches[k] = report["patches"];
         rays[k] = report["shadow_rays"];
         bundles[k] = report["bundles"];
@@ -128,7 +128,7 @@ void expectFurnace(const Bake& bake) {
 TEST(Clusters, LeaveAFurnaceExact) {
     Bake bake;
     bake.run(roomWithBall(5, 0.5f, 0.5f));
-    ASSERT_TRUE(mentions(reportOf(bake)["skipped"], "exchange it as clusters"));
+    ASSERT_TRUE(skips(reportOf(bake), SkippedWork::CLUSTERED_PATCHES));
     expectFurnace(bake);
     // Some of the ball's clusters and most of the room's patches meet few lines, and local rays.
     bake.settings.minBundles = bake.settings.maxBundles = 2;
@@ -157,7 +157,7 @@ TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
                 bake.settings.skipClusters = on;
                 bake.run(scene);
                 const Json report = reportOf(bake);
-                EXPECT_EQ(mentions(report["warnings"], "memory_limit"), megabytes < 1);
+                EXPECT_EQ(warns(report, WarningId::MEMORY_LIMIT), megabytes < 1);
                 light[on] = everything(bake);
                 stated[on] = report["estimated_error"];
                 balance[on] = report["energy"]["balance_error"];
@@ -177,9 +177,9 @@ TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
     setQuick(again);
     setQuick(fresh);
     again.run(hidden);
-    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "exchange it as clusters"));
+    EXPECT_TRUE(skips(reportOf(again), SkippedWork::CLUSTERED_PATCHES));
     again.run(shown);
-    EXPECT_FALSE(mentions(reportOf(again)["skipped"], "exchange it as clusters"));
+    EXPECT_FALSE(skips(reportOf(again), SkippedWork::CLUSTERED_PATCHES));
     fresh.run(shown);
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
     EXPECT_LT(difference(cornerLight(again, 3, RB_OUTPUT_LIGHTING),
@@ -190,7 +190,7 @@ TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
     painted.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
     again.run(hidden);
     again.run(painted);
-    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "geometry unchanged"));
+    EXPECT_TRUE(skips(reportOf(again), SkippedWork::UNCHANGED_GEOMETRY));
     fresh.run(painted);
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
 }
@@ -211,7 +211,7 @@ TEST(Clusters, OfOtherMaterialsGatherAnew) {
     setQuick(fresh);
     again.run(before);
     again.run(after);
-    EXPECT_TRUE(mentions(reportOf(again)["skipped"], "geometry unchanged"));
+    EXPECT_TRUE(skips(reportOf(again), SkippedWork::UNCHANGED_GEOMETRY));
     fresh.run(after);
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
     // Nor does a bake without clusters go on with what one with them kept.

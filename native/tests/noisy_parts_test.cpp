@@ -51,10 +51,7 @@ double differenceOf(int32_t instance, const Bake& bake, const Bake& reference) {
 }
 
 size_t sidesWithRays(const Bake& bake) {
-    const Json report = reportOf(bake);
-    for (const auto& skip : report["skipped"])
-        if (std::string(skip["why"]).find("cast rays") != std::string::npos) return skip["count"];
-    return 0;
+    return skippedCount(reportOf(bake), SkippedWork::RAYED_SIDES);
 }
 
 TEST(NoisyParts, SmallAndDarkThingsAreAsCleanAsWalls) {

@@ -192,7 +192,7 @@ TEST(PainterNewell, ABakeReportsBrokenCycles) {
         bake.settings.patchSize = 100;
         bake.settings.maxBundles = 64;
         bake.run(scene);
-        EXPECT_EQ(mentions(reportOf(bake)["warnings"], "cycles of patches"),
+        EXPECT_EQ(warns(reportOf(bake), WarningId::BROKEN_CYCLES),
                   std::string(projector) == "PAINTER_NEWELL");
     }
 }

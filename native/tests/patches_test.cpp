@@ -201,8 +201,9 @@ TEST(Patches, DegenerateFacesAreLeftOutAndTheirObjectIsNamed) {
     EXPECT_EQ(patches.degenerateFaces, 3u);
     EXPECT_NEAR(patchArea(patches), 0.5, 1e-6);
     ASSERT_EQ(patches.warnings.size(), 1u);
-    EXPECT_NE(patches.warnings[0].find("broken"), std::string::npos) << patches.warnings[0];
-    EXPECT_NE(patches.warnings[0].find('3'), std::string::npos) << patches.warnings[0];
+    EXPECT_NE(patches.warnings[0].text.find("broken"), std::string::npos)
+        << patches.warnings[0].text;
+    EXPECT_NE(patches.warnings[0].text.find('3'), std::string::npos) << patches.warnings[0].text;
 }
 
 TEST(Patches, CoordinatesThatAreNotFiniteAreRejectedByName) {

@@ -364,7 +364,7 @@ TEST(Planes, AnEmptySceneIsNoError) {
         Bake bake;
         bake.settings.projector = projector;
         bake.run(Scene());
-        EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "no faces"));
+        EXPECT_TRUE(warns(reportOf(bake), WarningId::NO_FACES));
     }
 }
 

@@ -358,7 +358,7 @@ TEST(RefinedBake, RelightingKeepsThePatches) {
     dark.addLight(pointLight({1, 1, 2}, {1, 5, 2}));
     bake.run(dark);
     EXPECT_EQ(bake.patches().count(), patches);
-    EXPECT_TRUE(mentions(reportOf(bake)["skipped"], "unchanged"));
+    EXPECT_TRUE(skips(reportOf(bake), SkippedWork::UNCHANGED_GEOMETRY));
 }
 
 // The painter's patches and those that are drawn one by one are the same as the rasteriser's.

@@ -213,7 +213,7 @@ TEST(SingleLines, AnEmptySceneIsNoError) {
     Bake bake;
     bake.settings.linesPerBundle = 1;
     bake.run(Scene());
-    EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "no faces"));
+    EXPECT_TRUE(warns(reportOf(bake), WarningId::NO_FACES));
 }
 
 }  // namespace

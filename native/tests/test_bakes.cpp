@@ -14,6 +14,20 @@ bool mentions(const Json& part, const std::string& text) {
     return part.dump().find(text) != std::string::npos;
 }
 
+bool warns(const Json& report, WarningId id) {
+    const Json& ids = report["warning_ids"];
+    return std::find(ids.begin(), ids.end(), nameOf(id)) != ids.end();
+}
+
+bool skips(const Json& report, SkippedWork work) { return skippedCount(report, work) > 0; }
+
+uint64_t skippedCount(const Json& report, SkippedWork work) {
+    uint64_t count = 0;
+    for (const Json& entry : report["skipped"])
+        if (entry["id"] == textOf(work).id) count += entry["count"].get<uint64_t>();
+    return count;
+}
+
 std::vector<glm::vec3> cornerLight(const Bake& bake, int32_t instance, rb_output output) {
     return bake.instanceLight(instance).perCorner(output);
 }

@@ -18,6 +18,11 @@ using Json = nlohmann::json;
 Json reportOf(const Bake& bake);
 // Whether a part of a report contains a text.
 bool mentions(const Json& part, const std::string& text);
+// Whether a report has a warning, and an entry of skipped work, of this identifier.
+bool warns(const Json& report, WarningId id);
+bool skips(const Json& report, SkippedWork work);
+// How often such work was skipped, by the report.
+uint64_t skippedCount(const Json& report, SkippedWork work);
 
 std::vector<glm::vec3> cornerLight(const Bake& bake, int32_t instance, rb_output output);
 // All outputs of all corners of the first three instances, which every room has.

@@ -128,7 +128,7 @@ TEST(TranslucenceOfMaterials, LightThatDoesNotComeToRestIsSaid) {
         setQuick(bake);
         bake.run(scene);
         const std::vector<glm::vec3> light = cornerLight(bake, 0, RB_OUTPUT_COMBINED);
-        const bool isSaid = mentions(reportOf(bake)["warnings"], "come to rest");
+        const bool isSaid = warns(reportOf(bake), WarningId::UNSETTLED_EXCHANGE);
         EXPECT_NE(isSaid, std::abs(light[0].x * kPi - 1) < 0.02) << rho << ' ' << light[0].x * kPi;
     }
 }
@@ -158,7 +158,7 @@ TEST(TranslucenceOfMaterials, ACubeStaysExactBeyondTheMemoryLimit) {
     bake.settings.memoryLimit = 1;
     bake.settings.minBundles = bake.settings.maxBundles = 512;
     bake.run(paperCube(0.5f, 0.3f));
-    ASSERT_TRUE(mentions(reportOf(bake)["warnings"], "memory_limit"));
+    ASSERT_TRUE(warns(reportOf(bake), WarningId::MEMORY_LIMIT));
     expectLight(bake, 0, RB_OUTPUT_COMBINED, 0.5 * 1.2 + 0.3 * kWorld, 1e-3);
 }
 

@@ -307,14 +307,14 @@ TEST(WorldImage, KeepsTheLinesOfTheBakeBefore) {
     const glm::dvec3 before = meanOf(bake, RB_OUTPUT_COMBINED);
     for (glm::vec3& pixel : scene.worldImage.pixels) pixel *= 2;
     bake.run(scene);
-    EXPECT_TRUE(mentions(reportOf(bake)["skipped"], "geometry unchanged"));
+    EXPECT_TRUE(skips(reportOf(bake), SkippedWork::UNCHANGED_GEOMETRY));
     EXPECT_NEAR(meanOf(bake, RB_OUTPUT_COMBINED).x, 2 * before.x, 1e-3 * before.x);
 }
 
 TEST(WorldImage, ABlackOneIsDark) {
     Bake bake;
     bake.run(houseUnder(painted(4, 2, [](auto&) { return glm::vec3(0); })));
-    EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "no light reaches any surface"));
+    EXPECT_TRUE(warns(reportOf(bake), WarningId::NO_LIGHT));
 }
 
 }  // namespace

@@ -24,8 +24,8 @@
 
 namespace raybundle {
 
-class NoisyParts;
 class Threads;
+struct SolveInput;
 struct Trace;
 
 // One bake: settings in, light per corner and a report out. Keeps patches and traced lines for the
@@ -56,23 +56,21 @@ class Bake {
     const CornerLight& setLight(int32_t set, int32_t instance) const;
 
   private:
+    struct Exchanged;
+
     void runStages(const Scene& scene, const Threads& threads);
+    void noteWhatIsGiven(const Scene& scene, const Threads& threads, Report& report) const;
     void makePatches(const Scene& scene, Report& report);
+    std::vector<CoarseShot> startLines(const Scene& scene, Report& report);
     std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);
-    std::vector<CoarseShot> shootCoarsely(const Scene& scene, Report& report);
-    SetLights shootSources(const Scene& scene, const ShownLight& shown,
-                           const std::vector<CoarseShot>& coarse, Report& report);
-    SideNoise keepFirstShot(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
-                            SetLights& lights, Report& report);
-    Report finishSolve(const Transports& transports, SetLights& lights, const ShownLight& shown,
-                       double error) const;
-    double castRays(NoisyParts& noisyParts, SetLights& lights,
-                    std::vector<std::array<Irradiance, 2>>& halves,
-                    const std::function<double(uint32_t)>& look, Report& report) const;
-    SideNoise solveToTarget(const Scene& scene, const Tiles& tiles, const ShownLight& shown,
-                            SetLights& lights, const Transports& transports, Report& report);
+    Exchanged exchange(const SolveInput& in, SetLights& lights, Report& report);
+    Transports transportsOf(const SetLights& lights, const ShownLight& shown) const;
+    std::vector<InstanceLight> show(const SolveInput& in, const SetLights& lights,
+                                    const Exchanged& exchanged, Report& report);
+    void noteWhatWasTraced(Report& report) const;
 
     std::unique_ptr<Trace> trace;  // of the last run's geometry
+    // Of the last run, per side: see patchIrradiance and exposedShare.
     Irradiance irradiance;
     std::vector<float> exposed;
     std::vector<InstanceLight> light;

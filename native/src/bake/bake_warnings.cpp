@@ -15,13 +15,13 @@ constexpr double kMostImbalance = 0.01;
 constexpr double kFewLines = 16;
 constexpr size_t kMostNamed = 20;
 
-}  // namespace
-
 std::string percent(double share) {
     std::ostringstream text;
     text << std::setprecision(3) << 100 * share << " %";
     return text.str();
 }
+
+}  // namespace
 
 void warnOfVisibility(const Scene& scene, const SetLights& lights, const Settings& settings,
                       Report& report) {
@@ -33,13 +33,15 @@ void warnOfVisibility(const Scene& scene, const SetLights& lights, const Setting
     for (const Instance& instance : scene.instances) {
         const std::string object = "object \"" + instance.name + "\": ";
         if (hasDimEmission && instance.stopsDirect != instance.exchanges)
-            report.warnings.push_back(object +
-                                      "it blocks the light of dim emission as it blocks that of "
-                                      "the world and not as it blocks that of lights");
+            report.warn(WarningId::BLOCKS_AS_THE_WORLD,
+                        object +
+                            "it blocks the light of dim emission as it blocks that of "
+                            "the world and not as it blocks that of lights");
         if (!instance.exchanges && instance.role == RB_ROLE_BAKE && settings.solver != "LINE_REUSE")
-            report.warnings.push_back(
-                object + "it takes no part in the exchange of light, so that " + settings.solver +
-                " finds no light of the world and of " + "other surfaces on it; LINE_REUSE does");
+            report.warn(WarningId::NO_EXCHANGE,
+                        object + "it takes no part in the exchange of light, so that " +
+                            settings.solver + " finds no light of the world and of " +
+                            "other surfaces on it; LINE_REUSE does");
     }
 }
 
@@ -47,20 +49,22 @@ void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& re
     if (settings.solver == "LINE_REUSE") return;
     for (const Material& material : scene.materials)
         if (material.isTranslucent())
-            report.warnings.push_back("material \"" + material.name + "\": " + settings.solver +
-                                      " does not carry on the light that passes through it; "
-                                      "LINE_REUSE does");
+            report.warn(WarningId::NO_TRANSLUCENCE,
+                        "material \"" + material.name + "\": " + settings.solver +
+                            " does not carry on the light that passes through it; "
+                            "LINE_REUSE does");
 }
 
 void warnOfAngles(const Patches& patches, const Settings& settings, Report& report) {
     if (patches.byAngle.empty()) return;
     auto warn = [&](const std::string& what, const std::string& remedy) {
-        report.warnings.push_back(
-            what +
-            " does not know at which angles light arrives: what reflects more at some angles, as "
-            "Principled and rough materials do, reflects it as light from everywhere, which may be "
-            "some percent off; " +
-            remedy + " is right");
+        report.warn(WarningId::NO_ANGLES, what +
+                                              " does not know at which angles light arrives: what "
+                                              "reflects more at some angles, as "
+                                              "Principled and rough materials do, reflects it as "
+                                              "light from everywhere, which may be "
+                                              "some percent off; " +
+                                              remedy + " is right");
     };
     if (settings.firstShot != "GATHER") warn("first_shot " + settings.firstShot, "GATHER");
     if (settings.solver != "LINE_REUSE") warn("solver " + settings.solver, "LINE_REUSE");
@@ -68,11 +72,13 @@ void warnOfAngles(const Patches& patches, const Settings& settings, Report& repo
 
 void warnOfGaps(size_t patches, Report& report) {
     if (patches == 0) return;
-    report.warnings.push_back(
+    report.warn(
+        WarningId::UNCUT_GAPS,
         std::to_string(patches) +
-        " patches lie beside gaps much narrower than they are, as below cutlery on a table: what "
-        "lies in such a gap gets too much light; solver LINE_REUSE with first_shot GATHER cuts "
-        "them smaller");
+            " patches lie beside gaps much narrower than they are, as below cutlery on a table: "
+            "what "
+            "lies in such a gap gets too much light; solver LINE_REUSE with first_shot GATHER cuts "
+            "them smaller");
 }
 
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
@@ -96,13 +102,14 @@ void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize,
     }
     if (few == 0) return;
     if (few > kMostNamed) names += " and " + std::to_string(few - kMostNamed) + " more";
-    report.warnings.push_back("fewer than " + std::to_string(int(kFewLines)) +
-                              " lines meet each patch of " + names +
-                              ", whose noise may be more "
-                              "than is stated: solver " +
-                              settings.solver +
-                              " has the same lines everywhere; LINE_REUSE has more where patches "
-                              "are small");
+    report.warn(WarningId::FEW_LINES,
+                "fewer than " + std::to_string(int(kFewLines)) + " lines meet each patch of " +
+                    names +
+                    ", whose noise may be more "
+                    "than is stated: solver " +
+                    settings.solver +
+                    " has the same lines everywhere; LINE_REUSE has more where patches "
+                    "are small");
 }
 
 void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
@@ -123,21 +130,57 @@ void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLigh
     const auto most =
         std::max_element(variances.begin(), variances.end(),
                          [](const auto& a, const auto& b) { return a.second < b.second; });
-    report.warnings.push_back(
+    report.warn(
+        WarningId::DIRECT_NOISE,
         "the noise is " + percent(noise) + " and not below " + percent(target) +
-        ": most of it is in the light of " + most->first.first + " on object \"" +
-        scene.instances[most->first.second].name +
-        "\", which more bundles do not help; smaller patches there or a larger distance do");
+            ": most of it is in the light of " + most->first.first + " on object \"" +
+            scene.instances[most->first.second].name +
+            "\", which more bundles do not help; smaller patches there or a larger distance do");
+}
+
+void warnOfMissedTarget(const Scene& scene, const MissedTarget& missed, Report& report) {
+    const std::string bundles = std::to_string(missed.bundles) + " bundles";
+    const bool isCountable = missed.stop != Stop::UNCOUNTABLE_LINES;
+    report.warn(
+        isCountable ? WarningId::MAX_BUNDLES : WarningId::UNCOUNTABLE_LINES,
+        (isCountable ? "max_bundles was reached at " + bundles + ": "
+                     : "the lines of more than " + bundles +
+                           " cannot be counted, which fewer lines_per_bundle allow: ") +
+            "the noise " +
+            (missed.set == kNoLightSet
+                 ? ""
+                 : "of light set \"" + scene.lightSets[size_t(missed.set)] + "\" ") +
+            "is " + percent(missed.noise) +
+            (missed.ofNoisiest > 0 ? ", " + percent(missed.ofNoisiest) + " where it is most,"
+                                   : "") +
+            " and not below " + percent(missed.target));
+}
+
+void warnOfBrokenCycles(uint64_t cycles, Report& report) {
+    if (cycles == 0) return;
+    report.warn(WarningId::BROKEN_CYCLES,
+                std::to_string(cycles) +
+                    " cycles of patches that cover each other were broken anywhere: the projector "
+                    "AUTO has none");
+}
+
+void warnOfWrongExchanges(double share, double error, Report& report) {
+    report.warn(WarningId::WRONG_EXCHANGES,
+                "the projector put " + std::to_string(100 * share) +
+                    " % of the lines in a wrong order or through surfaces, which more bundles do "
+                    "not mend: the error is about " +
+                    std::to_string(100 * error) + " %");
 }
 
 void warnOfImbalance(Report& report) {
     if (!(report.balanceError() > kMostImbalance)) return;
     report.warnings.insert(
         report.warnings.begin(),
-        "the energy balance is off by " + percent(report.balanceError()) +
-            ": so much of the light that is emitted is neither absorbed nor leaves the scene, or "
-            "comes from nowhere; look for lamps inside of other surfaces, and compare with a bake "
-            "of smaller patches (patch_size)");
+        {WarningId::ENERGY_BALANCE,
+         "the energy balance is off by " + percent(report.balanceError()) +
+             ": so much of the light that is emitted is neither absorbed nor leaves the scene, or "
+             "comes from nowhere; look for lamps inside of other surfaces, and compare with a bake "
+             "of smaller patches (patch_size)"});
 }
 
 }  // namespace raybundle

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/stop_rule.h"
 #include "job/report.h"
 #include "job/settings.h"
 #include "patches/patches.h"
@@ -13,8 +14,6 @@
 #include "transport/set_light.h"
 
 namespace raybundle {
-
-std::string percent(double share);  // with three digits and its sign
 
 // Names the instances whose visibility is only approximated.
 void warnOfVisibility(const Scene& scene, const SetLights& lights, const Settings& settings,
@@ -38,6 +37,24 @@ void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize,
 // per side, of what is wanted.
 void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
                        const std::vector<float>& area, double noise, double target, Report& report);
+
+// A bake that ended above its target; noises are relative.
+struct MissedTarget {
+    Stop stop;  // why it ended
+    uint32_t bundles;
+    int32_t set;        // the light set with the most noise, or kNoLightSet
+    double noise;       // of that light on all patches
+    double ofNoisiest;  // of the noisiest parts of objects; 0: not known
+    double target;
+};
+void warnOfMissedTarget(const Scene& scene, const MissedTarget& missed, Report& report);
+
+// Of cycles of patches that each cover the next one, which a painter's order cannot have.
+void warnOfBrokenCycles(uint64_t cycles, Report& report);
+
+// Of the share of all lines that met surfaces in a wrong order or passed through some, and the
+// relative error by them.
+void warnOfWrongExchanges(double share, double error, Report& report);
 
 // First of all that is said: light that is lost or made is worse than noise.
 void warnOfImbalance(Report& report);

@@ -11,6 +11,7 @@
 #include "bundles/line_counts.h"
 #include "bundles/line_windows.h"
 #include "first_shot/first_shot.h"
+#include "job/progress.h"
 #include "job/report.h"
 #include "job/settings.h"
 #include "patches/clusters.h"
@@ -99,6 +100,14 @@ struct Trace {
     };
     std::map<int32_t, Shot> shots;               // the last GATHER of each light set
     std::map<int32_t, LineSolutions> solutions;  // of each light set, between the clusters
+};
+
+// What every stage of a bake works on.
+struct StageInput {
+    const Scene& scene;
+    const Settings& settings;
+    const Progress& progress;
+    Trace& trace;
 };
 
 }  // namespace raybundle

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -65,6 +66,12 @@ double Report::balanceError() const {
     return emitted > 0 ? std::abs(emitted - absorbed - escaped) / emitted : 0;
 }
 
+void Report::addNotesOf(Report other) {
+    warnings.insert(warnings.end(), std::make_move_iterator(other.warnings.begin()),
+                    std::make_move_iterator(other.warnings.end()));
+    skipped.insert(skipped.end(), other.skipped.begin(), other.skipped.end());
+}
+
 std::string Report::json() const {
     return object(
         {{"seconds", object({{"total", text(totalSeconds)},
@@ -103,11 +110,15 @@ std::string Report::json() const {
                                               {"status", text(one.status)},
                                               {"error", errors(one.error)}});
                            })},
-         {"warnings", array(warnings, [](const std::string& warning) { return text(warning); })},
+         {"warnings", array(warnings, [](const Warning& warning) { return text(warning.text); })},
+         {"warning_ids",
+          array(warnings, [](const Warning& warning) { return text(nameOf(warning.id)); })},
          {"skipped", array(skipped, [](const Skip& skip) {
+              const SkippedText& said = textOf(skip.work);
               return skip.count == 0 ? ""
-                                     : object({{"what", text(skip.what)},
-                                               {"why", text(skip.why)},
+                                     : object({{"id", text(said.id)},
+                                               {"what", text(said.what)},
+                                               {"why", text(said.why)},
                                                {"count", text(skip.count)}});
           })}});
 }

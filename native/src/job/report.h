@@ -6,8 +6,11 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "job/skipped_work.h"
+#include "job/warning.h"
 #include "raybundle/raybundle.h"
 
 namespace raybundle {
@@ -26,8 +29,8 @@ struct Report {
         Errors error{};  // relative to the object's own light
     };
     struct Skip {
-        std::string what, why;
-        uint64_t count = 0;
+        SkippedWork work;
+        uint64_t count;
     };
     struct Cut {
         std::string why;
@@ -50,8 +53,14 @@ struct Report {
     double emitted = 0, absorbed = 0, escaped = 0;  // W, sum of the channels
     std::vector<LightSet> lightSets;
     std::vector<Object> objects;
-    std::vector<std::string> warnings;
+    Warnings warnings;
     std::vector<Skip> skipped;
+
+    void warn(WarningId id, std::string text) { warnings.push_back({id, std::move(text)}); }
+    // Notes that `count` times such work was left out; 0 leaves no line in the report.
+    void skip(SkippedWork work, uint64_t count) { skipped.push_back({work, count}); }
+    // Appends the warnings and the skipped work of another report.
+    void addNotesOf(Report other);
 
     // |emitted - absorbed - escaped| / emitted
     double balanceError() const;

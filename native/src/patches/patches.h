@@ -168,7 +168,7 @@ struct Patches {
     float size = 0;        // target edge of a tile, metres
     float finest = 0;      // the same where it is least (patch_size.h)
     size_t tileCount = 0;
-    std::vector<std::string> warnings;
+    Warnings warnings;
     size_t degenerateFaces = 0;  // left out
     // Of faces that are left out since others stand for them.
     std::vector<DoubledCorner> doubledCorners;
@@ -178,6 +178,12 @@ struct Patches {
     // Share of the light that a patch stops.
     float opacityOf(uint32_t patch) const { return opacity.empty() ? 1.0f : opacity[patch]; }
     size_t sideCount() const { return 2 * area.size(); }
+    // Per side: the area of its patch, m^2.
+    std::vector<float> sideAreas() const {
+        std::vector<float> areas(sideCount());
+        for (size_t side = 0; side < areas.size(); ++side) areas[side] = area[side / 2];
+        return areas;
+    }
     glm::vec3 translucenceOf(size_t side) const {
         return translucence.empty() ? glm::vec3(0.0f) : translucence[side];
     }

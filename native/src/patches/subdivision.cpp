@@ -77,13 +77,16 @@ class Subdivision {
             patches.degenerateFaces += degenerate;
             if (degenerate)
                 patches.warnings.push_back(
-                    "object \"" + scene.instances[i].name + "\": " + std::to_string(degenerate) +
-                    " faces without area, or with none but by rounding, were left out");
+                    {WarningId::DEGENERATE_FACES,
+                     "object \"" + scene.instances[i].name + "\": " + std::to_string(degenerate) +
+                         " faces without area, or with none but by rounding, were left out"});
             if (doubles)
                 patches.warnings.push_back(
-                    "object \"" + scene.instances[i].name + "\": " + std::to_string(doubles) +
-                    " faces lie on others that look the same way, whose light they get; merge such "
-                    "faces (Merge by Distance), or remove the object if it lies on another");
+                    {WarningId::DOUBLED_FACES,
+                     "object \"" + scene.instances[i].name + "\": " + std::to_string(doubles) +
+                         " faces lie on others that look the same way, whose light they get; merge "
+                         "such "
+                         "faces (Merge by Distance), or remove the object if it lies on another"});
         }
         CellVertices vertices(patches.cells.size());
         for (size_t c = 0; c < vertices.size(); ++c)
@@ -93,9 +96,10 @@ class Subdivision {
         const Crossings crossings = findCrossings(patches.cells, cellSizes, vertices);
         if (!crossings.isAll)
             patches.warnings.push_back(
-                "faces go through each other in so many places that the smaller ones are not cut "
-                "there: they may let some light through walls; delete or hide what nobody sees of "
-                "objects that go through each other");
+                {WarningId::UNCUT_CROSSINGS,
+                 "faces go through each other in so many places that the smaller ones are not cut "
+                 "there: they may let some light through walls; delete or hide what nobody sees of "
+                 "objects that go through each other"});
         for (uint32_t c = 0; c < patches.cells.size(); ++c) {
             throwIfCancelledAt(c);
             if (!patches.cells[c].hasPatches) continue;

@@ -146,7 +146,7 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
     std::vector<InstanceLight> result(scene.instances.size());
     report.objects.resize(scene.instances.size());
     std::atomic<size_t> occluders = 0, smooth = 0;
-    std::vector<std::string> warnings(scene.instances.size());
+    std::vector<std::optional<Warning>> warnings(scene.instances.size());
     auto reconstructInstance = [&](size_t i) {
         const Instance& instance = scene.instances[i];
         const Mesh& mesh = scene.meshes[instance.mesh];
@@ -188,11 +188,12 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
                                                settings.regularization, fields);
             nodes = std::move(fit.fields);
             if (!fit.isSolved)
-                warnings[i] =
+                warnings[i] = {
+                    WarningId::UNSOLVED_FIT,
                     "object \"" + instance.name +
-                    "\": the least squares came to no solution, and its vertices have the "
-                    "mean of the light around them; merge vertices by distance, or choose "
-                    "the reconstruction AREA_AVERAGE";
+                        "\": the least squares came to no solution, and its vertices have the "
+                        "mean of the light around them; merge vertices by distance, or choose "
+                        "the reconstruction AREA_AVERAGE"};
         }
         double noise = 0;  // of what corners gather: mean square
         for (size_t k = 0; k < lights.size(); ++k) {
@@ -231,9 +232,10 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
 
         if (out.isBaked && isInsideOut(patches, ranges[i], instance.side, onSides)) {
             report.objects[i].status = "baked; no light on this side";
-            warnings[i] = "object \"" + instance.name +
-                          "\": the baked sides of its faces get no light but the other sides do; "
-                          "flip its normals or choose the other side";
+            warnings[i] = {WarningId::NO_LIGHT_ON_SIDE,
+                           "object \"" + instance.name +
+                               "\": the baked sides of its faces get no light but the other sides "
+                               "do; flip its normals or choose the other side"};
         }
     };
     // Some at a time, so that this thread can report, and cancel, between them.
@@ -242,18 +244,14 @@ std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patche
         progress.report(RB_STAGE_RECONSTRUCTION, anyGathers ? 0.5 + 0.5 * share : share);
         parallelFor(i, std::min(i + kTogether, scene.instances.size()), reconstructInstance);
     }
-    for (const std::string& warning : warnings)
-        if (!warning.empty()) report.warnings.push_back(warning);
+    for (std::optional<Warning>& warning : warnings)
+        if (warning) report.warnings.push_back(std::move(*warning));
     if (atCorners) {
         report.shadowRays += atCorners->shadowRays();
-        report.skipped.push_back(
-            {"final gather", "corners whose light interpolation follows", smooth.load()});
-        report.skipped.push_back({"light on patches",
-                                  "corners with a result are few: they gather it",
-                                  atCorners->sparseCorners()});
+        report.skip(SkippedWork::SMOOTH_CORNERS, smooth.load());
+        report.skip(SkippedWork::SPARSE_CORNERS, atCorners->sparseCorners());
     }
-    if (occluders)
-        report.skipped.push_back({"reconstruction", "objects that only occlude", occluders.load()});
+    if (occluders) report.skip(SkippedWork::OCCLUDERS, occluders.load());
     progress.report(RB_STAGE_RECONSTRUCTION, 1);
     return result;
 }

@@ -62,6 +62,13 @@ const Material& ShownLight::materialOf(size_t side) const {
     return scene.materialOf(parent.instance, size_t(parent.face));
 }
 
+std::vector<float> ShownLight::resultArea() const {
+    std::vector<float> area = patches.sideAreas();
+    for (size_t side = 0; side < area.size(); ++side)
+        if (!isResult(side)) area[side] = 0;
+    return area;
+}
+
 glm::vec3 ShownLight::byAngle(size_t side, const glm::vec4& angles) const {
     if (fromEverywhere.empty()) return glm::vec3(1.0f);
     return materialOf(side).shown(side % 2, angles);

@@ -34,6 +34,8 @@ class ShownLight {
 
     // Whether a side has a result; all have where none is asked for.
     bool isResult(size_t side) const { return results[side]; }
+    // Per side, m^2: the whole area of those that have a result, else 0.
+    std::vector<float> resultArea() const;
     // See shownSides.
     const std::vector<bool>& sides() const { return shown; }
     // Whether a side has a result that is not its own light: what its corners gather.

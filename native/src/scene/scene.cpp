@@ -96,7 +96,9 @@ int32_t Scene::addMaterial(Material material) {
         clamped = clamped || limited != material.reflectance[side];
         material.reflectance[side] = limited;
     }
-    if (clamped) warnings.push_back(object + ": reflectance of 1 or more was clamped to 0.999");
+    if (clamped)
+        warnings.push_back({WarningId::CLAMPED_REFLECTANCE,
+                            object + ": reflectance of 1 or more was clamped to 0.999"});
     materials.push_back(std::move(material));
     return int32_t(materials.size()) - 1;
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "job/warning.h"
 #include "raybundle/raybundle.h"
 #include "scene/angles.h"
 
@@ -244,7 +245,7 @@ class Scene {
     WorldImage worldImage;                // what comes on top of it
     std::vector<std::string> lightSets;   // names
     int32_t worldLightSet = kNoLightSet;  // of both
-    std::vector<std::string> warnings;    // what was changed to make the scene usable
+    Warnings warnings;                    // what was changed to make the scene usable
 };
 
 }  // namespace raybundle

@@ -47,9 +47,15 @@ void GatheredNoise::apply(std::array<Irradiance, 2>& halves,
     bringTogether(halves[0].indirect, halves[1].indirect);
 }
 
-std::vector<float> GatheredNoise::withoutGathered(std::vector<float> error) const {
-    for (const Side& one : sides) error[one.side] = 0;
-    return error;
+std::vector<std::vector<float>> GatheredNoise::errorsOf(const SetLights& lights,
+                                                        const Tiles& tiles) const {
+    std::vector<std::vector<float>> result;
+    for (const SetLight& light : lights) {
+        std::vector<float> error = light.shot.error;
+        for (const Side& one : sides) error[one.side] = 0;
+        result.push_back(tiles.errorOfMean(error));
+    }
+    return result;
 }
 
 }  // namespace raybundle

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "patches/tiles.h"
 #include "reconstruction/shown_light.h"
 #include "transport/set_light.h"
 
@@ -24,9 +25,9 @@ class GatheredNoise {
     // weight: per side, of what is wanted.
     void apply(std::array<Irradiance, 2>& halves, const std::vector<float>& weight) const;
 
-    // The standard errors of a first shot, per side, without those of gathered sides: corners have
-    // their own.
-    std::vector<float> withoutGathered(std::vector<float> error) const;
+    // The standard error of the first shot of each light, in W/m^2 per side of the tiles, without
+    // that of gathered sides: corners have their own.
+    std::vector<std::vector<float>> errorsOf(const SetLights& lights, const Tiles& tiles) const;
 
   private:
     struct Side {

@@ -266,7 +266,8 @@ void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double targ
     if (noises.size() > named)
         text += " and " + std::to_string(noises.size() - named) +
                 " more, of which the report has the noise of each";
-    report.warnings.push_back(
+    report.warn(
+        WarningId::NOISY_OBJECTS,
         text + (isOutOfReach ? "; few lines bring them light: a lower target_error takes long "
                                "and gains little there"
                              : "; lower target_error"));
@@ -297,11 +298,13 @@ void warnOf(std::vector<CoarseMesh> meshes, Report& report) {
     std::stable_sort(meshes.begin(), meshes.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
     const size_t named = std::min(meshes.size(), kMostNamed);
-    for (size_t k = 0; k < named; ++k) report.warnings.push_back(std::move(meshes[k].second));
+    for (size_t k = 0; k < named; ++k)
+        report.warn(WarningId::COARSE_MESH, std::move(meshes[k].second));
     if (meshes.size() > named)
-        report.warnings.push_back(std::to_string(meshes.size() - named) +
-                                  " more objects are too coarse for their light: the report has "
-                                  "the error of each");
+        report.warn(WarningId::COARSE_MESH,
+                    std::to_string(meshes.size() - named) +
+                        " more objects are too coarse for their light: the report has "
+                        "the error of each");
 }
 
 }  // namespace

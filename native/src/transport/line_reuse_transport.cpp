@@ -110,26 +110,24 @@ class LineReuseTransport : public Transport {
         Irradiance result = irradiance(Half::BOTH, tolerance);
         // The first of each half starts from nothing.
         if (input.settings.skipWarmStart && solves > 2)
-            report.skipped.push_back(
-                {"iterations of a solve", "it starts from the last solution", solves - 2});
+            report.skip(SkippedWork::WARM_STARTS, solves - 2);
         const size_t starved = solver.gatherStarvedSides(
             input.visibility, input.clusters, input.touchDistance, kStarvedLines,
             uint32_t(input.settings.seed), wanted, last.of[size_t(Half::BOTH)].reflected, result);
-        if (starved)
-            report.skipped.push_back({"bundles on small patches",
-                                      "too few lines met them: they gathered with local rays",
-                                      starved});
+        if (starved) report.skip(SkippedWork::STARVED_SIDES, starved);
         if (!result.isSettled)
-            report.warnings.push_back(
+            report.warn(
+                WarningId::UNSETTLED_EXCHANGE,
                 "the exchange of light did not come to rest: some surfaces reflect or let through "
                 "nearly all of it, over and over; give those that are closed around light a "
                 "reflectance or translucence of 0.9 at most");
         if (streaming[0])
-            report.warnings.push_back(
+            report.warn(
+                WarningId::MEMORY_LIMIT,
                 "memory_limit was reached at " + std::to_string(input.counts.bundles) +
-                " bundles: each of the other " +
-                std::to_string(bundleCount() - input.counts.bundles) +
-                " was used once and forgotten, so that relighting has to trace them again");
+                    " bundles: each of the other " +
+                    std::to_string(bundleCount() - input.counts.bundles) +
+                    " was used once and forgotten, so that relighting has to trace them again");
         return result;
     }
 

@@ -4,11 +4,20 @@
 #include <algorithm>
 
 namespace raybundle {
+
 bool SetLight::isDark() const {
     auto isBlack = [](const glm::vec3& v) { return v == glm::vec3(0.0f); };
     return isBlack(worldRadiance) &&
            std::all_of(shot.emission.begin(), shot.emission.end(), isBlack) &&
            std::all_of(shot.irradiance.begin(), shot.irradiance.end(), isBlack);
+}
+
+Irradiance meanOver(const Tiles& tiles, const Irradiance& light, const std::vector<float>& weight) {
+    Irradiance result;
+    result.direct = tiles.mean(light.direct, weight);
+    result.gathered = tiles.mean(light.gathered, weight);
+    result.indirect = tiles.mean(light.indirect, weight);
+    return result;
 }
 
 Irradiance sumOf(const SetLights& lights) {

@@ -7,6 +7,7 @@
 
 #include "direct_light/direct_light.h"
 #include "first_shot/first_shot.h"
+#include "patches/tiles.h"
 #include "scene/scene.h"
 #include "transport/transport.h"
 
@@ -27,6 +28,9 @@ struct SetLight {
 
 // What belongs to no set comes first in a list of lights, then each set in the scene's order.
 using SetLights = std::vector<SetLight>;
+
+// Of light per patch side: the mean over each side of the tiles, by weight, per patch side.
+Irradiance meanOver(const Tiles& tiles, const Irradiance& light, const std::vector<float>& weight);
 
 // Irradiance by all of them.
 Irradiance sumOf(const SetLights& lights);

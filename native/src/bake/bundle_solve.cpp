@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/bundle_solve.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bake/bake_warnings.h"
+#include "bake/stopwatch.h"
+#include "bundles/line_windows.h"
+#include "stated_error/energy_balance.h"
+#include "stated_error/object_noise.h"
+#include "transport/extra_rays.h"
+
+namespace raybundle {
+namespace {
+
+// Relative residual of the last solve: a share of the noise, within these bounds. The upper one
+// keeps a relit bake, whose solves start elsewhere, within 1e-5 of a new one.
+constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
+constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
+// Rays of a side in the first pass, which each further pass may double.
+constexpr uint32_t kRaysOfFirstPass = 512, kMostPasses = 5;
+
+// Each window of finer pixels is a projection of its own for what lies in it.
+double projectionsOfFaces(const Trace& trace) {
+    const Sheets& sheets = trace.patches.sheets;
+    return trace.density.windows.empty() ? 0.0 : double(sheets.loose.size() + sheets.sheets.size());
+}
+
+}  // namespace
+
+BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Transports& transports)
+    : in(input),
+      patches(input.trace.patches),
+      lights(lights),
+      transports(transports),
+      tracer(*transports.front()),
+      area(input.shown.resultArea()),
+      gathered(patches, input.shown),
+      weight(patches.sideCount(), 0),
+      tileWeight(input.tiles.sideCount(), 0),
+      errorOfSets(gathered.errorsOf(lights, input.tiles)),
+      noise(input.trace.looks, errorOfSets, tileWeight, input.tiles.patches()),
+      growth(cornerGrowth(input.scene, input.tiles.patches())),
+      rule(input.settings, mostBundles(patches, input.trace.density), tracer.bundleCount()),
+      // Who fixes or limits the number of bundles wants what these tell.
+      castsRays(input.settings.solver == "LINE_REUSE" && input.settings.skipBundles &&
+                input.settings.minBundles < input.settings.maxBundles),
+      halves(lights.size()) {
+    if (input.settings.solver == "LINE_REUSE")
+        noisyParts.emplace(in.tiles, in.trace.looks, in.tiles.sum(area), in.shown, growth,
+                           overForetold, projectionsOfFaces(in.trace), in.settings.targetError);
+}
+
+SideNoise BundleSolve::run(Report& report) {
+    Stop stop = Stop::NOT_YET;
+    while (stop == Stop::NOT_YET) {
+        trace(report);
+        Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
+        look();
+        stop = stopAfterLook();
+    }
+    Stopwatch stage(report.seconds[RB_STAGE_SOLVE]);
+    return conclude(stop, report);
+}
+
+void BundleSolve::trace(Report& report) {
+    if (rule.wanted() <= tracer.bundleCount()) return;
+    Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
+    tracer.advance(rule.wanted() - tracer.bundleCount(), in.progress);
+}
+
+// Solves for each half of the bundles, and measures how far they differ.
+void BundleSolve::look() {
+    in.trace.measureExposedShare(uint32_t(in.settings.seed));
+    const uint32_t bundles = tracer.bundleCount();
+    in.progress.report(RB_STAGE_SOLVE, std::min(1.0, double(bundles) / in.settings.maxBundles));
+    const std::vector<float> exposed = in.trace.exposedShare();
+    for (size_t side = 0; side < weight.size(); ++side) weight[side] = area[side] * exposed[side];
+    tileWeight = in.tiles.sum(weight);
+    for (size_t k = 0; k < lights.size(); ++k)
+        for (size_t h = 0; h < 2; ++h)
+            halves[k][h] =
+                transports[k]->irradiance(Half(h), kHalfTolerance * float(in.settings.targetError));
+    const Halves now = seen();
+    noise.look(now, bundles, tracer.bias());
+    measureCorners(noise, now);
+    errors = noise.relative();
+    in.trace.looks = noise.looks();
+    if (!noisyParts) return;
+    noisyParts->look(noise, bundles, in.tiles.sum(in.trace.linesMet()), in.trace.linesMetByAll());
+    in.trace.looks.shareOfParts = noisyParts->shares();
+}
+
+Stop BundleSolve::stopAfterLook() {
+    const uint32_t bundles = tracer.bundleCount();
+    const Stop stop = rule.after(
+        bundles, noisyParts ? noisyParts->excess() : noise.excess(in.settings.targetError));
+    if (stop == Stop::NOT_YET) return stop;
+    finish();
+    return castsRays && stop == Stop::NOISE_AT_TARGET ? rule.afterRays(bundles, castRays()) : stop;
+}
+
+// The last solve for all bundles there are.
+void BundleSolve::finish() {
+    ofFinish = Report();
+    const float tolerance =
+        float(std::clamp(kFinalShare * errors.front(), kLeastTolerance, kMostTolerance));
+    for (size_t k = 0; k < lights.size(); ++k) {
+        Report unsaid;  // of the lines, which the first has said for all
+        lights[k].irradiance =
+            transports[k]->finish(tolerance, in.shown.sides(), k == 0 ? ofFinish : unsaid);
+    }
+}
+
+// Noisy sides cast rays of their own, and more of them as long as that helps. Returns what is left,
+// see NoisyParts::lookWithRays.
+double BundleSolve::castRays() {
+    const uint32_t bundles = tracer.bundleCount();
+    std::vector<std::array<float, 2>> samples = in.trace.linesByHalf();
+    double left = 0;
+    for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
+        const std::vector<ExtraRays> rays = noisyParts->rays(samples, kRaysOfFirstPass << pass);
+        if (pass == 0) ofFinish.skip(SkippedWork::RAYED_SIDES, rays.size());
+        if (rays.empty()) break;
+        addExtraRays(patches, in.trace.visibility, in.trace.touchDistance, in.trace.exposedShare(),
+                     rays, hash(uint32_t(in.settings.seed), pass), samples, lights, halves);
+        SetNoise withRays({}, errorOfSets, tileWeight, in.tiles.patches());
+        const Halves withThese = seen();
+        withRays.look(withThese, bundles, tracer.bias());
+        measureCorners(withRays, withThese);
+        left = noisyParts->lookWithRays(withRays, kMostPasses - 1 - pass);
+    }
+    return left;
+}
+
+// What is seen of the halves, on tiles.
+BundleSolve::Halves BundleSolve::seen() const {
+    Halves result(lights.size());
+    const std::vector<float> exposed = in.trace.exposedShare();
+    for (size_t k = 0; k < lights.size(); ++k) {
+        for (size_t h = 0; h < 2; ++h) result[k][h] = in.shown.of(halves[k][h], exposed);
+        gathered.apply(result[k], weight);
+        for (Irradiance& half : result[k]) half = meanOver(in.tiles, half, weight);
+    }
+    return result;
+}
+
+// At each look: the same light is to have the same rays, whatever was baked before; and rays leave
+// noise of another kind than lines.
+void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen) {
+    overForetold =
+        shownOverForetold(in.scene, in.tiles.patches(), look.ofLights().front(), halvesSeen.front(),
+                          in.tiles.mean(in.trace.exposedShare(), patches.sideAreas()),
+                          in.settings.regularization, growth);
+}
+
+// States the noise that is left, and says why no bundles were added.
+SideNoise BundleSolve::conclude(Stop stop, Report& report) {
+    const double target = in.settings.targetError;
+    const uint32_t bundles = tracer.bundleCount();
+    if (stop != Stop::NOISE_AT_TARGET) {
+        const auto worst = std::max_element(errors.begin(), errors.end());
+        warnOfMissedTarget(in.scene,
+                           {stop, bundles, lights[size_t(worst - errors.begin())].set, *worst,
+                            noisyParts ? rule.excess() * target : 0.0, target},
+                           report);
+    }
+    report.addNotesOf(std::move(ofFinish));
+    if (castsRays) {
+        noise.lookAgain(seen());
+        errors = noise.relative();
+    }
+    CornerNoise corners = noiseAtCorners(in.scene, in.tiles.patches(), noise.ofLights().front(),
+                                         growth, overForetold);
+    const bool isBelow =
+        *std::max_element(errors.begin(), errors.end()) <= target || corners.ofAll <= target;
+    if (stop == Stop::NOISE_AT_TARGET && isBelow)
+        report.skip(SkippedWork::REACHED_TARGET, rule.most() - std::min(rule.most(), bundles));
+    else if (stop == Stop::NOISE_AT_TARGET)
+        warnOfDirectNoise(in.scene, patches, lights, area, corners.ofAll, target, report);
+    const double wrong = errorOfWrongLines(report);
+    for (double& e : errors) e = std::hypot(e, wrong);
+    report.estimatedError = errors.front();
+    report.error.noise = std::hypot(corners.ofAll, wrong);
+    for (size_t set = 0; set < report.lightSets.size(); ++set)
+        report.lightSets[set].estimatedError = errors[set + 1];
+    in.progress.report(RB_STAGE_SOLVE, 1);
+    SideNoise result = noise.perSide();
+    result.ofObjects = std::move(corners.ofObjects);
+    result.isOutOfReach = stop == Stop::NOISE_AT_TARGET && rule.isOutOfReach();
+    return result;
+}
+
+// What more bundles do not help: lines that a projector puts in a wrong order, or that leak through
+// surfaces. Returns the relative error by them.
+double BundleSolve::errorOfWrongLines(Report& report) const {
+    warnOfBrokenCycles(in.trace.tracer->cycleCount(), report);
+    double share = in.trace.tracer->disorderedShare();
+    if (in.settings.smallPatches == "ROULETTE")
+        share +=
+            leakedShare(in.scene, patches, weight, in.trace.surrounding.open, tracer.openShare());
+    if (!(share > 0)) return 0;
+    const double error = errorByWrongExchanges(patches, share);
+    if (error > double(in.settings.targetError)) warnOfWrongExchanges(share, error, report);
+    return error;
+}
+
+SideNoise keepFirstShot(const SolveInput& in, SetLights& lights, std::vector<float>& exposed,
+                        Report& report) {
+    Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
+    const Patches& patches = in.trace.patches;
+    exposed = in.trace.surrounding.exposed;
+    if (exposed.empty()) exposed = in.trace.surroundingsOf(in.settings).exposed;
+    std::vector<float> weight = in.shown.resultArea();
+    for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exposed[side];
+    const std::vector<float> tileWeight = in.tiles.sum(weight);
+    const GatheredNoise gathered(patches, in.shown);
+    std::vector<std::array<Irradiance, 2>> halves;
+    for (SetLight& light : lights) {
+        HandOver first = handOver(patches, light.shot, exposed);
+        light.irradiance.gathered = first.gathered;
+        light.irradiance.direct = std::move(first.gathered);
+        light.irradiance.indirect = std::move(first.indirect);
+        const Irradiance mean = meanOver(in.tiles, light.irradiance, weight);
+        halves.push_back({mean, mean});
+    }
+    SetNoise noise({}, gathered.errorsOf(lights, in.tiles), tileWeight, in.tiles.patches());
+    noise.look(halves, 1, 0);
+    const std::vector<double> errors = noise.relative();
+    report.estimatedError = errors.front();
+    for (size_t set = 0; set < report.lightSets.size(); ++set)
+        report.lightSets[set].estimatedError = errors[set + 1];
+    const std::vector<double> growth = cornerGrowth(in.scene, in.tiles.patches());
+    CornerNoise corners =
+        noiseAtCorners(in.scene, in.tiles.patches(), noise.ofLights().front(), growth,
+                       std::vector<double>(growth.size(), kUsuallyOverForetold));
+    report.error.noise = corners.ofAll;
+    SideNoise result = noise.perSide();
+    result.ofObjects = std::move(corners.ofObjects);
+    return result;
+}
+
+}  // namespace raybundle

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/first_shots.h"
+
+#include <numeric>
+#include <optional>
+
+#include "bake/light_hash.h"
+#include "bake/stopwatch.h"
+#include "first_shot/bright_spots.h"
+
+namespace raybundle {
+namespace {
+
+// Notes what the first shot of a light set did not need to do.
+void noteSkips(const DirectLight& direct, const FirstShot& shot, Report& report) {
+    report.skip(SkippedWork::LAMP_INSIDES, direct.unseenSides());
+    report.skip(SkippedWork::WHOLLY_LIT, shot.unblockedSides);
+    report.skip(SkippedWork::FACING_AWAY, shot.hiddenSides);
+    report.skip(SkippedWork::WEAK_SOURCES, shot.weakSides);
+    report.skip(SkippedWork::INSIDE_OF_SOLIDS, shot.insideSides);
+    report.skip(SkippedWork::STAND_INS, shot.sidesByOthers);
+}
+
+// The first shot of one light set; aims: shotHash. Of the last bake's it takes what still holds.
+FirstShot shootOrKeep(const StageInput& in, const FirstShotInput& input, uint64_t aims,
+                      Trace::Shot& last, Report& report) {
+    const bool isGather = in.settings.firstShot == "GATHER";
+    const uint64_t hash = lightHash(input.light, aims);
+    if (in.settings.skipLights && isGather && last.hash == hash) {
+        report.skip(SkippedWork::UNCHANGED_LIGHTS, 1);
+        return last.shot;
+    }
+    FirstShot shot = firstShot(in.settings.firstShot, input);
+    report.shadowRays += shot.rays;
+    if (shot.bySource && shot.bySource == last.shot.bySource)
+        report.skip(SkippedWork::SCALED_LIGHTS, 1);
+    if (isGather) last = {hash, aims, shot};
+    return shot;
+}
+
+}  // namespace
+
+std::vector<CoarseShot> shootCoarsely(const StageInput& in, Report& report) {
+    Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
+    const Patches& patches = in.trace.patches;
+    std::vector<uint32_t> all(patches.sideCount());
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<CoarseShot> shots;
+    for (int32_t set = kNoLightSet; set < int32_t(in.scene.lightSets.size()); ++set) {
+        const DirectLight direct(in.scene, patches, in.trace.visibilityOfLights(),
+                                 uint32_t(in.settings.seed), set, in.settings);
+        CoarseShot shot{std::vector<Gathered>(all.size()), {}};
+        direct.shootCoarsely(
+            shot, all,
+            [&](size_t side) {
+                return Receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
+                                uint32_t(side)};
+            },
+            [&](double done) { in.progress.report(RB_STAGE_FIRST_SHOT, done); });
+        shots.push_back(std::move(shot));
+    }
+    return shots;
+}
+
+SetLights shootSources(const StageInput& in, const ShownLight& shown,
+                       const std::vector<CoarseShot>& coarse, Report& report) {
+    Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
+    Trace& trace = in.trace;
+    const Settings& settings = in.settings;
+    const Patches& patches = trace.patches;
+    const Visibility& visibility = trace.visibilityOfLights();
+    const uint64_t aims = shotHash(in.scene, settings, shown.sides(), !patches.scattering.empty());
+    const StandIns standIns(patches, settings.skipClusters ? &shown.sides() : nullptr);
+    const bool isGather = settings.firstShot == "GATHER";
+    SetLights lights;
+    const int32_t count = int32_t(in.scene.lightSets.size());
+    for (int32_t set = kNoLightSet; set < count; ++set) {
+        const Progress share = in.progress.part(lights.size(), size_t(count) + 1);
+        DirectLight direct(in.scene, patches, visibility, uint32_t(settings.seed), set, settings);
+        Trace::Shot& last = trace.shots[set];
+        const bool mayScale = settings.skipLights && isGather && last.aims == aims;
+        const FirstShotInput input{direct,
+                                   patches,
+                                   visibility,
+                                   settings,
+                                   share,
+                                   trace.touchDistance,
+                                   trace.linesPerBundle(),
+                                   &trace.visibility,
+                                   coarse.empty() ? nullptr : &coarse[lights.size()],
+                                   mayScale ? last.shot.bySource : nullptr,
+                                   &shown.sides(),
+                                   &standIns};
+        FirstShot shot = shootOrKeep(in, input, aims, last, report);
+        if (isGather && settings.solver == "LINE_REUSE")
+            if (const size_t spots =
+                    gatherBrightSpots(in.scene, input, trace.visibility, trace.density, shot))
+                report.skip(SkippedWork::BRIGHT_SPOTS, spots);
+        noteSkips(direct, shot, report);
+        lights.push_back({set, std::move(direct), std::move(shot), in.scene.worldRadianceOf(set),
+                          Irradiance(patches.sideCount())});
+    }
+    return lights;
+}
+
+}  // namespace raybundle
