@@ -18,7 +18,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from mathutils import Vector
-from raybundle.material_export import MaterialExporter, SlotMaterial
+from raybundle.materials.export import MaterialExporter, SlotMaterial
 from raybundle.scene_data import SceneData, Warnings
 
 SAMPLES = 16

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from cycles_comparison import square
 from cycles_reference import bake_objects
-from raybundle.diffuse_angles import MEANS
-from raybundle.gloss import gloss_albedo, ior_of
-from raybundle.principled import principled_albedo
+from raybundle.materials.diffuse_angles import MEANS
+from raybundle.materials.gloss import gloss_albedo, ior_of
+from raybundle.materials.principled import principled_albedo
 
 
 def fresnel_mean(n):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from cycles_comparison import square
 from cycles_reference import bake_objects
-from raybundle.diffuse_angles import angle_terms
-from raybundle.layers import burley_sheen, clearcoat, microfibers, velvet
+from raybundle.materials.diffuse_angles import angle_terms
+from raybundle.materials.layers import burley_sheen, clearcoat, microfibers, velvet
 
 NEW = bpy.app.version >= (4, 0, 0)
 

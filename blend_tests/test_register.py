@@ -103,5 +103,5 @@ def test_every_skip_is_a_choice():
 
 def test_only_one_module_knows_ctypes():
     folder = Path(inspect.getfile(raybundle)).parent
-    users = [path.name for path in folder.glob("*.py") if "ctypes" in path.read_text()]
+    users = [path.name for path in folder.rglob("*.py") if "ctypes" in path.read_text()]
     assert users == ["native.py"]

@@ -5,7 +5,6 @@ Coordinates are single precision: 1e-6 relative where nothing else is said.
 """
 
 import math
-import sys
 
 import bpy
 import numpy as np
@@ -15,7 +14,8 @@ from mathutils import Matrix
 from raybundle.corner_map import CORNER_CODE, VERTEX_CODE, build_corner_map
 from raybundle.light_export import (area_light_radiance,
                                     sun_irradiance_factor)
-from raybundle.principled import principled_albedo
+from raybundle.materials import cycles_bake
+from raybundle.materials.principled import principled_albedo
 from raybundle.scene_export import export_scene
 
 # Diffuse part of a Principled shader of roughness 0.5, without specular reflection.
@@ -590,7 +590,7 @@ def fail_to_bake(_stage):
 
 
 def test_what_cannot_be_baked_either_is_named(principled, monkeypatch):
-    monkeypatch.setattr(sys.modules['raybundle.surface_bake']._Stage, '_run', fail_to_bake)
+    monkeypatch.setattr(cycles_bake._Stage, '_run', fail_to_bake)
     add_noise(principled)
     material, result = exported_material(principled)
     assert material.reflectance[0] == pytest.approx(ALBEDO * np.array([0.1, 0.2, 0.3]))
@@ -602,14 +602,14 @@ def test_what_cannot_be_baked_either_is_named(principled, monkeypatch):
 @pytest.mark.parametrize("fails", [False, True])
 def test_a_bake_leaves_no_trace(principled, monkeypatch, fails):
     if fails:
-        monkeypatch.setattr(sys.modules['raybundle.surface_bake']._Stage, '_run', fail_to_bake)
+        monkeypatch.setattr(cycles_bake._Stage, '_run', fail_to_bake)
     add_noise(principled)
     # The noise is in a group too, which the bake copies.
     group = bpy.data.node_groups.new("Group", 'ShaderNodeTree')
     group.nodes.new('ShaderNodeTexNoise')
     principled.node_tree.nodes.new('ShaderNodeGroup').node_tree = group
     exported_material(principled)
-    sys.modules['raybundle.surface_bake'].discard_all()
+    cycles_bake.discard_all()
 
     item = bpy.data.objects["Square"]
     other = bpy.data.objects.new("Other", None)
@@ -635,7 +635,7 @@ def test_a_bake_leaves_no_trace(principled, monkeypatch, fails):
 
 
 def test_a_bake_is_kept_until_something_changes(principled, monkeypatch):
-    stage = sys.modules['raybundle.surface_bake']._Stage
+    stage = cycles_bake._Stage
     runs = []
     original = stage._run
     monkeypatch.setattr(stage, '_run', lambda self: (runs.append(1), original(self)))

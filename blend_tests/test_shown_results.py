@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 import raybundle
-from raybundle.last_surfaces import LastSurfaces
+from raybundle.materials.last_surfaces import LastSurfaces
 from raybundle.scene_export import export_scene
 from surface_error import read_colors
 

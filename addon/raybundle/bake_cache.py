@@ -10,7 +10,8 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
-from . import native, surface_bake
+from . import native
+from .materials import cycles_bake
 
 _bakes: dict[str, native.Bake] = {}
 
@@ -40,7 +41,7 @@ def discard(scene: bpy.types.Scene) -> None:
 
 
 def discard_all() -> None:
-    surface_bake.discard_all()
+    cycles_bake.discard_all()
     for bake in _bakes.values():
         bake.close()
     _bakes.clear()

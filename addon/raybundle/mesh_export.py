@@ -15,8 +15,8 @@ import bpy
 import numpy as np
 
 from .color_attribute import rendered_attribute
-from .color_expression import Texture
-from .material_export import MaterialExport
+from .materials.color_expression import Texture
+from .materials.export import MaterialExport
 from .scene_data import MeshData
 
 

@@ -385,7 +385,7 @@ class Scene(_Handle):
 
     def set_material_lobe(self, material: int, lobe: int, reflectance: np.ndarray,
                           by_angle: np.ndarray, roughness: np.ndarray) -> None:
-        """lobe: rb_lobe, as in layers.py; (2, 3): what of the reflectance it sends;
+        """lobe: rb_lobe, as in materials/layers.py; (2, 3): what of the reflectance it sends;
         (4, 2, 3): how that depends on the light's angle; roughness: (2,)."""
         arrays = [_float_array(values, shape, name) for values, shape, name in
                   ((reflectance, (2, 3), "reflectance"), (by_angle, (4, 2, 3), "by_angle"),
@@ -394,7 +394,7 @@ class Scene(_Handle):
             self._pointer, material, lobe, *map(_as_floats, arrays))
 
     def set_material_diffuse_model(self, material: int, model: int, roughness: np.ndarray) -> None:
-        """model: rb_diffuse_model, as in scattering.py; roughness: (2,)."""
+        """model: rb_diffuse_model, as in materials/scattering.py; roughness: (2,)."""
         roughness = _float_array(roughness, (2,), "roughness")
         self._library.rb_set_material_diffuse_model(
             self._pointer, material, model, _as_floats(roughness))
@@ -405,8 +405,8 @@ class Scene(_Handle):
         self._library.rb_set_material_leaving(self._pointer, material, _as_floats(factors))
 
     def set_material_angles(self, material: int, reflected: np.ndarray, shown: np.ndarray) -> None:
-        """(4, 2, 3): by the terms of diffuse_angles.py, how the reflectance depends on the light's
-        angle; (5, 2, 3): what outputs show of light from straight above, then by the terms."""
+        """(4, 2, 3): by the terms of materials/diffuse_angles.py, how the reflectance depends on
+        the light's angle; (5, 2, 3): what outputs show of light from straight above, then by the terms."""
         reflected = _float_array(reflected, (4, 2, 3), "reflected")
         shown = _float_array(shown, (5, 2, 3), "shown")
         self._library.rb_set_material_angles(

@@ -6,8 +6,8 @@ import bpy
 from . import bake_cache, color_attribute, viewport_preview
 from .bake import bake
 from .bake_report import BakeError
-from .last_surfaces import LastSurfaces
 from .light_sets import written_attributes
+from .materials.last_surfaces import LastSurfaces
 from .native import ErrorCode, RaybundleError
 from .subdivided_copy import remove_copies
 

@@ -38,8 +38,8 @@ class MaterialData:
     # (2, 3) each: scale * reflectance + offset is diffuse, the rest gloss.
     diffuse_scale: np.ndarray = field(default_factory=lambda: np.ones((2, 3)))
     diffuse_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    # By the terms of diffuse_angles.py: (4, 2, 3) of the reflectance; (5, 2, 3) what outputs show of
-    # light from straight above, then by the terms.
+    # By the terms of materials/diffuse_angles.py: (4, 2, 3) of the reflectance; (5, 2, 3) what
+    # outputs show of light from straight above, then by the terms.
     reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
     shown_by_angle: np.ndarray = field(
         default_factory=lambda: np.concatenate([np.ones((1, 2, 3)), np.zeros((4, 2, 3))]))
@@ -50,12 +50,12 @@ class MaterialData:
     gloss_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
     gloss_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
     separate_masking: bool = False  # rb_masking
-    # What of the reflectance each lobe of layers.py sends (rb_set_material_lobe): (n, 2, 3), that by
-    # angle: (n, 4, 2, 3), and how rough: (n, 2).
+    # What of the reflectance each lobe of materials/layers.py sends (rb_set_material_lobe):
+    # (n, 2, 3), that by angle: (n, 4, 2, 3), and how rough: (n, 2).
     lobes: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
     lobes_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((0, 4, 2, 3)))
     lobe_roughness: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    diffuse_model: int = 0  # of scattering.py
+    diffuse_model: int = 0  # of materials/scattering.py
     diffuse_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))  # likewise by angle
     # (2, 3): what leaves a side, diffusely, of the light that arrives at the other.

@@ -16,16 +16,16 @@ from mathutils import Vector
 
 from . import left_out
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
-from .gloss import filter_glossy_of
 from .hidden_lights import hidden_light_instances
-from .last_surfaces import LastSurfaces
 from .light_export import export_light, is_portal
 from .light_sets import LightSet, LightSetMembers
-from .material_export import MaterialExporter, SlotMaterial
+from .materials.cycles_bake import BakedSurface, Wanted, bake_surfaces
+from .materials.export import MaterialExporter, SlotMaterial
+from .materials.gloss import filter_glossy_of
+from .materials.last_surfaces import LastSurfaces
+from .materials.shown_results import RENDERED, renders_result, result_names
 from .mesh_export import MeshError, export_mesh, has_turned_normals
 from .scene_data import InstanceData, MeshData, SceneData, Warnings
-from .shown_results import RENDERED, renders_result, result_names
-from .surface_bake import BakedSurface, Wanted, bake_surfaces
 from .world_export import export_world
 
 # Object types whose evaluated geometry is a mesh.
@@ -147,7 +147,8 @@ class _Exporter:
         self.members = LightSetMembers(list(light_sets), self.result.scene)
         self._baked: dict[bpy.types.Object, BakedSurface] = {}
         self._meshes: dict[tuple, int | MeshError] = {}
-        self._taken: dict[tuple, list[str]] = {}  # likewise, digests of last_surfaces.py by slot
+        # By the same keys, the digests (LastSurfaces) of the surfaces in a mesh's slots.
+        self._taken: dict[tuple, list[str]] = {}
         # Of the exported ones, by counts and digest; None: of one that needed no digest yet.
         self._alike: dict[tuple[int, int, int], dict[bytes | None, int]] = {}
         self._instance_counts: Counter[tuple[str, str]] = Counter()

@@ -19,8 +19,7 @@ sys.path.insert(0, str(ROOT / "addon"))
 
 import attribute_picture  # noqa: E402
 import raybundle  # noqa: E402
-from raybundle.material_export import SlotMaterial  # noqa: E402
-from raybundle.material_export import MaterialExporter  # noqa: E402
+from raybundle.materials.export import MaterialExporter, SlotMaterial  # noqa: E402
 from raybundle.scene_data import SceneData, Warnings  # noqa: E402
 
 ATTRIBUTE = "Radiosity"

@@ -21,8 +21,8 @@ import bpy
 import numpy as np
 
 from .face_atlas import BORDER, FaceAtlas, face_atlas
+from .fingerprint import material_fingerprint
 from .gloss import filter_glossy_of
-from .material_fingerprint import material_fingerprint
 from .node_reader import LIGHT_PATH
 from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSLUCENCE,
                             TRANSMITTANCE, ShaderColors)

@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ..image_export import ImagePixels
+from ..scene_data import ImageData, MaterialData, SceneData, Warnings
 from .color_expression import WHITE, ColorExpression, Texture
+from .cycles_bake import BakedMaterial
 from .diffuse_angles import lambert
-from .image_export import ImagePixels
 from .last_surfaces import LastSurface, LastSurfaces
 from .layers import LOBES
 from .node_reader import NodeReader, output_node
-from .scene_data import ImageData, MaterialData, SceneData, Warnings
 from .shown_results import RENDERED, attributes_read
 from .surface import Surface
-from .surface_bake import BakedMaterial
 
 # What Blender shows where a face has no material.
 DEFAULT_REFLECTANCE = 0.8
@@ -42,7 +42,7 @@ class MaterialExport:
     index: int
     texture: Texture | None = None
     attribute: str | None = None
-    baked_uvs: bool = False  # the images are laid out by surface_bake.py
+    baked_uvs: bool = False  # the images are laid out by cycles_bake.py
     surface: LastSurface | None = None  # for the next bake; None: a guess
 
 
@@ -171,7 +171,7 @@ class MaterialExporter:
 
     def add_baked(self, slot: SlotMaterial, material: bpy.types.Material, baked: BakedMaterial
                   ) -> MaterialExport:
-        """A material as Cycles baked it for the faces of one object (surface_bake.py)."""
+        """A material as Cycles baked it for the faces of one object (cycles_bake.py)."""
         if self._shows(material, slot).any:
             self.showing[material.name] = None
         # What both ways only approximate is still named.

@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 import bpy
 import numpy as np
 
-from .color_attribute import rendered_attribute
+from ..color_attribute import rendered_attribute
 from .color_expression import ColorExpression, Texture
 from .surface import Surface
 

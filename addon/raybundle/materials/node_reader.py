@@ -16,14 +16,14 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
+from ..image_export import ImagePixels, sphere_mean
+from ..scene_data import Warnings
 from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Texture
 from .gloss import gloss_albedo, seen_roughness
-from .image_export import ImagePixels, sphere_mean
 from .layers import Layer, microfibers, velvet
 from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, SHEEN_TINT,
                          SPECULAR_TINT, principled_albedo, sheen_on)
 from .scattering import BURLEY, OREN_NAYAR, Scattering
-from .scene_data import Warnings
 from .shown_results import reads_result
 from .surface import Surface
 
@@ -73,7 +73,7 @@ class NodeReader:
     """Reads one tree for one side of the surface (backfacing).
 
     What is only approximated goes to the warnings. What a node does and the reader cannot express
-    goes to `inexact`, for there is another way to it (surface_bake.py); by default it is a warning
+    goes to `inexact`, for there is another way to it (cycles_bake.py); by default it is a warning
     too. varying_emission: whether emission may be more than a constant. filter_glossy: see
     gloss.filter_glossy_of. unread_color: (3,), what stands for colours that cannot be read; None:
     that of the socket. results: names of the attributes that are results of a bake: as emission

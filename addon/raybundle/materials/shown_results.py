@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from .color_attribute import error_name, rendered_attribute
+from ..color_attribute import error_name, rendered_attribute
 
 # How nodes name the render colour attribute, which a bake makes its result.
 RENDERED = ""
