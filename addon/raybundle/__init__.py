@@ -25,20 +25,20 @@ bl_info = {
     "category": "Render",
 }
 
+# In the order of registration: panels show operators and properties.
+_MODULES = (properties, bake_cache, operators, panels)
+
 
 def register() -> None:
-    properties.register()
-    bake_cache.register()
-    operators.register()
-    panels.register()
-    # Blender as a module frees the classes of panels when Python has ended, and crashes by it (4.2).
+    for module in _MODULES:
+        module.register()
+    # Blender as a Python module (4.2) frees the classes of panels after Python has ended, which
+    # crashes: they are unregistered while Python still runs.
     if not bpy.app.binary_path:
         atexit.register(unregister)
 
 
 def unregister() -> None:
     atexit.unregister(unregister)
-    panels.unregister()
-    operators.unregister()
-    bake_cache.unregister()
-    properties.unregister()
+    for module in reversed(_MODULES):
+        module.unregister()

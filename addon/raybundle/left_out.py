@@ -95,12 +95,24 @@ def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Mat
                    f'where it has no surface light passes as through air')
         if is_transparent and any(_is_glass(node) for node in _nodes(material.node_tree)):
             glassy.append(f'"{material.name}"')
-    if turned:
-        yield (f"normal maps are not read, light is that of the surfaces without them: "
-               f"{listed(turned)}: unlink them to compare with Cycles")
-    if glassy and not getattr(getattr(scene, 'cycles', None), 'caustics_refractive', True):
-        yield (f"Refractive Caustics are off, by which glass stops reflected light in Cycles; here "
-               f"it passes: {listed(glassy)}: switch them on to compare")
+    yield from _line_about(
+        turned, "normal maps are not read, light is that of the surfaces without them",
+        "unlink them to compare with Cycles")
+    if not getattr(getattr(scene, 'cycles', None), 'caustics_refractive', True):
+        yield from _line_about(
+            glassy, "Refractive Caustics are off, by which glass stops reflected light in Cycles; "
+                    "here it passes", "switch them on to compare")
+
+
+def _line_about(owners: Iterable[str], what: str, remedy: str) -> Iterator[str]:
+    """One line that names the owners (quoted names), or none where there are no owners."""
+    owners = list(owners)
+    if owners:
+        yield f"{what}: {listed(owners)}: {remedy}"
+
+
+def _quoted(names: Iterable[str]) -> list[str]:
+    return [f'"{name}"' for name in names]
 
 
 def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
@@ -151,9 +163,9 @@ def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
             yield (f'"{item.name}": Shading Offset of its shadow terminator is not read: set it to '
                    f'0 to compare with Cycles')
         differing += [f'"{item.name}" ({how})' for how in _differences(item)]
-    if differing:
-        yield (f"geometry is as the viewport shows it, and not as renders do: "
-               f"{listed(differing)}: make both alike")
+    yield from _line_about(
+        differing, "geometry is as the viewport shows it, and not as renders do",
+        "make both alike")
 
 
 def _of_hair(item: bpy.types.Object) -> Iterator[str]:
@@ -202,41 +214,40 @@ def has_light_linking(item: bpy.types.Object) -> bool:
 def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iterator[str]:
     """hidden: surfaces that the viewport hides and renders do not, original; lights: names of such
     lamps, which shine."""
-    shining = [f'"{name}"' for name in dict.fromkeys(lights)]
-    if shining:
-        yield (f"lights that are hidden in the viewport shine, as in Cycles: {listed(shining)}: "
-               f"disable them in renders to switch them off")
-    names = [f'"{item.name}"' for item in hidden]
-    if names:
-        yield (f"what is hidden in the viewport is left out, though Cycles renders it: "
-               f"{listed(names)}: show it, or disable it in renders as well")
+    yield from _line_about(
+        _quoted(dict.fromkeys(lights)),
+        "lights that are hidden in the viewport shine, as in Cycles",
+        "disable them in renders to switch them off")
+    yield from _line_about(
+        _quoted(item.name for item in hidden),
+        "what is hidden in the viewport is left out, though Cycles renders it",
+        "show it, or disable it in renders as well")
 
 
 def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
     """unrendered: shown in the viewport but not in renders, original. What is drawn as wires or
     bounds, as those that cut others are, is not missed."""
-    names = [f'"{item.name}"' for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')]
-    if names:
-        yield (f"what is hidden in renders is left out, as by Cycles: {listed(names)}: enable it "
-               f"in renders to bake it")
+    yield from _line_about(
+        _quoted(item.name for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')),
+        "what is hidden in renders is left out, as by Cycles", "enable it in renders to bake it")
 
 
 def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str]:
     """Names of objects whose modifiers make several corners of one, and of those whose modifiers
     keep no trace of some corners."""
-    names = [f'"{name}"' for name in copied]
-    if names:
-        yield (f"modifiers make several faces of one, and all show the light of that in its place: "
-               f"{listed(names)}: apply the modifiers to light each by itself")
-    names = [f'"{name}"' for name in untraced]
-    if names:
-        yield (f"modifiers keep no trace of some corners, which have the light of what lies "
-               f"nearest: {listed(names)}: apply the modifiers for their own")
+    yield from _line_about(
+        _quoted(copied),
+        "modifiers make several faces of one, and all show the light of that in its place",
+        "apply the modifiers to light each by itself")
+    yield from _line_about(
+        _quoted(untraced),
+        "modifiers keep no trace of some corners, which have the light of what lies nearest",
+        "apply the modifiers for their own")
 
 
 def of_normals(turned: Iterable[str]) -> Iterator[str]:
     """Names of objects whose custom normals turn their faces."""
-    names = [f'"{name}"' for name in turned]
-    if names:
-        yield (f"custom normals that turn faces are not followed, light falls on the faces as they "
-               f"lie: {listed(names)}: clear the custom split normals to compare with Cycles")
+    yield from _line_about(
+        _quoted(turned),
+        "custom normals that turn faces are not followed, light falls on the faces as they lie",
+        "clear the custom split normals to compare with Cycles")

@@ -406,7 +406,8 @@ class Scene(_Handle):
 
     def set_material_angles(self, material: int, reflected: np.ndarray, shown: np.ndarray) -> None:
         """(4, 2, 3): by the terms of materials/diffuse_angles.py, how the reflectance depends on
-        the light's angle; (5, 2, 3): what outputs show of light from straight above, then by the terms."""
+        the light's angle; (5, 2, 3): what outputs show of light from straight above, then by the
+        terms."""
         reflected = _float_array(reflected, (4, 2, 3), "reflected")
         shown = _float_array(shown, (5, 2, 3), "shown")
         self._library.rb_set_material_angles(
@@ -642,23 +643,23 @@ class Bake(_Handle):
     def corner_light(self, instance: int, output: str, count: int, light_set: int | None = None
                      ) -> np.ndarray:
         """(count, 3) float32, in the order of the mesh's corners; by all lights or by a set."""
-        light = np.empty((count, 3), np.float32)
-        arguments = (instance, OUTPUTS[output], _as_floats(light), count)
-        if light_set is None:
-            self._library.rb_get_corner_light(self._pointer, *arguments)
-        else:
-            self._library.rb_get_set_corner_light(self._pointer, light_set, *arguments)
-        return light
+        return self._light('corner', instance, output, count, light_set)
 
     def vertex_light(self, instance: int, output: str, count: int, light_set: int | None = None
                      ) -> np.ndarray:
         """(count, 3) float32, in the order of the mesh's vertices; by all lights or by a set."""
+        return self._light('vertex', instance, output, count, light_set)
+
+    def _light(self, element: str, instance: int, output: str, count: int,
+               light_set: int | None) -> np.ndarray:
+        """(count, 3) float32. element: 'corner' or 'vertex', of which the mesh has count."""
         light = np.empty((count, 3), np.float32)
         arguments = (instance, OUTPUTS[output], _as_floats(light), count)
         if light_set is None:
-            self._library.rb_get_vertex_light(self._pointer, *arguments)
+            getattr(self._library, f'rb_get_{element}_light')(self._pointer, *arguments)
         else:
-            self._library.rb_get_set_vertex_light(self._pointer, light_set, *arguments)
+            getattr(self._library, f'rb_get_set_{element}_light')(
+                self._pointer, light_set, *arguments)
         return light
 
     def corner_error(self, instance: int, count: int) -> np.ndarray:

@@ -43,29 +43,29 @@ def _run_bake(operator: bpy.types.Operator, context: bpy.types.Context) -> set[s
     return {'FINISHED'}
 
 
-class RAYBUNDLE_OT_bake(bpy.types.Operator):
+class _NeedsScene:
+    """Of an operator that may run wherever there is a scene."""
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+
+class RAYBUNDLE_OT_bake(_NeedsScene, bpy.types.Operator):
     """Write direct and indirect light into the colour attributes of the scene's meshes"""
     bl_idname = "raybundle.bake"
     bl_label = "Bake Radiosity"
     bl_options = {'REGISTER', 'UNDO'}
 
-    @classmethod
-    def poll(cls, context):
-        return context.scene is not None
-
     def execute(self, context):
         return _run_bake(self, context)
 
 
-class RAYBUNDLE_OT_relight(bpy.types.Operator):
+class RAYBUNDLE_OT_relight(_NeedsScene, bpy.types.Operator):
     """Bake again after a change of lights or colours; the lines of unchanged geometry are reused"""
     bl_idname = "raybundle.relight"
     bl_label = "Relight"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context):
-        return context.scene is not None
 
     def execute(self, context):
         if not bake_cache.has_result(context.scene):
@@ -102,15 +102,11 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
         return {'FINISHED'}
 
 
-class RAYBUNDLE_OT_light_set_add(bpy.types.Operator):
+class RAYBUNDLE_OT_light_set_add(_NeedsScene, bpy.types.Operator):
     """Add a light set: a group of lights that is baked into an attribute of its own"""
     bl_idname = "raybundle.light_set_add"
     bl_label = "Add Light Set"
     bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context):
-        return context.scene is not None
 
     def execute(self, context):
         settings = context.scene.raybundle
@@ -142,14 +138,10 @@ class RAYBUNDLE_OT_light_set_remove(bpy.types.Operator):
         return {'FINISHED'}
 
 
-class RAYBUNDLE_OT_preview(bpy.types.Operator):
+class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
     """Show the baked attribute in the 3D views' solid shading, or the earlier shading again"""
     bl_idname = "raybundle.preview"
     bl_label = "Preview"
-
-    @classmethod
-    def poll(cls, context):
-        return context.scene is not None
 
     def execute(self, context):
         for item in context.scene.objects:
@@ -161,21 +153,11 @@ class RAYBUNDLE_OT_preview(bpy.types.Operator):
         return {'FINISHED'}
 
 
-classes = (
+register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_OT_bake,
     RAYBUNDLE_OT_relight,
     RAYBUNDLE_OT_clear,
     RAYBUNDLE_OT_light_set_add,
     RAYBUNDLE_OT_light_set_remove,
     RAYBUNDLE_OT_preview,
-)
-
-
-def register() -> None:
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
+))

@@ -71,11 +71,8 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        layout.prop(settings, "target_error")
-        layout.prop(settings, "topology")
-        layout.prop(settings, "patch_size")
-        layout.prop(settings, "refine")
-        layout.prop(settings, "contacts")
+        for name in ("target_error", "topology", "patch_size", "refine", "contacts"):
+            layout.prop(settings, name)
 
 
 class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
@@ -127,13 +124,9 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        layout.prop(settings, "output")
-        layout.prop(settings, "attribute")
-        layout.prop(settings, "domain")
-        layout.prop(settings, "data_type")
-        layout.prop(settings, "exposure")
-        layout.prop(settings, "clamp")
-        layout.prop(settings, "write_error")
+        for name in ("output", "attribute", "domain", "data_type", "exposure", "clamp",
+                     "write_error"):
+            layout.prop(settings, name)
         column = layout.column()
         # A subdivided copy has a mesh of its own anyway.
         column.active = settings.topology == 'KEEP'
@@ -207,7 +200,7 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
         layout.operator("raybundle.preview")
 
 
-classes = (
+register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_PT_render,
     RAYBUNDLE_PT_last_bake,
     RAYBUNDLE_PT_quality,
@@ -218,14 +211,4 @@ classes = (
     RAYBUNDLE_PT_light_sets,
     RAYBUNDLE_PT_object,
     RAYBUNDLE_PT_sidebar,
-)
-
-
-def register() -> None:
-    for cls in classes:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
+))

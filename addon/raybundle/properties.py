@@ -420,16 +420,15 @@ def _checked_bool(name: str, value: object) -> bool:
     return choices[str(value).lower()]
 
 
-classes = (
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory((
     RaybundleLightSet,
     RaybundleSceneSettings,
     RaybundleObjectSettings,
-)
+))
 
 
 def register() -> None:
-    for cls in classes:
-        bpy.utils.register_class(cls)
+    _register_classes()
     bpy.types.Scene.raybundle = PointerProperty(
         name="Raybundle", description="Settings of Raybundle", type=RaybundleSceneSettings)
     bpy.types.Object.raybundle = PointerProperty(
@@ -439,5 +438,4 @@ def register() -> None:
 def unregister() -> None:
     del bpy.types.Object.raybundle
     del bpy.types.Scene.raybundle
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()
