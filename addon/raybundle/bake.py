@@ -18,7 +18,7 @@ from . import bake_cache, color_attribute, native
 from .bake_report import BakeError, BakeReport, ObjectReport
 from .corner_map import CornerMap, grouped_mean
 from .light_sets import LightSet, read_light_sets
-from .mesh_export import corner_vertices
+from .mesh_arrays import corner_vertices
 from .native import ErrorCode, Progress, RaybundleError
 from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings

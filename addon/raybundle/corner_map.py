@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
 
-from .mesh_export import corner_vertices, read, topology, vertex_positions
+from .mesh_arrays import corner_vertices, read, topology, vertex_positions
 
 VERTEX_CODE = ".raybundle_vertex"
 CORNER_CODE = ".raybundle_corner"

@@ -9,7 +9,6 @@ read at all.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -17,14 +16,11 @@ import numpy as np
 from .color_attribute import rendered_attribute
 from .materials.color_expression import Texture
 from .materials.export import MaterialExport
+from .mesh_arrays import HAS_ATTRIBUTES, corner_vertices, read, read_attribute, vertex_positions
 from .scene_data import MeshData
-
 
 # Squares of larger coordinates overflow in single precision.
 COORDINATE_LIMIT = 1e15
-
-# Whether corners' vertices, slots and sharpness are attributes.
-_HAS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
 
 # Normals turn by no more than about 10 degrees if the cosine is larger; more than this share of
 # corners makes a mesh one whose normals are turned.
@@ -33,56 +29,6 @@ _SAME_WAY, _TURNED_SHARE = 0.985, 0.02
 
 class MeshError(ValueError):
     """A mesh that cannot take part; the message says why, without naming it."""
-
-
-@dataclass(frozen=True)
-class Topology:
-    """What two meshes must share for their corners to correspond one to one."""
-
-    vertex_count: int
-    corner_vertices: np.ndarray  # (c,) int32
-    face_sizes: np.ndarray  # (f,) int32
-
-    def matches(self, other: Topology) -> bool:
-        return (self.vertex_count == other.vertex_count
-                and np.array_equal(self.corner_vertices, other.corner_vertices)
-                and np.array_equal(self.face_sizes, other.face_sizes))
-
-
-def read(collection: bpy.types.bpy_prop_collection, name: str, dtype: type, width: int = 1
-         ) -> np.ndarray:
-    """A property of all elements: (n,) or, for vectors, (n, width)."""
-    values = np.empty(len(collection) * width, dtype)
-    collection.foreach_get(name, values)
-    return values.reshape(-1, width) if width > 1 else values
-
-
-def _read_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str, dtype: type
-                    ) -> np.ndarray | None:
-    """(n,) of an attribute that is Blender's own; None: all of its elements have the default."""
-    attribute = mesh.attributes.get(name)
-    if attribute is None or (attribute.domain, attribute.data_type) != (domain, data_type):
-        return None
-    return read(attribute.data, 'value', dtype)
-
-
-def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(c,) int32."""
-    if _HAS_ATTRIBUTES:
-        vertices = _read_attribute(mesh, '.corner_vert', 'CORNER', 'INT', np.int32)
-        if vertices is not None:
-            return vertices
-    return read(mesh.loops, 'vertex_index', np.int32)
-
-
-def topology(mesh: bpy.types.Mesh) -> Topology:
-    return Topology(len(mesh.vertices), corner_vertices(mesh),
-                    read(mesh.polygons, 'loop_total', np.int32))
-
-
-def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(n, 3) float32."""
-    return read(mesh.vertices, 'co', np.float32, 3)
 
 
 def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExport],
@@ -101,8 +47,8 @@ def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExp
     face_offsets = np.append(starts, np.int32(len(mesh.loops)))
     sizes = np.diff(face_offsets)
     # Later ones have no size beside the start.
-    if not _HAS_ATTRIBUTES and not np.array_equal(sizes, read(mesh.polygons, 'loop_total',
-                                                              np.int32)):
+    if not HAS_ATTRIBUTES and not np.array_equal(sizes, read(mesh.polygons, 'loop_total',
+                                                             np.int32)):
         raise MeshError("has faces out of order; a modifier or script left the mesh invalid")
     materials = materials or (default_material,)
     slots = _face_slots(mesh, len(materials))
@@ -133,8 +79,8 @@ def _face_slots(mesh: bpy.types.Mesh, count: int) -> np.ndarray:
     """(f,) int32, positions in `count` materials."""
     slots = None
     if count > 1:
-        slots = (_read_attribute(mesh, 'material_index', 'FACE', 'INT', np.int32)
-                 if _HAS_ATTRIBUTES else read(mesh.polygons, 'material_index', np.int32))
+        slots = (read_attribute(mesh, 'material_index', 'FACE', 'INT', np.int32)
+                 if HAS_ATTRIBUTES else read(mesh.polygons, 'material_index', np.int32))
     if slots is None:
         return np.zeros(len(mesh.polygons), np.int32)
     # Blender shows the last material where a face names one that does not exist.
@@ -143,9 +89,9 @@ def _face_slots(mesh: bpy.types.Mesh, count: int) -> np.ndarray:
 
 def _face_smooth(mesh: bpy.types.Mesh) -> np.ndarray:
     """(f,) bool."""
-    if not _HAS_ATTRIBUTES:
+    if not HAS_ATTRIBUTES:
         return read(mesh.polygons, 'use_smooth', bool)
-    sharp = _read_attribute(mesh, 'sharp_face', 'FACE', 'BOOLEAN', bool)
+    sharp = read_attribute(mesh, 'sharp_face', 'FACE', 'BOOLEAN', bool)
     return np.ones(len(mesh.polygons), bool) if sharp is None else ~sharp
 
 
@@ -172,8 +118,8 @@ def _corner_normals(mesh: bpy.types.Mesh, vertices_of_corners: np.ndarray, sizes
 
 def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray:
     """(e, 2) int32, the vertices of the edges that are marked sharp."""
-    sharp = (_read_attribute(mesh, 'sharp_edge', 'EDGE', 'BOOLEAN', bool)
-             if _HAS_ATTRIBUTES else read(mesh.edges, 'use_edge_sharp', bool))
+    sharp = (read_attribute(mesh, 'sharp_edge', 'EDGE', 'BOOLEAN', bool)
+             if HAS_ATTRIBUTES else read(mesh.edges, 'use_edge_sharp', bool))
     if sharp is None or not sharp.any():
         return np.empty((0, 2), np.int32)
     return read(mesh.edges, 'vertices', np.int32, 2)[sharp]

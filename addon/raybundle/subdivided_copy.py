@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from .mesh_export import corner_vertices, read
+from .mesh_arrays import corner_vertices, read
 from .native import Subdivision
 from .scene_data import MeshData
 

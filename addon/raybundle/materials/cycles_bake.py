@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..mesh_arrays import read, vertex_positions
 from .face_atlas import BORDER, FaceAtlas, face_atlas
 from .fingerprint import material_fingerprint
 from .gloss import filter_glossy_of
@@ -134,13 +135,10 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
             (mesh.polygons, 'loop_total', np.int32, 1),
             (mesh.polygons, 'material_index', np.int32, 1),
             (mesh.polygons, 'use_smooth', bool, 1)):
-        values = np.empty(len(collection) * width, dtype)
-        collection.foreach_get(name, values)
-        content.update(values.data)
+        content.update(read(collection, name, dtype, width).tobytes())
     for layer in mesh.uv_layers:
-        values = np.empty(2 * len(layer.data), np.float32)
-        layer.data.foreach_get('uv', values)
-        content.update(layer.name.encode() + bytes([layer.active_render]) + values.tobytes())
+        content.update(layer.name.encode() + bytes([layer.active_render])
+                       + read(layer.data, 'uv', np.float32, 2).tobytes())
     for attribute in mesh.attributes:
         # Every bake changes its result, which is not looked at.
         if attribute.name in asked.results:
@@ -158,9 +156,7 @@ def _attribute_bytes(attribute: bpy.types.Attribute) -> bytes:
                        attribute.data_type, (None, 0))
     if name is None:
         return b""
-    values = np.empty(len(attribute.data) * width, np.float32)
-    attribute.data.foreach_get(name, values)
-    return values.tobytes()
+    return read(attribute.data, name, np.float32, width).tobytes()
 
 
 # --------------------------------------------------------------------------------------------------
@@ -171,9 +167,8 @@ def _attribute_bytes(attribute: bpy.types.Attribute) -> bytes:
 def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Mesh,
           asked: Wanted, pixel: float) -> BakedSurface:
     reasons = asked.reasons
-    slots = np.empty(len(mesh.polygons), np.int32)
-    mesh.polygons.foreach_get('material_index', slots)
-    slots = np.clip(slots, 0, max(len(item.material_slots) - 1, 0))
+    slots = np.clip(read(mesh.polygons, 'material_index', np.int32), 0,
+                    max(len(item.material_slots) - 1, 0))
     wanted = np.isin(slots, list(reasons))
     uvs = np.full((len(mesh.loops), 2), -1.0, np.float32)
     if not wanted.any():
@@ -206,8 +201,7 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
     black = np.zeros((atlas.height, atlas.width, 3), np.float32)
     whole = images.get(REFLECTANCE, black)
     diffuse = images.get(DIFFUSE, black) if stage.has_gloss else whole
-    sizes = np.empty(len(mesh.polygons), np.int32)
-    mesh.polygons.foreach_get('loop_total', sizes)
+    sizes = read(mesh.polygons, 'loop_total', np.int32)
     materials = {}
     for slot, reason in reasons.items():
         pixels, diffuse_pixels, *others = _pixels(
@@ -249,14 +243,10 @@ def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def _atlas(mesh: bpy.types.Mesh, matrix: np.ndarray, wanted: np.ndarray, pixel: float
            ) -> FaceAtlas:
-    vertices = np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.vertices.foreach_get('co', vertices)
-    corners = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get('vertex_index', corners)
-    sizes = np.empty(len(mesh.polygons), np.int32)
-    mesh.polygons.foreach_get('loop_total', sizes)
-    placed = vertices.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    return face_atlas(placed[corners], np.concatenate([[0], np.cumsum(sizes)]), wanted, pixel)
+    placed = vertex_positions(mesh).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    sizes = read(mesh.polygons, 'loop_total', np.int32)
+    return face_atlas(placed[read(mesh.loops, 'vertex_index', np.int32)],
+                      np.concatenate([[0], np.cumsum(sizes)]), wanted, pixel)
 
 
 class _Stage:
@@ -292,8 +282,7 @@ class _Stage:
                        image: bpy.types.Image, made: list[bpy.types.ID]) -> bool:
         found = False
         mesh = self.item.data
-        faces = np.empty(len(mesh.polygons), np.int32)
-        mesh.polygons.foreach_get('material_index', faces)
+        faces = read(mesh.polygons, 'material_index', np.int32)
         mesh.materials.clear()
         for index, slot in enumerate(self.source.material_slots):
             if index in slots:

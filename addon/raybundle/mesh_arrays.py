@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The elements of a Blender mesh as numpy arrays, read by foreach_get."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+# Whether Blender keeps the vertices of corners, material slots and sharpness as attributes.
+HAS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What two meshes must share for their corners to correspond one to one."""
+
+    vertex_count: int
+    corner_vertices: np.ndarray  # (c,) int32
+    face_sizes: np.ndarray  # (f,) int32
+
+    def matches(self, other: Topology) -> bool:
+        return (self.vertex_count == other.vertex_count
+                and np.array_equal(self.corner_vertices, other.corner_vertices)
+                and np.array_equal(self.face_sizes, other.face_sizes))
+
+
+def read(collection: bpy.types.bpy_prop_collection, name: str, dtype: type, width: int = 1
+         ) -> np.ndarray:
+    """A property of all elements: (n,) or, for vectors, (n, width)."""
+    values = np.empty(len(collection) * width, dtype)
+    collection.foreach_get(name, values)
+    return values.reshape(-1, width) if width > 1 else values
+
+
+def read_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str, dtype: type
+                    ) -> np.ndarray | None:
+    """(n,) of an attribute that is Blender's own; None: all of its elements have the default."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None or (attribute.domain, attribute.data_type) != (domain, data_type):
+        return None
+    return read(attribute.data, 'value', dtype)
+
+
+def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
+    """(c,) int32."""
+    if HAS_ATTRIBUTES:
+        vertices = read_attribute(mesh, '.corner_vert', 'CORNER', 'INT', np.int32)
+        if vertices is not None:
+            return vertices
+    return read(mesh.loops, 'vertex_index', np.int32)
+
+
+def topology(mesh: bpy.types.Mesh) -> Topology:
+    return Topology(len(mesh.vertices), corner_vertices(mesh),
+                    read(mesh.polygons, 'loop_total', np.int32))
+
+
+def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
+    """(n, 3) float32."""
+    return read(mesh.vertices, 'co', np.float32, 3)
