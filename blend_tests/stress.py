@@ -257,6 +257,13 @@ def lamp(kind: str, energy: float = 100.0, **values) -> None:
 
 
 def cases() -> Iterator[Case]:
+    yield from room_cases()
+    yield from placement_cases()
+    yield from mesh_cases()
+    yield from value_cases()
+
+
+def room_cases() -> Iterator[Case]:
     for reflectance in (0.0, 0.5, 0.9, 0.99, 0.999):
         yield Case(f"a room of reflectance {reflectance:g}", lambda r=reflectance: room(r),
                    1.0 / (1.0 - reflectance))
@@ -271,6 +278,8 @@ def cases() -> Iterator[Case]:
     for place in (1e4, 1e6):
         yield Case(f"a room {place:g} m from the origin", lambda p=place: room(location=p), 2.0)
 
+
+def placement_cases() -> Iterator[Case]:
     yield Case("mirrored", lambda: scaled(-1, 1, 1))
     yield Case("mirrored three times", lambda: scaled(-1, -1, -1))
     yield Case("flattened to a plane", lambda: scaled(1, 1, 0), hides_faces=True)
@@ -279,6 +288,8 @@ def cases() -> Iterator[Case]:
     yield Case("sheared by a parent, tenfold", lambda: sheared(10))
     yield Case("sheared by a parent, a thousandfold", lambda: sheared(1000))
 
+
+def mesh_cases() -> Iterator[Case]:
     yield Case("slivers of 1 m by 1e-6 m", lambda: slivers(1000), is_quick=False)
     yield Case("50 slivers of 1 m by 1e-6 m", lambda: slivers(50))
     yield Case("ten thousand triangles of a millimetre", lambda: dust(10000))
@@ -322,6 +333,9 @@ def cases() -> Iterator[Case]:
     yield Case("instances five levels deep", lambda: nested_instances(5))
     yield Case("nothing", lambda: None, None, "Nothing to bake", True)
 
+
+def value_cases() -> Iterator[Case]:
+    """Of materials, the world and lamps."""
     yield Case("an emission of -1 W/m^2", room_of_negative_emission, None, "Grey")
     yield Case("an emission that is no number", lambda: room(0.5, np.nan), None, "Grey", True)
     yield Case("a reflectance that is no number", lambda: room(np.nan), None, "Grey", True)

@@ -10,7 +10,7 @@ from cycles_comparison import square
 from cycles_reference import bake_objects
 from raybundle.materials.diffuse_angles import MEANS
 from raybundle.materials.gloss import gloss_albedo, ior_of
-from raybundle.materials.principled import principled_albedo
+from raybundle.materials.principled import PrincipledSockets, principled_albedo
 
 
 def fresnel_mean(n):
@@ -67,7 +67,7 @@ def test_cycles_from_above(new_object, new_world, roughness, metallic):
     assert found == pytest.approx(expected, rel=0.02, abs=0.001)
     if not metallic:
         diffuse = bake_objects([sheet], 512, 0, "DIFFUSE", passes)["Sheet"].mean()
-        found = principled_albedo(roughness, 0.5, 1.5, 0.0, node.distribution == 'MULTI_GGX', base,
-                                  0.0)
+        found = principled_albedo(PrincipledSockets(
+            roughness, 0.5, 1.5, 0.0, node.distribution == 'MULTI_GGX', base), 0.0)
         from_everywhere = found.angles.shown[0, 0] + MEANS @ found.angles.shown[1:, 0]
         assert diffuse == pytest.approx(base * found.shown * from_everywhere, rel=0.01)

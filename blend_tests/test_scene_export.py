@@ -15,11 +15,11 @@ from raybundle.corner_map import CORNER_CODE, VERTEX_CODE, build_corner_map
 from raybundle.light_export import (area_light_radiance,
                                     sun_irradiance_factor)
 from raybundle.materials import cycles_bake
-from raybundle.materials.principled import principled_albedo
+from raybundle.materials.principled import PrincipledSockets, principled_albedo
 from raybundle.scene_export import export_scene
 
 # Diffuse part of a Principled shader of roughness 0.5, without specular reflection.
-ALBEDO = principled_albedo(0.5, 0.0, 1.5, 0.0, False, 0.5, 1.0).diffuse[0]
+ALBEDO = principled_albedo(PrincipledSockets(0.5, 0.0, 1.5, 0.0, False, 0.5), 1.0).diffuse[0]
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
 
@@ -408,6 +408,12 @@ def shader_of(material):
     return next(node for node in material.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
 
 
+def sockets_of(shader, specular, base):
+    """Of a Principled shader of the default roughness."""
+    return PrincipledSockets(0.5, specular, shader.inputs['IOR'].default_value, 0.0,
+                             shader.distribution == 'MULTI_GGX', base)
+
+
 def test_no_material_is_grey():
     assert exported_material(None)[0].reflectance == pytest.approx(np.full((2, 3), 0.8))
 
@@ -431,8 +437,7 @@ def test_principled(principled):
     shader.inputs['Emission Strength'].default_value = 3.0
     material, result = exported_material(principled)
     base = np.array([0.8, 0.4, 0.2])
-    albedo = principled_albedo(0.5, 0.0, shader.inputs['IOR'].default_value, 0.0,
-                               shader.distribution == 'MULTI_GGX', base, 1.0)
+    albedo = principled_albedo(sockets_of(shader, 0.0, base), 1.0)
     assert any('"Principled"' in text and "mirrors" in text for text in result.warnings)
     for side in range(2):
         assert material.reflectance[side] == pytest.approx(
@@ -671,8 +676,7 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
     shader = shader_of(principled)
     base = np.array([0.8, 0.4, 0.0])
     shader.inputs['Base Color'].default_value = (*base, 1.0)
-    albedo, alone = (principled_albedo(0.5, 0.5, shader.inputs['IOR'].default_value, 0.0,
-                                       shader.distribution == 'MULTI_GGX', base, filter_glossy)
+    albedo, alone = (principled_albedo(sockets_of(shader, 0.5, base), filter_glossy)
                      for filter_glossy in (1.0, None))
     material, result = exported_material(principled)
     assert result.warnings == []

@@ -16,7 +16,7 @@ from .cycles_bake import BakedMaterial
 from .diffuse_angles import lambert
 from .last_surfaces import LastSurface, LastSurfaces
 from .layers import LOBES
-from .node_reader import NodeReader, output_node
+from .node_reader import NodeReader, Reading, output_node
 from .shown_results import RENDERED, attributes_read
 from .surface import Surface
 
@@ -157,8 +157,7 @@ class MaterialExporter:
         """What of the (evaluated) material only Cycles can tell, if anything."""
         key = replace(slot, last=None)
         if key not in self._unread:
-            surface = self._surface(material, False, Warnings(), unread := [],
-                                    results=self._results(slot))
+            surface = self._surface(material, self._reading(slot), Warnings(), unread := [])
             if not unread and not _share_coordinates(surface.reflectance, surface.radiance):
                 unread.append("its emission, which varies in another way than its reflectance")
             if not unread and not _is_laid_out(surface.translucence, surface.reflectance,
@@ -176,8 +175,8 @@ class MaterialExporter:
             self.showing[material.name] = None
         # What both ways only approximate is still named.
         approximated = Warnings()
-        surface = self._surface(material, False, approximated, [], baked.diffuse_color,
-                                self._results(slot)).limited()
+        reading = replace(self._reading(slot), unread_color=baked.diffuse_color)
+        surface = self._surface(material, reading, approximated, []).limited()
         for text in (*approximated, baked.message):
             self.warnings.add(text)
         index = {}
@@ -210,11 +209,11 @@ class MaterialExporter:
         shown = self._shows(material, slot)
         # What is not used of a material is no warning.
         warnings = Warnings() if shown.only else self.warnings
-        reader, front = self._read(material, False, warnings, None, None, self._results(slot))
+        reader, front = self._read(material, self._reading(slot), warnings)
         sides = [front.limited()] * 2
         if reader is not None and reader.has_backfacing:
-            sides[1] = self._surface(material, True, warnings, results=self._results(slot)
-                                     ).limited()
+            reading = self._reading(slot, backfacing=True)
+            sides[1] = self._surface(material, reading, warnings).limited()
         surface = LastSurface(material.name if material else "(none)", tuple(sides))
         if shown.any:
             self.showing[material.name] = None
@@ -248,17 +247,21 @@ class MaterialExporter:
     def _results(self, slot: SlotMaterial) -> frozenset[str]:
         return self.results | {RENDERED} if slot.renders_result else self.results
 
+    def _reading(self, slot: SlotMaterial, backfacing: bool = False) -> Reading:
+        return Reading(backfacing, varying_emission=True, filter_glossy=self.filter_glossy,
+                       results=self._results(slot))
+
     def _shows(self, material: bpy.types.Material | None, slot: SlotMaterial) -> _Shown:
         """material: the evaluated one of the slot."""
-        results = self._results(slot)
-        if material is None or results.isdisjoint(self._attributes.get(material.original, ())):
+        if material is None or self._results(slot).isdisjoint(
+                self._attributes.get(material.original, ())):
             return _Shown()
         key = material.original, slot.renders_result
         if key not in self._shown:
             parts = []
             for backfacing in (False, True):
-                reader, surface = self._read(material, backfacing, Warnings(), Warnings(), None,
-                                             results)
+                reader, surface = self._read(material, self._reading(slot, backfacing),
+                                             Warnings(), Warnings())
                 parts.append((reader is not None and reader.shows_result,
                               reader is not None and reader.shows_only_result(surface),
                               reader is not None and reader.tells_emission
@@ -332,20 +335,18 @@ class MaterialExporter:
                               texture or glow_texture or passed_texture,
                               glow_attribute if attribute is None else attribute)
 
-    def _surface(self, material: bpy.types.Material | None, backfacing: bool, warnings: Warnings,
-                 unread: list[str] | None = None, unread_color: np.ndarray | None = None,
-                 results: frozenset[str] = frozenset()) -> Surface:
-        """unread: gets what is inexact, which then is no warning. Others: see NodeReader."""
-        reader, surface = self._read(material, backfacing, warnings,
-                                     None if unread is None else Warnings(), unread_color, results)
+    def _surface(self, material: bpy.types.Material | None, reading: Reading, warnings: Warnings,
+                 unread: list[str] | None = None) -> Surface:
+        """unread: gets what is inexact, which then is no warning."""
+        reader, surface = self._read(material, reading, warnings,
+                                     None if unread is None else Warnings())
         if unread is not None and reader is not None:
             unread += reader.unread
         return surface
 
-    def _read(self, material: bpy.types.Material | None, backfacing: bool, warnings: Warnings,
-              inexact: Warnings | None, unread_color: np.ndarray | None,
-              results: frozenset[str]) -> tuple[NodeReader | None, Surface]:
-        """Without a reader where there are no nodes."""
+    def _read(self, material: bpy.types.Material | None, reading: Reading, warnings: Warnings,
+              inexact: Warnings | None = None) -> tuple[NodeReader | None, Surface]:
+        """Without a reader where there are no nodes. inexact: see NodeReader."""
         if material is None:
             return None, Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
         # From 5.0 on every material has nodes and use_nodes only warns.
@@ -358,9 +359,7 @@ class MaterialExporter:
         if output.inputs['Volume'].is_linked and not output.inputs['Surface'].is_linked:
             # A border between two kinds of air.
             return None, Surface(transmittance=WHITE)
-        reader = NodeReader(f'material "{material.name}"', self.images, warnings, backfacing,
-                            inexact, varying_emission=True, filter_glossy=self.filter_glossy,
-                            unread_color=unread_color, results=results)
+        reader = NodeReader(f'material "{material.name}"', self.images, warnings, reading, inexact)
         return reader, reader.surface(output.inputs['Surface'])
 
     @staticmethod

@@ -22,7 +22,7 @@ from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Textu
 from .gloss import gloss_albedo, seen_roughness
 from .layers import Layer, microfibers, velvet
 from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, SHEEN_TINT,
-                         SPECULAR_TINT, principled_albedo, sheen_on)
+                         SPECULAR_TINT, PrincipledSockets, principled_albedo, sheen_on)
 from .scattering import BURLEY, OREN_NAYAR, Scattering
 from .shown_results import reads_result
 from .surface import Surface
@@ -69,33 +69,37 @@ class _Source:
     output: bpy.types.NodeSocket | None = None
 
 
+@dataclass(frozen=True)
+class Reading:
+    """For what a node tree is read."""
+
+    backfacing: bool = False  # whether the side is the back: value of the Backfacing output
+    varying_emission: bool = False  # whether emission may be more than a constant colour
+    filter_glossy: float | None = 1.0  # see gloss.filter_glossy_of
+    # (3,) linear RGB in place of colours that cannot be read; None: the colour of the socket.
+    unread_color: np.ndarray | None = None
+    # Names of the attributes that hold results of a bake. As emission they count 0 and as a factor
+    # 1; where one alone is a surface's colour, that of the socket is used.
+    results: frozenset[str] = frozenset()
+
+
 class NodeReader:
-    """Reads one tree for one side of the surface (backfacing).
+    """Reads one tree for one side of the surface.
 
     What is only approximated goes to the warnings. What a node does and the reader cannot express
     goes to `inexact`, for there is another way to it (cycles_bake.py); by default it is a warning
-    too. varying_emission: whether emission may be more than a constant. filter_glossy: see
-    gloss.filter_glossy_of. unread_color: (3,), what stands for colours that cannot be read; None:
-    that of the socket. results: names of the attributes that are results of a bake: as emission
-    they count 0, as a factor 1, and where they are a colour alone that of the socket is used.
+    too.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
-                 backfacing: bool = False, inexact: Warnings | None = None,
-                 varying_emission: bool = False, filter_glossy: float | None = 1.0,
-                 unread_color: np.ndarray | None = None,
-                 results: frozenset[str] = frozenset()) -> None:
+                 reading: Reading = Reading(), inexact: Warnings | None = None) -> None:
         self.owner = owner  # what warnings name, such as 'material "Wall"'
         self.images = images
         self.warnings = warnings
-        self.backfacing = backfacing
-        self.has_backfacing = False  # whether what was read depends on it
+        self.reading = reading
+        self.has_backfacing = False  # whether what was read depends on the side
         self.inexact = warnings if inexact is None else inexact
-        self.varying_emission = varying_emission
-        self.filter_glossy = filter_glossy
-        self.unread_color = unread_color
         self.unread: list[str] = []  # what is inexact, without the consequences
-        self.results = results
         self.color_result = Result.NONE  # the most that a shader's colour has of a result
         self.emits_result = False
         self.tells_emission = False  # whether a shader emits, or would if it were switched on
@@ -172,11 +176,12 @@ class NodeReader:
         if through > 0.0:
             self._warn(node, "lets light through: it goes straight on here")
         mean = np.clip(base.mean(), 0.0, 1.0)
-        albedo = principled_albedo(
+        sockets = PrincipledSockets(
             *self._values(node, GLOSS_SOCKETS, path), node.distribution == 'MULTI_GGX', mean,
-            self.filter_glossy, self._usual_color(node, *SPECULAR_TINT, path)).coated(
-                *self._values(node, COAT_SOCKETS, path),
-                self._usual_color(node, *COAT_TINT, path), self.filter_glossy)
+            self._usual_color(node, *SPECULAR_TINT, path))
+        albedo = principled_albedo(sockets, self.reading.filter_glossy).coated(
+            *self._values(node, COAT_SOCKETS, path), self._usual_color(node, *COAT_TINT, path),
+            self.reading.filter_glossy)
         opaque = 1.0 - metallic - through
         several = metallic * albedo.several
         mirrored = base.scaled(metallic * albedo.metal - several[0]).plus(ColorExpression(
@@ -222,12 +227,12 @@ class NodeReader:
         return self._plus(base.scaled(1.0 - share), under.scaled(share), node)
 
     def _glossy(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
-        if self.filter_glossy is None:
+        if self.reading.filter_glossy is None:
             return Surface()
         color = self._own_color(_input(node, 'Color', 'Base Color'), path)
         roughness = self._usual(node, *GLOSS_SOCKETS[0], path)
         mean = np.maximum(np.clip(color.mean(), 0.0, 1.0), 1e-6)
-        gloss = glossy_albedo(node, roughness, mean, self.filter_glossy,
+        gloss = glossy_albedo(node, roughness, mean, self.reading.filter_glossy,
                               self._usual_color(node, *EDGE_TINT, path))
         several_by_angle = gloss.several[:, None] * gloss.again
         return Surface(
@@ -299,7 +304,7 @@ class NodeReader:
         node, path = source.node, source.path
         if node is None:
             return ColorExpression(_default_color(source.socket))
-        if reads_result(node, source.output, self.results):
+        if reads_result(node, source.output, self.reading.results):
             return _only_result(source)
         if node.type == 'RGB':
             return ColorExpression(_default_color(node.outputs[0]))
@@ -322,8 +327,8 @@ class NodeReader:
         if behind == Result.ALONE:
             return _only_result(source)
         self._inexact(node, "cannot be read: the colour of the socket it is linked to is used")
-        return ColorExpression(_default_color(source.socket) if self.unread_color is None
-                               else self.unread_color, result=behind)
+        return ColorExpression(_default_color(source.socket) if self.reading.unread_color is None
+                               else self.reading.unread_color, result=behind)
 
     def _own_color(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
                    ) -> ColorExpression:
@@ -354,7 +359,7 @@ class NodeReader:
         goes into it."""
         has_result = has_others = False
         pending, seen = [(node, path)], set()
-        while pending and self.results:
+        while pending and self.reading.results:
             current, path = pending.pop()
             if current in seen:
                 continue
@@ -364,7 +369,7 @@ class NodeReader:
             has_others |= (not linked and current.type != 'VALUE'
                            or current.type.startswith('TEX_'))
             for source in linked:
-                if reads_result(source.node, source.output, self.results):
+                if reads_result(source.node, source.output, self.reading.results):
                     has_result = True
                 else:
                     pending.append((source.node, source.path))
@@ -376,7 +381,7 @@ class NodeReader:
                         path: tuple[bpy.types.Node, ...]) -> ColorExpression:
         """Where only constants are possible (lights, the world), the mean of what varies."""
         color = self.color(socket, path)
-        if color.is_constant or self.varying_emission:
+        if color.is_constant or self.reading.varying_emission:
             return color
         self._warn(socket.node, f"has a varying {socket.name}: its mean is used")
         return ColorExpression(color.mean(), result=color.result)
@@ -532,14 +537,14 @@ class NodeReader:
 
     def _node_value(self, source: _Source) -> float:
         node, path = source.node, source.path
-        if reads_result(node, source.output, self.results):
+        if reads_result(node, source.output, self.reading.results):
             self._result_values += 1
             return 1.0
         if node.type == 'VALUE':
             return node.outputs[0].default_value
         if node.type == 'NEW_GEOMETRY' and source.output.name == 'Backfacing':
             self.has_backfacing = True
-            return float(self.backfacing)
+            return float(self.reading.backfacing)
         if node.type == 'LIGHT_PATH':
             return LIGHT_PATH.get(source.output.name, 0.0)
         if node.type == 'LIGHT_FALLOFF':

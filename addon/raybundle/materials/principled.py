@@ -18,8 +18,8 @@ from .diffuse_angles import MEANS, TERMS, DiffuseAngles, angle_terms, burley, or
 from .gloss import gloss_albedo, ior_of, seen_roughness
 from .layers import Layer, burley_sheen, clearcoat, microfibers
 
-# Names of the sockets that gloss and angles depend on, the first arguments of principled_albedo,
-# and what they count as where they vary or are missing.
+# Names of the sockets that gloss and angles depend on, in the order of the first fields of
+# PrincipledSockets, and what they count as where they vary or are missing.
 GLOSS_SOCKETS = ((('Roughness',), 0.5), (('Specular IOR Level', 'Specular'), 0.5),
                  (('IOR',), 1.5), (('Diffuse Roughness',), 0.0))
 # The same of the coat, the first arguments of PrincipledAlbedo.coated, and of sheen_on.
@@ -33,6 +33,21 @@ SPECULAR_TINT = ('Specular Tint',), 1.0 if bpy.app.version >= (4, 0, 0) else 0.0
 # Before 4.0, by which a tint has the base's hue: of sheen, and of the specular layer.
 _LUMINANCE, _ROUGH_LUMINANCE = np.array([0.2126, 0.7152, 0.0722]), np.array([0.3, 0.6, 0.1])
 _VIEWS = np.sqrt((np.arange(24) + 0.5) / 24)  # cosines, of equal shares of the projected solid angle
+
+
+@dataclass(frozen=True)
+class PrincipledSockets:
+    """Values of a Principled shader's sockets and options that its gloss and angles depend on."""
+
+    roughness: float
+    specular: float  # Specular IOR Level, or Specular before Blender 4.0
+    ior: float
+    diffuse_roughness: float
+    is_multiscatter: bool  # whether the distribution is Multiscatter GGX
+    # (3,) or one number for all channels, linear RGB: by the base colour light is lost where it
+    # meets several facets.
+    base: np.ndarray | float
+    tint: np.ndarray | float = SPECULAR_TINT[1]  # (3,) or one number: Specular Tint
 
 
 @dataclass(frozen=True)
@@ -131,20 +146,19 @@ def _in_hue(base: np.ndarray, share: np.ndarray | float, weights: np.ndarray) ->
     return 1.0 + share * (hue - 1.0)
 
 
-def principled_albedo(roughness: float, specular: float, ior: float, diffuse_roughness: float,
-                      multiple: bool, base: np.ndarray | float, filter_glossy: float | None,
-                      tint: np.ndarray | float = SPECULAR_TINT[1]) -> PrincipledAlbedo:
-    """Values of the sockets (specular: Specular or Specular IOR Level); multiple: whether the
-    distribution is Multiscatter GGX; base: the base colour, by which light is lost where it meets
-    several facets. filter_glossy: see gloss.filter_glossy_of. tint: Specular Tint, (3,) or one."""
+def principled_albedo(sockets: PrincipledSockets, filter_glossy: float | None
+                      ) -> PrincipledAlbedo:
+    """filter_glossy: see gloss.filter_glossy_of."""
     is_layered = bpy.app.version >= (4, 0, 0)
-    f0 = 0.08 * specular
+    roughness, diffuse_roughness = sockets.roughness, sockets.diffuse_roughness
+    multiple = sockets.is_multiscatter
+    f0 = 0.08 * sockets.specular
     if is_layered:
-        f0 = 2.0 * specular * ((ior - 1.0) / (ior + 1.0))**2
+        f0 = 2.0 * sockets.specular * ((sockets.ior - 1.0) / (sockets.ior + 1.0))**2
     f0 = min(max(f0, 0.0), 0.99)
-    base = np.broadcast_to(base, 3)
+    base = np.broadcast_to(sockets.base, 3)
     specular_ior = ior_of(f0)
-    tint = np.clip(np.broadcast_to(tint, 3), 0.0, 1.0)
+    tint = np.clip(np.broadcast_to(sockets.tint, 3), 0.0, 1.0)
     f0 = f0 * (tint if is_layered else _in_hue(base, tint, _ROUGH_LUMINANCE))
     layer, layer_above = (gloss_albedo(roughness, specular_ior, from_above, is_layered)
                           for from_above in (False, True))

@@ -18,7 +18,8 @@ from .diffuse_angles import facet_shares, oren_nayar
 from .layers import Layer
 from .node_reader import CLOTH, CLOTH_ROUGHNESS, EDGE_TINT, GLOSSY, cloth_layer, glossy_albedo
 from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, SHEEN_TINT,
-                         SPECULAR_TINT, PrincipledAlbedo, principled_albedo, sheen_on)
+                         SPECULAR_TINT, PrincipledAlbedo, PrincipledSockets, principled_albedo,
+                         sheen_on)
 from .shown_results import reads_result
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
@@ -252,12 +253,12 @@ def _base_color(formula: _Formula, node: bpy.types.Node) -> _Value:
 
 
 def _principled_albedo(formula: _Formula, node: bpy.types.Node) -> PrincipledAlbedo:
-    return principled_albedo(
+    sockets = PrincipledSockets(
         *_values(formula, node, GLOSS_SOCKETS), node.distribution == 'MULTI_GGX',
-        float(_mean_base(formula, node).mean()), formula.filter_glossy,
-        _usual_color(formula, node, *SPECULAR_TINT)).coated(
-            *_values(formula, node, COAT_SOCKETS), _usual_color(formula, node, *COAT_TINT),
-            formula.filter_glossy)
+        float(_mean_base(formula, node).mean()), _usual_color(formula, node, *SPECULAR_TINT))
+    return principled_albedo(sockets, formula.filter_glossy).coated(
+        *_values(formula, node, COAT_SOCKETS), _usual_color(formula, node, *COAT_TINT),
+        formula.filter_glossy)
 
 
 def _mean_base(formula: _Formula, node: bpy.types.Node) -> np.ndarray:
