@@ -41,6 +41,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import raybundle  # noqa: E402
 from cycles_reference import (bakeable_objects, corner_values, load,  # noqa: E402
                               prepare_scene, target_attribute)
@@ -244,8 +245,7 @@ def print_scene(result: dict, contestants: dict, kinds: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str]) -> None:
-    parser = argparse.ArgumentParser(prog="benchmark.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--scenes", nargs="+", default=["cornell_box", "big_room"])
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--threads", type=int, default=0, help="of both; 0: all cores")
@@ -264,4 +264,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

@@ -15,7 +15,6 @@ name of scenes/, a file, or room:NAME (lamp_rooms.py); without any, all of scene
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ ROOT = HERE.parent
 sys.path[:0] = [str(ROOT / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import lamp_rooms  # noqa: E402
 import raybundle  # noqa: E402
 from object_light import SCENES, open_file  # noqa: E402
@@ -103,8 +103,7 @@ def state_targets(scenes: list[str], targets: list[float], settings: dict[str, s
 
 
 def main() -> None:
-    arguments = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
-    parser = argparse.ArgumentParser()
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("scenes", nargs="*")
     parser.add_argument("--target", type=float, nargs="+", default=[0.02])
     parser.add_argument("--seeds", type=int, default=1)
@@ -113,7 +112,7 @@ def main() -> None:
                         help="NAME=VALUE of both bakes, as output=DIRECT")
     parser.add_argument("--stated", action="store_true")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "cleanliness")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(command_line.arguments())
     settings = dict(text.split("=", 1) for text in options.set)
     scenes = options.scenes or sorted(path.stem for path in SCENES.glob("*.blend"))
     if not hasattr(bpy.types.Scene, "raybundle"):

@@ -26,7 +26,6 @@ than a face: an object that is too far off is compared again, with lamps sampled
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -41,10 +40,11 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import fuzz_scenes  # noqa: E402
 import raybundle  # noqa: E402
 from cycles_reference import bake_objects, sample_emissive_meshes  # noqa: E402
-from scene_items import edited  # noqa: E402
+from scene_items import edited, new_shader  # noqa: E402
 from surface_error import (  # noqa: E402
     corner_areas, corner_vertices, face_means, face_sizes, read_colors, world_positions)
 
@@ -127,11 +127,7 @@ def _white() -> bpy.types.Material:
     found = bpy.data.materials.get("white probe")
     if found is None:
         found = bpy.data.materials.new("white probe")
-        found.use_nodes = True
-        tree = found.node_tree
-        tree.nodes.clear()
-        tree.links.new(tree.nodes.new('ShaderNodeBsdfDiffuse').outputs[0],
-                       tree.nodes.new('ShaderNodeOutputMaterial').inputs['Surface'])
+        new_shader(found, 'ShaderNodeBsdfDiffuse')
     return found
 
 
@@ -268,8 +264,7 @@ def summary(outcomes: list[Outcome]) -> str:
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="fuzz_cycles.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("first", type=int)
     parser.add_argument("last", type=int)
     parser.add_argument("--samples", type=int, default=128)
@@ -288,4 +283,4 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

@@ -36,6 +36,7 @@ ROOT = HERE.parent
 sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scenes"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import raybundle  # noqa: E402
 from benchmark import bake_cycles, bake_raybundle  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
@@ -132,8 +133,7 @@ def table_row(result: dict) -> str:
 
 def main(arguments: Sequence[str]) -> None:
     builder = scene_builder()
-    parser = argparse.ArgumentParser(prog="mesh_densities.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--scenes", nargs="+", default=builder.SCENES, choices=builder.SCENES)
     parser.add_argument("--densities", nargs="+", type=float, default=[0.5, 1.0, 2.0])
     parser.add_argument("--samples", type=int, default=128,
@@ -160,4 +160,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

@@ -13,7 +13,6 @@ that ends it earlier is Blender's.
 
 from __future__ import annotations
 
-import argparse
 import math
 import random
 import sys
@@ -29,6 +28,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import raybundle  # noqa: E402
 from surface_error import read_colors  # noqa: E402
 
@@ -251,8 +251,7 @@ def bake_file(seed: int) -> str:
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="mutations.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--files", type=int, default=100)
     options = parser.parse_args(arguments)
@@ -268,4 +267,4 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

@@ -35,6 +35,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import lamp_rooms  # noqa: E402
 import raybundle  # noqa: E402
 from area_lamps import area_lamps  # noqa: E402
@@ -316,8 +317,7 @@ PARTS: dict[str, Callable[[argparse.Namespace], Iterator[Row]]] = {
 
 
 def main(arguments: Sequence[str]) -> None:
-    parser = argparse.ArgumentParser(prog="performance.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--only", nargs="+", default=list(PARTS), choices=list(PARTS))
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--samples", type=int, default=1024)
@@ -338,4 +338,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

@@ -27,7 +27,6 @@ and coarse rooms. A new kind of lamp, material or setting adds its row.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Callable
@@ -40,6 +39,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import lamp_noise  # noqa: E402
 import lamp_rooms  # noqa: E402
 import light_changes  # noqa: E402
@@ -287,8 +287,7 @@ def all_scenes(quick: bool) -> list[str]:
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="relations.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
     parser.add_argument("--quick", action="store_true", help="those of the tests, coarse rooms")
     parser.add_argument("--only", default="", help="relations, or rooms, with this in their name")
@@ -323,4 +322,4 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

@@ -126,14 +126,18 @@ def select(chosen: list[bpy.types.Object]) -> None:
 
 def black_material() -> bpy.types.Material:
     material = bpy.data.materials.new("black")
+    new_shader(material, 'ShaderNodeBsdfDiffuse').inputs['Color'].default_value = (0, 0, 0, 1)
+    return material
+
+
+def new_shader(material: bpy.types.Material, kind: str) -> bpy.types.Node:
+    """Leaves the material with nothing but a new shader of this kind, which is returned."""
     material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
-    shader = tree.nodes.new('ShaderNodeBsdfDiffuse')
-    shader.inputs['Color'].default_value = (0.0, 0.0, 0.0, 1.0)
-    tree.links.new(shader.outputs[0],
-                   tree.nodes.new('ShaderNodeOutputMaterial').inputs['Surface'])
-    return material
+    shader = tree.nodes.new(kind)
+    tree.links.new(shader.outputs[0], tree.nodes.new('ShaderNodeOutputMaterial').inputs['Surface'])
+    return shader
 
 
 def add_mesh_item(name: str, vertices, faces, material: bpy.types.Material) -> bpy.types.Object:

@@ -35,6 +35,7 @@ ROOT = HERE.parent
 sys.path[:0] = [str(ROOT / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import raybundle  # noqa: E402
 from benchmark import bake_cycles, bake_raybundle  # noqa: E402
 from cycles_reference import bakeable_objects  # noqa: E402
@@ -164,8 +165,7 @@ def measure(name: str, options: argparse.Namespace) -> list[str]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    parser = argparse.ArgumentParser(prog="small_objects.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--scenes", nargs="+", default=list(LARGE), choices=list(LARGE))
     parser.add_argument("--target", type=float, default=0.01)
     parser.add_argument("--seeds", type=int, default=2)
@@ -184,4 +184,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

@@ -13,7 +13,6 @@ is taken, which wanders by more with what the allocator keeps for later.
 
 from __future__ import annotations
 
-import argparse
 import ctypes
 import resource
 import sys
@@ -27,6 +26,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import raybundle  # noqa: E402
 from conftest import CUBE_FACES, CUBE_VERTICES  # noqa: E402
 from raybundle.native import ErrorCode  # noqa: E402
@@ -178,8 +178,7 @@ def growth(memory: list[int]) -> float:
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="soak.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--bakes", type=int, default=500)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
@@ -220,4 +219,4 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

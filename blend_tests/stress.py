@@ -20,7 +20,6 @@ was, and what is left out, clamped or refused is named.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -33,6 +32,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
 sys.dont_write_bytecode = True
 
+import command_line  # noqa: E402
 import raybundle  # noqa: E402
 from conftest import (  # noqa: E402
     CUBE_FACES, CUBE_VERTICES, create_material, create_object, create_world)
@@ -437,8 +437,7 @@ def row(case: Case, result: Result) -> str:
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="stress.py", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--quick", action="store_true", help="without the long ones")
     parser.add_argument("--only", default="", help="cases with this in their name")
     options = parser.parse_args(arguments)
@@ -457,4 +456,4 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    main(command_line.arguments())

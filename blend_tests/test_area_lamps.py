@@ -7,6 +7,7 @@ import pytest
 from area_lamps import area_lamps
 from cycles_comparison import square
 from cycles_reference import bake_objects
+from scene_items import new_shader
 
 SAMPLES = 1024
 
@@ -19,14 +20,9 @@ def test_far_from_a_lamp(new_object, new_material, sides, looks_down):
     corners = [(0.2 * np.cos(angle), 0.2 * np.sin(angle), 2.0)
                for angle in 2.0 * np.pi * np.arange(sides) / sides][::-1 if looks_down else 1]
     material = bpy.data.materials.new("Lamp")
-    material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    emission = tree.nodes.new('ShaderNodeEmission')
+    emission = new_shader(material, 'ShaderNodeEmission')
     emission.inputs['Color'].default_value = (1.0, 0.5, 0.2, 1.0)
     emission.inputs['Strength'].default_value = 30.0
-    tree.links.new(emission.outputs[0],
-                   tree.nodes.new('ShaderNodeOutputMaterial').inputs['Surface'])
     new_object("Lamp", corners, [tuple(range(sides))], material)
     bpy.context.view_layer.update()
 

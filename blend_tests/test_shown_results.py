@@ -10,6 +10,7 @@ import pytest
 import raybundle
 from raybundle.materials.last_surfaces import LastSurfaces
 from raybundle.scene_export import export_scene
+from scene_items import new_shader
 from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
@@ -54,15 +55,6 @@ def reader(tree, name, kind='VERTEX_COLOR'):
         node = tree.nodes.new('ShaderNodeAttribute')
         node.attribute_name = name
     return node.outputs['Color']
-
-
-def new_shader(material, kind):
-    """The material with nothing but this shader."""
-    tree = material.node_tree
-    tree.nodes.clear()
-    shader = tree.nodes.new(kind)
-    tree.links.new(shader.outputs[0], tree.nodes.new('ShaderNodeOutputMaterial').inputs['Surface'])
-    return shader
 
 
 def new_mix(tree, first, second, blend='MULTIPLY', factor=1.0, is_old=False):

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Command lines of the programs in this folder that run inside Blender.
+
+Blender keeps all it is given after `--` for the script that it runs.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def arguments() -> list[str]:
+    """Those after `--`, none if there is no `--`."""
+    return sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
+
+
+def parser(script: str, description: str) -> argparse.ArgumentParser:
+    """script: its __file__; description: its __doc__, whose lines are kept as they are."""
+    return argparse.ArgumentParser(prog=Path(script).name, description=description,
+                                   formatter_class=argparse.RawDescriptionHelpFormatter)
