@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
-from .materials.node_reader import output_node
+from .materials.node_links import output_node
 from .warning_lines import listed
 
 # Whatever a mesh is not made of.

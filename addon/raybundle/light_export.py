@@ -12,7 +12,8 @@ from mathutils import Matrix
 
 from .image_export import ImagePixels
 from .left_out import NO_CAUSTICS, has_light_linking
-from .materials.node_reader import NodeReader, output_node
+from .materials.node_links import output_node
+from .materials.node_reader import NodeReader
 from .scene_data import AreaLightData, LightData, PointLightData, SunLightData, Warnings
 
 # The default of a light's Max Bounces, which no path reaches.

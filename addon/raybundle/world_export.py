@@ -12,7 +12,8 @@ import numpy as np
 
 from . import world_panorama
 from .image_export import ImagePixels
-from .materials.node_reader import NodeReader, output_node
+from .materials.node_links import output_node
+from .materials.node_reader import NodeReader
 from .scene_data import SunLightData, Warnings
 
 # Images that vary by less than this share of their mean are constant: noise and rounding.

@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from .materials.node_reader import LIGHT_PATH
+from .materials.node_links import LIGHT_PATH
 from .scene_data import SunLightData
 
 # Pixels around the horizon: 0.7 degrees each. Suns are far finer, and are dealt with apart.

@@ -8,8 +8,10 @@ a material from its nodes to these numbers:
 
 1. export.py: `MaterialExporter`, the only entrance for scene_export.py, turns each material slot
    into one `MaterialData` of scene_data.py.
-2. node_reader.py: `NodeReader` walks a node tree from its output and returns a `Surface`. Lamps
-   and the world have node trees too and are read by the same class.
+2. node_reader.py: `NodeReader` reads the shaders of a node tree and returns a `Surface`. It
+   derives from the `ColorReader` of color_reader.py, which reads the colours and values that are
+   linked to shaders; node_links.py follows the links. Lamps and the world have node trees too and
+   are read by the same class.
 3. surface.py: `Surface`, one side of a material. Its colours are those of color_expression.py, a
    constant plus a weighted image plus a weighted attribute. scattering.py holds in which
    directions the reflected light leaves.

@@ -24,7 +24,7 @@ from ..mesh_arrays import read, vertex_positions
 from .face_atlas import BORDER, FaceAtlas, face_atlas
 from .fingerprint import material_fingerprint
 from .gloss import filter_glossy_of
-from .node_reader import LIGHT_PATH
+from .node_links import LIGHT_PATH
 from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSLUCENCE,
                             TRANSMITTANCE, ShaderColors)
 

@@ -12,11 +12,13 @@ import numpy as np
 from ..image_export import ImagePixels
 from ..scene_data import ImageData, MaterialData, SceneData, Warnings
 from .color_expression import WHITE, ColorExpression, Texture
+from .color_reader import Reading
 from .cycles_bake import BakedMaterial
 from .diffuse_angles import lambert
 from .last_surfaces import LastSurface, LastSurfaces
 from .layers import LOBES
-from .node_reader import NodeReader, Reading, output_node
+from .node_links import output_node
+from .node_reader import NodeReader
 from .shown_results import RENDERED, attributes_read
 from .surface import Surface
 

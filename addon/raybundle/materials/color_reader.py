@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colours and values in node trees -> constants, images and attributes (color_expression.py)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix
+
+from ..image_export import ImagePixels, sphere_mean
+from ..scene_data import Warnings
+from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Texture
+from .node_links import LIGHT_PATH, Source, default_color, default_value, follow, input_of
+from .shown_results import reads_result
+
+# Nodes that change a colour in a way that is not linear: exact for constants is not attempted.
+_COLOR_FILTERS = ('GAMMA', 'HUE_SAT', 'BRIGHTCONTRAST', 'INVERT', 'CURVE_RGB', 'VALTORGB',
+                  'RGBTOBW', 'CLAMP')
+_VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')
+
+_MATH: dict[str, Callable[[float, float], float]] = {
+    'ADD': lambda a, b: a + b,
+    'SUBTRACT': lambda a, b: a - b,
+    'MULTIPLY': lambda a, b: a * b,
+    'DIVIDE': lambda a, b: a / b if b else 0.0,
+    'MINIMUM': min,
+    'MAXIMUM': max,
+    'GREATER_THAN': lambda a, b: float(a > b),
+    'LESS_THAN': lambda a, b: float(a < b),
+    'POWER': lambda a, b: a ** b if a > 0.0 else 0.0,
+    'ABSOLUTE': lambda a, b: abs(a),
+    'SQRT': lambda a, b: math.sqrt(max(a, 0.0)),
+}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """For what a node tree is read."""
+
+    backfacing: bool = False  # whether the side is the back: value of the Backfacing output
+    varying_emission: bool = False  # whether emission may be more than a constant colour
+    filter_glossy: float | None = 1.0  # see gloss.filter_glossy_of
+    # (3,) linear RGB in place of colours that cannot be read; None: the colour of the socket.
+    unread_color: np.ndarray | None = None
+    # Names of the attributes that hold results of a bake. As emission they count 0 and as a factor
+    # 1; where one alone is a surface's colour, that of the socket is used.
+    results: frozenset[str] = frozenset()
+
+
+class ColorReader:
+    """Reads colours and values of one tree for one side of the surface.
+
+    What is only approximated goes to the warnings. What a node does and the reader cannot express
+    goes to `inexact`, for there is another way to it (cycles_bake.py); by default it is a warning
+    too.
+    """
+
+    def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
+                 reading: Reading = Reading(), inexact: Warnings | None = None) -> None:
+        self.owner = owner  # what warnings name, such as 'material "Wall"'
+        self.images = images
+        self.warnings = warnings
+        self.reading = reading
+        self.has_backfacing = False  # whether what was read depends on the side
+        self.inexact = warnings if inexact is None else inexact
+        self.unread: list[str] = []  # what is inexact, without the consequences
+        self._result_values = 0  # how often a result was read as a value
+
+    # ----------------------------------------------------------------------------------------------
+    # Colours
+    # ----------------------------------------------------------------------------------------------
+
+    def color(self, socket: bpy.types.NodeSocket,
+              path: tuple[bpy.types.Node, ...] = ()) -> ColorExpression:
+        values = self._result_values
+        color = self._read_color(follow(socket, path))
+        if self._result_values > values and not color.result:
+            # As the share of a mix, say.
+            color = replace(color, result=Result.FACTOR)
+        return color
+
+    def _read_color(self, source: Source) -> ColorExpression:
+        node, path = source.node, source.path
+        if node is None:
+            return ColorExpression(default_color(source.socket))
+        if reads_result(node, source.output, self.reading.results):
+            return _only_result(source)
+        if node.type == 'RGB':
+            return ColorExpression(default_color(node.outputs[0]))
+        if node.type == 'TEX_IMAGE':
+            return self._image(node, source.output, path)
+        if node.type == 'TEX_ENVIRONMENT':
+            return self._environment(node)
+        if node.type in ('ATTRIBUTE', 'VERTEX_COLOR') and source.output.name == 'Color':
+            return self._attribute(node)
+        if node.type in ('MIX', 'MIX_RGB'):
+            return self._mix(node, path)
+        if node.type in _COLOR_FILTERS:
+            return self._filter(node, path)
+        if node.type in _VALUE_NODES:
+            values = self._result_values
+            value = self._node_value(source)
+            return (ColorExpression(WHITE * value) if self._result_values == values
+                    else _only_result(source))
+        behind = self._result_behind(node, path)
+        if behind == Result.ALONE:
+            return _only_result(source)
+        self._inexact(node, "cannot be read: the colour of the socket it is linked to is used")
+        return ColorExpression(default_color(source.socket) if self.reading.unread_color is None
+                               else self.reading.unread_color, result=behind)
+
+    def _result_behind(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Result:
+        """What a node that cannot be read has of a result: ALONE if nothing else that is linked
+        goes into it."""
+        has_result = has_others = False
+        pending, seen = [(node, path)], set()
+        while pending and self.reading.results:
+            current, path = pending.pop()
+            if current in seen:
+                continue
+            seen.add(current)
+            sources = [follow(socket, path) for socket in current.inputs]
+            linked = [source for source in sources if source.node is not None]
+            has_others |= (not linked and current.type != 'VALUE'
+                           or current.type.startswith('TEX_'))
+            for source in linked:
+                if reads_result(source.node, source.output, self.reading.results):
+                    has_result = True
+                else:
+                    pending.append((source.node, source.path))
+        if not has_result:
+            return Result.NONE
+        return Result.FACTOR if has_others else Result.ALONE
+
+    def _image(self, node: bpy.types.Node, output: bpy.types.NodeSocket,
+               path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        pixels = self.images.read(node.image) if node.image else None
+        if pixels is None:
+            self._warn(node, "has no image data: black is used")
+            return ColorExpression()
+        mean = pixels.mean(axis=(0, 1), dtype=np.float64)
+        if output.name != 'Color':
+            self._inexact(node, f"is used by its {output.name}: 1 is used")
+            return ColorExpression(WHITE)
+        if node.projection != 'FLAT':
+            self._inexact(node, f"is projected as {node.projection}: the image's mean is used")
+            return ColorExpression(mean)
+        coordinates = self._coordinates(node.inputs['Vector'], path)
+        if coordinates is None:
+            self._inexact(node, "has coordinates that are not a UV map: the image's mean is used")
+            return ColorExpression(mean)
+        extension = node.extension
+        if extension not in ('REPEAT', 'EXTEND', 'CLIP'):
+            self._inexact(node, f"has extension {extension}: REPEAT is used")
+            extension = 'REPEAT'
+        layer, matrix = coordinates
+        return ColorExpression(texture=Texture(node.image, extension, mean, layer, matrix),
+                               texture_weight=WHITE)
+
+    def _coordinates(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
+                     ) -> tuple[str, np.ndarray] | None:
+        """Name of the UV map ("" for the active one) and affine map (2, 3) of an image's vector."""
+        source = follow(socket, path)
+        node, path = source.node, source.path
+        if node is None:
+            return "", IDENTITY_UV
+        if node.type == 'UVMAP':
+            return node.uv_map, IDENTITY_UV
+        if node.type == 'TEX_COORD' and source.output.name == 'UV':
+            return "", IDENTITY_UV
+        if node.type == 'ATTRIBUTE' and source.output.name == 'Vector':
+            return node.attribute_name, IDENTITY_UV
+        if node.type == 'MAPPING' and node.vector_type in ('POINT', 'TEXTURE'):
+            sockets = [node.inputs.get(name) for name in ('Location', 'Rotation', 'Scale')]
+            inner = self._coordinates(node.inputs['Vector'], path)
+            if inner is None or any(item.is_linked for item in sockets):
+                return None
+            location, rotation, scale = (item.default_value for item in sockets)
+            matrix = Matrix.LocRotScale(location, Euler(rotation), scale)
+            if node.vector_type == 'TEXTURE':
+                matrix = matrix.inverted_safe()
+            layer, first = inner
+            square = np.vstack([first, [0.0, 0.0, 1.0]])
+            second = np.array(matrix)[:2][:, [0, 1, 3]]
+            return layer, second @ square
+        return None
+
+    def _environment(self, node: bpy.types.Node) -> ColorExpression:
+        pixels = self.images.read(node.image) if node.image else None
+        if pixels is None:
+            self._warn(node, "has no image data: black is used")
+            return ColorExpression()
+        self._warn(node, "varies with the direction: its mean over the sphere is used")
+        if node.projection == 'MIRROR_BALL':
+            return ColorExpression(pixels.mean(axis=(0, 1), dtype=np.float64))
+        return ColorExpression(sphere_mean(pixels))
+
+    def _attribute(self, node: bpy.types.Node) -> ColorExpression:
+        if node.type == 'ATTRIBUTE' and node.attribute_type != 'GEOMETRY':
+            self._inexact(node, "reads a property of the object: grey is used")
+            return ColorExpression(WHITE * 0.5)
+        name = node.layer_name if node.type == 'VERTEX_COLOR' else node.attribute_name
+        return ColorExpression(attribute=name, attribute_weight=WHITE)
+
+    def _mix(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        if node.type == 'MIX_RGB':
+            factor, first, second = node.inputs[:3]
+        elif node.data_type == 'RGBA':
+            # One node has a set of sockets per data type, told apart by identifier.
+            sockets = {socket.identifier: socket for socket in node.inputs}
+            factor, first, second = (
+                sockets[name] for name in ('Factor_Float', 'A_Color', 'B_Color'))
+        elif node.data_type == 'FLOAT':
+            sockets = {socket.identifier: socket for socket in node.inputs}
+            share = self.value(sockets['Factor_Float'], path)
+            a, b = (self.value(sockets[name], path) for name in ('A_Float', 'B_Float'))
+            return ColorExpression(WHITE * (a + (b - a) * share))
+        else:
+            self._inexact(node, f"mixes {node.data_type}: grey is used")
+            return ColorExpression(WHITE * 0.5)
+        share = float(np.clip(self.value(factor, path), 0.0, 1.0))
+        a, b = self.color(first, path), self.color(second, path)
+        if (Result.ALONE in (a.result, b.result)
+                and node.blend_type not in ('MIX', 'ADD', 'SUBTRACT', 'MULTIPLY')):
+            # The result counts as not there.
+            return a if a.result == b.result else replace(
+                b if a.result == Result.ALONE else a, result=Result.FACTOR)
+        if node.blend_type == 'MIX':
+            return self._plus(a.scaled(1.0 - share), b.scaled(share), node)
+        if node.blend_type == 'ADD':
+            return self._plus(a, b.scaled(share), node)
+        if node.blend_type == 'SUBTRACT':
+            return self._plus(a, b.scaled(-share), node)
+        if node.blend_type == 'MULTIPLY':
+            return self._plus(a.scaled(1.0 - share), self._times(a, b, node).scaled(share), node)
+        self._inexact(node, f"blends by {node.blend_type}: its first colour is used")
+        return replace(a, result=max(a.result, b.result))
+
+    def _filter(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        name = {'VALTORGB': 'Fac', 'CLAMP': 'Value'}.get(node.type, 'Color')
+        color = self.color(input_of(node, name, 'Factor'), path)
+        if color.result == Result.ALONE:
+            return color
+        if node.type == 'VALTORGB' and color.is_constant:
+            return ColorExpression(np.array(node.color_ramp.evaluate(color.constant.mean())[:3]),
+                                   result=color.result)
+        if node.type == 'VALTORGB':
+            self._inexact(node, "maps a varying colour: its value for the mean is used")
+            return ColorExpression(np.array(node.color_ramp.evaluate(color.mean().mean())[:3]),
+                                   result=color.result)
+        if node.type == 'RGBTOBW' and color.is_constant:
+            return ColorExpression(WHITE * (color.constant @ [0.2126, 0.7152, 0.0722]),
+                                   result=color.result)
+        self._inexact(node, "is left out: the colour that goes into it is used")
+        return color
+
+    def _plus(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
+              ) -> ColorExpression:
+        if not a.can_add(b):
+            self._inexact(node, "joins two images or attributes: the mean of the second is used")
+        return a.plus(b).simplified()
+
+    def _times(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
+               ) -> ColorExpression:
+        if Result.ALONE in (a.result, b.result):
+            return _times_result(a, b)
+        if a.is_constant:
+            return replace(b.scaled(a.constant), result=max(a.result, b.result))
+        if not b.is_constant:
+            self._inexact(node, "multiplies two images or attributes: the mean of the second is "
+                                "used")
+        return replace(a.scaled(b.mean()), result=max(a.result, b.result))
+
+    # ----------------------------------------------------------------------------------------------
+    # Values
+    # ----------------------------------------------------------------------------------------------
+
+    def value(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...] = ()) -> float:
+        source = follow(socket, path)
+        if source.node is None:
+            return default_value(source.socket)
+        return self._node_value(source)
+
+    def _node_value(self, source: Source) -> float:
+        node, path = source.node, source.path
+        if reads_result(node, source.output, self.reading.results):
+            self._result_values += 1
+            return 1.0
+        if node.type == 'VALUE':
+            return node.outputs[0].default_value
+        if node.type == 'NEW_GEOMETRY' and source.output.name == 'Backfacing':
+            self.has_backfacing = True
+            return float(self.reading.backfacing)
+        if node.type == 'LIGHT_PATH':
+            return LIGHT_PATH.get(source.output.name, 0.0)
+        if node.type == 'LIGHT_FALLOFF':
+            if source.output.name != 'Quadratic' or self.value(node.inputs['Smooth'], path):
+                self._warn(node, f"is used as {source.output.name} with Smooth: the light falls "
+                                 f"off with the square of the distance")
+            return self.value(node.inputs['Strength'], path)
+        if node.type == 'MATH' and node.operation in _MATH:
+            a, b = (self.value(socket, path) for socket in node.inputs[:2])
+            result = _MATH[node.operation](a, b)
+            return min(max(result, 0.0), 1.0) if node.use_clamp else result
+        if node.type in ('RGB', 'MIX', 'MIX_RGB', 'CLAMP'):
+            color = self.color(source.socket, path)
+            self._result_values += bool(color.result)
+            if color.result == Result.ALONE:
+                return 1.0
+            if color.is_constant:
+                return float(color.constant @ [0.2126, 0.7152, 0.0722])
+        behind = self._result_behind(node, path)
+        self._result_values += bool(behind)
+        if behind == Result.ALONE:
+            return 1.0
+        self._inexact(node, f"is no constant: the value of the socket {source.socket.name} is "
+                            f"used")
+        return default_value(source.socket)
+
+    def _warn(self, node: bpy.types.Node, what: str) -> None:
+        self.warnings.add(f'{self.owner}: node "{node.name}" ({node.bl_label}) {what}')
+
+    def _inexact(self, node: bpy.types.Node, what: str) -> None:
+        self.unread.append(f'node "{node.name}" ({node.bl_label})')
+        self.inexact.add(f'{self.owner}: {self.unread[-1]} {what}')
+
+
+def _only_result(source: Source) -> ColorExpression:
+    return ColorExpression(default_color(source.socket), result=Result.ALONE)
+
+
+def _times_result(a: ColorExpression, b: ColorExpression) -> ColorExpression:
+    """Of which one at least is a result."""
+    result, other = (a, b) if a.result == Result.ALONE else (b, a)
+    # What no surface has as a colour makes the result brighter or leaves it as it is.
+    if other.result == Result.ALONE or other.is_constant and other.constant.max() >= 1.0:
+        return result
+    return replace(other, result=Result.FACTOR)
