@@ -19,11 +19,14 @@ IDENTITY_UV = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 class Result(IntEnum):
-    """What a colour has of the result of a bake (shown_results.py), which is no colour."""
+    """How a colour depends on the result of an earlier bake (shown_results.py).
+
+    A result is light, and tells nothing about the colour of the surface that shows it.
+    """
 
     NONE = 0
-    FACTOR = 1  # is multiplied by it, which counts as 1
-    ALONE = 2  # is it, or is mixed of it: the rest of the expression is a guess
+    FACTOR = 1  # the colour is multiplied by a result, which counts as 1
+    ALONE = 2  # the colour is a result or is mixed with one: the rest of the expression is a guess
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class Texture:
     uv_matrix: np.ndarray = field(default_factory=lambda: IDENTITY_UV)  # (2, 3), affine
 
     def same_as(self, other: Texture) -> bool:
+        """Whether both read the same image, at the same coordinates and with the same extension."""
         return (self.image == other.image and self.extension == other.extension
                 and self.uv_layer == other.uv_layer
                 and np.allclose(self.uv_matrix, other.uv_matrix))
@@ -58,14 +62,15 @@ class ColorExpression:
         return self.texture is None and self.attribute is None
 
     def scaled(self, factor: np.ndarray | float) -> ColorExpression:
-        """This colour times a constant, per channel."""
+        """This colour times a constant: one number, or (3,) by channel."""
         return ColorExpression(
             self.constant * factor, self.texture, self.texture_weight * factor,
             self.attribute, self.attribute_weight * factor,
             self.result if np.any(factor) else Result.NONE).simplified()
 
     def simplified(self) -> ColorExpression:
-        """Without terms of weight 0, so that they raise no needless questions later."""
+        """The same colour without an image or attribute whose weight is 0, so that it does not
+        count as varying."""
         textured, attributed = np.any(self.texture_weight), np.any(self.attribute_weight)
         return ColorExpression(
             self.constant,
@@ -74,13 +79,13 @@ class ColorExpression:
             self.attribute_weight if attributed else BLACK, self.result)
 
     def can_add(self, other: ColorExpression) -> bool:
-        """Whether plus() is exact."""
+        """Whether plus() is exact: the two have no different images and no different attributes."""
         return not ((self.texture and other.texture and not self.texture.same_as(other.texture))
                     or (self.attribute is not None and other.attribute is not None
                         and self.attribute != other.attribute))
 
     def plus(self, other: ColorExpression) -> ColorExpression:
-        """The sum; where can_add() is False, the other's varying terms count with their mean."""
+        """The sum. Where can_add() is False, the mean of the other colour is added."""
         if not self.can_add(other):
             other = ColorExpression(other.mean(), result=other.result)
         return ColorExpression(
@@ -90,7 +95,8 @@ class ColorExpression:
             self.attribute_weight + other.attribute_weight, max(self.result, other.result))
 
     def mean(self) -> np.ndarray:
-        """(3,); of an attribute, whose values belong to a mesh, half its range is assumed."""
+        """(3,) linear RGB, the mean over the image. The values of an attribute belong to a mesh
+        and are not known here: 0.5, the middle of 0 to 1, is assumed."""
         mean = self.constant + 0.5 * self.attribute_weight
         return mean + self.texture_weight * self.texture.mean if self.texture else mean
 

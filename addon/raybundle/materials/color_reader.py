@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours and values in node trees -> constants, images and attributes (color_expression.py)."""
+"""Reads the colours and values of node trees, as far as a ColorExpression can express them."""
 
 from __future__ import annotations
 
@@ -17,11 +17,14 @@ from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Textu
 from .node_links import LIGHT_PATH, Source, default_color, default_value, follow, input_of
 from .shown_results import reads_result
 
-# Nodes that change a colour in a way that is not linear: exact for constants is not attempted.
+# Nodes that change a colour by a formula that is not linear. ColorRamp and RGB to BW are evaluated
+# for constant colours; of all others the colour that goes in is used.
 _COLOR_FILTERS = ('GAMMA', 'HUE_SAT', 'BRIGHTCONTRAST', 'INVERT', 'CURVE_RGB', 'VALTORGB',
                   'RGBTOBW', 'CLAMP')
+# Nodes whose output is a number.
 _VALUE_NODES = ('VALUE', 'NEW_GEOMETRY', 'LIGHT_PATH', 'LIGHT_FALLOFF', 'MATH')
 
+# The operations of the Math node that are evaluated.
 _MATH: dict[str, Callable[[float, float], float]] = {
     'ADD': lambda a, b: a + b,
     'SUBTRACT': lambda a, b: a - b,
@@ -39,24 +42,24 @@ _MATH: dict[str, Callable[[float, float], float]] = {
 
 @dataclass(frozen=True)
 class Reading:
-    """For what a node tree is read."""
+    """For which side of a surface a node tree is read, and with what known beforehand."""
 
-    backfacing: bool = False  # whether the side is the back: value of the Backfacing output
-    varying_emission: bool = False  # whether emission may be more than a constant colour
+    backfacing: bool = False  # the back side: what the Backfacing output of Geometry is
+    varying_emission: bool = False  # emission may have images and attributes; else its mean counts
     filter_glossy: float | None = 1.0  # see gloss.filter_glossy_of
-    # (3,) linear RGB in place of colours that cannot be read; None: the colour of the socket.
+    # (3,) linear RGB, used in place of colours that cannot be read; None: the socket's own colour.
     unread_color: np.ndarray | None = None
-    # Names of the attributes that hold results of a bake. As emission they count 0 and as a factor
-    # 1; where one alone is a surface's colour, that of the socket is used.
+    # Names of the attributes that hold results of earlier bakes. A result counts 0 as emission and
+    # 1 as a factor; where it alone is the colour of a surface, the socket's own colour is used.
     results: frozenset[str] = frozenset()
 
 
 class ColorReader:
-    """Reads colours and values of one tree for one side of the surface.
+    """Reads the colours and values of one node tree, for one side of a surface.
 
-    What is only approximated goes to the warnings. What a node does and the reader cannot express
-    goes to `inexact`, for there is another way to it (cycles_bake.py); by default it is a warning
-    too.
+    What the bake approximates in any case is added to `warnings`. What a ColorExpression cannot
+    express is added to `inexact`, since Cycles can bake such colours into images (cycles_bake.py);
+    `inexact` is the same list as `warnings` if it is not given.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
@@ -65,10 +68,10 @@ class ColorReader:
         self.images = images
         self.warnings = warnings
         self.reading = reading
-        self.has_backfacing = False  # whether what was read depends on the side
+        self.has_backfacing = False  # whether anything that was read depends on the side
         self.inexact = warnings if inexact is None else inexact
-        self.unread: list[str] = []  # what is inexact, without the consequences
-        self._result_values = 0  # how often a result was read as a value
+        self.unread: list[str] = []  # the nodes that `inexact` names
+        self._result_values = 0  # how often the result of a bake was read as a number
 
     # ----------------------------------------------------------------------------------------------
     # Colours
@@ -76,10 +79,12 @@ class ColorReader:
 
     def color(self, socket: bpy.types.NodeSocket,
               path: tuple[bpy.types.Node, ...] = ()) -> ColorExpression:
+        """The colour of an input: that of the node it is linked to, or its own. path: see
+        node_links.follow."""
         values = self._result_values
         color = self._read_color(follow(socket, path))
         if self._result_values > values and not color.result:
-            # As the share of a mix, say.
+            # A result that is read as a number, such as the factor of a mix, is a factor.
             color = replace(color, result=Result.FACTOR)
         return color
 
@@ -114,8 +119,8 @@ class ColorReader:
                                else self.reading.unread_color, result=behind)
 
     def _result_behind(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Result:
-        """What a node that cannot be read has of a result: ALONE if nothing else that is linked
-        goes into it."""
+        """How a node that cannot be read depends on the result of a bake: ALONE if results are all
+        that is linked to it, FACTOR if other nodes are linked too, NONE if no result is."""
         has_result = has_others = False
         pending, seen = [(node, path)], set()
         while pending and self.reading.results:
@@ -163,7 +168,9 @@ class ColorReader:
 
     def _coordinates(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
                      ) -> tuple[str, np.ndarray] | None:
-        """Name of the UV map ("" for the active one) and affine map (2, 3) of an image's vector."""
+        """Where an image is read: the name of a UV map ("" for the active render UV map), and a
+        (2, 3) affine map of its coordinates. None if the coordinates are no UV map, or are mapped
+        by more than constants."""
         source = follow(socket, path)
         node, path = source.node, source.path
         if node is None:
@@ -210,7 +217,7 @@ class ColorReader:
         if node.type == 'MIX_RGB':
             factor, first, second = node.inputs[:3]
         elif node.data_type == 'RGBA':
-            # One node has a set of sockets per data type, told apart by identifier.
+            # The node has sockets of the same names for each data type, told apart by identifier.
             sockets = {socket.identifier: socket for socket in node.inputs}
             factor, first, second = (
                 sockets[name] for name in ('Factor_Float', 'A_Color', 'B_Color'))
@@ -226,7 +233,7 @@ class ColorReader:
         a, b = self.color(first, path), self.color(second, path)
         if (Result.ALONE in (a.result, b.result)
                 and node.blend_type not in ('MIX', 'ADD', 'SUBTRACT', 'MULTIPLY')):
-            # The result counts as not there.
+            # The result of a bake is no colour of the surface: the other colour is used.
             return a if a.result == b.result else replace(
                 b if a.result == Result.ALONE else a, result=Result.FACTOR)
         if node.blend_type == 'MIX':
@@ -280,6 +287,8 @@ class ColorReader:
     # ----------------------------------------------------------------------------------------------
 
     def value(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...] = ()) -> float:
+        """The number that an input has; its own value where what is linked varies over the surface.
+        path: see node_links.follow."""
         source = follow(socket, path)
         if source.node is None:
             return default_value(source.socket)
@@ -334,9 +343,9 @@ def _only_result(source: Source) -> ColorExpression:
 
 
 def _times_result(a: ColorExpression, b: ColorExpression) -> ColorExpression:
-    """Of which one at least is a result."""
+    """The product of two colours, at least one of which is the result of a bake."""
     result, other = (a, b) if a.result == Result.ALONE else (b, a)
-    # What no surface has as a colour makes the result brighter or leaves it as it is.
+    # A factor of 1 or more is no reflectance: it only sets how bright the result is shown.
     if other.result == Result.ALONE or other.is_constant and other.constant.max() >= 1.0:
         return result
     return replace(other, result=Result.FACTOR)

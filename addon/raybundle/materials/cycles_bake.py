@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Asks Cycles what materials reflect, emit and let through where node_reader.py cannot tell.
+"""Lets Cycles bake into images what materials reflect, emit and let through.
 
-A copy of the object, in a scene of its own, gets copies of its materials that emit the property in
-question (shader_colors.py), and Cycles bakes their emission into one image (face_atlas.py). That is
-done once; the images are kept until the object's mesh, place or materials change. Nothing of the
-user's file changes, and nothing is left in it.
+This is for materials that node_reader.py cannot read. A copy of the object, in a scene of its own,
+gets copies of its materials that emit the property in question (shader_colors.py), and Cycles bakes
+the emission into one image (face_atlas.py). The images are kept until the object's mesh, place or
+materials change. The user's data does not change, and everything that is made for it is removed.
 
-Approximations: what depends on the direction of view is as seen from straight above; a Backfacing
-input has the mean of both sides; a random value per object is that of another object.
+Approximations: what depends on the direction of view is as seen from straight above; a material
+that uses the Backfacing output gets the mean of both sides; a random value per object is that of
+the copy.
 """
 
 from __future__ import annotations
@@ -28,26 +29,26 @@ from .node_links import LIGHT_PATH
 from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSLUCENCE,
                             TRANSMITTANCE, ShaderColors)
 
-# Within a pixel.
-_SAMPLES = 4
+_SAMPLES = 4  # per pixel
 _UV_MAP = "Raybundle Bake"
-# Where pixels are compared, between the middle of a face (0) and its corners (1).
+# Where pixels are sampled, as a share of the way from the middle of a face to each corner.
 _PLACES = (0.2, 0.5, 0.8)
 
 
 @dataclass(frozen=True)
 class BakedMaterial:
-    """(height, width, 3) float32 each, of all materials of the object in one image."""
+    """One material of an object, baked. Images are (height, width, 3) float32, linear RGB, bottom
+    row first, and shared by all materials of the object."""
 
-    message: str  # what was done and why
+    message: str  # for the report: what was done and why
     reflectance: np.ndarray
     radiance: np.ndarray | None  # None: emits nothing
     opacity: np.ndarray | None  # None: lets nothing straight through
     translucence: np.ndarray | None  # None: lets nothing through diffusely
-    # (3,) each: scale * reflectance + offset is diffuse, as nearly as that goes for all its pixels.
+    # (3,) each: scale * reflectance + offset is the diffuse part, fitted to the material's pixels.
     diffuse_scale: np.ndarray
     diffuse_offset: np.ndarray
-    # Means, (3,) each.
+    # (3,) each: means over the material's faces.
     diffuse_color: np.ndarray
     radiance_color: np.ndarray
     transmittance: np.ndarray
@@ -56,31 +57,35 @@ class BakedMaterial:
 
 @dataclass(frozen=True)
 class BakedSurface:
-    uvs: np.ndarray  # (c, 2), corners of the evaluated mesh
+    """The baked materials of an object."""
+
+    uvs: np.ndarray  # (c, 2) float32, where corners of the evaluated mesh read the images
     materials: dict[int, BakedMaterial]  # by slot
 
 
-# By scene: of its last export, by content.
+# The baked surfaces of the last export, by name of the scene and digest of what they depend on.
 _cache: dict[str, dict[bytes, BakedSurface]] = {}
 
 
 def discard_all() -> None:
+    """Forgets the images of all scenes."""
     _cache.clear()
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Of an object."""
+    """What is to be baked of an object."""
 
-    reasons: dict[int, str]  # of the slots in question
-    results: frozenset[str]  # attributes that hold the result of a bake (shown_results.py)
+    reasons: dict[int, str]  # by slot to bake: why, see MaterialExporter.unread
+    results: frozenset[str]  # attributes that hold results of bakes (shown_results.py)
 
 
 def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, Wanted], pixel: float
                   ) -> tuple[dict[bpy.types.Object, BakedSurface], list[str]]:
-    """wanted: by original object; pixel: about its edge, m.
+    """Bakes materials of objects, or takes the images of the last export if nothing has changed.
 
-    Returns what was baked, and why something was not.
+    wanted: by original object; pixel: about the size of a pixel on the surface, m. Returns the
+    baked surfaces by object, and for each object that Cycles could not bake a line that says why.
     """
     name = context.scene.name_full
     before = _cache.get(name, {})
@@ -105,12 +110,12 @@ def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, Wan
 @contextmanager
 def _evaluated_mesh(context: bpy.types.Context, item: bpy.types.Object
                     ) -> Iterator[bpy.types.Mesh]:
-    """A copy of the object's evaluated mesh."""
+    """A copy of the object's evaluated mesh, which is removed at the end of the with block."""
     depsgraph = context.evaluated_depsgraph_get()
     mesh = bpy.data.meshes.new_from_object(item.evaluated_get(depsgraph),
                                            preserve_all_data_layers=True, depsgraph=depsgraph)
     try:
-        # Generated coordinates belong to the original shape.
+        # Generated texture coordinates are relative to the bounds of the original mesh.
         if item.type == 'MESH':
             mesh.use_auto_texspace = False
             mesh.texspace_location = item.data.texspace_location
@@ -122,6 +127,7 @@ def _evaluated_mesh(context: bpy.types.Context, item: bpy.types.Object
 
 def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Mesh,
             asked: Wanted, pixel: float) -> bytes:
+    """Digest of all that the images depend on."""
     content = hashlib.blake2b(digest_size=16)
     depsgraph = context.evaluated_depsgraph_get()
     content.update(repr((sorted(asked.reasons), sorted(asked.results), round(pixel, 9),
@@ -140,7 +146,7 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
         content.update(layer.name.encode() + bytes([layer.active_render])
                        + read(layer.data, 'uv', np.float32, 2).tobytes())
     for attribute in mesh.attributes:
-        # Every bake changes its result, which is not looked at.
+        # The bake changes the results in the attributes, and materials are read without them.
         if attribute.name in asked.results:
             continue
         content.update(attribute.name.encode() + _attribute_bytes(attribute))
@@ -150,6 +156,7 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
 
 
 def _attribute_bytes(attribute: bpy.types.Attribute) -> bytes:
+    """The values of an attribute, none for types that nodes cannot read."""
     name, width = {'FLOAT': ('value', 1), 'INT': ('value', 1), 'BOOLEAN': ('value', 1),
                    'FLOAT_VECTOR': ('vector', 3), 'FLOAT_COLOR': ('color', 4),
                    'BYTE_COLOR': ('color', 4), 'FLOAT2': ('vector', 2)}.get(
@@ -195,7 +202,7 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
                 images[wanted_property] = np.mean(sides, axis=0)
     opacity = None
     if TRANSMITTANCE in images:
-        # Coloured transparency is grey.
+        # The native library has one opacity for all channels.
         through = np.clip(images[TRANSMITTANCE], 0.0, 1.0).mean(axis=2, keepdims=True)
         opacity = np.repeat(1.0 - through, 3, axis=2)
     black = np.zeros((atlas.height, atlas.width, 3), np.float32)
@@ -218,7 +225,8 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
 
 def _pixels(atlas: FaceAtlas, sizes: np.ndarray, faces: np.ndarray, *images: np.ndarray
             ) -> list[np.ndarray]:
-    """(n, 3) of each image, at some places in each of the faces (a mask)."""
+    """(n, 3) float64 of each image: its pixels at some places in each chosen face. sizes: (f,),
+    corners of each face; faces: (f,) bool."""
     firsts = np.cumsum(sizes) - sizes
     centres = np.repeat(np.add.reduceat(atlas.uvs, firsts) / sizes[:, None], sizes, axis=0)
     inside = np.repeat(faces, sizes)
@@ -230,8 +238,8 @@ def _pixels(atlas: FaceAtlas, sizes: np.ndarray, faces: np.ndarray, *images: np.
 
 
 def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """scale and offset, (3,) each, of y over x, both (n, 3), by least squares; a line through zero
-    where x hardly varies."""
+    """scale and offset, (3,) each, with which y is nearest to scale * x + offset by least squares;
+    x, y: (n, 3). The offset is 0 where x hardly varies."""
     means = x.mean(axis=0), y.mean(axis=0)
     spread = ((x - means[0])**2).sum(axis=0)
     varies = spread > 1e-6 * (x**2).sum(axis=0)
@@ -243,6 +251,8 @@ def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def _atlas(mesh: bpy.types.Mesh, matrix: np.ndarray, wanted: np.ndarray, pixel: float
            ) -> FaceAtlas:
+    """The layout of the mesh's faces at their size in the world. matrix: (4, 4), object to world;
+    wanted: (f,) bool."""
     placed = vertex_positions(mesh).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     sizes = read(mesh.polygons, 'loop_total', np.int32)
     return face_atlas(placed[read(mesh.loops, 'vertex_index', np.int32)],
@@ -256,12 +266,15 @@ class _Stage:
                  scene: bpy.types.Scene, item: bpy.types.Object, results: frozenset[str]) -> None:
         self.context, self.source, self.scene, self.item = context, source, scene, item
         self.results = results
+        # Known after the first bake, of REFLECTANCE; see ShaderColors.
         self.has_backfacing = False
         self.has_gloss = False
 
     def bake(self, wanted: str, slots: set[int], atlas: FaceAtlas, backfacing: bool
              ) -> np.ndarray | None:
-        """(height, width, 3); None where no material can have the property."""
+        """Bakes a property. wanted: one of PROPERTIES; slots: those whose materials are baked.
+        Returns (height, width, 3) float32; None if no shader of the materials has the property.
+        Raises RuntimeError if Cycles cannot bake."""
         image = bpy.data.images.new(_UV_MAP, atlas.width, atlas.height, alpha=False,
                                     float_buffer=True, is_data=True)
         made: list[bpy.types.ID] = [image]
@@ -280,6 +293,8 @@ class _Stage:
 
     def _set_materials(self, wanted: str, slots: set[int], backfacing: bool,
                        image: bpy.types.Image, made: list[bpy.types.ID]) -> bool:
+        """Gives the object materials that emit the property; returns whether any shader has it.
+        made: gets all that is created, to be removed."""
         found = False
         mesh = self.item.data
         faces = read(mesh.polygons, 'material_index', np.int32)
@@ -325,6 +340,7 @@ class _Stage:
 @contextmanager
 def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types.Mesh,
            results: frozenset[str]) -> Iterator[_Stage]:
+    """A scene with a copy of the object, both of which are removed at the end."""
     scene = bpy.data.scenes.new(_UV_MAP)
     item = bpy.data.objects.new(_UV_MAP, mesh)
     try:
@@ -332,7 +348,7 @@ def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types
         scene.cycles.samples = _SAMPLES
         scene.cycles.use_adaptive_sampling = False
         scene.cycles.use_denoising = False
-        # Not frame_set, which calls the user's handlers.
+        # Not by frame_set, which calls the user's handlers.
         scene.frame_current = context.scene.frame_current
         scene.collection.objects.link(item)
         depsgraph = context.evaluated_depsgraph_get()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials -> reflectance and emission of both sides, and the colours that vary."""
+"""Material slots -> `MaterialData`: reflectance and emission of both sides, images, attributes."""
 
 from __future__ import annotations
 
@@ -22,43 +22,46 @@ from .node_reader import NodeReader
 from .shown_results import RENDERED, attributes_read
 from .surface import Surface
 
-# What Blender shows where a face has no material.
+# Linear grey of faces without a material, as Blender shows them.
 DEFAULT_REFLECTANCE = 0.8
 
 
 @dataclass(frozen=True)
 class SlotMaterial:
-    """A material as an object has it in a slot."""
+    """A material in the slot of an object, with what of the object matters for its light."""
 
-    material: bpy.types.Material | None  # original; None is the grey default
-    # For one that shows the result of a bake: whether the mesh's render colour attribute is one,
-    # and what the last bake took the slot for (last_surfaces.py), if that counts.
+    material: bpy.types.Material | None  # original; None: the default grey
+    # Whether the material reads the mesh's render colour attribute, and that holds the result of
+    # an earlier bake.
     renders_result: bool = False
+    # For a material that shows nothing but a result: digest of the surface that the last bake used
+    # for the slot (last_surfaces.py).
     last: str | None = None
 
 
 @dataclass(frozen=True)
 class MaterialExport:
-    """A material's index in SceneData, and what meshes must bring along for it."""
+    """An exported material, and what a mesh must export for it."""
 
-    index: int
-    texture: Texture | None = None
-    attribute: str | None = None
-    baked_uvs: bool = False  # the images are laid out by cycles_bake.py
-    surface: LastSurface | None = None  # for the next bake; None: a guess
+    index: int  # in SceneData.materials
+    texture: Texture | None = None  # at whose coordinates the images are read
+    attribute: str | None = None  # that the corner colours are read from; "": the rendered one
+    baked_uvs: bool = False  # the images are read at the coordinates of cycles_bake.py
+    surface: LastSurface | None = None  # to be kept for the next bake; None: it was guessed
 
 
 @dataclass(frozen=True)
 class _Shown:
-    """What a material shows of results."""
+    """How far a material shows the result of an earlier bake."""
 
     any: bool = False
-    only: bool = False  # nothing else of its colour
-    tells_emission: bool = False
+    only: bool = False  # the material tells nothing of the surface's own colour
+    tells_emission: bool = False  # the material has an emission that is no result
 
 
 def _share_coordinates(*colors: ColorExpression) -> bool:
-    """Whether what varies of colours is read at one place."""
+    """Whether the images and attributes of the colours can be read together: at the same UV
+    coordinates, and from one attribute."""
     if len({color.attribute for color in colors if color.attribute is not None}) > 1:
         return False
     first, *others = [color.texture for color in colors if color.texture] or [None]
@@ -67,12 +70,13 @@ def _share_coordinates(*colors: ColorExpression) -> bool:
 
 
 def _is_laid_out(translucence: ColorExpression, *others: ColorExpression) -> bool:
-    """Whether what varies of the translucence is an image read where the other colours are."""
+    """Whether a translucence varies by an image alone, at the same UV coordinates as the others."""
     return translucence.attribute is None and _share_coordinates(translucence, *others)
 
 
 def _line_to(part: ColorExpression, whole: ColorExpression) -> tuple[np.ndarray, np.ndarray]:
-    """scale and offset, (3,) each: the part of a reflectance is scale * whole + offset."""
+    """scale and offset, (3,) each, with which part = scale * whole + offset: exactly if the part
+    varies by the same image or attribute as the whole, else for their means."""
     if part.texture and whole.texture and part.texture.same_as(whole.texture):
         scale = _ratio(part.texture_weight, whole.texture_weight)
     elif part.attribute is not None and part.attribute == whole.attribute:
@@ -85,14 +89,14 @@ def _line_to(part: ColorExpression, whole: ColorExpression) -> tuple[np.ndarray,
 
 
 def _shown_by_angle(surface: Surface) -> np.ndarray:
-    """(1 + TERMS, 3), for MaterialData."""
+    """(1 + TERMS, 3): what is shown of light by its angle, for a diffuse colour of 1."""
     color = np.maximum(surface.diffuse.mean(), 0.0)
     return np.where(color > 1e-6, surface.shown_by_angle / np.maximum(color, 1e-6),
                     lambert().shown)
 
 
 def _by_side(values: list[np.ndarray]) -> np.ndarray:
-    """(n, 2, 3) of (n, 3) of the front and of the back."""
+    """(n, 2, 3), of the arrays (n, 3) of the front and of the back."""
     return np.stack(values, axis=1)
 
 
@@ -101,10 +105,10 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
 
 
 class MaterialExporter:
-    """Adds each material, and each image it uses, once to the scene.
+    """Adds each material, and each image that it uses, once to the exported scene.
 
     filter_glossy: see gloss.filter_glossy_of. results: names of the attributes that bakes write to.
-    last: what the last bake took materials for.
+    last: the surfaces that the last bake used; None: there was no bake.
     """
 
     def __init__(self, scene: SceneData, warnings: Warnings, filter_glossy: float | None = 1.0,
@@ -116,17 +120,19 @@ class MaterialExporter:
         self.last = last
         self.images = ImagePixels()
         self.showing: dict[str, None] = {}  # names of exported materials that show results
-        self._attributes: dict[bpy.types.Material | None, set[str]] = {}
-        self._plain: dict[bpy.types.Material | None, SlotMaterial] = {}  # show no result
+        self._attributes: dict[bpy.types.Material | None, set[str]] = {}  # that the nodes read
+        self._plain: dict[bpy.types.Material | None, SlotMaterial] = {}  # that show no result
         self._shown: dict[tuple[bpy.types.Material, bool], _Shown] = {}
         self._materials: dict[SlotMaterial, MaterialExport] = {}
-        self._baked: dict[bpy.types.Material, int] = {}  # by Cycles; one of its indices
-        self._unread: dict[SlotMaterial, str | None] = {}
+        # Of materials that Cycles has baked, the index of the last one: there is one per object.
+        self._baked: dict[bpy.types.Material, int] = {}
+        self._unread: dict[SlotMaterial, str | None] = {}  # results of unread()
         self._image_indices: dict[tuple[str, str], int] = {}
 
     def slot(self, material: bpy.types.Material | None, renders_result: Callable[[], bool],
              last: Callable[[], str | None]) -> SlotMaterial:
-        """renders_result, last: see SlotMaterial; asked for if they matter."""
+        """Describes a slot. material: evaluated. renders_result, last: give the values of the
+        fields of SlotMaterial; called only where these matter."""
         key = material.original if material is not None else None
         if key in self._plain:
             return self._plain[key]
@@ -142,13 +148,14 @@ class MaterialExporter:
 
     def export(self, slot: SlotMaterial, material: bpy.types.Material | None = None
                ) -> MaterialExport:
-        """material: the evaluated one; None: as the original."""
+        """Adds the slot's material to the scene, if it is not there yet. material: the evaluated
+        one, which is read; None: the original is read."""
         if slot not in self._materials:
             self._materials[slot] = self._export(slot, material or slot.material)
         return self._materials[slot]
 
     def exported(self) -> Iterator[tuple[bpy.types.Material, bool]]:
-        """Original materials, each with whether it lets light straight through."""
+        """The exported materials (original), each with whether light passes straight through."""
         for slot, export in self._materials.items():
             if slot.material is not None:
                 yield slot.material, self.scene.materials[export.index].opacity < 1.0
@@ -156,7 +163,8 @@ class MaterialExporter:
             yield material, self.scene.materials[index].opacity_image is not None
 
     def unread(self, slot: SlotMaterial, material: bpy.types.Material) -> str | None:
-        """What of the (evaluated) material only Cycles can tell, if anything."""
+        """What of the evaluated material only Cycles can evaluate, as the end of the sentence
+        "because of ..."; None if the export can read all of it."""
         key = replace(slot, last=None)
         if key not in self._unread:
             surface = self._surface(material, self._reading(slot), Warnings(), unread := [])
@@ -172,10 +180,11 @@ class MaterialExporter:
 
     def add_baked(self, slot: SlotMaterial, material: bpy.types.Material, baked: BakedMaterial
                   ) -> MaterialExport:
-        """A material as Cycles baked it for the faces of one object (cycles_bake.py)."""
+        """Adds a material that Cycles has baked into images for one object (cycles_bake.py).
+        material: evaluated."""
         if self._shows(material, slot).any:
             self.showing[material.name] = None
-        # What both ways only approximate is still named.
+        # What neither the nodes nor Cycles' bake give exactly is warned of.
         approximated = Warnings()
         reading = replace(self._reading(slot), unread_color=baked.diffuse_color)
         surface = self._surface(material, reading, approximated, []).limited()
@@ -200,7 +209,7 @@ class MaterialExporter:
             translucence_image=index.get('translucence'),
             translucence_image_weight=None if baked.translucence is None else np.ones((2, 3))))
         self._baked[material.original] = len(self.scene.materials) - 1
-        # The images are not kept, their means are.
+        # For the next bake only the means of the images are kept.
         mean = replace(surface, radiance=ColorExpression(baked.radiance_color),
                        transmittance=baked.transmittance,
                        translucence=ColorExpression(baked.translucence_color))
@@ -209,7 +218,7 @@ class MaterialExporter:
 
     def _export(self, slot: SlotMaterial, material: bpy.types.Material | None) -> MaterialExport:
         shown = self._shows(material, slot)
-        # What is not used of a material is no warning.
+        # What is wrong with a material that is not used is not worth a warning.
         warnings = Warnings() if shown.only else self.warnings
         reader, front = self._read(material, self._reading(slot), warnings)
         sides = [front.limited()] * 2
@@ -225,28 +234,30 @@ class MaterialExporter:
         if last is None:
             return self._guess(material.name, sides, shown)
         if last.material == material.name and shown.tells_emission:
-            # That may have been changed since.
+            # The material's emission is no result: take it as it is now.
             last = replace(last, sides=tuple(replace(kept, radiance=side.radiance)
                                              for kept, side in zip(last.sides, sides)))
         return replace(self._add(material.name, list(last.sides)), surface=last)
 
     def _guess(self, name: str, sides: list[Surface], shown: _Shown) -> MaterialExport:
-        """For a material that shows results alone, where no bake has been before."""
+        """A surface for a material that shows nothing but a result, if the last bake has kept none:
+        with the colours of its sockets, or grey."""
         if any(np.any(side.reflectance.mean() + side.translucence.mean() > 0.0) for side in sides):
             self.warnings.add(
                 f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
-                f'its own colour: that of the socket it is linked to is used; set it there, or link '
-                f'the result through a Multiply node')
+                f'its own colour: that of the socket it is linked to is used; set it there, or '
+                f'link the result through a Multiply node')
         else:
             grey = Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
             sides = [replace(grey, transmittance=side.transmittance) for side in sides]
             self.warnings.add(
                 f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
-                f'its own colour: grey of {DEFAULT_REFLECTANCE} is used; bake with its own material '
-                f'first')
+                f'its own colour: grey of {DEFAULT_REFLECTANCE} is used; bake with its own '
+                f'material first')
         return self._add(name, sides)
 
     def _results(self, slot: SlotMaterial) -> frozenset[str]:
+        """Attributes, by the names that nodes use, that hold results on the slot's object."""
         return self.results | {RENDERED} if slot.renders_result else self.results
 
     def _reading(self, slot: SlotMaterial, backfacing: bool = False) -> Reading:
@@ -254,7 +265,7 @@ class MaterialExporter:
                        results=self._results(slot))
 
     def _shows(self, material: bpy.types.Material | None, slot: SlotMaterial) -> _Shown:
-        """material: the evaluated one of the slot."""
+        """How far the slot's material (evaluated) shows results, on either side."""
         if material is None or self._results(slot).isdisjoint(
                 self._attributes.get(material.original, ())):
             return _Shown()
@@ -272,15 +283,17 @@ class MaterialExporter:
         return self._shown[key]
 
     def _add(self, name: str, sides: list[Surface]) -> MaterialExport:
+        """Adds a material of these sides, front and back; what the native library cannot vary over
+        the surface gets its mean, with a warning."""
         if not sides[0].reflectance.same_variation(sides[1].reflectance):
-            # The native library lays an image on both sides alike.
+            # The native library has one image and one weight for the reflectance of both sides.
             self.warnings.add(f'material "{name}": an image or attribute differs between the '
                               f'sides: its mean is used')
             sides = [replace(side, reflectance=ColorExpression(side.reflectance.mean()),
                              diffuse=ColorExpression(side.diffuse.mean())) for side in sides]
         varying = sides[0].reflectance
         texture, attribute = varying.texture, varying.attribute
-        # An image is read at one place for both: where emission has another one, its mean counts.
+        # Images of reflectance and of emission are read at the same coordinates.
         glows = [side.radiance for side in sides]
         glow_texture = next((glow.texture for glow in glows if glow.texture), None)
         glow_attribute = next((glow.attribute for glow in glows if glow.attribute is not None),
@@ -339,7 +352,8 @@ class MaterialExporter:
 
     def _surface(self, material: bpy.types.Material | None, reading: Reading, warnings: Warnings,
                  unread: list[str] | None = None) -> Surface:
-        """unread: gets what is inexact, which then is no warning."""
+        """One side of a material. unread: gets the nodes that cannot be read, which otherwise are
+        warned of."""
         reader, surface = self._read(material, reading, warnings,
                                      None if unread is None else Warnings())
         if unread is not None and reader is not None:
@@ -348,7 +362,8 @@ class MaterialExporter:
 
     def _read(self, material: bpy.types.Material | None, reading: Reading, warnings: Warnings,
               inexact: Warnings | None = None) -> tuple[NodeReader | None, Surface]:
-        """Without a reader where there are no nodes. inexact: see NodeReader."""
+        """One side of a material, and the reader that has read it: None where there are no nodes.
+        inexact: see ColorReader."""
         if material is None:
             return None, Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
         # From 5.0 on every material has nodes and use_nodes only warns.
@@ -359,14 +374,14 @@ class MaterialExporter:
             warnings.add(f'material "{material.name}" has no output node: it is black')
             return None, Surface()
         if output.inputs['Volume'].is_linked and not output.inputs['Surface'].is_linked:
-            # A border between two kinds of air.
+            # A material with a volume and no surface lets all light pass, as in Cycles.
             return None, Surface(transmittance=WHITE)
         reader = NodeReader(f'material "{material.name}"', self.images, warnings, reading, inexact)
         return reader, reader.surface(output.inputs['Surface'])
 
     @staticmethod
     def _scattering(sides: list[Surface]) -> dict[str, np.ndarray | int]:
-        """Fields of MaterialData."""
+        """The fields of MaterialData that say in which directions light is reflected."""
         lines = [_line_to(side.scattering.gloss, side.reflectance) for side in sides]
         models = [side.scattering.diffuse_model() for side in sides]
         return {
@@ -385,6 +400,7 @@ class MaterialExporter:
             'leaving': _by_side([side.scattering.leaving_factors() for side in sides])}
 
     def _image_index(self, texture: Texture) -> int:
+        """Index of the texture's image in SceneData.images, where it is added once."""
         key = (texture.image.name_full, texture.extension)
         if key not in self._image_indices:
             pixels = self.images.read(texture.image)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A place in one image for each face of a mesh, of a resolution that follows the face's size.
+"""Lays out the faces of a mesh in one image, each with a resolution that follows its size.
 
-Each face is mapped by an affine map of its plane, so that whoever cuts it into triangles
-interpolates the same coordinates. Cells have sides of powers of two and are packed in rows, the
-highest and widest first: then none crosses the end of a row.
+Each face is mapped by an affine map of its plane, so that all its triangulations interpolate the
+same coordinates. The cells of the faces have powers of two as sides and are packed in rows, the
+highest and then the widest first, so that no cell crosses the end of a row.
 """
 
 from __future__ import annotations
@@ -12,24 +12,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Pixels between the edge of a cell and its face: filled by the bake's margin, so that looking up
-# between pixels at the edge of a face meets no other face.
+# Pixels between a face and the edge of its cell. The margin of the bake fills them, so that
+# interpolation at the edge of a face does not reach the pixels of another face.
 BORDER = 2
-_LEAST_PIXELS = 4  # along the shorter side of a face
-_MOST_PIXELS = 1024
+_LEAST_PIXELS = 4  # along either side of a face
+_MOST_PIXELS = 1024  # the same
 _LARGEST_IMAGE = 4096
 
 
 @dataclass(frozen=True)
 class FaceAtlas:
+    """An image with a cell for each face, sizes in pixels."""
+
     width: int
     height: int
-    uvs: np.ndarray  # (c, 2) float32; outside the image for faces that have no place
+    uvs: np.ndarray  # (c, 2) float32, by corner; -1, outside the image, for faces without a cell
 
 
 def face_atlas(positions: np.ndarray, face_offsets: np.ndarray, wanted: np.ndarray,
                pixel: float) -> FaceAtlas:
-    """positions: (c, 3) of the corners, m; wanted: (f,) bool; pixel: m."""
+    """Lays out faces. positions: (c, 3) m, of the corners. face_offsets: (f + 1,), the first corner
+    of each face and their number. wanted: (f,) bool, the faces that get a cell. pixel: size of a
+    pixel on the surface, m; it is made larger if the image would be larger than 4096 pixels."""
     starts, sizes = face_offsets[:-1], np.diff(face_offsets)
     faces = np.flatnonzero(wanted)
     faces_of_corners = np.repeat(np.arange(len(starts)), sizes)
@@ -53,13 +57,16 @@ def face_atlas(positions: np.ndarray, face_offsets: np.ndarray, wanted: np.ndarr
 
 def _axes(positions: np.ndarray, starts: np.ndarray, sizes: np.ndarray
           ) -> tuple[np.ndarray, np.ndarray]:
-    """(f, 3) each: the edges at the first corner, which fill the cells of triangles and
-    parallelograms; of faces whose edges there are parallel or that are n-gons, the first edge and
-    one across it."""
+    """The two axes of each face's plane, (f, 3) each, m.
+
+    They are the two edges at the face's first corner, so that triangles and parallelograms fill
+    their cells; for n-gons, and where these edges are nearly parallel, the first edge and a vector
+    across it.
+    """
     first = positions[starts]
     a = positions[starts + 1] - first
     b = positions[starts + sizes - 1] - first
-    # Newell's normal: twice the area.
+    # Newell's normal, whose length is twice the area.
     nexts = np.arange(len(positions)) + 1
     nexts[starts + sizes - 1] = starts
     normal = np.add.reduceat(np.cross(positions, positions[nexts]), starts)
@@ -79,7 +86,7 @@ def _axis_lengths(positions: np.ndarray, starts: np.ndarray, sizes: np.ndarray) 
 
 def _plane_coordinates(positions: np.ndarray, starts: np.ndarray, sizes: np.ndarray
                        ) -> np.ndarray:
-    """(c, 2), each corner in the affine coordinates of its face's axes."""
+    """(c, 2): each corner in the affine coordinates of its face's two axes."""
     a, b = (np.repeat(axis, sizes, axis=0) for axis in _axes(positions, starts, sizes))
     d = positions - np.repeat(positions[starts], sizes, axis=0)
     aa, ab, bb, da, db = (np.einsum('ij,ij->i', x, y)
@@ -90,7 +97,8 @@ def _plane_coordinates(positions: np.ndarray, starts: np.ndarray, sizes: np.ndar
 
 
 def _pack(cells: np.ndarray) -> tuple[np.ndarray, int, int]:
-    """(n, 2) lower corners of cells with sides of powers of two, and the size of the image."""
+    """Packs cells, (n, 2) sides in pixels that are powers of two. Returns their lower corners,
+    (n, 2), and width and height of the image."""
     area = float(np.prod(cells, axis=1).sum())
     width = int(max(cells[:, 0].max(), 2 ** np.ceil(0.5 * np.log2(area))))
     order = np.lexsort((-cells[:, 0], -cells[:, 1]))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the last bake took each object's materials for, kept in the file.
+"""The surfaces that the last bake used for each object's material slots, kept in the .blend file.
 
 A material that shows nothing but the result of a bake (shown_results.py) tells neither the colour
-nor the light of its surface: the next bake takes it for the same as the last one did. The scene has
-a table of surfaces by their digest, the objects the digests of their slots.
+nor the emission of its surface: the next bake uses the same surface as the last one. The scene has
+a table of surfaces by digest, and each object the digests of its slots.
 """
 
 from __future__ import annotations
@@ -20,20 +20,24 @@ from ..color_attribute import rendered_attribute
 from .color_expression import ColorExpression, Texture
 from .surface import Surface
 
-# Of a slot that no surface is known of.
+# The digest of a slot whose surface is not known.
 _NONE = "-"
 
 
 @dataclass(frozen=True)
 class LastSurface:
+    """A material as a bake used it."""
+
     material: str  # name
     sides: tuple[Surface, Surface]  # front and back
 
 
 class LastSurfaces:
-    """Of a scene: those of the last bake, and those that this one takes in their place."""
+    """The surfaces of a scene: those that the last bake has kept, and those of the current bake,
+    which write() puts in their place."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
+        """scene: original; what an earlier bake has stored in it is read."""
         self._scene = scene
         self._table: dict[str, dict] = {}
         self._attributes: set[str] = set()
@@ -42,25 +46,27 @@ class LastSurfaces:
             self._table = dict(stored.get('surfaces', {}))
             self._attributes = set(stored.get('attributes', ()))
         except (ValueError, TypeError, AttributeError):
-            # Not ours: as if there had been no bake.
+            # Somebody else wrote the property: go on as if there had been no bake.
             pass
         self._taken: dict[bpy.types.Object, str] = {}
         self._new: dict[str, dict] = {}
-        # With the surface, whose place in memory tells it apart.
+        # By the surface's id(), and with the surface, so that the id stays its own.
         self._digests: dict[tuple, tuple[LastSurface, str]] = {}
 
     @property
     def attributes(self) -> frozenset[str]:
-        """Those that the scene's bakes have written so far and Clear has not removed."""
+        """Names of the attributes that bakes have written to and Clear has not removed."""
         return frozenset(self._attributes)
 
     def digest(self, item: bpy.types.Object, slot: int) -> str | None:
-        """Of an original object's surface in the last bake."""
+        """Digest of the surface that the last bake used for a slot of an original object; None if
+        none is kept."""
         digests = item.raybundle.last_surfaces.split()
         digest = digests[slot] if slot < len(digests) else _NONE
         return digest if digest in self._table else None
 
     def surface(self, digest: str | None) -> LastSurface | None:
+        """The kept surface of a digest; None if there is none that can be read."""
         if digest not in self._table:
             return None
         try:
@@ -68,11 +74,11 @@ class LastSurfaces:
             return LastSurface(stored['material'],
                                tuple(_decoded(side, Surface()) for side in stored['sides']))
         except (KeyError, ValueError, TypeError):
-            # Of a version that has other terms.
+            # Another version of the add-on has stored it.
             return None
 
     def digest_of(self, surface: LastSurface | None, mesh: bpy.types.Mesh) -> str:
-        """Of a surface that this bake takes on a mesh."""
+        """Digest of a surface that the current bake uses on a mesh; the surface is kept for it."""
         if surface is None:
             return _NONE
         attribute = rendered_attribute(mesh)
@@ -91,22 +97,25 @@ class LastSurfaces:
         return self._digests[key][1]
 
     def take(self, item: bpy.types.Object, digests: Sequence[str]) -> None:
-        """Of all slots of an original object."""
+        """Keeps the digests of all slots of an original object, for write()."""
         if item.library is None:
             self._taken[item] = " ".join(digests)
 
     def share(self, original: bpy.types.Object, copy: bpy.types.Object) -> None:
-        """copy: the finer one of an original (subdivided_copy.py), with the same slots."""
+        """Keeps for a copy (subdivided_copy.py) what is kept for its original, which has the same
+        slots."""
         if original in self._taken:
             self._taken[copy] = self._taken[original]
 
     def forget_attributes(self) -> None:
-        """They were removed; surfaces stay, since materials may still show what is gone."""
+        """After the baked attributes were removed. The surfaces are kept, since materials may still
+        read the attributes that are gone."""
         self._attributes.clear()
         self.write(())
 
     def write(self, attributes: Iterable[str]) -> None:
-        """Keep what was taken; attributes: those that the bake has written."""
+        """Stores the surfaces of the current bake in the file. attributes: names of those that the
+        bake has written to."""
         used: set[str] = set()
         for item, digests in self._taken.items():
             used.update(digests.split())
@@ -114,9 +123,9 @@ class LastSurfaces:
                 if item.raybundle.last_surfaces != digests:
                     item.raybundle.last_surfaces = digests
             except ReferenceError:
-                # Removed while the bake ran.
+                # The object was removed while the bake ran.
                 continue
-        # Objects that were no part of this bake keep theirs.
+        # Objects that took no part in this bake keep their surfaces.
         used.update(digest for item in self._scene.objects
                     for digest in item.raybundle.last_surfaces.split())
         table = {digest: stored for digest, stored in {**self._table, **self._new}.items()
@@ -128,16 +137,17 @@ class LastSurfaces:
 
 
 # --------------------------------------------------------------------------------------------------
-# As JSON: zeros are null, so that matt surfaces are short
+# JSON of surfaces: arrays of zeros are null, so that those of plain diffuse surfaces are short
 # --------------------------------------------------------------------------------------------------
 
 
 def _encoded(value: object, rendered: str | None) -> object:
-    """rendered: name of the mesh's render colour attribute, which is another one after the bake."""
+    """The JSON value of a surface or of a part of it. rendered: name of the mesh's render colour
+    attribute, which the surface is stored with since the bake makes its result that attribute."""
     if isinstance(value, ColorExpression) and value.attribute == "":
         value = replace(value, attribute=rendered)
         if rendered is None:
-            # Nodes read black.
+            # Without an attribute nodes read black.
             value = replace(value, attribute_weight=np.zeros(3))
     if isinstance(value, Texture):
         return {'image': value.image.name_full, 'extension': value.extension,
@@ -152,7 +162,7 @@ def _encoded(value: object, rendered: str | None) -> object:
 
 
 def _decoded(stored: dict, default: object) -> object:
-    """A dataclass in the shape of its default."""
+    """The dataclass of a stored value; default: gives the type and the shapes of its arrays."""
     values = {}
     for item in fields(default):
         if item.name not in stored:
@@ -168,7 +178,7 @@ def _decoded(stored: dict, default: object) -> object:
         values[item.name] = value
     decoded = replace(default, **values)
     if isinstance(decoded, ColorExpression) and decoded.texture and decoded.texture.image is None:
-        # The image is gone; its mean is known.
+        # The image was removed from the file: use its mean.
         decoded = replace(decoded, constant=decoded.constant
                           + decoded.texture_weight * decoded.texture.mean,
                           texture=None, texture_weight=np.zeros(3))

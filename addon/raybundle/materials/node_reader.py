@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Node trees of materials, lights and the world -> colours and shaders of the simple kind that
-radiosity needs: reflectance, what of it is diffuse, where it goes, and emission.
+"""Reads the shaders of node trees, of materials, lamps and the world, as a Surface.
 
-A tree is read from its output towards its inputs. What cannot be read takes the value of the socket
-(or the mean of the image) and is named in the warnings.
+A Surface has what radiosity needs: the reflectance, which part of it is diffuse, in which
+directions the reflected light leaves, what passes through, and the emission. A tree is read from
+its output towards its inputs. Where something cannot be read, the value of the socket (or the mean
+of the image) is used and a warning names the node.
 """
 
 from __future__ import annotations
@@ -25,31 +26,38 @@ from .principled import (COAT_SOCKETS, COAT_TINT, GLOSS_SOCKETS, SHEEN_SOCKETS, 
 from .scattering import BURLEY, OREN_NAYAR, Scattering
 from .surface import Surface
 
-# Shaders that are gloss alone.
+# Types of shaders that mirror and have no diffuse part.
 GLOSSY = ('BSDF_GLOSSY', 'BSDF_ANISOTROPIC', 'BSDF_METALLIC')
-# Those that are a layer alone; names of the socket of its roughness, and what it usually is.
+# Types of shaders that are one of the layers of layers.py.
 CLOTH = ('BSDF_SHEEN', 'BSDF_VELVET')
+# Names of a socket, by Blender version, and the value assumed where it varies or is missing.
 CLOTH_ROUGHNESS = ('Roughness', 'Sigma'), 0.5
-EDGE_TINT = ('Edge Tint',), 1.0  # of metals
+EDGE_TINT = ('Edge Tint',), 1.0  # of the Metallic shader
 MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughness of 0.45 or more"
 
 
 class NodeReader(ColorReader):
-    """Reads the shaders of one tree for one side of the surface; see ColorReader."""
+    """Reads the shaders of one node tree, for one side of a surface.
+
+    ColorReader describes the parameters, and what becomes of nodes that cannot be read.
+    """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
                  reading: Reading = Reading(), inexact: Warnings | None = None) -> None:
         super().__init__(owner, images, warnings, reading, inexact)
-        self.color_result = Result.NONE  # the most that a shader's colour has of a result
-        self.emits_result = False
-        self.tells_emission = False  # whether a shader emits, or would if it were switched on
+        # The highest Result of the colours of reflecting and transmitting shaders.
+        self.color_result = Result.NONE
+        self.emits_result = False  # whether a shader emits the result of a bake
+        self.tells_emission = False  # whether a shader has an emission colour, at any strength
 
     @property
     def shows_result(self) -> bool:
+        """Whether anything that was read depends on the result of a bake."""
         return bool(self.color_result or self.emits_result or self._result_values)
 
     def shows_only_result(self, surface: Surface) -> bool:
-        """Whether a surface that was read tells nothing of its own colour, and perhaps light."""
+        """Whether the tree shows nothing but the result of a bake, so that the surface's own colour
+        is not known. surface: what surface() returned for the tree."""
         if self.color_result == Result.ALONE:
             return True
         own = surface.diffuse, surface.translucence, surface.radiance
@@ -57,7 +65,8 @@ class NodeReader(ColorReader):
 
     def surface(self, socket: bpy.types.NodeSocket,
                 path: tuple[bpy.types.Node, ...] = ()) -> Surface:
-        """The shader linked to a socket; nothing linked is black, as in Cycles."""
+        """The surface that the shader linked to an input makes; black where nothing is linked, as
+        in Cycles. path: see node_links.follow."""
         source = follow(socket, path)
         node, path = source.node, source.path
         if node is None:
@@ -83,7 +92,7 @@ class NodeReader(ColorReader):
             return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
         if node.type == 'MIX_SHADER':
             factor = float(np.clip(self.value(node.inputs[0], path), 0.0, 1.0))
-            # A branch that is not seen at all raises no warnings.
+            # A branch of weight 0 is not read, so that nothing is warned of for its sake.
             parts = [self.surface(node.inputs[index], path).scaled(share)
                      for index, share in ((1, 1.0 - factor), (2, factor)) if share > 0.0]
             return self._sum(parts, node)
@@ -151,7 +160,8 @@ class NodeReader(ColorReader):
 
     def _base_color(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]
                     ) -> ColorExpression:
-        """What is scattered under the surface has a colour of its own before 4.0."""
+        """The base colour. Before Blender 4.0 light that is scattered under the surface has a
+        colour of its own, which is mixed in by its weight."""
         base = self._own_color(node.inputs['Base Color'], path)
         if 'Subsurface Color' not in node.inputs:
             return base
@@ -179,8 +189,9 @@ class NodeReader(ColorReader):
 
     def _usual(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                path: tuple[bpy.types.Node, ...]) -> float:
-        """A value that is no reason to ask Cycles: where it varies, or no input has one of the
-        names, it is the usual one."""
+        """The value of the input with the first of the names that exists. Where it varies, or no
+        input has one of the names, `usual` is used: such values alone are not worth a bake by
+        Cycles."""
         if not any(name in node.inputs for name in names):
             return usual
         source = follow(input_of(node, *names), path)
@@ -194,7 +205,8 @@ class NodeReader(ColorReader):
 
     def _usual_color(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                      path: tuple[bpy.types.Node, ...]) -> np.ndarray:
-        """(3,), likewise."""
+        """(3,) linear RGB: the colour of the input with the first of the names that exists, or grey
+        of the value `usual` where it varies or there is none."""
         if not any(name in node.inputs for name in names):
             return WHITE * usual
         source = follow(input_of(node, *names), path)
@@ -224,31 +236,35 @@ class NodeReader(ColorReader):
 
     def _own_color(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
                    ) -> ColorExpression:
-        """Of what a shader does with light."""
+        """The colour of a reflecting or transmitting shader; keeps track of color_result."""
         color = self.color(socket, path)
         self.color_result = max(self.color_result, color.result)
         return color
 
     def _radiance(self, color: bpy.types.NodeSocket, strength: bpy.types.NodeSocket,
                   path: tuple[bpy.types.Node, ...]) -> ColorExpression:
+        """Colour times strength of an emission; 0 if either is the result of a bake."""
         values, inexact, unread = self._result_values, len(self.inexact), len(self.unread)
         factor = self.value(strength, path)
         radiance = self._emission_color(color, path).scaled(factor) if factor else ColorExpression()
         if not radiance.result and self._result_values == values:
-            # A Principled shader that was just added is white and switched off from 4.0 on.
+            # From Blender 4.0 on a new Principled shader emits white with a strength of 0: nobody
+            # has chosen that colour.
             is_usual = (color.node.type == 'BSDF_PRINCIPLED' and bpy.app.version >= (4, 0, 0)
                         and factor == 0.0)
             self.tells_emission |= not is_usual and bool(
                 color.is_linked or np.any(default_color(color)))
             return radiance
-        # The light of a bake is none of the scene's, whatever it is multiplied by.
+        # A result is not a light source of the scene, whatever it is multiplied by: what could not
+        # be read of it does not matter.
         del self.inexact[inexact:], self.unread[unread:]
         self.emits_result = True
         return ColorExpression()
 
     def _emission_color(self, socket: bpy.types.NodeSocket,
                         path: tuple[bpy.types.Node, ...]) -> ColorExpression:
-        """Where only constants are possible (lights, the world), the mean of what varies."""
+        """The colour of an emission; its mean, with a warning, unless reading.varying_emission is
+        set (lamps and the world have one radiance)."""
         color = self.color(socket, path)
         if color.is_constant or self.reading.varying_emission:
             return color
@@ -258,19 +274,23 @@ class NodeReader(ColorReader):
 
 @dataclass(frozen=True)
 class Glossy:
-    """A Glossy shader's albedo of its colour, as diffuse light sees it."""
+    """Shares of diffuse light, linear RGB, that a shader of one of the types GLOSSY reflects."""
 
-    once: np.ndarray  # (3,), by one facet, and (TERMS, 3) that by angle
-    by_angle: np.ndarray
-    again: np.ndarray  # (3,), what several facets add
-    several: np.ndarray  # (TERMS,), see GlossAlbedo
-    roughness: float
+    once: np.ndarray  # (3,), light that is reflected by one facet
+    by_angle: np.ndarray  # (TERMS, 3), how `once` depends on the angle of the light
+    again: np.ndarray  # (3,), light that is reflected by several facets in turn
+    several: np.ndarray  # (TERMS,), how `again` depends on the angle; see GlossAlbedo
+    roughness: float  # 0 to 1, as diffuse light sees it
 
 
 def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray, filter_glossy: float,
                   tint: np.ndarray) -> Glossy:
-    """color: (3,). tint: (3,), of the edge, which metals alone have. What several facets add has
-    the roughness of the socket."""
+    """What a shader of one of the types GLOSSY reflects of diffuse light.
+
+    roughness: 0 to 1, of the socket. color: (3,) linear RGB, 0 to 1. filter_glossy: Cycles'
+    setting, which makes the roughness larger for light that one facet reflects; light of several
+    facets keeps that of the socket. tint: (3,), of the edge, which the Metallic shader alone has.
+    """
     if node.distribution == 'SHARP':
         roughness = 0.0
     seen = seen_roughness(roughness, filter_glossy)
@@ -278,7 +298,7 @@ def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray, fil
     for value in (roughness, seen):
         albedo = gloss_albedo(value, None, correlated=bpy.app.version >= (4, 0, 0))
         if node.type != 'BSDF_METALLIC':
-            # Of one colour at all angles.
+            # The shader has the same colour at all angles.
             albedo = replace(albedo, edge=0.0, angles=albedo.angles * [[1.0], [0.0], [1.0]])
         albedos.append(albedo)
     of_socket, of_seen = albedos
@@ -288,7 +308,8 @@ def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray, fil
 
 
 def cloth_layer(node: bpy.types.Node, roughness: float) -> Layer:
-    """Of a Sheen shader, or Velvet as it was before 4.0."""
+    """The layer that a Sheen shader is, or Velvet before Blender 4.0. roughness: 0 to 1, or
+    Velvet's Sigma."""
     if node.type == 'BSDF_VELVET' or node.distribution == 'ASHIKHMIN':
         return velvet(roughness)
     return microfibers(roughness)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender's Principled shader is to diffuse light, by version, apart from its base colour.
+"""What Blender's Principled shader reflects of diffuse light, by version, for any base colour.
 
-Before 4.0 the specular layer lies on top of a diffuse part that is Burley's, and sheen and clearcoat
-are added to them. From 4.0 on the diffuse part is Lambert's, or later Oren and Nayar's, and what
-lies on top (sheen, coat, the specular layer, in this order) is missing beneath; the specular
-layer's reflectance follows the index of refraction.
+Before Blender 4.0 the diffuse part is Burley's, and the specular layer, sheen and clearcoat are
+added to it. From 4.0 on the diffuse part is Lambert's, from 4.3 on Oren and Nayar's; sheen, coat
+and the specular layer lie on top, in this order from above, and light that a layer reflects is
+missing beneath it; the specular layer's reflectance follows from the index of refraction.
 """
 
 from __future__ import annotations
@@ -18,21 +18,24 @@ from .diffuse_angles import MEANS, TERMS, DiffuseAngles, angle_terms, burley, or
 from .gloss import gloss_albedo, ior_of, seen_roughness
 from .layers import Layer, burley_sheen, clearcoat, microfibers
 
-# Names of the sockets that gloss and angles depend on, in the order of the first fields of
-# PrincipledSockets, and what they count as where they vary or are missing.
+# Groups of sockets: for each socket its names by Blender version, and the value that is assumed
+# where it varies or is missing. These are the first fields of PrincipledSockets, in its order.
 GLOSS_SOCKETS = ((('Roughness',), 0.5), (('Specular IOR Level', 'Specular'), 0.5),
                  (('IOR',), 1.5), (('Diffuse Roughness',), 0.0))
-# The same of the coat, the first arguments of PrincipledAlbedo.coated, and of sheen_on.
+# Those of the coat, in the order of the arguments of PrincipledAlbedo.coated.
 COAT_SOCKETS = ((('Coat Weight', 'Clearcoat'), 0.0),
                 (('Coat Roughness', 'Clearcoat Roughness'), 0.03), (('Coat IOR',), 1.5))
+# Those of sheen, in the order of the arguments of sheen_on.
 SHEEN_SOCKETS = ((('Sheen Weight', 'Sheen'), 0.0), (('Sheen Roughness',), 0.5))
-# Of their colours; sheen's is a number before 4.0.
+# The colours of coat and sheen; that of sheen is a number before 4.0.
 COAT_TINT, SHEEN_TINT = (('Coat Tint',), 1.0), (('Sheen Tint',), 1.0)
-# Of the specular layer, and of metals' edges; a number before 4.0.
+# The colour of the specular layer and of metals' edges; a number before 4.0.
 SPECULAR_TINT = ('Specular Tint',), 1.0 if bpy.app.version >= (4, 0, 0) else 0.0
-# Before 4.0, by which a tint has the base's hue: of sheen, and of the specular layer.
+# Weights of the luminance by which, before 4.0, a tint takes the hue of the base colour: for sheen,
+# and for the specular layer.
 _LUMINANCE, _ROUGH_LUMINANCE = np.array([0.2126, 0.7152, 0.0722]), np.array([0.3, 0.6, 0.1])
-_VIEWS = np.sqrt((np.arange(24) + 0.5) / 24)  # cosines, of equal shares of the projected solid angle
+# Cosines of views that stand for equal shares of the projected solid angle.
+_VIEWS = np.sqrt((np.arange(24) + 0.5) / 24)
 
 
 @dataclass(frozen=True)
@@ -44,53 +47,65 @@ class PrincipledSockets:
     ior: float
     diffuse_roughness: float
     is_multiscatter: bool  # whether the distribution is Multiscatter GGX
-    # (3,) or one number for all channels, linear RGB: by the base colour light is lost where it
-    # meets several facets.
+    # (3,) linear RGB or one number for all channels: the base colour. It is the colour of metals,
+    # and of what light loses between several facets.
     base: np.ndarray | float
     tint: np.ndarray | float = SPECULAR_TINT[1]  # (3,) or one number: Specular Tint
 
 
 @dataclass(frozen=True)
 class PrincipledAlbedo:
-    """Shares of the light. With o = (1 - metallic) (1 - transmission) and m = metallic:
+    """What a Principled shader reflects of diffuse light, as shares that the sockets Base Color,
+    Metallic and Transmission weigh.
 
-    reflectance = base (o diffuse + m metal) + o specular + m metal_edge, of which
-    base o shown is the diffuse colour that is seen from straight above, of light by its angle as
-    angles has it. What is mirrored depends on the angle by o specular_by_angle + m metal_by_angle.
+    With o = (1 - metallic) (1 - transmission) and m = metallic, each channel has
+
+    reflectance = base (o diffuse + m metal) + o specular + m metal_edge.
+
+    A view from straight above shows the diffuse colour base o shown, which depends on the angle of
+    the light as `angles` says. What is mirrored depends on the angle of the light by
+    o specular_by_angle + m metal_by_angle.
     """
 
-    angles: DiffuseAngles
-    roughness: float  # of the gloss, as diffuse light sees it
-    diffuse_roughness: float
+    angles: DiffuseAngles  # of the diffuse part without layers
+    roughness: float  # 0 to 1, of the gloss, as diffuse light sees it
+    diffuse_roughness: float  # 0 to 1
     shown: np.ndarray  # (3,)
-    diffuse: np.ndarray  # (3,)
+    diffuse: np.ndarray  # (3,), under the layers
     specular: np.ndarray = field(default_factory=lambda: np.zeros(3))
     specular_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
     metal: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_edge: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (2, 3): the part of metal and metal_edge that several facets send back; (TERMS, 3): that by
-    # the angle.
+    # (2, 3): the part of metal and of metal_edge that several facets reflect in turn.
     several: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
+    # (TERMS, 3): how light that several facets reflect depends on its angle.
     several_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (TERMS, 3): how the layers let the diffuse light out (rb_set_material_leaving).
+    # (TERMS, 3): how the layers let diffuse light out, by the angle at which it leaves.
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (3,): what the coat leaves of emission and of light that goes through.
+    # (3,): share of emission, and of light that passes through, that the coat lets out.
     uncoated: np.ndarray = field(default_factory=lambda: np.ones(3))
 
     def reflected_by_angle(self, base: np.ndarray, opaque: float, metallic: float) -> np.ndarray:
-        """(TERMS, 3), of a whole surface."""
-        under = self.diffuse / self.angles.albedo  # the share of light that the layers let through
+        """(TERMS, 3): how the reflectance depends on the angle of the light. base: (3,) linear RGB;
+        opaque: o; metallic: m."""
+        under = self.diffuse / self.angles.albedo  # share of light that the layers let through
         return (opaque * base * under * self.angles.reflected
                 + metallic * self.several_by_angle + self.mirrored_by_angle(opaque, metallic))
 
     def mirrored_by_angle(self, opaque: float, metallic: float) -> np.ndarray:
-        """(TERMS, 3), likewise."""
+        """(TERMS, 3): how the part that one facet mirrors depends on the angle of the light.
+        opaque: o; metallic: m."""
         return opaque * self.specular_by_angle + metallic * self.metal_by_angle
 
     def coated(self, weight: float, roughness: float, ior: float, tint: np.ndarray,
                filter_glossy: float | None) -> PrincipledAlbedo:
-        """Under a coat. tint: (3,), of what passes through it. filter_glossy: as below."""
+        """The same with a coat on top.
+
+        weight: clamped to 0 to 1. roughness: 0 to 1. ior: the coat's index of refraction. tint:
+        (3,), by which light that passes through the coat is multiplied. filter_glossy: see
+        gloss.filter_glossy_of.
+        """
         weight = min(max(weight, 0.0), 1.0)
         if weight == 0.0:
             return self
@@ -101,7 +116,7 @@ class PrincipledAlbedo:
             layer = gloss_albedo(roughness, ior)
             from_above = gloss_albedo(roughness, ior, from_above=True)
             terms = angle_terms(_VIEWS) - MEANS
-            # By how far light goes in the coat to each view.
+            # The length of the path through the coat to each view, relative to its thickness.
             depths = 1.0 / np.sqrt(1.0 - (1.0 - _VIEWS[:, None]**2) / max(ior, 1.0)**2)
             tint = np.clip(tint, 0.0, 1.0)
             let_out = 1.0 - weight + weight * tint**depths
@@ -132,15 +147,19 @@ class PrincipledAlbedo:
 
 def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray, opaque: float
              ) -> tuple[Layer, np.ndarray]:
-    """The layer on top of a whole surface, and its colour. tint, base: (3,)."""
+    """The sheen of a Principled shader: the layer, and the colour (3,) that multiplies its albedo.
+
+    weight, roughness: of the sockets. tint, base: (3,) linear RGB. opaque: 0 to 1, the share of the
+    surface that is neither metal nor transmits light, which alone has sheen before Blender 4.0.
+    """
     if bpy.app.version >= (4, 0, 0):
         return microfibers(roughness), min(max(weight, 0.0), 1.0) * np.maximum(tint, 0.0)
-    # What is not metal and does not let light through has it.
     return burley_sheen(), max(weight, 0.0) * opaque * _in_hue(base, tint, _LUMINANCE)
 
 
 def _in_hue(base: np.ndarray, share: np.ndarray | float, weights: np.ndarray) -> np.ndarray:
-    """(3,), white and a share of the base's hue. weights: of its luminance."""
+    """(3,): white, moved by `share` towards the hue of the base colour. weights: (3,), of the
+    luminance by which the base is divided to leave its hue."""
     luminance = float(weights @ base)
     hue = base / luminance if luminance > 0.0 else np.zeros(3)
     return 1.0 + share * (hue - 1.0)
@@ -148,7 +167,8 @@ def _in_hue(base: np.ndarray, share: np.ndarray | float, weights: np.ndarray) ->
 
 def principled_albedo(sockets: PrincipledSockets, filter_glossy: float | None
                       ) -> PrincipledAlbedo:
-    """filter_glossy: see gloss.filter_glossy_of."""
+    """What the shader reflects of diffuse light, without coat and sheen. filter_glossy: see
+    gloss.filter_glossy_of."""
     is_layered = bpy.app.version >= (4, 0, 0)
     roughness, diffuse_roughness = sockets.roughness, sockets.diffuse_roughness
     multiple = sockets.is_multiscatter
@@ -164,13 +184,14 @@ def principled_albedo(sockets: PrincipledSockets, filter_glossy: float | None
                           for from_above in (False, True))
     under, shown, leaving = 1.0, np.ones(3), np.zeros((TERMS, 3))
     if is_layered:
-        # What it mirrors towards the eye is missing, of all colours, wherever light comes from.
+        # Light that the layer mirrors towards the eye is missing beneath, alike in all channels and
+        # whatever the direction of the light.
         shown = shown - layer_above.covering(f0, multiple).max()
         angles = oren_nayar(diffuse_roughness, base)
     else:
         angles, diffuse_roughness = burley(roughness), roughness
     if filter_glossy is None:
-        # To diffuse light there is no such layer.
+        # Light that left a diffuse surface does not meet the specular layer.
         return PrincipledAlbedo(angles, roughness, diffuse_roughness, shown, angles.albedo)
     if is_layered:
         brightest = int(f0.argmax())
@@ -180,7 +201,7 @@ def principled_albedo(sockets: PrincipledSockets, filter_glossy: float | None
     gain = layer.gain(f0, multiple)
     seen = seen_roughness(roughness, filter_glossy)
     metal_ior, metal_tint = (None, tint) if is_layered else (specular_ior, 1.0)
-    # What several facets add has the roughness of the socket.
+    # Light that several facets reflect has the roughness of the socket, not that of Filter Glossy.
     rough_metal = gloss_albedo(roughness, metal_ior, False, is_layered)
     layer, metal = (gloss_albedo(seen, ior, False, is_layered)
                     for ior in (specular_ior, metal_ior))

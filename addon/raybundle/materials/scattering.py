@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where surfaces that are not Lambert's send the light of the sources.
+"""In which directions a surface that is not Lambert's reflects light, by that of the light.
 
-By the direction it comes from: gloss as GGX mirrors it, cloth (layers.py) and several facets of
-gloss by lobes of their own, the diffuse rest as Burley's or Oren and Nayar's model has it
-(native/src/surfaces/lobe.h). What differs from Cycles: a surface has one gloss, one lobe of each
-kind and one diffuse model, with the means of the roughnesses that it is mixed of.
+Gloss is mirrored as by GGX microfacets. Cloth (layers.py), and light that several facets reflect in
+turn, have lobes of their own. The diffuse rest follows the model of Burley or of Oren and Nayar
+(native/src/surfaces/lobe.h). Differs from Cycles: a surface has one gloss, one lobe of each kind
+and one diffuse model; where a material mixes several, it has the mean of their roughnesses.
 """
 
 from __future__ import annotations
@@ -22,43 +22,49 @@ LAMBERT, BURLEY, OREN_NAYAR = range(3)  # rb_diffuse_model
 
 @dataclass(frozen=True)
 class Scattering:
-    """Sums over the shaders of a surface."""
+    """The parts of a side's reflectance by the way they are reflected, summed over its shaders.
 
-    gloss: ColorExpression = field(default_factory=ColorExpression)  # part of the reflectance
-    # (TERMS, 3): of it, by the terms of diffuse_angles.py.
+    Roughnesses are kept as sums of part times roughness, so that their means can be taken.
+    """
+
+    gloss: ColorExpression = field(default_factory=ColorExpression)  # the mirrored part
+    # (TERMS, 3): how the mirrored part depends on the angle of the light (diffuse_angles.py).
     by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    rough_gloss: float = 0.0  # means of gloss times roughness, as diffuse light sees it
-    # (LOBES, 2, 3): what of the reflectance each lobe sends, and that times the roughness.
-    # (LOBES, TERMS, 3): by angle.
+    rough_gloss: float = 0.0  # sum of mirrored part (mean of channels) times roughness
+    # (LOBES, 2, 3): the part that each lobe reflects, and the sum of part times roughness.
     lobes: np.ndarray = field(default_factory=lambda: np.zeros((len(LOBES), 2, 3)))
+    # (LOBES, TERMS, 3): how the part of each lobe depends on the angle of the light.
     lobes_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((len(LOBES), TERMS, 3)))
-    # (2, 2, 3): for Burley's model and for Oren and Nayar's, of which Lambert's is one, the mean
-    # diffuse colour, and that times the roughness.
+    # (2, 2, 3): for Burley's model, and for Oren and Nayar's (of which Lambert's is that of
+    # roughness 0): the mean diffuse colour, and the sum of colour times roughness.
     diffuse: np.ndarray = field(default_factory=lambda: np.zeros((2, 2, 3)))
-    # (TERMS, 3): that times how it leaves by angle (rb_set_material_leaving).
+    # (TERMS, 3): diffuse colour times how the layers above let it out by angle.
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
 
     @staticmethod
     def mirror(gloss: ColorExpression, by_angle: np.ndarray, roughness: float) -> Scattering:
+        """Gloss alone. by_angle: (TERMS, 3); roughness: 0 to 1, as diffuse light sees it."""
         return Scattering(gloss, by_angle, roughness * float(gloss.mean().mean()))
 
     @staticmethod
     def matt(color: np.ndarray, model: int, roughness: float,
              leaving: np.ndarray | float = 0.0) -> Scattering:
-        """color: (3,), mean. leaving: (TERMS, 3), for a colour of 1."""
+        """A diffuse part alone. color: (3,), its mean; model: BURLEY or OREN_NAYAR; roughness: 0 to
+        1; leaving: (TERMS, 3), how it leaves by angle, for a colour of 1."""
         diffuse = np.zeros((2, 2, 3))
         diffuse[0 if model == BURLEY else 1] = [color, roughness * color]
         return Scattering(diffuse=diffuse, leaving=color * leaving + np.zeros((TERMS, 3)))
 
     @staticmethod
     def clothed(color: np.ndarray, layer: Layer) -> Scattering:
-        """color: (3,), times the layer's albedo."""
+        """A layer of cloth alone. color: (3,), by which the layer's albedo is multiplied."""
         return Scattering._of_lobe(layer.lobe, layer.albedo * color,
                                    layer.arriving[:, None] * color, layer.roughness)
 
     @staticmethod
     def several_facets(color: np.ndarray, by_angle: np.ndarray, roughness: float) -> Scattering:
-        """What they add to gloss. color: (3,); by_angle: (TERMS, 3)."""
+        """Light that several facets of gloss reflect in turn. color: (3,), the part of the
+        reflectance; by_angle: (TERMS, 3), how it depends on the angle; roughness: 0 to 1."""
         return Scattering._of_lobe(SEVERAL_FACETS, color, by_angle, roughness)
 
     @staticmethod
@@ -70,38 +76,44 @@ class Scattering:
         return scattering
 
     def scaled(self, factor: float) -> Scattering:
+        """All parts times a factor, as in a mix of shaders."""
         return Scattering(self.gloss.scaled(factor), factor * self.by_angle,
                           factor * self.rough_gloss, factor * self.lobes,
                           factor * self.lobes_by_angle, factor * self.diffuse,
                           factor * self.leaving)
 
     def limited(self, share: np.ndarray) -> Scattering:
-        """share: (3,), of what is sent by angle and by lobes; the rest is taken relatively."""
+        """With the absolute parts (lobes, and what depends on the angle) times share, (3,). Gloss
+        and the diffuse colour only count relative to the reflectance and stay."""
         return replace(self, by_angle=self.by_angle * share, lobes=self.lobes * share,
                        lobes_by_angle=self.lobes_by_angle * share)
 
     def covered(self, share: float, layer: Layer) -> Scattering:
-        """Without what a layer, of so much weight, sends back."""
+        """Under a layer, which takes `share` times its albedo of the light."""
         under = self.scaled(1.0 - share * layer.albedo)
         return replace(under, leaving=under.leaving
                        - share * layer.by_angle[:, None] * self.diffuse[:, 0].sum(axis=0))
 
     def plus(self, other: Scattering) -> Scattering:
+        """Of the sum of two shaders."""
         return Scattering(self.gloss.plus(other.gloss).simplified(), self.by_angle + other.by_angle,
                           self.rough_gloss + other.rough_gloss, self.lobes + other.lobes,
                           self.lobes_by_angle + other.lobes_by_angle,
                           self.diffuse + other.diffuse, self.leaving + other.leaving)
 
     def gloss_roughness(self) -> float:
+        """0 to 1, the mean over the gloss."""
         gloss = float(self.gloss.mean().mean())
         return min(self.rough_gloss / gloss, 1.0) if gloss > 0.0 else 0.0
 
     def lobe_roughness(self, lobe: int) -> float:
+        """0 to 1, the mean over what the lobe reflects. lobe: one of LOBES."""
         weight, rough = self.lobes[lobe].mean(axis=1)
         return float(np.clip(rough / max(weight, 1e-6), 0.0, 1.0))
 
     def diffuse_model(self) -> tuple[int, float]:
-        """The heavier one, and its roughness."""
+        """LAMBERT, BURLEY or OREN_NAYAR, whichever has the larger diffuse colour, and its mean
+        roughness, 0 to 1."""
         weights, rough = self.diffuse.mean(axis=2).T
         model = int(weights[1] >= weights[0])
         if weights[model] <= 0.0:
@@ -112,5 +124,5 @@ class Scattering:
         return (OREN_NAYAR, roughness) if roughness > 0.0 else (LAMBERT, 0.0)
 
     def leaving_factors(self) -> np.ndarray:
-        """(TERMS, 3), for rb_set_material_leaving."""
+        """(TERMS, 3): how diffuse light leaves by angle, for a diffuse colour of 1."""
         return self.leaving / np.maximum(self.diffuse[:, 0].sum(axis=0), 1e-6)

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Node trees rewritten so that they emit one of their own properties, for Cycles to evaluate.
+"""Rewrites the node trees of materials so that they emit one of their own properties.
 
-Each shader gives way to an emission shader of its reflectance, what of that is diffuse, its
-radiance, its transmittance or its translucence; mixes and sums of shaders stay as they are, because
-all of these are linear in them. The tables say the same as node_reader.py; here whatever is linked
-to a socket stays linked, but for those that gloss depends on (principled.py).
+Cycles then evaluates the property by baking the emission (cycles_bake.py). Each shader is replaced
+by an emission shader of its reflectance, of the diffuse part of that, of its radiance, its
+transmittance or its translucence. Mixes and sums of shaders stay, since all these properties are
+linear in them. The formulas are those of node_reader.py, as nodes: what is linked to a socket stays
+linked to the formula, except for the sockets that gloss depends on (principled.py), which count
+with a constant.
 """
 
 from __future__ import annotations
@@ -24,31 +26,36 @@ from .shown_results import reads_result
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
     'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
-# DIFFUSE is the reflectance where nothing has gloss, and nothing diffuse is rough or cloth.
+# In the order in which they are baked. DIFFUSE equals REFLECTANCE, and need not be baked, where no
+# shader has gloss, is cloth, or is diffuse with a roughness.
 PROPERTIES = (REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE)
-_USUAL_COLOR = 0.5  # of a metal whose colour varies
+_USUAL_COLOR = 0.5  # grey that stands for a varying colour in what gloss depends on
 
-# A value of the rewritten tree: an output of a node, or a constant.
+# A value in a rewritten tree: an output of a node, or a constant number or colour (a tuple).
 _Value = object
 
 
 class ShaderColors:
-    """Rewrites trees that nobody else uses; copies of groups are in `groups`, to be removed."""
+    """Rewrites node trees for one property, in place: the trees must be copies.
+
+    Node groups are copied too; the caller removes the copies, which `groups` lists.
+    """
 
     def __init__(self, wanted: str, light_path: dict[str, float], backfacing: bool = False,
                  filter_glossy: float | None = 1.0, results: frozenset[str] = frozenset()
                  ) -> None:
-        self.wanted = wanted
-        self.results = results  # attributes that hold the result of a bake (shown_results.py)
+        self.wanted = wanted  # one of PROPERTIES
+        self.results = results  # attributes that hold results of bakes (shown_results.py)
         self.filter_glossy = filter_glossy  # see gloss.filter_glossy_of
         self.light_path = light_path  # values of the Light Path node's outputs; others are 0
-        self.backfacing = backfacing
+        self.backfacing = backfacing  # value of the Backfacing output
         self.groups: list[bpy.types.NodeTree] = []
         self.found = False  # whether any shader may have the property
-        self.has_backfacing = False
-        self.has_gloss = False
+        self.has_backfacing = False  # whether the trees depend on the side
+        self.has_gloss = False  # whether DIFFUSE may differ from REFLECTANCE
 
     def rewrite(self, tree: bpy.types.NodeTree) -> None:
+        """Rewrites a tree and the groups in it. Volume and displacement are unlinked."""
         for node in list(tree.nodes):
             if node.type == 'GROUP' and node.node_tree is not None:
                 node.node_tree = node.node_tree.copy()
@@ -61,7 +68,7 @@ class ShaderColors:
                 self.has_backfacing = True
                 _replace(tree, node.outputs['Backfacing'], float(self.backfacing))
             elif node.type in ('ATTRIBUTE', 'VERTEX_COLOR'):
-                # As emission it is no light, as a factor it changes nothing.
+                # The result of a bake emits no light, and as a factor changes nothing.
                 for output in node.outputs:
                     if reads_result(node, output, self.results):
                         _replace(tree, output, 0.0 if self.wanted == RADIANCE else 1.0)
@@ -89,13 +96,14 @@ class ShaderColors:
 
 
 def _is_shader(node: bpy.types.Node) -> bool:
-    """Whether the node makes a shader of its own."""
+    """Whether the node is a shader, rather than a mix or sum of shaders or a group."""
     return (any(item.type == 'SHADER' for item in node.outputs)
             and not any(item.type == 'SHADER' for item in node.inputs)
             and node.type not in ('GROUP', 'GROUP_INPUT', 'REROUTE'))
 
 
 def _replace(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket, value: float) -> None:
+    """Puts a constant in the place of an output."""
     targets = [link.to_socket for link in output.links]
     if not targets:
         return
@@ -106,7 +114,7 @@ def _replace(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket, value: floa
 
 
 def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: _Value) -> None:
-    """Gives an input a value: links it to an output, or sets its constant."""
+    """Gives an input a value: links it to an output, or sets its own value to a constant."""
     if isinstance(value, bpy.types.NodeSocket):
         tree.links.new(value, socket)
     elif isinstance(value, tuple):
@@ -117,20 +125,22 @@ def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: _Value) 
 
 
 class _Formula:
-    """Adds the nodes of a formula to a tree; constants stay constants."""
+    """Adds the nodes of a formula to a tree. Operations on constants add no nodes and give
+    constants."""
 
     def __init__(self, tree: bpy.types.NodeTree, filter_glossy: float | None) -> None:
         self.tree = tree
         self.filter_glossy = filter_glossy
 
     def value(self, node: bpy.types.Node, *names: str) -> _Value:
-        """A number, clamped to 0 to 1, by the first of the names that exists."""
+        """The number, clamped to 0 to 1, of the node's input with the first name that exists."""
         value = self.raw(node, *names)
         if not isinstance(value, bpy.types.NodeSocket):
             return min(max(value, 0.0), 1.0)
         return self._math('ADD', value, 0.0)
 
     def raw(self, node: bpy.types.Node, *names: str) -> _Value:
+        """The value of the node's input with the first name that exists, as it is."""
         socket = next(node.inputs[name] for name in names if name in node.inputs)
         if socket.is_linked and not socket.links[0].is_muted:
             return socket.links[0].from_socket
@@ -138,18 +148,19 @@ class _Formula:
         return tuple(value)[:3] if hasattr(value, '__len__') else float(value)
 
     def times(self, a: _Value, b: _Value) -> _Value:
-        """Of numbers."""
+        """The product of two numbers."""
         if not isinstance(a, bpy.types.NodeSocket) and not isinstance(b, bpy.types.NodeSocket):
             return a * b
         return self._math('MULTIPLY', a, b, clamp=False)
 
     def rest(self, a: _Value) -> _Value:
-        """1 - a."""
+        """1 - a, of a number."""
         if not isinstance(a, bpy.types.NodeSocket):
             return 1.0 - a
         return self._math('SUBTRACT', 1.0, a)
 
     def scaled(self, color: _Value, factor: _Value) -> _Value:
+        """A colour times a number."""
         if isinstance(color, tuple) and not isinstance(factor, bpy.types.NodeSocket):
             return tuple(component * factor for component in color)
         if factor == 0.0 or color == (0.0, 0.0, 0.0):
@@ -161,13 +172,13 @@ class _Formula:
         return node.outputs[0]
 
     def plus(self, a: _Value, b: _Value) -> _Value:
-        """Of colours."""
+        """The sum of two colours."""
         if isinstance(a, tuple) and isinstance(b, tuple):
             return tuple(x + y for x, y in zip(a, b))
         return self.vector('ADD', a, b)
 
     def tinted(self, color: _Value, tint: np.ndarray) -> _Value:
-        """tint: (3,)."""
+        """A colour times a constant colour, (3,), by channel."""
         if isinstance(color, tuple):
             return tuple(np.array(color) * tint)
         if np.ptp(tint) == 0.0:
@@ -175,7 +186,7 @@ class _Formula:
         return self.vector('MULTIPLY', color, tuple(tint))
 
     def vector(self, operation: str, a: _Value, b: _Value) -> _Value:
-        """Of colours, channel by channel."""
+        """A node of Vector Math on two colours, by channel. operation: as the node names it."""
         node = self.tree.nodes.new('ShaderNodeVectorMath')
         node.operation = operation
         _set(self.tree, node.inputs[0], a)
@@ -233,7 +244,7 @@ def _rough_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
     once, again = facet_shares(roughness)
     if again == 0.0:
         return formula.scaled(color, once)
-    # Light that meets several facets.
+    # Add light that several facets reflect in turn; see diffuse_angles.facet_shares.
     rest = formula.vector('SUBTRACT', (1.0, 1.0, 1.0), formula.scaled(color, 1.0 - once))
     cube = formula.vector('MULTIPLY', color, formula.vector('MULTIPLY', color, color))
     return formula.plus(formula.scaled(color, once),
@@ -242,7 +253,7 @@ def _rough_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
 
 def _base_color(formula: _Formula, node: bpy.types.Node) -> _Value:
     base = formula.raw(node, 'Base Color')
-    # Before 4.0.
+    # Before 4.0 light that is scattered under the surface has a colour of its own.
     if 'Subsurface Color' not in node.inputs:
         return base
     share = formula.value(node, 'Subsurface')
@@ -267,7 +278,7 @@ def _mean_base(formula: _Formula, node: bpy.types.Node) -> np.ndarray:
 
 
 def _principled_shares(formula: _Formula, node: bpy.types.Node) -> tuple[_Value, _Value]:
-    """What is neither metal nor lets light through, and metal."""
+    """The shares of the surface that are neither metal nor transmit light, and that are metal."""
     metallic = formula.value(node, 'Metallic')
     opaque = formula.times(formula.rest(metallic),
                            formula.rest(formula.value(node, *_TRANSMISSION)))
@@ -305,13 +316,14 @@ def _sheen(formula: _Formula, node: bpy.types.Node) -> tuple[Layer, np.ndarray]:
 
 def _covered(formula: _Formula, color: _Value, layer: Layer, sheen: np.ndarray, albedo: float
              ) -> _Value:
-    """albedo: that of the layer or what is seen from above."""
+    """A colour under sheen. sheen: (3,), the colour of the layer. albedo: of the layer, over all
+    directions or as seen from straight above."""
     return formula.plus(formula.scaled(color, 1.0 - layer.taken(sheen) * albedo),
                         tuple(sheen * albedo))
 
 
 def _under_layers(formula: _Formula, node: bpy.types.Node) -> np.ndarray:
-    """(3,), what coat and sheen leave of emission and of light that goes through."""
+    """(3,): share of emission and of transmitted light that coat and sheen let out."""
     layer, sheen = _sheen(formula, node)
     return (_principled_albedo(formula, node).uncoated
             * (1.0 - layer.taken(sheen) * layer.albedo))
@@ -357,7 +369,7 @@ def _principled_transmittance(formula: _Formula, node: bpy.types.Node) -> _Value
             formula.times(alpha, through)))
 
 
-# The colour of a property, by kind of shader; a shader that is not here has none of it.
+# The formula of a property by type of shader. A shader that is not listed has 0 of the property.
 _SHADERS: dict[tuple[str, str], Callable[[_Formula, bpy.types.Node], _Value]] = {
     ('BSDF_DIFFUSE', REFLECTANCE): _rough_diffuse,
     ('BSDF_DIFFUSE', DIFFUSE): _color,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a shader, or a sum of shaders, is to diffuse light, seen from one side."""
+"""One side of a surface: what its shader, or sum of shaders, does with light."""
 
 from __future__ import annotations
 
@@ -15,23 +15,27 @@ from .scattering import OREN_NAYAR, Scattering
 
 @dataclass(frozen=True)
 class Surface:
-    """What a shader is to diffuse light, seen from one side."""
+    """What one side of a surface reflects, emits and lets through. Colours are linear RGB."""
 
+    # Share of the light from all directions that is reflected, 0 to 1, gloss included.
     reflectance: ColorExpression = field(default_factory=ColorExpression)
-    radiance: ColorExpression = field(default_factory=ColorExpression)
-    transmittance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) straight through
-    # What of the reflectance is a diffuse colour.
+    radiance: ColorExpression = field(default_factory=ColorExpression)  # emitted, W/(m^2 sr)
+    # (3,), share of the light that passes straight through, 0 to 1.
+    transmittance: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # The diffuse part of the reflectance, as a view from straight above shows it.
     diffuse: ColorExpression = field(default_factory=ColorExpression)
-    # (TERMS, 3): how the reflectance depends on the light's angle (diffuse_angles.py).
+    # (TERMS, 3): how the reflectance depends on the angle of the light (diffuse_angles.py).
     reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (1 + TERMS, 3): what is seen of light by its angle, times the mean of the diffuse colour.
+    # (1 + TERMS, 3): what a view from straight above shows of light from straight above, and how
+    # that depends on the angle of the light; for the mean of the diffuse colour.
     shown_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((1 + TERMS, 3)))
-    # What leaves it, diffusely, of the light on the other side.
+    # Share of the light on the other side that leaves this side diffusely, 0 to 1.
     translucence: ColorExpression = field(default_factory=ColorExpression)
-    scattering: Scattering = field(default_factory=Scattering)
+    scattering: Scattering = field(default_factory=Scattering)  # where reflected light goes
 
     @staticmethod
     def matt(color: ColorExpression, roughness: float = 0.0) -> Surface:
+        """A diffuse surface: Lambert's, or Oren and Nayar's if roughness (0 to 1) is not 0."""
         mean = np.maximum(color.mean(), 0.0)
         angles = oren_nayar(roughness, mean)
         return Surface(color.scaled(angles.albedo), diffuse=color,
@@ -41,11 +45,12 @@ class Surface:
 
     @property
     def emission(self) -> np.ndarray:
-        """(3,), the mean radiance."""
+        """(3,) W/(m^2 sr), the mean of the emitted radiance."""
         return self.radiance.mean()
 
     def covered(self, layer: Layer, color: np.ndarray) -> Surface:
-        """Beneath a layer. color: (3,), times the layer's albedo."""
+        """This surface with a layer on top. color: (3,) linear RGB, by which the layer's albedo is
+        multiplied."""
         share = layer.taken(color)
         under, above = 1.0 - share * layer.albedo, 1.0 - share * layer.above
         return Surface(
@@ -58,8 +63,8 @@ class Surface:
             self.scattering.covered(share, layer).plus(Scattering.clothed(color, layer)))
 
     def limited(self) -> Surface:
-        """With parts that fit a reflectance of 1, where the whole, which the native library clamps,
-        is more."""
+        """The same surface, with its parts scaled down in channels where the mean reflectance is
+        above 1: the native library clamps the reflectance, and its parts must not exceed it."""
         whole = self.reflectance.mean()
         if not np.any(whole > 1.0):
             return self
@@ -68,6 +73,7 @@ class Surface:
                        scattering=self.scattering.limited(share))
 
     def scaled(self, factor: float) -> Surface:
+        """The surface as a part of a mix: all its shares and its radiance times the factor."""
         return Surface(self.reflectance.scaled(factor), self.radiance.scaled(factor),
                        self.transmittance * factor, self.diffuse.scaled(factor),
                        self.reflected_by_angle * factor, self.shown_by_angle * factor,
