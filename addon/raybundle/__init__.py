@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Raybundle: global illumination in vertex colours, by bundles of parallel global lines.
 
-From Python: raybundle.bake(bpy.context, ...) -> BakeReport.
+Scripts call raybundle.bake(bpy.context, ...), which returns a BakeReport and raises BakeError or
+RaybundleError.
 """
 
 import atexit
@@ -25,7 +26,7 @@ bl_info = {
     "category": "Render",
 }
 
-# In the order of registration: panels show operators and properties.
+# In the order in which they are registered: panels show operators and properties.
 _MODULES = (properties, bake_cache, operators, panels)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bake, stage by stage: check, export, native scene, execute, read results, write, report.
+"""A bake, stage by stage: check, export, native scene, execute, read results, write, report.
 
-Nothing of the user's data changes before the whole solve has succeeded.
+The user's data is changed only after the native library has computed all of the light.
 """
 
 from __future__ import annotations
@@ -31,26 +31,29 @@ from .warning_lines import grouped
 
 @dataclass(frozen=True)
 class TargetLight:
-    """What is to be written to an object."""
+    """The light that is to be written to an object."""
 
     target: BakeTarget
-    light: np.ndarray  # (corners or vertices, 3), by settings.domain
-    error: np.ndarray | None  # (corners or vertices,), likewise; None: not to be written
-    subdivided: SubdividedMesh | None
-    set_lights: dict[str, np.ndarray] = field(default_factory=dict)  # likewise, by attribute
+    light: np.ndarray  # (n, 3), of n corners or vertices by settings.domain
+    error: np.ndarray | None  # (n,), the stated error; None: not to be written
+    subdivided: SubdividedMesh | None  # the finer mesh that gets the light; None: the object's own
+    # (n, 3) by name of the attribute, the light of each light set.
+    set_lights: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 def bake(context: bpy.types.Context, progress: Progress | None = None,
          **overrides: object) -> BakeReport:
-    """Bake the context's scene with its settings, some perhaps overridden (seed=1, ...).
+    """Bakes the context's scene into colour attributes of its meshes, and returns the report.
 
-    progress(stage, fraction) may return False to cancel. Raises BakeError for what the user can put
-    right, RaybundleError for what the native library refuses, with code CANCELLED after a cancel.
+    progress(stage, fraction), fraction from 0 to 1, may return False to cancel. overrides: values
+    of settings of scene.raybundle that hold for this bake (seed=1, ...). Raises BakeError, with a
+    message for the user, for settings or scenes that cannot be baked, and RaybundleError if the
+    native library is missing or fails; its code is CANCELLED after a cancel.
     """
     started = time.perf_counter()
     report_progress = _checked_progress(progress)
     native.load()
-    # Before anything is read: whoever gets the progress may change the file.
+    # Call before anything is read: the function may change the file.
     report_progress('export', 0.0)
     scene = context.scene
     try:
@@ -101,7 +104,7 @@ def _checked_progress(progress: Progress | None) -> Progress:
 
 @contextmanager
 def _object_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Out of Edit Mode, in which meshes can be neither evaluated nor written, and back again."""
+    """Object Mode in the with block: in Edit Mode meshes can be neither evaluated nor written."""
     was_editing = context.mode.startswith('EDIT')
     if was_editing and bpy.ops.object.mode_set.poll():
         bpy.ops.object.mode_set(mode='OBJECT')
@@ -113,6 +116,7 @@ def _object_mode(context: bpy.types.Context) -> Iterator[None]:
 
 
 def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[LightSet]) -> None:
+    """Raises BakeError if the attributes of settings and light sets cannot be written."""
     if not settings.attribute:
         raise BakeError("The attribute needs a name")
     longest = settings.attribute
@@ -139,13 +143,14 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[Ligh
 
 def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list[LightSet]
             ) -> tuple[SceneExport, dict[int, SubdividedMesh]]:
-    """The exported scene and, for topology 'SUBDIVIDE', the finer mesh by target's instance."""
+    """The exported scene and, for topology 'SUBDIVIDE', the finer mesh of each target, by the
+    target's position in SceneData.instances. Raises BakeError if there is nothing to bake."""
     refine = settings.topology == 'SUBDIVIDE'
     selected = None
     if settings.scope == 'SELECTED':
         selected = {item for item in context.scene.objects if item.select_get()}
         if refine:
-            # Whoever selects a copy means its original.
+            # A selected copy stands for its original.
             selected |= {original for original, copy in find_copies(context.scene).items()
                          if copy in selected}
     with originals_shown(context.scene) if refine else nullcontext():
@@ -164,10 +169,11 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
 
 
 def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
-    """Targets whose data belongs to another file keep taking part in the light."""
+    """Removes targets that cannot be written, since their data belongs to another file. They still
+    reflect and block light."""
     writable = []
     for target in export.targets:
-        # A copy needs a place beside its original, but has a mesh of its own.
+        # A subdivided copy has a mesh of its own, but is put beside its original object.
         owner = target.object if settings.topology == 'SUBDIVIDE' else target.object.data
         if owner.library is None and owner.override_library is None:
             writable.append(target)
@@ -182,6 +188,7 @@ def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
 
 
 def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, SubdividedMesh]:
+    """Puts a finer mesh in the place of each target's; returns them by position of the instance."""
     scene = export.scene
     patch_size = settings.patch_size or scene.diagonal() / 64.0
     result = {}
@@ -195,7 +202,7 @@ def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, Subdivided
 
 
 def _want_written_corners(export: SceneExport) -> None:
-    """Of meshes that modifiers made finer: the light of the corners that are written alone."""
+    """Where modifiers have changed a mesh, limits the results to the corners that are written."""
     instances = export.scene.instances
     for target in export.targets:
         if not target.corner_map.is_identity:
@@ -212,7 +219,8 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
 
 
 def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: native.Bake) -> None:
-    """Whoever got the progress may have undone a step, opened a file, edited a mesh."""
+    """Raises BakeError if a target or the bake is no longer as it was exported: the progress
+    function may have undone a step, opened a file or edited a mesh."""
     for target in export.targets:
         try:
             mesh = target.object.data
@@ -236,6 +244,7 @@ def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: n
 def _read_results(native_bake: native.Bake, export: SceneExport,
                   subdivided: dict[int, SubdividedMesh], settings: BakeSettings,
                   light_sets: list[LightSet]) -> list[TargetLight]:
+    """The light of each target, at the corners or vertices of the mesh that gets it."""
     results = []
     for target in export.targets:
         mesh = export.scene.meshes[export.scene.instances[target.instance].mesh]
@@ -263,7 +272,8 @@ def _read_results(native_bake: native.Bake, export: SceneExport,
 
 def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
                 corner_map: CornerMap, domain: str) -> np.ndarray:
-    """(corners or vertices,), the RMS of what comes together there."""
+    """(n,): the stated error of n corners or vertices, by domain ('CORNER' or 'POINT'); the root
+    mean square where several evaluated corners stand for one element."""
     error = native_bake.corner_error(target.instance, mesh.corner_count)
     squares = corner_map.to_original(np.repeat(error[:, None] ** 2, 3, axis=1))
     if domain == 'POINT' and corner_map.is_identity:
@@ -281,6 +291,7 @@ def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
 
 def _write(context: bpy.types.Context, lights: list[TargetLight], settings: BakeSettings,
            export: SceneExport, native_report: dict) -> list[ObjectReport]:
+    """Writes the light to the targets, or to their subdivided copies."""
     copies: dict[bpy.types.Object, bpy.types.Object] = {}
     if settings.topology == 'SUBDIVIDE':
         copies = create_copies(context, {item.target.object: item.subdivided for item in lights})
@@ -290,7 +301,7 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
     reports = []
     for item in lights:
         receiver = copies.get(item.target.object, item.target.object)
-        # The last one is shown: the light of all.
+        # Each attribute becomes the active one: write the light of all lights last.
         for name, light in {**item.set_lights, settings.attribute: item.light}.items():
             color_attribute.write_light(receiver.data, name, settings.data_type, settings.domain,
                                         light)
@@ -312,13 +323,14 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
 
 
 def _exposed(light: np.ndarray, settings: BakeSettings) -> np.ndarray:
+    """Light as it is written, with the settings' exposure and clamping."""
     light = light * np.float32(2.0 ** settings.exposure)
     return np.clip(light, 0.0, 1.0) if settings.clamp else light
 
 
 def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
                            export: SceneExport) -> list[TargetLight]:
-    """One mesh has one set of colours: copy the mesh, or average the light."""
+    """Where targets share a mesh, which has one light, copies the mesh or takes the mean light."""
     groups: dict[bpy.types.Mesh, list[TargetLight]] = {}
     for item in lights:
         groups.setdefault(item.target.object.data, []).append(item)
@@ -328,7 +340,7 @@ def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
             mean = np.mean([item.light for item in group], axis=0)
             set_means = {name: np.mean([item.set_lights[name] for item in group], axis=0)
                          for name in group[0].set_lights}
-            # Of the mean it would be less, as far as errors differ.
+            # The largest error: errors of different signs would make that of the mean smaller.
             error = None if group[0].error is None else np.max([item.error for item in group], 0)
             group = [replace(item, light=mean, error=error, set_lights=set_means)
                      for item in group]

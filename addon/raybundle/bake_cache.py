@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The native bake of each scene, kept for the session.
+"""The native bake of each scene, kept until the file is closed.
 
 It holds the patches and the traced lines, so that a bake after a change of lights or colours only
-solves anew. Whether the geometry is still the same is the native library's own comparison.
+has to solve again. The native library itself compares the geometry with that of the last bake.
 """
 
 from __future__ import annotations
@@ -13,10 +13,13 @@ from bpy.app.handlers import persistent
 from . import native
 from .materials import cycles_bake
 
+# By full name of the scene.
 _bakes: dict[str, native.Bake] = {}
 
 
 def get_or_create(scene: bpy.types.Scene) -> native.Bake:
+    """The scene's native bake, which this module owns. Raises RaybundleError if the library cannot
+    be loaded."""
     if scene.name_full not in _bakes:
         _bakes[scene.name_full] = native.Bake()
     return _bakes[scene.name_full]
@@ -35,12 +38,14 @@ def has_result(scene: bpy.types.Scene) -> bool:
 
 
 def discard(scene: bpy.types.Scene) -> None:
+    """Closes the scene's native bake, if there is one."""
     bake = _bakes.pop(scene.name_full, None)
     if bake is not None:
         bake.close()
 
 
 def discard_all() -> None:
+    """Closes all native bakes, and forgets the materials that Cycles has baked."""
     cycles_bake.discard_all()
     for bake in _bakes.values():
         bake.close()
@@ -49,7 +54,7 @@ def discard_all() -> None:
 
 @persistent
 def _on_load(*_arguments: object) -> None:
-    # The names of scenes mean other scenes now.
+    # In the next file the same names belong to other scenes.
     discard_all()
 
 

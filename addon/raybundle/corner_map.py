@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the corners of an evaluated mesh back to the corners of the mesh the user edits.
+"""Which corners of an evaluated mesh stand for which corners of the mesh that the user edits.
 
-Modifiers may change the topology, and Blender's own index of origin is not open to Python. So the
-original mesh carries two integer attributes during the export, with a scattered code per vertex and
-per corner. Modifiers copy the codes of elements they keep and interpolate (which is to say spoil)
-those of elements they make; a scattered code is recognised as spoilt where a plain index would
-often pass for another element's.
+Modifiers may change the topology, and Python has no access to Blender's own index of the original
+element. During the export the original mesh therefore carries two integer attributes, with a code
+for each vertex and each corner. Modifiers copy the codes of elements that they keep, and
+interpolate codes for elements that they create. Codes are sparse numbers in no order, so that an
+interpolated one is nearly never the code of an element; a plain index often would be.
 """
 
 from __future__ import annotations
@@ -22,40 +22,44 @@ from .mesh_arrays import corner_vertices, read, topology, vertex_positions
 VERTEX_CODE = ".raybundle_vertex"
 CORNER_CODE = ".raybundle_corner"
 
-# Integers of so many bits survive Blender's interpolation in single precision with a weight of 1.
+# Blender interpolates integers in single precision, which keeps so many bits if the weight is 1.
 _CODE_BITS = 24
 
-# Of this many integers one is a code: so rarely is an interpolated code taken for an exact one. It
-# is less rare on meshes of more than 4096 elements, for which the limit above is what counts.
+# One in so many integers is a code: an interpolated one is taken for a code as rarely. On meshes of
+# more than 4096 elements the limit of bits makes codes denser.
 _CODES_PER_ELEMENT = 4096
 
-# Faces look the same way if the cosine between their normals is larger.
+# Faces count as facing the same way if the cosine between their normals is larger.
 _SAME_WAY = 0.7
 
 
 @dataclass(frozen=True)
 class CornerMap:
-    """Means over evaluated corners for each original corner, or one to one."""
+    """Pairs of corners of an evaluated mesh and of the original one.
 
-    original_count: int
-    evaluated: np.ndarray | None = None  # (k,) evaluated corner of each pair; None: one to one
-    original: np.ndarray | None = None  # (k,) original corner of each pair
-    copied: int = 0  # original corners of which the modifiers made several, in other places
-    untraced: int = 0  # original corners that the modifiers kept no trace of
+    An original corner gets the mean of the evaluated corners that it is paired with.
+    """
+
+    original_count: int  # corners of the original mesh
+    # (k,): evaluated corner of each pair; None: both meshes have the same corners.
+    evaluated: np.ndarray | None = None
+    original: np.ndarray | None = None  # (k,): original corner of each pair
+    copied: int = 0  # original corners that modifiers have copied to other places as well
+    untraced: int = 0  # original corners that the modifiers kept no code of
 
     @property
     def is_identity(self) -> bool:
         return self.evaluated is None
 
     def to_original(self, values: np.ndarray) -> np.ndarray:
-        """values: (evaluated corners, 3) -> (original corners, 3); 0 where there is none."""
+        """Values (evaluated corners, 3) -> (original corners, 3); 0 for a corner without a pair."""
         if self.is_identity:
             return values
         return grouped_mean(values[self.evaluated], self.original, self.original_count)
 
 
 class ElementCodes:
-    """Puts the codes on original meshes and takes them off again; a context manager."""
+    """A context manager: original meshes have their codes in the with block."""
 
     def __init__(self, meshes: Iterable[bpy.types.Mesh]) -> None:
         self._meshes = list(dict.fromkeys(meshes))
@@ -74,20 +78,22 @@ class ElementCodes:
     def __exit__(self, *exception: object) -> None:
         for mesh, active in zip(self._meshes, self._active):
             _remove_codes(mesh)
-            # A new attribute becomes the active one.
+            # New attributes have become the active ones.
             mesh.attributes.active_index = active
 
 
 def same_topology(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> bool:
+    """Whether the corners of the two meshes correspond one to one."""
     return topology(original).matches(topology(evaluated))
 
 
 def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> CornerMap:
-    """Both meshes in object space; codes must have been there when the mesh was evaluated.
+    """Pairs the corners of two meshes, both in object space.
 
-    Of several corners that modifiers made of one it takes that whose face looks the same way, then
-    the one nearest to the original, then the first: of Solidify the shell with the original's
-    normals, of Mirror and Array the copy in its place.
+    If the topology differs, the original mesh must have had its codes (ElementCodes) when it was
+    evaluated. Where modifiers have made several corners of one, the corner is taken whose face
+    faces the same way, then the one nearest to the original, then the first: for Solidify that is
+    the shell with the original's normals, for Mirror and Array the copy in the original's place.
     """
     count = len(original.loops)
     if same_topology(original, evaluated):
@@ -100,7 +106,7 @@ def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> Cor
     before, after = _Corners(original), _Corners(evaluated)
     missing = np.ones(count, bool)
 
-    # The corners that came through; a corner and its vertex must agree.
+    # Pair corners whose code was kept and whose vertex has the code of the same original vertex.
     exact = corners >= 0
     exact[exact] = original_vertices[corners[exact]] == corner_origin_vertices[exact]
     candidates = np.flatnonzero(exact)
@@ -109,7 +115,7 @@ def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> Cor
     missing[corners[candidates]] = False
     copied = len(np.unique(corners[candidates][~is_best]))
 
-    # For the others those of their vertex, if that came through.
+    # Pair the others with all corners of their vertex, if its code was kept.
     if missing.any():
         candidates, targets = _pairs_with_equal_keys(corner_origin_vertices, original_vertices,
                                                      np.flatnonzero(missing))
@@ -117,7 +123,7 @@ def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> Cor
         pairs.append((candidates[is_best], targets[is_best]))
         missing[targets] = False
 
-    # For the rest what lies nearest and looks the same way.
+    # Pair the rest with the nearest corner that faces the same way.
     rest = np.flatnonzero(missing)
     if len(rest) and len(evaluated.loops):
         pairs.append((_nearest_corners(before, after, rest), rest))
@@ -125,19 +131,21 @@ def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> Cor
 
 
 def grouped_mean(values: np.ndarray, groups: np.ndarray, group_count: int) -> np.ndarray:
-    """(group_count, 3) float32, the mean of each group's values (k, 3); 0 where it has none."""
+    """(group_count, 3) float32: the mean of each group's values, 0 for a group without values.
+    values: (k, 3); groups: (k,), the group of each value."""
     counts = np.bincount(groups, minlength=group_count)
     sums = [np.bincount(groups, values[:, channel], group_count) for channel in range(3)]
     return (np.stack(sums, axis=1) / np.maximum(counts, 1)[:, None]).astype(np.float32)
 
 
 def _codes(count: int) -> np.ndarray:
-    """(count,) int32, distinct, positive, always the same, in no order."""
+    """(count,) int32: a code for each element, distinct and positive; always the same for the same
+    count."""
     numbers = np.arange(1, count + 1, dtype=np.uint64)
     bits = min((_CODES_PER_ELEMENT * count).bit_length(), _CODE_BITS)
     if count >= 2 ** bits:
         return numbers.astype(np.int32)
-    # Each step permutes the numbers of so many bits and leaves 0 where it is.
+    # Each step is a permutation of the numbers of so many bits, in which 0 stays 0.
     for factor in (0x9E3779B1, 0x85EBCA77):
         numbers = (numbers * np.uint64(factor)) & np.uint64(2 ** bits - 1)
         numbers ^= numbers >> np.uint64(bits // 2)
@@ -145,9 +153,10 @@ def _codes(count: int) -> np.ndarray:
 
 
 def _decoded(evaluated: bpy.types.Mesh, name: str, count: int, original_count: int) -> np.ndarray:
-    """(count,) the original element of each evaluated one, -1 where there is none."""
+    """(count,): the original element of each of the count evaluated ones, by the attribute `name`;
+    -1 where its value is no code."""
     attribute = evaluated.attributes.get(name)
-    # Modifiers that build a new mesh, such as Remesh, drop attributes; others move their domain.
+    # Modifiers that build a new mesh, such as Remesh, drop attributes; others change their domain.
     if attribute is None or len(attribute.data) != count or attribute.data_type != 'INT' \
             or original_count == 0:
         return np.full(count, -1)
@@ -161,7 +170,9 @@ def _decoded(evaluated: bpy.types.Mesh, name: str, count: int, original_count: i
 
 def _pairs_with_equal_keys(source_keys: np.ndarray, target_keys: np.ndarray, targets: np.ndarray
                            ) -> tuple[np.ndarray, np.ndarray]:
-    """All (source, target) pairs with the same key, for these targets; keys below 0 match none."""
+    """All pairs (source, target) with the same key, as two arrays. targets: positions in
+    target_keys that are looked for; their keys are at least 0, so that negative source keys, which
+    mean none, match nothing."""
     order = np.argsort(source_keys, kind='stable')
     ordered = source_keys[order]
     first = np.searchsorted(ordered, target_keys[targets], side='left')
@@ -172,14 +183,14 @@ def _pairs_with_equal_keys(source_keys: np.ndarray, target_keys: np.ndarray, tar
 
 
 class _Corners:
-    """Places of a mesh's corners, object space, and the normals of their faces."""
+    """The corners of a mesh: places, in object space, and normals of their faces, (c, 3) each."""
 
     def __init__(self, mesh: bpy.types.Mesh) -> None:
         self.places = vertex_positions(mesh)[corner_vertices(mesh)]
         sizes = read(mesh.polygons, 'loop_total', np.int32)
         faces = np.repeat(np.arange(len(sizes)), sizes)
         self.normals = read(mesh.polygons, 'normal', np.float32, 3)[faces]
-        # Drawn a little into their faces: corners of one vertex differ by face.
+        # Move each corner a little into its face, so that those of one vertex differ.
         centres = grouped_mean(self.places, faces, len(sizes))[faces]
         self.inner_places = self.places + 0.1 * (centres - self.places)
         areas = read(mesh.polygons, 'area', np.float32)
@@ -188,12 +199,13 @@ class _Corners:
 
 def _are_best(candidates: np.ndarray, targets: np.ndarray, before: _Corners, after: _Corners
               ) -> np.ndarray:
-    """(k,) whether an evaluated corner is the best for its target, an original one, or lies where
-    that does, as those of the two triangles of a quad."""
+    """(k,) bool: whether each pair of a candidate (evaluated corner) and a target (original corner)
+    is the best one of its target, or its candidate lies where that of the best one does, as for the
+    corners of the two triangles of a quad."""
     cosines = np.einsum('ij,ij->i', after.normals[candidates], before.normals[targets])
     turn = np.searchsorted((-_SAME_WAY, 0.0), -cosines)  # 0: the same way, 1: sideways, 2: away
     distances = np.linalg.norm(after.places[candidates] - before.places[targets], axis=1)
-    # Copies as far away but for rounding are alike.
+    # Distances that differ by rounding alone count as equal.
     rounding = 1e-4 * before.face_width or 1.0
     order = np.lexsort((candidates, np.round(distances / rounding), turn, targets))
     groups, first = np.unique(targets[order], return_index=True)
@@ -203,8 +215,9 @@ def _are_best(candidates: np.ndarray, targets: np.ndarray, before: _Corners, aft
 
 
 def _nearest_corners(before: _Corners, after: _Corners, corners: np.ndarray) -> np.ndarray:
-    """(k,) for each of these original corners the evaluated one nearest in place and normal."""
-    width = before.face_width  # so far apart in space is as bad as facing away by 60 degrees
+    """(k,): for each of the given original corners, the evaluated one nearest in place and normal.
+    A distance of a mean face's width weighs as much as normals that differ by 60 degrees."""
+    width = before.face_width
     tree = KDTree(len(after.places))
     for index, point in enumerate((after.inner_places + width * after.normals).tolist()):
         tree.insert(point, index)

@@ -1,30 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender images -> linear RGB pixels, and their means."""
+"""Reads Blender images as linear RGB pixels."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
-# Larger images are averaged down: patches see nothing finer, and the native library copies them.
+# Pixels along a side. Larger images are averaged down: patches are larger than their pixels, and
+# the native library copies the images.
 MAX_SIZE = 2048
 
 
 class ImagePixels:
-    """Reads each image once."""
+    """The pixels of images, each of which is read once."""
 
     def __init__(self) -> None:
         self._pixels: dict[str, np.ndarray | None] = {}
 
     def read(self, image: bpy.types.Image) -> np.ndarray | None:
-        """(height, width, 3) float32, linear RGB, bottom row first; None without pixel data."""
+        """(height, width, 3) float32, linear RGB, bottom row first; None if the image has no
+        pixels, as when its file is missing."""
         if image.name_full not in self._pixels:
             self._pixels[image.name_full] = _read(image)
         return self._pixels[image.name_full]
 
 
 def srgb_to_linear(values: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1, any shape."""
+    """Linear values, float32, of sRGB values 0 to 1 (IEC 61966-2-1), of any shape."""
     return np.where(values <= 0.04045, values / 12.92,
                     ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
@@ -33,7 +35,8 @@ _LINEAR_OF_BYTE = srgb_to_linear(np.arange(256) / 255.0)
 
 
 def sphere_mean(pixels: np.ndarray) -> np.ndarray:
-    """(3,), the mean of an equirectangular image over the sphere; rows near the poles are small."""
+    """(3,), the mean of an equirectangular image (height, width, 3) over the sphere, in which rows
+    near the poles cover little."""
     height = len(pixels)
     weights = np.sin((np.arange(height) + 0.5) * np.pi / height)
     return np.average(pixels.mean(axis=1), axis=0, weights=weights)
@@ -42,7 +45,7 @@ def sphere_mean(pixels: np.ndarray) -> np.ndarray:
 def _read(image: bpy.types.Image) -> np.ndarray | None:
     width, height = image.size
     channels = image.channels
-    # Both are 0 when the file is missing.
+    # A missing file gives sizes of 0.
     if width == 0 or height == 0 or channels == 0 or not image.has_data and not len(image.pixels):
         return None
     values = np.empty(width * height * channels, np.float32)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What changes Cycles' diffuse light and not that of the bake: a line for each, with what to do.
+"""Names what changes Cycles' diffuse light but not that of a bake, with what the user can do.
 
-docs/limits.md has the table of all of it, and of what is followed.
+Each function yields lines for the report. docs/limits.md lists all such features, and those that
+the bake follows.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import bpy
 from .materials.node_links import output_node
 from .warning_lines import listed
 
-# Whatever a mesh is not made of.
+# Types of objects that take no part in a bake, and what is said of each.
 UNREAD_TYPES = {
     'CURVES': "hair curves neither block nor reflect light here: convert them to a mesh with "
               "thickness",
@@ -23,9 +24,10 @@ UNREAD_TYPES = {
     'VOLUME': "a volume neither dims nor scatters light here: convert it to a mesh, or hide it in "
               "renders to compare with Cycles",
 }
-# Blender's own values: less is somebody's choice.
+# Blender's defaults: lower values were chosen by the user.
 _BOUNCES, _DIFFUSE_BOUNCES, _CLAMP_INDIRECT = 12, 4, 10.0
-# Of modifiers and of the data of objects: in the viewport and in renders.
+# Names of properties that set the detail of geometry in the viewport and in renders: of modifiers,
+# and of the data of objects by type.
 _DETAIL = (('levels', 'render_levels'), ('steps', 'render_steps'),
            ('viewport_resolution', 'resolution'))
 _DATA_DETAIL = {'CURVE': ('resolution_u', 'render_resolution_u'),
@@ -36,6 +38,7 @@ NO_CAUSTICS = "its Shadow Caustics are not read: light goes straight on through 
 
 
 def of_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
+    """Settings of the scene, of its view layer and of Cycles that a bake does not follow."""
     if scene.background_set is not None:
         yield (f'the background set "{scene.background_set.name}" is left out: link its objects to '
                f'the scene')
@@ -65,6 +68,7 @@ def of_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) 
 
 
 def of_world(world: bpy.types.World | None) -> Iterator[str]:
+    """Features of the world that a bake does not follow."""
     tree = world.node_tree if world is not None else None
     # From 5.0 on every world has nodes and use_nodes only warns.
     if tree is None or bpy.app.version < (5, 0, 0) and not world.use_nodes:
@@ -79,7 +83,8 @@ def of_world(world: bpy.types.World | None) -> Iterator[str]:
 
 def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Material, bool]]
                  ) -> Iterator[str]:
-    """materials: original, each with whether it lets light straight through."""
+    """Features of materials that a bake does not follow. materials: original, each with whether
+    light passes straight through it."""
     turned, glassy = [], []
     for material, is_transparent in materials:
         output = output_node(material.node_tree) if material.node_tree is not None else None
@@ -117,7 +122,7 @@ def _quoted(names: Iterable[str]) -> list[str]:
 
 def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
            ) -> Iterator[bpy.types.Node]:
-    """Of a tree and its groups."""
+    """The nodes of a tree and of its groups. seen: full names of the groups around the tree."""
     for node in tree.nodes:
         yield node
         group = getattr(node, 'node_tree', None)
@@ -126,7 +131,8 @@ def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
 
 
 def _turns_normals(node: bpy.types.Node) -> bool:
-    """By more than bumps, which are not in Cycles' bake of vertices either."""
+    """Whether a node changes shading normals in a way that Cycles' vertex bake shows; bumps are not
+    in it."""
     if node.type == 'NORMAL_MAP':
         return not node.mute and any(output.is_linked for output in node.outputs)
     socket = node.inputs.get('Normal') if any(item.type == 'SHADER' for item in node.outputs) \
@@ -136,16 +142,18 @@ def _turns_normals(node: bpy.types.Node) -> bool:
 
 
 def _is_glass(node: bpy.types.Node) -> bool:
+    """Whether a shader refracts light."""
     if node.type != 'BSDF_PRINCIPLED':
         return node.type in ('BSDF_GLASS', 'BSDF_REFRACTION')
-    # Renamed in 4.0.
+    # The socket was renamed in 4.0.
     socket = node.inputs.get('Transmission Weight') or node.inputs.get('Transmission')
     return socket.is_linked or socket.default_value > 0.0
 
 
 def _setting(owner: bpy.types.ID, name: str, usual: object) -> object:
-    """Of Cycles' settings as long as it has them, of Blender's since then."""
-    # Of the original: what a script changes in Cycles' does not reach the evaluated one.
+    """A setting that was Cycles' and is Blender's own in later versions; `usual` if neither has
+    it."""
+    # Read the original: changes of Cycles' settings by scripts do not reach the evaluated owner.
     cycles = getattr(owner.original, 'cycles', None)
     return getattr(cycles, name, getattr(owner, name, usual))
 
@@ -155,7 +163,7 @@ def _displacement(material: bpy.types.Material) -> str:
 
 
 def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
-    """items: original, those that take part."""
+    """Features of objects that a bake does not follow. items: original, those that take part."""
     differing = []
     for item in items:
         yield from _of_hair(item)
@@ -169,6 +177,7 @@ def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
 
 
 def _of_hair(item: bpy.types.Object) -> Iterator[str]:
+    """Hair of particle systems that renders show."""
     for modifier in item.modifiers:
         if modifier.type != 'PARTICLE_SYSTEM' or not modifier.show_render:
             continue
@@ -181,7 +190,7 @@ def _of_hair(item: bpy.types.Object) -> Iterator[str]:
 
 
 def _differences(item: bpy.types.Object) -> Iterator[str]:
-    """Between viewport and renders."""
+    """Where the object's geometry differs between viewport and renders, each in a few words."""
     for modifier in item.modifiers:
         if modifier.show_viewport != modifier.show_render:
             yield f'{modifier.name} is on in one of them'
@@ -200,20 +209,21 @@ def _differences(item: bpy.types.Object) -> Iterator[str]:
         yield "adaptive subdivision"
     if item.type in _DATA_DETAIL:
         shown, rendered = (getattr(item.data, name) for name in _DATA_DETAIL[item.type])
-        # 0 of renders is as in the viewport.
+        # A resolution of 0 in renders means that of the viewport.
         if rendered and shown != rendered:
             yield f'{_DATA_DETAIL[item.type][0]} {shown:.3g} and {rendered:.3g}'
 
 
 def has_light_linking(item: bpy.types.Object) -> bool:
-    """Of a lamp, or an object that emits; from 4.0 on."""
+    """Whether light linking limits what a lamp or an emissive object lights or is blocked by. It
+    exists from Blender 4.0 on."""
     linking = getattr(item, 'light_linking', None)
     return bool(linking and (linking.receiver_collection or linking.blocker_collection))
 
 
 def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iterator[str]:
-    """hidden: surfaces that the viewport hides and renders do not, original; lights: names of such
-    lamps, which shine."""
+    """What is hidden in the viewport but not in renders. hidden: original objects with surfaces,
+    which are left out; lights: names of lamps, which do take part."""
     yield from _line_about(
         _quoted(dict.fromkeys(lights)),
         "lights that are hidden in the viewport shine, as in Cycles",
@@ -225,16 +235,17 @@ def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iter
 
 
 def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
-    """unrendered: shown in the viewport but not in renders, original. What is drawn as wires or
-    bounds, as those that cut others are, is not missed."""
+    """What is shown in the viewport but not in renders, and left out. unrendered: original objects.
+    Those that are drawn as wires or bounds, such as cutters of Boolean modifiers, are not named."""
     yield from _line_about(
         _quoted(item.name for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')),
         "what is hidden in renders is left out, as by Cycles", "enable it in renders to bake it")
 
 
 def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str]:
-    """Names of objects whose modifiers make several corners of one, and of those whose modifiers
-    keep no trace of some corners."""
+    """Modifiers that hinder the way back to the original mesh (corner_map.py). copied: names of
+    objects whose modifiers make several corners of one; untraced: names of objects whose modifiers
+    do not tell what some corners were."""
     yield from _line_about(
         _quoted(copied),
         "modifiers make several faces of one, and all show the light of that in its place",
@@ -246,7 +257,7 @@ def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str
 
 
 def of_normals(turned: Iterable[str]) -> Iterator[str]:
-    """Names of objects whose custom normals turn their faces."""
+    """Custom normals. turned: names of objects whose custom normals turn their faces."""
     yield from _line_about(
         _quoted(turned),
         "custom normals that turn faces are not followed, light falls on the faces as they lie",

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light sets: named groups of lights, each baked into a colour attribute of its own.
 
-A set has the lights and the emissive objects of a Blender collection, its children included, and
-perhaps the world. What is in no set only counts in the light of all, the scene's main attribute.
+A set contains the lamps and the emissive objects of a Blender collection and of its children, and
+perhaps the world. Lights in no set are only part of the light of all, in the main attribute.
 """
 
 from __future__ import annotations
@@ -19,19 +19,22 @@ from .scene_data import LightSetData, SceneData
 
 @dataclass(frozen=True)
 class LightSet:
+    """An enabled light set of a scene."""
+
     name: str
-    attribute: str
-    objects: frozenset[bpy.types.Object]
-    world: bool
+    attribute: str  # name of the colour attribute that it is written to
+    objects: frozenset[bpy.types.Object]  # original
+    world: bool  # whether it contains the light of the world
 
 
 def attribute_of(item: bpy.types.PropertyGroup, main_attribute: str) -> str:
-    """The name of the attribute that a set of scene.raybundle.light_sets is written to."""
+    """The name of the attribute that a set is written to. item: of scene.raybundle.light_sets."""
     return item.attribute or f"{main_attribute} {item.name}"
 
 
 def read_light_sets(scene: bpy.types.Scene, main_attribute: str) -> list[LightSet]:
-    """The enabled sets. Raises BakeError where their names or attributes clash."""
+    """The enabled sets of the scene. Raises BakeError if a set has no name, or if names or
+    attributes are too long or occur twice."""
     sets: list[LightSet] = []
     owners = {main_attribute: "the light of all"}
     for item in scene.raybundle.light_sets:
@@ -55,7 +58,7 @@ def read_light_sets(scene: bpy.types.Scene, main_attribute: str) -> list[LightSe
 
 
 def written_attributes(scene: bpy.types.Scene) -> set[str]:
-    """The attributes that the scene's sets are or were written to."""
+    """Names of the attributes that the scene's sets are written to, or were in the last bake."""
     settings = scene.raybundle
     names = {attribute_of(item, settings.attribute) for item in settings.light_sets}
     # Sets may have been renamed or removed since the last bake.
@@ -64,7 +67,10 @@ def written_attributes(scene: bpy.types.Scene) -> set[str]:
 
 
 class LightSetMembers:
-    """What of an exported scene belongs to which set; filled while it is exported."""
+    """Records, while a scene is exported, which of its lights belong to which set.
+
+    Raises BakeError if a light belongs to more than one set.
+    """
 
     def __init__(self, sets: list[LightSet], scene: SceneData) -> None:
         self._sets = sets
@@ -73,19 +79,20 @@ class LightSetMembers:
         _check_single("The world", [light_set for light_set in sets if light_set.world])
 
     def add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        """The light that was exported last, of this instance."""
+        """Records the lamp that was exported last. instance: the evaluated instance of it."""
         for index in self._sets_of(instance):
             self._scene.light_sets[index].lights.append(len(self._scene.lights) - 1)
 
     def add_world_lights(self, count: int) -> None:
-        """The lights that were exported last, as parts of the world."""
+        """Records the last `count` exported lights as parts of the world: the suns in its sky."""
         lights = range(len(self._scene.lights) - count, len(self._scene.lights))
         for data in self._scene.light_sets:
             if data.world:
                 data.lights.extend(lights)
 
     def add_instance(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        """The mesh that was exported last, of this instance, if it shines."""
+        """Records the mesh instance that was exported last, if it emits light. instance: the
+        evaluated instance of it."""
         position = len(self._scene.instances) - 1
         if not self._scene.emits(position):
             return
@@ -93,7 +100,8 @@ class LightSetMembers:
             self._scene.light_sets[index].instances.append(position)
 
     def _sets_of(self, instance: bpy.types.DepsgraphObjectInstance) -> list[int]:
-        """None or one, by the object itself or by the one that instances it."""
+        """Positions of the sets, one at most, that contain the object or the one that instances
+        it."""
         items = {instance.object.original}
         if instance.is_instance and instance.parent is not None:
             items.add(instance.parent.original)
@@ -104,6 +112,7 @@ class LightSetMembers:
 
 
 def _check_single(what: str, sets: list[LightSet]) -> None:
+    """Raises BakeError if there is more than one set. what: what belongs to them."""
     if len(sets) > 1:
         names = " and ".join(f'"{light_set.name}"' for light_set in sets)
         raise BakeError(f"{what} belongs to the light sets {names}: light is in one set at most")

@@ -14,7 +14,7 @@ HAS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
 
 @dataclass(frozen=True)
 class Topology:
-    """What two meshes must share for their corners to correspond one to one."""
+    """What must be equal in two meshes for their corners to correspond one to one."""
 
     vertex_count: int
     corner_vertices: np.ndarray  # (c,) int32
@@ -28,7 +28,8 @@ class Topology:
 
 def read(collection: bpy.types.bpy_prop_collection, name: str, dtype: type, width: int = 1
          ) -> np.ndarray:
-    """A property of all elements: (n,) or, for vectors, (n, width)."""
+    """A property of all elements of a collection, as an array of dtype: (n,), or (n, width) for
+    vectors of width components."""
     values = np.empty(len(collection) * width, dtype)
     collection.foreach_get(name, values)
     return values.reshape(-1, width) if width > 1 else values
@@ -36,7 +37,8 @@ def read(collection: bpy.types.bpy_prop_collection, name: str, dtype: type, widt
 
 def read_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str, dtype: type
                     ) -> np.ndarray | None:
-    """(n,) of an attribute that is Blender's own; None: all of its elements have the default."""
+    """(n,): one of Blender's own attributes; None if the mesh does not have it in this domain and
+    type, which means that all elements have the default."""
     attribute = mesh.attributes.get(name)
     if attribute is None or (attribute.domain, attribute.data_type) != (domain, data_type):
         return None
@@ -44,7 +46,7 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str,
 
 
 def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(c,) int32."""
+    """(c,) int32: the vertex of each corner."""
     if HAS_ATTRIBUTES:
         vertices = read_attribute(mesh, '.corner_vert', 'CORNER', 'INT', np.int32)
         if vertices is not None:
@@ -53,10 +55,11 @@ def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def topology(mesh: bpy.types.Mesh) -> Topology:
+    """The topology of a mesh, original or evaluated."""
     return Topology(len(mesh.vertices), corner_vertices(mesh),
                     read(mesh.polygons, 'loop_total', np.int32))
 
 
 def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(n, 3) float32."""
+    """(n, 3) float32, in object space."""
     return read(mesh.vertices, 'co', np.float32, 3)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender meshes -> arrays, by foreach_get only.
+"""Evaluated Blender meshes -> `MeshData`, by foreach_get only.
 
-Elements' own properties are read one by one, inside Blender: some tens of nanoseconds each. What
-Blender 4 keeps as an attribute is copied as a whole, and what is the same for all elements is not
-read at all.
+Blender copies an attribute as a whole, but reads other properties element by element, at some tens
+of nanoseconds each. Therefore what Blender 4 keeps as attributes is read as such, and what is the
+same for all elements is not read at all.
 """
 
 from __future__ import annotations
@@ -19,34 +19,36 @@ from .materials.export import MaterialExport
 from .mesh_arrays import HAS_ATTRIBUTES, corner_vertices, read, read_attribute, vertex_positions
 from .scene_data import MeshData
 
-# Squares of larger coordinates overflow in single precision.
+# Squares of larger coordinates, m, lose all meaning or overflow in single precision.
 COORDINATE_LIMIT = 1e15
 
-# Normals turn by no more than about 10 degrees if the cosine is larger; more than this share of
-# corners makes a mesh one whose normals are turned.
+# A normal counts as turned if its cosine to the usual one is smaller (about 10 degrees), and a mesh
+# as one with turned normals if more than this share of its corners are turned.
 _SAME_WAY, _TURNED_SHARE = 0.985, 0.02
 
 
 class MeshError(ValueError):
-    """A mesh that cannot take part; the message says why, without naming it."""
+    """A mesh that cannot take part in a bake; the message says why, without naming the mesh."""
 
 
 def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExport],
                 default_material: MaterialExport, baked_uvs: np.ndarray | None = None) -> MeshData:
-    """mesh: evaluated; materials: by slot; baked_uvs: (c, 2), for those that Cycles baked.
+    """The arrays of a mesh, in object space.
 
-    Raises MeshError for a mesh that cannot take part.
+    mesh: evaluated. name: for messages. materials: by slot; default_material: used if there are no
+    slots. baked_uvs: (c, 2), for materials that Cycles has baked. Raises MeshError if the mesh has
+    no faces, coordinates that are not finite or too large, or an invalid order of faces.
     """
     if not len(mesh.polygons):
         raise MeshError("has no faces")
     vertices = vertex_positions(mesh)
-    # This is False for NaN too.
+    # The comparison is False for NaN too.
     if not (np.abs(vertices) < COORDINATE_LIMIT).all():
         raise MeshError("has coordinates that are not finite numbers, or too large to compute with")
     starts = read(mesh.polygons, 'loop_start', np.int32)
     face_offsets = np.append(starts, np.int32(len(mesh.loops)))
     sizes = np.diff(face_offsets)
-    # Later ones have no size beside the start.
+    # Later versions of Blender have no sizes that could contradict the starts.
     if not HAS_ATTRIBUTES and not np.array_equal(sizes, read(mesh.polygons, 'loop_total',
                                                              np.int32)):
         raise MeshError("has faces out of order; a modifier or script left the mesh invalid")
@@ -63,8 +65,8 @@ def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExp
 
 
 def has_turned_normals(mesh: bpy.types.Mesh, data: MeshData) -> bool:
-    """Whether custom normals turn the shading of faces, away from both their own normals and those
-    of their vertices; data: exported from the mesh."""
+    """Whether custom normals turn the shading of faces, away from both the faces' own normals and
+    those of their vertices. mesh: evaluated; data: exported from it."""
     if not mesh.has_custom_normals:
         return False
     usual = (np.repeat(read(mesh.polygon_normals, 'vector', np.float32, 3),
@@ -76,7 +78,7 @@ def has_turned_normals(mesh: bpy.types.Mesh, data: MeshData) -> bool:
 
 
 def _face_slots(mesh: bpy.types.Mesh, count: int) -> np.ndarray:
-    """(f,) int32, positions in `count` materials."""
+    """(f,) int32: the material slot of each face, clamped to 0 to count - 1."""
     slots = None
     if count > 1:
         slots = (read_attribute(mesh, 'material_index', 'FACE', 'INT', np.int32)
@@ -88,7 +90,7 @@ def _face_slots(mesh: bpy.types.Mesh, count: int) -> np.ndarray:
 
 
 def _face_smooth(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(f,) bool."""
+    """(f,) bool: whether each face is shaded smooth."""
     if not HAS_ATTRIBUTES:
         return read(mesh.polygons, 'use_smooth', bool)
     sharp = read_attribute(mesh, 'sharp_face', 'FACE', 'BOOLEAN', bool)
@@ -97,11 +99,14 @@ def _face_smooth(mesh: bpy.types.Mesh) -> np.ndarray:
 
 def _corner_normals(mesh: bpy.types.Mesh, vertices_of_corners: np.ndarray, sizes: np.ndarray,
                     smooth: np.ndarray) -> np.ndarray:
-    """(c, 3) float32, unit shading normals. Of corners and faces: vertices; corners, smoothness."""
+    """(c, 3) float32, the unit shading normal of each corner, in object space.
+
+    vertices_of_corners: (c,); sizes: (f,), corners of each face; smooth: (f,) bool.
+    """
     if bpy.app.version >= (4, 1, 0):
         return read(mesh.corner_normals, 'vector', np.float32, 3)
     if mesh.use_auto_smooth:
-        # Split at edges, or the user's own.
+        # Normals that are split at sharp edges, or set by the user.
         mesh.calc_normals_split()
         normals = read(mesh.loops, 'normal', np.float32, 3)
         mesh.free_normals_split()
@@ -117,7 +122,7 @@ def _corner_normals(mesh: bpy.types.Mesh, vertices_of_corners: np.ndarray, sizes
 
 
 def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(e, 2) int32, the vertices of the edges that are marked sharp."""
+    """(e, 2) int32: the two vertices of each edge that is marked sharp."""
     sharp = (read_attribute(mesh, 'sharp_edge', 'EDGE', 'BOOLEAN', bool)
              if HAS_ATTRIBUTES else read(mesh.edges, 'use_edge_sharp', bool))
     if sharp is None or not sharp.any():
@@ -127,7 +132,8 @@ def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray:
 
 def _uvs(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport], corner_slots: np.ndarray,
          baked_uvs: np.ndarray | None) -> np.ndarray | None:
-    """(c, 2) as each corner's own material reads them; None if no material has an image."""
+    """(c, 2) float32: the coordinates at which each corner's own material reads its images; None if
+    no material has an image. corner_slots: (c,), slot of each corner."""
     textures = [(slot, item.texture) for slot, item in enumerate(materials) if item.texture]
     baked = [slot for slot, item in enumerate(materials) if item.baked_uvs]
     if not textures and not baked:
@@ -151,6 +157,7 @@ def _uvs(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport], corner_slots
 
 
 def _uv_layer(mesh: bpy.types.Mesh, texture: Texture) -> bpy.types.MeshUVLoopLayer | None:
+    """The UV map that a texture is read at; None if the mesh has no such map."""
     if texture.uv_layer:
         return mesh.uv_layers.get(texture.uv_layer)
     return next((layer for layer in mesh.uv_layers if layer.active_render), None)
@@ -158,7 +165,8 @@ def _uv_layer(mesh: bpy.types.Mesh, texture: Texture) -> bpy.types.MeshUVLoopLay
 
 def _corner_colors(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport],
                    corner_slots: np.ndarray) -> np.ndarray | None:
-    """(c, 3) as each corner's own material reads them; None if no material has an attribute."""
+    """(c, 3) float32, linear RGB: the attribute that each corner's own material reads; None if no
+    material reads one. corner_slots: (c,), slot of each corner."""
     names = [(slot, item.attribute) for slot, item in enumerate(materials)
              if item.attribute is not None]
     if not names:
@@ -178,4 +186,5 @@ def _corner_colors(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport],
 
 
 def _color_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
+    """The colour attribute of a name, "" for the rendered one; None if there is none."""
     return mesh.color_attributes.get(name) if name else rendered_attribute(mesh)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The native library: the only module that knows ctypes.
+"""Calls the native library; the only module that uses ctypes.
 
-The library is loaded on first use, not at registration, so that enabling the add-on never fails and
-a missing or incompatible library gives a readable message. Arrays go in and out as numpy arrays
-whose shape and type are checked here; handles are wrapped in classes with close() that also work as
-context managers. The interface itself is described in native/include/raybundle/raybundle.h.
+The library is loaded at its first use and not when the add-on is registered, so that enabling the
+add-on never fails, and a missing or incompatible library gives a readable message. Arrays are numpy
+arrays, whose shape and type are checked here: TypeError and ValueError name the one that does not
+fit. Handles are wrapped in classes with close(), which are context managers too. A call that fails
+raises RaybundleError. native/include/raybundle/raybundle.h describes the interface.
 """
 
 from __future__ import annotations
@@ -32,15 +33,16 @@ class ErrorCode(enum.IntEnum):
 
 
 class RaybundleError(RuntimeError):
-    """A failed call of the native library, or a library that cannot be used."""
+    """A call of the native library failed, or the library cannot be used."""
 
     def __init__(self, code: int, message: str) -> None:
+        """code: an ErrorCode."""
         super().__init__(message)
         self.code = code
         self.message = message
 
 
-# Names of the stages in the order of rb_stage; the keys of the report's seconds.
+# Names of the stages in the order of rb_stage, which are keys of the report's seconds.
 STAGES = ('patches', 'first_shot', 'bundles', 'solve', 'reconstruction')
 
 IMAGE_EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2}
@@ -83,7 +85,8 @@ SKIPS = ('darkness', 'reflection', 'geometry', 'lights', 'facing', 'occluders', 
          'clusters')
 SETTINGS.update({f'skip.{name}': int for name in SKIPS})
 
-# Called with the stage and the share of it that is done (0 to 1); returning False cancels.
+# A function that is called with the name of the stage and the share of it that is done, 0 to 1;
+# it cancels the bake by returning False.
 Progress = Callable[[str, float], object]
 
 _ProgressFunction = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_double)
@@ -182,7 +185,8 @@ def library_path() -> Path:
 
 
 def load() -> ctypes.CDLL:
-    """Load the library on first use and check that it speaks this module's version."""
+    """The library, loaded at the first call. Raises RaybundleError, with code INVALID_OPERATION, if
+    it is missing, cannot be loaded or has another version of the interface."""
     global _library
     if _library is not None:
         return _library
@@ -247,9 +251,10 @@ def _declare(library: ctypes.CDLL) -> None:
 
 
 def _array(values: object, dtype: type, shape: tuple[int | None, ...], name: str) -> np.ndarray:
-    """A C-contiguous array of this type; None in shape stands for any length.
+    """The values as a C-contiguous array of a type and shape; None in shape stands for any length.
 
-    Floats may change precision and integers size, but floats never silently become integers.
+    Floats may change precision and integers size, but floats do not become integers. Raises
+    TypeError or ValueError, which name the array, if type or shape do not fit.
     """
     array = np.asarray(values)
     if array.size and not np.can_cast(array.dtype, dtype, casting='same_kind'):
@@ -278,7 +283,7 @@ def _as_ints(array: np.ndarray) -> object:
 
 
 class _Handle:
-    """Owner of a native object: close() or a with block releases it."""
+    """Owns a native object, which close() or the end of a with block releases."""
 
     _release = ""
 
@@ -302,7 +307,7 @@ class _Handle:
         self.close()
 
     def __del__(self) -> None:
-        # A failed load leaves an object without a pointer.
+        # If the library could not be loaded, there is no pointer.
         if getattr(self, '_pointer', None):
             self.close()
 
@@ -313,7 +318,10 @@ class _Handle:
 
 
 class Scene(_Handle):
-    """The scene as the native library sees it: images, materials, meshes, instances, lights."""
+    """The native library's scene: images, materials, meshes, instances, lights, world.
+
+    Arrays are copied. Methods that add something return its id.
+    """
 
     _release = 'rb_release_scene'
 
@@ -322,7 +330,8 @@ class Scene(_Handle):
         self._library.rb_new_scene(ctypes.byref(self._pointer))
 
     def add_image(self, name: str, pixels: np.ndarray, extension: str) -> int:
-        """pixels: (height, width, 3), linear RGB, bottom row first."""
+        """pixels: (height, width, 3) float, linear RGB, bottom row first; extension: a key of
+        IMAGE_EXTENSIONS."""
         pixels = _float_array(pixels, (None, None, 3), "pixels")
         identifier = _int()
         self._library.rb_add_image(
@@ -437,7 +446,8 @@ class Scene(_Handle):
 
     def add_mesh(self, name: str, vertices: np.ndarray, corner_vertices: np.ndarray,
                  face_offsets: np.ndarray, face_materials: np.ndarray | None) -> int:
-        """vertices: (n, 3) m; corner_vertices: (c,); face_offsets: (f + 1,); materials: (f,)."""
+        """vertices: (n, 3) m; corner_vertices: (c,), vertex of each corner; face_offsets: (f + 1,),
+        first corner of each face, and c; face_materials: (f,), ids, or None for a grey of 0.8."""
         vertices = _float_array(vertices, (None, 3), "vertices")
         corner_vertices = _int_array(corner_vertices, (None,), "corner_vertices")
         face_offsets = _int_array(face_offsets, (None,), "face_offsets")
@@ -454,30 +464,30 @@ class Scene(_Handle):
         return identifier.value
 
     def set_mesh_corner_normals(self, mesh: int, normals: np.ndarray) -> None:
-        """normals: (c, 3), unit length."""
+        """normals: (c, 3), unit length, by corner."""
         normals = _float_array(normals, (None, 3), "normals")
         self._library.rb_set_mesh_corner_normals(
             self._pointer, mesh, _as_floats(normals), len(normals))
 
     def set_mesh_sharp_edges(self, mesh: int, edges: np.ndarray) -> None:
-        """edges: (e, 2), vertex indices."""
+        """edges: (e, 2), the two vertices of each edge."""
         edges = _int_array(edges, (None, 2), "edges")
         self._library.rb_set_mesh_sharp_edges(self._pointer, mesh, _as_ints(edges), len(edges))
 
     def set_mesh_uvs(self, mesh: int, uvs: np.ndarray) -> None:
-        """uvs: (c, 2)."""
+        """uvs: (c, 2), by corner: where materials read images."""
         uvs = _float_array(uvs, (None, 2), "uvs")
         self._library.rb_set_mesh_uvs(self._pointer, mesh, _as_floats(uvs), len(uvs))
 
     def set_mesh_corner_colors(self, mesh: int, colors: np.ndarray) -> None:
-        """colors: (c, 3), linear RGB."""
+        """colors: (c, 3), linear RGB, by corner: what materials with corner colours read."""
         colors = _float_array(colors, (None, 3), "colors")
         self._library.rb_set_mesh_corner_colors(
             self._pointer, mesh, _as_floats(colors), len(colors))
 
     def add_instance(self, mesh: int, name: str, transform: np.ndarray, role: str,
                      side: str) -> int:
-        """transform: (3, 4), object to world."""
+        """transform: (3, 4), object to world; role: a key of ROLES; side: a key of SIDES."""
         transform = _float_array(transform, (3, 4), "transform")
         identifier = _int()
         self._library.rb_add_instance(
@@ -487,7 +497,7 @@ class Scene(_Handle):
 
     def add_point_light(self, name: str, position: np.ndarray, intensity: np.ndarray,
                         radius: float, shape: str) -> int:
-        """position: (3,) m; intensity: (3,) W/sr; radius: m."""
+        """position: (3,) m; intensity: (3,) W/sr; radius: m; shape: a key of POINT_SHAPES."""
         position = _float_array(position, (3,), "position")
         intensity = _float_array(intensity, (3,), "intensity")
         identifier = _int()
@@ -498,7 +508,9 @@ class Scene(_Handle):
 
     def set_light_cone(self, light: int, world_to_light: np.ndarray, angle: float,
                        blend: float, dims_by_cosine: bool) -> None:
-        """world_to_light: (3, 3); angle: full opening in radians; blend: 0 to 1."""
+        """Makes a point light a spot light, which shines along its -Z axis. world_to_light: (3, 3);
+        angle: full opening in radians; blend: 0 to 1, share of the cone in which the light fades;
+        dims_by_cosine: whether the intensity falls with the cosine to the axis."""
         world_to_light = _float_array(world_to_light, (3, 3), "world_to_light")
         self._library.rb_set_light_cone(
             self._pointer, light, _as_floats(world_to_light), angle, blend, dims_by_cosine)
@@ -516,7 +528,8 @@ class Scene(_Handle):
 
     def add_area_light(self, name: str, centre: np.ndarray, axis_u: np.ndarray,
                        axis_v: np.ndarray, radiance: np.ndarray, shape: str) -> int:
-        """centre, axis_u, axis_v: (3,) m, half axes; radiance: (3,) W/(m^2 sr)."""
+        """centre: (3,) m; axis_u, axis_v: (3,) m, half axes; radiance: (3,) W/(m^2 sr); shape: a
+        key of AREA_SHAPES."""
         centre = _float_array(centre, (3,), "centre")
         axis_u = _float_array(axis_u, (3,), "axis_u")
         axis_v = _float_array(axis_v, (3,), "axis_v")
@@ -529,30 +542,31 @@ class Scene(_Handle):
         return identifier.value
 
     def set_light_spread(self, light: int, spread: float) -> None:
-        """spread: full opening in radians, 0 to pi, of an area light."""
+        """spread: full opening in radians, 0 to pi, of the light of an area light."""
         self._library.rb_set_light_spread(self._pointer, light, spread)
 
     def set_light_shadows(self, light: int, casts_shadows: bool) -> None:
         self._library.rb_set_light_shadows(self._pointer, light, casts_shadows)
 
     def set_instance_visibility(self, instance: int, stops_direct: bool, exchanges: bool) -> None:
-        """Whether it blocks direct light, and whether it takes part in the exchange of light."""
+        """stops_direct: whether the instance blocks direct light; exchanges: whether it reflects
+        light to other surfaces and blocks theirs."""
         self._library.rb_set_instance_visibility(self._pointer, instance, stops_direct, exchanges)
 
     def set_result_corners(self, instance: int, corners: np.ndarray) -> None:
-        """corners: (k,) of its mesh, those whose light is wanted."""
+        """corners: (k,), the corners of the instance's mesh whose light will be read."""
         corners = np.ascontiguousarray(corners, np.int32)
         self._library.rb_set_result_corners(self._pointer, instance, _as_ints(corners),
                                             len(corners))
 
     def set_world(self, radiance: np.ndarray) -> None:
-        """radiance: (3,) W/(m^2 sr)."""
+        """radiance: (3,) W/(m^2 sr), the same from all directions."""
         radiance = _float_array(radiance, (3,), "radiance")
         self._library.rb_set_world(self._pointer, _as_floats(radiance))
 
     def set_world_image(self, pixels: np.ndarray) -> None:
-        """pixels: (height, width, 3) W/(m^2 sr) on top of set_world, equirectangular as in Cycles,
-        bottom row first."""
+        """pixels: (height, width, 3) W/(m^2 sr), equirectangular as in Cycles, bottom row first; is
+        added to the radiance of set_world."""
         pixels = _float_array(pixels, (None, None, 3), "pixels")
         self._library.rb_set_world_image(
             self._pointer, pixels.shape[1], pixels.shape[0], _as_floats(pixels))
@@ -566,7 +580,7 @@ class Scene(_Handle):
         self._library.rb_set_light_set(self._pointer, light, light_set)
 
     def set_instance_light_set(self, instance: int, light_set: int) -> None:
-        """The set that the instance's emission belongs to."""
+        """Puts the emission of an instance into a light set."""
         self._library.rb_set_instance_light_set(self._pointer, instance, light_set)
 
     def set_world_light_set(self, light_set: int) -> None:
@@ -579,7 +593,8 @@ class Scene(_Handle):
 
 
 class Bake(_Handle):
-    """A bake: settings, execution, results. It keeps patches and lines for the next execution."""
+    """A bake: its settings, execution and results. Patches and lines are kept for the next
+    execution."""
 
     _release = 'rb_release_bake'
 
@@ -594,7 +609,7 @@ class Bake(_Handle):
         elif kind is int:
             self._library.rb_set_bake_int(self._pointer, name.encode(), int(value))
         else:
-            # The library itself refuses unknown names.
+            # The library refuses names that it does not know.
             self._library.rb_set_bake_float(self._pointer, name.encode(), float(value))
 
     def get(self, name: str) -> int | float | str:
@@ -612,20 +627,20 @@ class Bake(_Handle):
         return real.value
 
     def execute(self, scene: Scene, progress: Progress | None = None) -> None:
-        """Bake the scene. Raises RaybundleError, with code CANCELLED if progress returned False;
-        an exception inside progress cancels and is raised again here. After a close() inside
-        progress there are no results."""
+        """Bakes a scene. Raises RaybundleError, with code CANCELLED if progress returned False. An
+        exception in progress cancels too and is raised again here. If progress calls close(), there
+        are no results."""
         raised: list[BaseException] = []
 
         def report(_user: object, stage: int, fraction: float) -> bool:
             try:
                 return progress(STAGES[stage], fraction) is not False
             except BaseException as exception:
-                # It must not cross the C frames between here and the caller of execute.
+                # An exception must not cross the C frames between here and execute.
                 raised.append(exception)
                 return False
 
-        # The function object lives in this frame as long as the library may call it.
+        # Keep the function object in this frame: it must live as long as the library may call it.
         function = _ProgressFunction(report) if progress else _ProgressFunction()
         self._library.rb_set_bake_progress(self._pointer, function, None)
         try:
@@ -642,17 +657,19 @@ class Bake(_Handle):
 
     def corner_light(self, instance: int, output: str, count: int, light_set: int | None = None
                      ) -> np.ndarray:
-        """(count, 3) float32, in the order of the mesh's corners; by all lights or by a set."""
+        """(count, 3) float32: the light at the corners of an instance's mesh, of which there are
+        count. output: a key of OUTPUTS; light_set: id, or None for the light of all lights."""
         return self._light('corner', instance, output, count, light_set)
 
     def vertex_light(self, instance: int, output: str, count: int, light_set: int | None = None
                      ) -> np.ndarray:
-        """(count, 3) float32, in the order of the mesh's vertices; by all lights or by a set."""
+        """(count, 3) float32: the light at the vertices of an instance's mesh, of which there are
+        count. output: a key of OUTPUTS; light_set: id, or None for the light of all lights."""
         return self._light('vertex', instance, output, count, light_set)
 
     def _light(self, element: str, instance: int, output: str, count: int,
                light_set: int | None) -> np.ndarray:
-        """(count, 3) float32. element: 'corner' or 'vertex', of which the mesh has count."""
+        """corner_light or vertex_light. element: 'corner' or 'vertex'."""
         light = np.empty((count, 3), np.float32)
         arguments = (instance, OUTPUTS[output], _as_floats(light), count)
         if light_set is None:
@@ -663,13 +680,15 @@ class Bake(_Handle):
         return light
 
     def corner_error(self, instance: int, count: int) -> np.ndarray:
-        """(count,) float32, in the order of the mesh's corners: stated error of LIGHTING."""
+        """(count,) float32: the stated error of LIGHTING, in its unit, at the corners of an
+        instance's mesh."""
         error = np.empty(count, np.float32)
         self._library.rb_get_corner_error(self._pointer, instance, _as_floats(error), count)
         return error
 
     def report(self) -> dict:
-        """The native part of the report of the last successful execution."""
+        """The native part of the report of the last execution that succeeded. Raises
+        RaybundleError if there was none."""
         text = _text()
         self._library.rb_get_report(self._pointer, ctypes.byref(text))
         return json.loads(text.value.decode())
@@ -681,7 +700,7 @@ class Bake(_Handle):
 
 
 class Subdivision(_Handle):
-    """A conforming triangle mesh whose edges are no longer than max_edge metres.
+    """A conforming triangle mesh, made of another mesh, with edges not longer than max_edge, m.
 
     vertices        (n, 3) float32, m
     triangles       (t, 3) int32, vertex indices

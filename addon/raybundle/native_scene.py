@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""SceneData -> the native library's scene."""
+"""Builds the native library's scene of a `SceneData`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from .scene_data import (AreaLightData, LightData, LightSetData, MeshData, Point
 
 
 def build_native_scene(data: SceneData) -> native.Scene:
-    """Ids of instances and lights are positions in data's lists. The caller closes the scene."""
+    """The native scene, which the caller closes. Its ids of instances and of lights are positions
+    in the lists of data. Raises RaybundleError if the native library refuses any of it."""
     scene = native.Scene()
     images = [scene.add_image(image.name, image.pixels, image.extension) for image in data.images]
     materials = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: each asks whether it may run, calls one function and reports."""
+"""The operators of the add-on: each checks whether it may run, calls the bake, and reports."""
 
 import bpy
 
@@ -11,18 +11,20 @@ from .materials.last_surfaces import LastSurfaces
 from .native import ErrorCode, RaybundleError
 from .subdivided_copy import remove_copies
 
-# Share of the progress bar at the start of each stage; most of the time goes into bundles.
+# Where on the progress bar, from 0 to 1, each stage starts; bundles take most of the time.
 _STAGE_STARTS = {'export': 0.0, 'patches': 0.05, 'first_shot': 0.1, 'bundles': 0.3, 'solve': 0.85,
                  'reconstruction': 0.9, 'write_back': 0.97, 'done': 1.0}
 
 
 def _overall_fraction(stage: str, fraction: float) -> float:
+    """The place on the progress bar, 0 to 1, of a fraction of a stage."""
     starts = list(_STAGE_STARTS.values())
     index = list(_STAGE_STARTS).index(stage)
     return starts[index] + fraction * (starts[index + 1] - starts[index])
 
 
 def _run_bake(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+    """Bakes with a progress bar, and reports errors, warnings and the summary to the user."""
     window_manager = context.window_manager
 
     def show_progress(stage: str, fraction: float) -> None:
@@ -44,7 +46,7 @@ def _run_bake(operator: bpy.types.Operator, context: bpy.types.Context) -> set[s
 
 
 class _NeedsScene:
-    """Of an operator that may run wherever there is a scene."""
+    """Mixin of operators that may run wherever there is a scene."""
 
     @classmethod
     def poll(cls, context):
@@ -147,7 +149,7 @@ class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
         for item in context.scene.objects:
             if item.type == 'MESH' and item.data.library is None:
                 color_attribute.activate(item.data, context.scene.raybundle.attribute)
-        # In the background there are no views.
+        # A background process has no windows.
         if not bpy.app.background:
             viewport_preview.toggle(context.window_manager)
         return {'FINISHED'}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panels: Render properties, Object properties, and the sidebar of the 3D view."""
+"""The panels of the add-on: in Render properties, Object properties and the 3D view's sidebar."""
 
 import json
 
@@ -9,14 +9,15 @@ from .light_sets import attribute_of
 
 
 def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
-    """The panel's layout with labels beside the values, and no dots for keyframes."""
+    """The panel's layout, with labels beside the values and without buttons for keyframes."""
     panel.layout.use_property_split = True
     panel.layout.use_property_decorate = False
     return panel.layout
 
 
 class RaybundleRenderPanel:
-    """In the Render properties, whatever the engine: the bake depends on none."""
+    """Mixin of panels in the Render properties, which show with any render engine: a bake does not
+    depend on it."""
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     bl_context = "render"
@@ -51,7 +52,7 @@ class RAYBUNDLE_PT_last_bake(RaybundleRenderPanel, bpy.types.Panel):
         layout = self.layout
         report = json.loads(context.scene.raybundle.report)
         column = layout.column(align=True)
-        # Reports of earlier releases have none.
+        # Reports by earlier releases have no 'error'.
         if error := report.get('error'):
             column.label(text=f"Noise: {100.0 * error['noise']:.2g} %")
             column.label(text=f"Patch size: {100.0 * error['discretisation']:.2g} %")
@@ -83,7 +84,7 @@ class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        # Short, since the editor is narrow.
+        # Short labels, since the editor is narrow.
         layout.prop(settings, "max_patches", text="Patches")
         layout.prop(settings, "max_bundles", text="Bundles")
         layout.prop(settings, "lines_per_bundle", text="Lines")
@@ -128,7 +129,7 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
                      "write_error"):
             layout.prop(settings, name)
         column = layout.column()
-        # A subdivided copy has a mesh of its own anyway.
+        # Subdivided copies never share a mesh.
         column.active = settings.topology == 'KEEP'
         column.prop(settings, "shared_meshes")
 

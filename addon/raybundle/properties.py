@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the scene (scene.raybundle) and of objects (object.raybundle).
+"""The settings of a scene (scene.raybundle) and of an object (object.raybundle).
 
-The defaults of what the native library knows are its own; a test compares them.
+Settings that the native library has too have its defaults, which a test compares.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ enum_shared_meshes = (
     ('AVERAGE', "Average", "Objects that share a mesh keep sharing it and show their mean light"),
 )
 
-# What each skip leaves out; the names are those of the native library's settings "skip.NAME". New
-# ones at the end: files keep their places.
+# What each skip leaves out, by the names of the native library's settings "skip.NAME". Add new ones
+# at the end: .blend files store the positions in this list.
 enum_skip = (
     ('darkness', "Darkness", "Bundles and solve, if no light reaches any surface"),
     ('reflection', "Reflection", "The same, if no surface reflects light"),
@@ -320,7 +320,7 @@ class RaybundleObjectSettings(bpy.types.PropertyGroup):
 
 @dataclass(frozen=True)
 class BakeSettings:
-    """The settings of one bake: those of the scene, some perhaps overridden."""
+    """The settings of one bake: those of the scene, of which some may be overridden."""
 
     scope: str
     target_error: float
@@ -357,8 +357,9 @@ class BakeSettings:
 
 
 def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
-    """Raises ValueError for an override that is unknown, and for a value, of an override or stored,
-    that is none of the property's: its limits let one pass that is no number."""
+    """The settings of a scene, with overrides by name. Raises ValueError for an override that is
+    unknown, and for a value, overridden or stored, that the property does not allow: Blender itself
+    stores NaN in spite of a property's limits."""
     names = [item.name for item in fields(BakeSettings)]
     for name in overrides:
         if name not in names:
@@ -369,9 +370,9 @@ def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeS
 
 
 def assign(settings: RaybundleSceneSettings, name: str, value: object) -> None:
-    """Sets a setting to a value that may be text; "skip.NAME" switches a skip.
+    """Sets a setting of scene.raybundle to a value, which may be text; "skip.NAME" switches a skip.
 
-    Raises KeyError for a name that is unknown and ValueError for a value that is none of it.
+    Raises KeyError for an unknown name, and ValueError for a value that the setting does not allow.
     """
     section, dot, skip = name.partition(".")
     if dot and section == "skip":
@@ -384,7 +385,8 @@ def assign(settings: RaybundleSceneSettings, name: str, value: object) -> None:
 
 
 def checked_value(name: str, value: object) -> object:
-    """The value in the type of the scene setting of this name; text is converted."""
+    """The value, which may be text, in the type of the scene setting of this name. Raises KeyError
+    for an unknown name, and ValueError for a value that the setting does not allow."""
     definition = RaybundleSceneSettings.bl_rna.properties[name]
     if definition.type == 'ENUM' and definition.is_enum_flag:
         unknown = set(value) - set(definition.enum_items.keys())
@@ -406,7 +408,7 @@ def checked_value(name: str, value: object) -> object:
     except (TypeError, ValueError) as error:
         raise ValueError(f'{name}: "{value}" is not a number') from error
     low, high = definition.hard_min, definition.hard_max
-    if definition.type == 'FLOAT':  # kept as float32, which 0.0005 is a little more of
+    if definition.type == 'FLOAT':  # stored in single precision, where 0.0005 is a little more
         low, high = float(f"{low:g}"), float(f"{high:g}")
     if not low <= number <= high:
         raise ValueError(f"{name}: {number} is not between {low:g} and {high:g}")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The exported scene: plain arrays between Blender and the native library, without bpy.
+"""The exported scene as plain arrays, between Blender and the native library and without bpy.
 
-Indices (mesh, material, image) are positions in the lists of SceneData.
+Indices of meshes, materials, images, instances and lights are positions in the lists of SceneData.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ImageData:
+    """An image of a material."""
+
     name: str
     pixels: np.ndarray  # (height, width, 3) float32, linear RGB, bottom row first
     extension: str  # 'REPEAT', 'EXTEND' or 'CLIP'
@@ -66,20 +68,22 @@ class MaterialData:
 
 @dataclass(frozen=True)
 class MeshData:
+    """A mesh of n vertices, c corners and f faces, in object space."""
+
     name: str
     vertices: np.ndarray  # (n, 3) float32, m
-    corner_vertices: np.ndarray  # (c,) int32
-    face_offsets: np.ndarray  # (f + 1,) int32
-    face_materials: np.ndarray  # (f,) int32
+    corner_vertices: np.ndarray  # (c,) int32, the vertex of each corner
+    face_offsets: np.ndarray  # (f + 1,) int32, the first corner of each face, and c
+    face_materials: np.ndarray  # (f,) int32, index in SceneData.materials
     corner_normals: np.ndarray  # (c, 3) float32, unit length
-    sharp_edges: np.ndarray  # (e, 2) int32, vertices
-    face_smooth: np.ndarray  # (f,) bool
-    uvs: np.ndarray | None = None  # (c, 2) float32
-    corner_colors: np.ndarray | None = None  # (c, 3) float32, linear RGB
+    sharp_edges: np.ndarray  # (e, 2) int32, the two vertices of each edge
+    face_smooth: np.ndarray  # (f,) bool, whether the face is shaded smooth
+    uvs: np.ndarray | None = None  # (c, 2) float32, where materials read images
+    corner_colors: np.ndarray | None = None  # (c, 3) float32, linear RGB, read by materials
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Of vertices, corners and faces."""
+        """Numbers of vertices, of corners and of faces."""
         return len(self.vertices), self.corner_count, self.face_count
 
     @property
@@ -91,15 +95,15 @@ class MeshData:
         return len(self.face_offsets) - 1
 
     def corner_faces(self) -> np.ndarray:
-        """(c,) the face of each corner."""
+        """(c,): the face of each corner."""
         return np.repeat(np.arange(self.face_count), np.diff(self.face_offsets))
 
     def digest(self) -> bytes:
-        """The same for meshes with the same content, whatever their name."""
+        """A digest of the content, without the name."""
         content = hashlib.blake2b(digest_size=16)
         for array in (self.vertices, self.corner_vertices, self.face_offsets, self.face_materials,
                       self.corner_normals, self.sharp_edges, self.uvs, self.corner_colors):
-            # The length keeps two neighbouring arrays from changing places.
+            # Add the shape, so that values cannot move from one array to the next.
             content.update(str(None if array is None else array.shape).encode())
             if array is not None:
                 content.update(np.ascontiguousarray(array).data)
@@ -108,32 +112,38 @@ class MeshData:
 
 @dataclass(frozen=True)
 class InstanceData:
+    """A mesh at a place in the world."""
+
     mesh: int
     name: str
     transform: np.ndarray  # (3, 4) float64, object to world
     role: str  # 'BAKE' or 'OCCLUDE'
     side: str  # 'FRONT' or 'BACK'
-    stops_direct: bool = True  # blocks the light of lamps
-    exchanges: bool = True  # sends light to other objects, and blocks what they send
-    result_corners: np.ndarray | None = None  # (k,) corners whose light is written; None: all
+    stops_direct: bool = True  # whether it blocks the direct light of lamps
+    exchanges: bool = True  # whether it reflects light to other objects and blocks theirs
+    result_corners: np.ndarray | None = None  # (k,), corners whose light is written; None: all
 
 
 @dataclass(frozen=True)
 class PointLightData:
+    """A point or spot lamp."""
+
     name: str
     position: np.ndarray  # (3,) m
     intensity: np.ndarray  # (3,) W/sr
     radius: float  # m
-    shape: str  # 'DISK' or 'SPHERE'
-    world_to_light: np.ndarray | None = None  # (3, 3), of a spot light
-    cone_angle: float = 0.0  # radians, full opening
-    cone_blend: float = 0.0  # 0 to 1
-    cone_dims: bool = False  # the intensity falls with the cosine to the axis
+    shape: str  # 'DISK' (facing the receiver) or 'SPHERE'
+    world_to_light: np.ndarray | None = None  # (3, 3), of a spot lamp, which shines along its -Z
+    cone_angle: float = 0.0  # radians, full opening of a spot lamp
+    cone_blend: float = 0.0  # 0 to 1, share of the cone in which the light fades
+    cone_dims: bool = False  # whether the intensity falls with the cosine to the axis
     casts_shadows: bool = True
 
 
 @dataclass(frozen=True)
 class SunLightData:
+    """A sun lamp, or a sun in the world's sky."""
+
     name: str
     direction: np.ndarray  # (3,) towards the sun
     irradiance: np.ndarray  # (3,) W/m^2 at normal incidence
@@ -143,13 +153,15 @@ class SunLightData:
 
 @dataclass(frozen=True)
 class AreaLightData:
+    """An area lamp."""
+
     name: str
     centre: np.ndarray  # (3,) m
     axis_u: np.ndarray  # (3,) m, half axis
     axis_v: np.ndarray  # (3,) m, half axis
     radiance: np.ndarray  # (3,) W/(m^2 sr)
     shape: str  # 'RECTANGLE' or 'ELLIPSE'
-    spread: float = math.pi  # radians, full opening; the power does not depend on it
+    spread: float = math.pi  # radians, full opening; the emitted power does not depend on it
     casts_shadows: bool = True
 
 
@@ -158,22 +170,25 @@ LightData = PointLightData | SunLightData | AreaLightData
 
 @dataclass
 class LightSetData:
-    """A named group of lights: positions in the lists of SceneData."""
+    """A named group of lights."""
     name: str
-    world: bool = False
-    lights: list[int] = field(default_factory=list)
-    instances: list[int] = field(default_factory=list)
+    world: bool = False  # whether the light of the world belongs to it
+    lights: list[int] = field(default_factory=list)  # indices
+    instances: list[int] = field(default_factory=list)  # indices, of those that emit light
 
 
 @dataclass
 class SceneData:
+    """All that the native library needs of a scene."""
+
     images: list[ImageData] = field(default_factory=list)
     materials: list[MaterialData] = field(default_factory=list)
     meshes: list[MeshData] = field(default_factory=list)
     instances: list[InstanceData] = field(default_factory=list)
     lights: list[LightData] = field(default_factory=list)
     world: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr)
-    # (height, width, 3) W/(m^2 sr) on top of it, equirectangular as in Cycles, bottom row first
+    # (height, width, 3) W/(m^2 sr), equirectangular as in Cycles, bottom row first: is added to
+    # `world`.
     world_image: np.ndarray | None = None
     light_sets: list[LightSetData] = field(default_factory=list)
 
@@ -183,7 +198,7 @@ class SceneData:
         return any(np.any(self.materials[index].emission > 0.0) for index in used)
 
     def diagonal(self) -> float:
-        """Of the bounding box of all instances in the world, m."""
+        """The diagonal of the bounding box of all instances in the world, m; 0 without any."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in self.instances:
             vertices = self.meshes[instance.mesh].vertices
@@ -194,7 +209,7 @@ class SceneData:
 
 
 def box_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(8, 3), the corners of an axis-aligned box."""
+    """(8, 3): the corners of the axis-aligned box from low, (3,), to high, (3,)."""
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
                      for z in (low[2], high[2])])
 

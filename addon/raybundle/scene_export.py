@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The evaluated scene -> SceneData, and what belongs to each object that gets light.
+"""The evaluated scene -> `SceneData`, and for each object that gets light how to write it back.
 
-The viewport's evaluation is used (Python has no other), filtered by what renders.
+Python can only evaluate the scene as the viewport does; of that, what renders show is exported.
 """
 
 from __future__ import annotations
@@ -34,31 +34,35 @@ GEOMETRY_TYPES = ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT')
 
 @dataclass(frozen=True)
 class BakeTarget:
-    """An object that gets light."""
+    """An object that light is written to."""
 
     object: bpy.types.Object  # original
     instance: int  # position in SceneData.instances
-    corner_map: CornerMap
-    name: str  # and vertices, of the object when it was exported
-    vertex_count: int
+    corner_map: CornerMap  # from the exported mesh to the object's own
+    name: str  # of the object when it was exported
+    vertex_count: int  # of the object's own mesh when it was exported
 
 
 @dataclass
 class SceneExport:
+    """An exported scene, and what the report says of it."""
+
     scene: SceneData = field(default_factory=SceneData)
     targets: list[BakeTarget] = field(default_factory=list)
-    statuses: dict[str, str] = field(default_factory=dict)  # of objects that get no light
+    statuses: dict[str, str] = field(default_factory=dict)  # by name: why an object gets no light
     warnings: Warnings = field(default_factory=Warnings)
-    last: LastSurfaces | None = None  # with what the materials are taken for, to be kept
+    last: LastSurfaces | None = None  # holds the surfaces that are used, for the next bake
 
 
 def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None,
                  light_sets: Sequence[LightSet] = (), patch_size: float = 0.0,
                  attribute: str | None = None) -> SceneExport:
-    """selected: the objects to bake, None for all; patch_size: m, 0 for the library's own choice;
-    attribute: where the light is written to, None for that of the scene's settings.
+    """Exports the context's scene. The user's data is unchanged afterwards.
 
-    The original data is as before on return.
+    selected: original objects to bake, None for all; others still reflect and block light.
+    light_sets: of which the members are recorded. patch_size: m, 0 for the native library's choice;
+    images that Cycles bakes follow it. attribute: name of the attribute that light is written to,
+    None for that of the scene's settings. Raises BakeError if a light is in several light sets.
     """
     if attribute is None:
         attribute = context.scene.raybundle.attribute
@@ -70,12 +74,12 @@ def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Obje
             return exporter.export()
     finally:
         if changed:
-            # Evaluate once more, so that nothing that is evaluated still has the codes.
+            # Evaluate again, so that evaluated meshes have no codes either.
             context.view_layer.update()
 
 
 def renderable_instances(context: bpy.types.Context) -> Iterator[bpy.types.DepsgraphObjectInstance]:
-    """What is both visible in the viewport and enabled for rendering."""
+    """Evaluated instances of objects that are both visible in the viewport and shown in renders."""
     depsgraph = context.evaluated_depsgraph_get()
     renderable = _objects_in_rendered_collections(context.view_layer)
     for instance in depsgraph.object_instances:
@@ -93,6 +97,7 @@ def renderable_instances(context: bpy.types.Context) -> Iterator[bpy.types.Depsg
 
 
 def _objects_in_rendered_collections(view_layer: bpy.types.ViewLayer) -> set[bpy.types.Object]:
+    """Original objects in collections that the view layer has and renders show."""
     objects: set[bpy.types.Object] = set()
     pending = [view_layer.layer_collection]
     while pending:
@@ -100,7 +105,7 @@ def _objects_in_rendered_collections(view_layer: bpy.types.ViewLayer) -> set[bpy
         collection = layer_collection.collection
         if collection.hide_render:
             continue
-        # An excluded collection may have children that are not.
+        # Children of an excluded collection need not be excluded.
         if not layer_collection.exclude:
             objects.update(collection.objects)
         pending.extend(layer_collection.children)
@@ -108,6 +113,7 @@ def _objects_in_rendered_collections(view_layer: bpy.types.ViewLayer) -> set[bpy
 
 
 def _role(item: bpy.types.Object, selected: Collection[bpy.types.Object] | None) -> str:
+    """'BAKE', 'OCCLUDE' or 'IGNORE': the role of an original object in this bake."""
     role = item.raybundle.role
     if role == 'BAKE' and selected is not None and item not in selected:
         return 'OCCLUDE'
@@ -117,7 +123,7 @@ def _role(item: bpy.types.Object, selected: Collection[bpy.types.Object] | None)
 def _meshes_with_changed_topology(context: bpy.types.Context,
                                   selected: Collection[bpy.types.Object] | None
                                   ) -> list[bpy.types.Mesh]:
-    """Original meshes of baked objects whose modifiers make other corners."""
+    """Original meshes of baked objects whose modifiers change the topology."""
     meshes = []
     for instance in renderable_instances(context):
         item = instance.object.original
@@ -131,7 +137,7 @@ def _meshes_with_changed_topology(context: bpy.types.Context,
 
 
 class _Exporter:
-    """One walk over the evaluated scene."""
+    """Exports the evaluated scene, for one bake."""
 
     def __init__(self, context: bpy.types.Context,
                  selected: Collection[bpy.types.Object] | None,
@@ -145,27 +151,32 @@ class _Exporter:
         self.materials = MaterialExporter(self.result.scene, self.result.warnings,
                                           filter_glossy_of(context.scene), self.results, self.last)
         self.members = LightSetMembers(list(light_sets), self.result.scene)
-        self._baked: dict[bpy.types.Object, BakedSurface] = {}
+        self._baked: dict[bpy.types.Object, BakedSurface] = {}  # by original object
+        # By mesh and materials, see _mesh: index in SceneData.meshes, or why it is left out.
         self._meshes: dict[tuple, int | MeshError] = {}
-        # By the same keys, the digests (LastSurfaces) of the surfaces in a mesh's slots.
+        # By the same keys, the digests (LastSurfaces) of the surfaces in the slots.
         self._taken: dict[tuple, list[str]] = {}
-        # Of the exported ones, by counts and digest; None: of one that needed no digest yet.
+        # Exported meshes by counts and digest; None in place of the digest of a first one.
         self._alike: dict[tuple[int, int, int], dict[bytes | None, int]] = {}
+        # Instances that are no objects of their own, by names of the instancing object and theirs.
         self._instance_counts: Counter[tuple[str, str]] = Counter()
-        self._corner_maps: dict[bpy.types.Object, CornerMap] = {}
+        self._corner_maps: dict[bpy.types.Object, CornerMap] = {}  # by original object
         self._copied: list[str] = []  # objects whose modifiers make several corners of one
         self._untraced: list[str] = []  # objects whose modifiers keep no trace of some corners
         self._turned: dict[int, str] = {}  # by mesh: an object whose custom normals turn faces
+        # Name, mesh and transform of exported objects that are no meshes.
         self._placed: set[tuple[str, int, bytes]] = set()
         self._drawn: dict[bpy.types.Object, None] = {}  # originals that take part
 
     def bake_surfaces(self, patch_size: float) -> None:
-        """Asks Cycles for the materials that only it can tell. Not while others are evaluated."""
+        """Lets Cycles bake the materials that cannot be read. Must not be called while the
+        evaluated scene is in use, since Cycles evaluates another scene."""
         wanted: dict[bpy.types.Object, Wanted] = {}
         seen: set[tuple] = set()
         for instance in renderable_instances(self.context):
             item = instance.object
-            # Only what has a mesh of its own. What shares it is exported once, with the first.
+            # Only objects with a mesh of their own; of those that share one and its materials, the
+            # first.
             if (item.type != 'MESH' or item.original.type != 'MESH'
                     or _role(item.original, None) == 'IGNORE'):
                 continue
@@ -175,7 +186,8 @@ class _Exporter:
                 continue
             seen.add(group)
             reasons = {}
-            # Cycles bakes the original's, which a script may have changed after the evaluation.
+            # Cycles bakes the original's materials, whose slots a script may have changed since the
+            # evaluation.
             for index, (slot, original) in enumerate(zip(item.material_slots,
                                                          item.original.material_slots)):
                 if slot.material is None or original.material is None:
@@ -188,27 +200,28 @@ class _Exporter:
                 wanted[item.original] = Wanted(reasons, self.results | rendered)
         if not wanted:
             return
-        # A quarter of a patch, as the native library chooses them.
+        # A quarter of the size that the native library chooses for patches.
         pixel = 0.25 * (patch_size or self._diagonal() / 64.0)
         self._baked, failures = bake_surfaces(self.context, wanted, pixel)
         for text in failures:
             self.result.warnings.add(text)
 
     def _slots(self, item: bpy.types.Object) -> tuple[SlotMaterial, ...]:
-        """item: evaluated."""
+        """The material slots of an evaluated object."""
         return tuple(
             self.materials.slot(slot.material, lambda: self._renders_result(item),
                                 lambda index=index: self.last.digest(item.original, index))
             for index, slot in enumerate(item.material_slots))
 
     def _renders_result(self, item: bpy.types.Object) -> bool:
+        """Whether the render colour attribute of an evaluated object is the result of a bake."""
         if item.type != 'MESH' or item.original.type != 'MESH':
             return False
         return renders_result(item.data, self.results,
                               _role(item.original, self.selected) == 'BAKE')
 
     def _diagonal(self) -> float:
-        """About that of the exported scene, m."""
+        """The diagonal of the bounding box of what is exported, about, m."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in renderable_instances(self.context):
             item = instance.object
@@ -218,6 +231,7 @@ class _Exporter:
         return float(np.linalg.norm(high - low))
 
     def export(self) -> SceneExport:
+        """Walks over the evaluated scene; after bake_surfaces."""
         for instance in renderable_instances(self.context):
             item = instance.object
             if item.type == 'LIGHT':
@@ -246,21 +260,22 @@ class _Exporter:
         return self.result
 
     def _hidden(self) -> list[bpy.types.Object]:
-        """Objects that the viewport hides and renders do not, original."""
+        """Original objects that are hidden in the viewport and not in renders, by name."""
         shown = {item.original for item in self.context.evaluated_depsgraph_get().objects}
         return [item for item in sorted(_objects_in_rendered_collections(self.context.view_layer),
                                         key=lambda item: item.name_full)
                 if item not in shown and not item.hide_render]
 
     def _unrendered(self) -> list[bpy.types.Object]:
-        """Objects that the viewport shows and renders do not, original."""
+        """Original objects that are shown in the viewport and not in renders, by name."""
         rendered = _objects_in_rendered_collections(self.context.view_layer)
         return [item for item in sorted(self.context.view_layer.objects,
                                         key=lambda item: item.name_full)
                 if (item.hide_render or item not in rendered) and item.visible_get()]
 
     def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str]) -> None:
-        """lights: names of the hidden ones, which are not."""
+        """Warns of what the bake does not follow. hidden: see _hidden; lights: names of the lamps
+        among them, which are exported."""
         scene = self.context.scene
         hidden, unrendered = (
             [item for item in items
@@ -290,7 +305,7 @@ class _Exporter:
 
     def _add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         item = instance.object
-        # Both are ways to say that diffuse surfaces do not see the light.
+        # Portals and lamps without Diffuse visibility do not light diffuse surfaces.
         if is_portal(item.data) or not item.visible_diffuse:
             return
         light = export_light(item, instance.matrix_world, self.materials.images,
@@ -311,12 +326,12 @@ class _Exporter:
             return
         mesh = self._mesh(item, wants_map=role == 'BAKE' and not instance.is_instance)
         if isinstance(mesh, MeshError):
-            # A curve without a surface, an empty font: not worth a word unless it is a mesh.
+            # Curves without a surface and empty texts are usual; only meshes are worth a warning.
             if original.type == 'MESH':
                 self._refuse(item.name, str(mesh))
             return
         if original.type != 'MESH':
-            # Blender lists a curve both as itself and as the mesh that it evaluates to.
+            # Blender lists a curve twice: as itself and as the mesh that it evaluates to.
             place = (original.name_full, mesh, transform.tobytes())
             if place in self._placed:
                 return
@@ -336,7 +351,7 @@ class _Exporter:
             what = "holdout" if is_holdout else "shadow catcher"
             self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, here it '
                                      f'is an object like others')
-        # Cycles has the flags of the instancer too.
+        # In Cycles the ray visibility of the instancing object counts too.
         shown = (item, instance.parent) if instance.is_instance and instance.parent else (item,)
         self.result.scene.instances.append(
             InstanceData(mesh, item.name, transform, role, original.raybundle.side,
@@ -354,12 +369,14 @@ class _Exporter:
                            len(original.data.vertices)))
 
     def _refuse(self, name: str, reason: str) -> None:
+        """Leaves out an object, with a warning."""
         self.result.statuses[name] = reason
         self.result.warnings.add(f'"{name}" is left out: {reason}')
 
     def _mesh(self, item: bpy.types.Object, wants_map: bool) -> int | MeshError:
-        """Index of the object's mesh in the scene; objects that share it export it once."""
-        # Materials may sit on the object, and then differ between objects with the same mesh.
+        """Index in SceneData.meshes of an evaluated object's mesh, which is exported once;
+        MeshError if it cannot take part. wants_map: the object's corner map is built too."""
+        # Materials may be linked to the object and then differ between objects with the same mesh.
         key = (item.data.as_pointer(), item.type, self._slots(item))
         original = item.original
         needs_map = wants_map and original.type == 'MESH' and original not in self._corner_maps
@@ -381,7 +398,7 @@ class _Exporter:
     def _exported(self, item: bpy.types.Object, mesh: bpy.types.Mesh, key: tuple
                   ) -> int | MeshError:
         baked = self._baked.get(item.original)
-        # Evaluated anew, it may be another mesh.
+        # The mesh was evaluated again since and may have changed.
         if baked is not None and len(baked.uvs) != len(mesh.loops):
             baked = None
         slots = self._slots(item)
@@ -403,11 +420,12 @@ class _Exporter:
         return index
 
     def _unique(self, data: MeshData) -> int:
-        """Copies of a mesh count as the same one, such as those that an earlier bake made."""
+        """Index in SceneData.meshes, where a mesh with the same content, such as a copy that an
+        earlier bake made, is added once."""
         meshes = self.result.scene.meshes
         alike = self._alike.setdefault(data.counts, {})
         if not alike:
-            # Most differ by their counts: nothing to digest.
+            # No mesh has the same counts: a digest is not needed yet.
             digest = None
         else:
             if None in alike:

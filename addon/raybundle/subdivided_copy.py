@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finer copies of objects, for meshes too coarse for their light (topology 'SUBDIVIDE').
+"""Finer copies of objects whose meshes are too coarse for their light (topology 'SUBDIVIDE').
 
-A copy "<name> (Radiosity)" stands in for its original, which is hidden. The copy remembers the
-original in raybundle.source, so that the next bake replaces it and Clear undoes it.
+The copy "<name> (Radiosity)" is shown in place of the original, which is hidden. Its property
+raybundle.source is the original, so that the next bake replaces the copy and Clear removes it.
 """
 
 from __future__ import annotations
@@ -23,20 +23,24 @@ NAME_SUFFIX = " (Radiosity)"
 
 @dataclass(frozen=True)
 class SubdividedMesh:
-    """The finer mesh, and where its corners lie on the mesh it was made of."""
+    """A finer mesh of t triangles, and where its corners lie on the mesh that it was made of."""
 
-    data: MeshData
-    source_faces: np.ndarray  # (t,) int32
-    source_corners: np.ndarray  # (3 t, 3) int32
-    source_weights: np.ndarray  # (3 t, 3) float32, rows sum to 1
+    data: MeshData  # of the finer mesh, in object space
+    source_faces: np.ndarray  # (t,) int32, the source face that each triangle lies in
+    # (3 t, 3): for each corner three corners of the source mesh, int32, and their weights, float32,
+    # which sum to 1.
+    source_corners: np.ndarray
+    source_weights: np.ndarray
 
     def interpolated(self, values: np.ndarray) -> np.ndarray:
-        """values: (source corners, n) -> (corners, n)."""
+        """Values at the corners of the source, (source corners, n), interpolated at those of the
+        finer mesh, (3 t, n)."""
         return np.einsum('cj,cjn->cn', self.source_weights, values[self.source_corners])
 
 
 def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> SubdividedMesh:
-    """No edge of the result is longer than max_edge (m) in the world; transform: (3, 4)."""
+    """A triangle mesh whose edges are not longer than max_edge, m, in the world. transform: (3, 4),
+    object to world. Raises RaybundleError if the native library cannot make it."""
     world = mesh.vertices @ transform[:, :3].T + transform[:, 3]
     with Subdivision(world, mesh.corner_vertices, mesh.face_offsets, max_edge) as subdivision:
         vertices_of_corners = subdivision.triangles.reshape(-1)
@@ -44,7 +48,7 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
                                 subdivision.source_corners.reshape(-1, 3),
                                 subdivision.source_weights.reshape(-1, 3))
         vertex_count = len(subdivision.vertices)
-    # Interpolate in object space, rather than invert a transform that may be flat.
+    # Interpolate in object space: the transform may be flat and have no inverse.
     vertices = np.zeros((vertex_count, 3), np.float32)
     vertices[vertices_of_corners] = result.interpolated(mesh.vertices[mesh.corner_vertices])
     normals = result.interpolated(mesh.corner_normals)
@@ -56,7 +60,7 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
         face_offsets=np.arange(0, len(vertices_of_corners) + 1, 3, dtype=np.int32),
         face_materials=mesh.face_materials[result.source_faces],
         corner_normals=normals.astype(np.float32),
-        # The edges of the source are gone; its normals still part what is sharp and not flat.
+        # The source's edges do not exist here; its normals still differ across sharp ones.
         sharp_edges=np.empty((0, 2), np.int32),
         face_smooth=mesh.face_smooth[result.source_faces],
         uvs=None if mesh.uvs is None else result.interpolated(mesh.uvs),
@@ -65,13 +69,13 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
 
 
 def find_copies(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.Object]:
-    """The copy of each original of the scene."""
+    """The subdivided copies in the scene, by original."""
     return {item.raybundle.source: item for item in scene.objects if item.raybundle.source}
 
 
 @contextmanager
 def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
-    """Originals in place of their copies, until the end of the with block."""
+    """Shows the originals in place of their copies in the with block, in viewport and renders."""
     copies = find_copies(scene)
     states = [(item, item.hide_viewport, item.hide_render)
               for pair in copies.items() for item in pair]
@@ -88,8 +92,11 @@ def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
 def create_copies(context: bpy.types.Context,
                   meshes: dict[bpy.types.Object, SubdividedMesh]
                   ) -> dict[bpy.types.Object, bpy.types.Object]:
-    """Put a copy in the place of each original; earlier copies are removed."""
-    # A hidden original is not evaluated: show all of them for one evaluation.
+    """Makes a finer copy of each object, hides the original and removes an earlier copy of it.
+
+    meshes: by original object. Returns the copies by original.
+    """
+    # Blender does not evaluate hidden objects: show all originals for one evaluation.
     with originals_shown(context.scene):
         depsgraph = context.evaluated_depsgraph_get()
         built = {original: _evaluated_copy(original.evaluated_get(depsgraph), subdivided)
@@ -118,7 +125,7 @@ def _evaluated_copy(evaluated: bpy.types.Object, subdivided: SubdividedMesh) -> 
 def _place_copy(context: bpy.types.Context, original: bpy.types.Object, mesh: bpy.types.Mesh
                 ) -> bpy.types.Object:
     copy = bpy.data.objects.new(original.name + NAME_SUFFIX, mesh)
-    # A collection of another file cannot take new objects.
+    # Objects cannot be added to a collection of another file.
     collections = [item for item in original.users_collection if item.library is None]
     for collection in collections or [context.scene.collection]:
         collection.objects.link(copy)
@@ -135,7 +142,7 @@ def _place_copy(context: bpy.types.Context, original: bpy.types.Object, mesh: bp
 
 
 def remove_copies(scene: bpy.types.Scene) -> int:
-    """Remove all copies and show their originals again; returns how many there were."""
+    """Removes all copies and shows their originals again; returns the number of copies."""
     copies = find_copies(scene)
     for original, copy in copies.items():
         _set_hidden(original, False)
@@ -165,7 +172,7 @@ def _build_mesh(name: str, source: bpy.types.Mesh, subdivided: SubdividedMesh) -
     mesh.polygons.add(data.face_count)
     mesh.polygons.foreach_set('loop_start', data.face_offsets[:-1])
     if bpy.app.version < (4, 1, 0):
-        # Later versions derive it from the starts and refuse to set it.
+        # Later versions derive the sizes from the starts and do not let them be set.
         mesh.polygons.foreach_set('loop_total', np.diff(data.face_offsets))
     slots = read(source.polygons, 'material_index', np.int32)
     mesh.polygons.foreach_set('material_index', slots[subdivided.source_faces])
@@ -174,7 +181,7 @@ def _build_mesh(name: str, source: bpy.types.Mesh, subdivided: SubdividedMesh) -
     _carry_uv_layers(source, mesh, subdivided)
     _carry_color_attributes(source, mesh, subdivided)
     if data.face_smooth.any():
-        # Set as custom normals, the shading stays that of the source, sharp edges included.
+        # Custom normals keep the shading of the source, sharp edges included.
         if bpy.app.version < (4, 1, 0):
             mesh.use_auto_smooth = True
             mesh.auto_smooth_angle = np.pi

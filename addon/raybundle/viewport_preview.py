@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colour attributes in the solid shading of the 3D views, and back to what was there before."""
+"""Shows colour attributes in the 3D views by solid shading, and restores the earlier shading."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ class _Shading:
 _PREVIEW = _Shading('SOLID', 'VERTEX', 'FLAT')
 _DEFAULT = _Shading('SOLID', 'MATERIAL', 'STUDIO')
 
-# What to go back to, by the view's address: views have no name and do not outlive the session.
+# The shading before the preview, by the view's address: views have no names.
 _earlier: dict[int, _Shading] = {}
 
 
 def toggle(window_manager: bpy.types.WindowManager) -> bool:
-    """Returns whether the views show the attribute now."""
+    """Switches the preview on in all 3D views; if it is on in all of them, switches it off. Returns
+    whether it is on now."""
     views = list(_views(window_manager))
     show = any(_read(view) != _PREVIEW for view in views)
     for view in views:

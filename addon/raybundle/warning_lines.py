@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines of the report that say the same of several owners, as one line: 45 materials that mirror are
-no 45 lines."""
+"""Joins lines of the report that say the same of several owners, such as 45 materials, into one."""
 
 from __future__ import annotations
 
@@ -8,15 +7,16 @@ import re
 from collections.abc import Iterable
 
 _MOST_NAMES = 12
-# The kind of owner, its name, and what is said of it; of some a count comes first.
+# A line: the kind of owner, its name, and what is said of it, which may begin with a count.
 _LINE = re.compile(r'(?P<kind>(?:[a-z]+ )?)"(?P<name>.+?)"(?P<said>[: ].*)', re.DOTALL)
 _COUNT = re.compile(r': (?P<count>\d+) (?P<counted>.*)', re.DOTALL)
-# Blender's suffix of copies, in the names of nodes.
+# The suffix that Blender gives to names of copies, here of nodes.
 _SUFFIX = re.compile(r'\.\d{3,}"')
 
 
 def grouped(lines: Iterable[str]) -> list[str]:
-    """In the order of the first of each. Counts are added up."""
+    """Lines of which those that differ only by owner and count are joined: the owners are listed
+    and the counts added. The order is that of the first line of each group."""
     groups: dict[tuple[str, str], list[re.Match]] = {}
     for line in dict.fromkeys(lines):
         match = _LINE.fullmatch(line)
@@ -43,6 +43,6 @@ def grouped(lines: Iterable[str]) -> list[str]:
 
 
 def listed(items: list[str], most: int = 3) -> str:
-    """The first of them, and how many more there are."""
+    """The first `most` items, separated by commas, and how many more there are."""
     text = ", ".join(items[:most])
     return text if len(items) <= most else f"{text} and {len(items) - most} more"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world's light: a constant radiance, and for all else an image and suns."""
+"""The light of the world, as a constant radiance, an image of what varies, and suns."""
 
 from __future__ import annotations
 
@@ -16,28 +16,33 @@ from .materials.node_links import output_node
 from .materials.node_reader import NodeReader
 from .scene_data import SunLightData, Warnings
 
-# Images that vary by less than this share of their mean are constant: noise and rounding.
+# An image that varies by less than this share of its mean counts as constant.
 _LEAST_VARIATION = 1e-3
-# Worlds that are remembered: the last ones, so that a bake after a change of lamps is quick.
+# Number of evaluated worlds that are kept, so that a bake after a change of lamps is quick.
 _REMEMBERED = 4
 
 
 @dataclass(frozen=True)
 class WorldData:
+    """The light of a world on diffuse surfaces: the sum of its three parts."""
+
     radiance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr), constant
-    image: np.ndarray | None = None  # (height, width, 3) W/(m^2 sr), on top of it
+    # (height, width, 3) W/(m^2 sr), equirectangular, bottom row first; None: none.
+    image: np.ndarray | None = None
     suns: tuple[SunLightData, ...] = ()
 
 
+# By _digest of the world, the last one last.
 _evaluated: dict[bytes, WorldData] = {}
 
 
 def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warnings
                  ) -> WorldData:
-    """The light of the scene's world on diffuse surfaces."""
+    """The light of the scene's world on diffuse surfaces. Node trees that cannot be read are
+    rendered by Cycles; where that fails too, the mean that was read is used, with a warning."""
     scene = context.scene
     world = scene.world
-    # A view layer may leave it out.
+    # The view layer may leave out the world, and diffuse surfaces may not see it.
     if (world is None or not context.view_layer.use_sky
             or not getattr(world.cycles_visibility, 'diffuse', True)):
         return WorldData()
@@ -53,7 +58,7 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
     radiance = np.maximum(given, 0.0)
     if np.any(given < 0.0):
         warnings.add(f'world "{world.name}": light that is negative is left out')
-    # What is read without a word is constant.
+    # A world that is read without warnings is constant.
     if not unread:
         return WorldData(radiance)
     if not world_panorama.is_available():
@@ -77,7 +82,8 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
 
 
 def _split(panorama: world_panorama.Panorama) -> WorldData:
-    """The least radiance of all directions is constant: bundles bring it, without shadow rays."""
+    """Takes the least radiance of all directions as constant, since bundles transport constant
+    light without shadow rays, and the rest as image."""
     pixels = panorama.pixels
     angles = world_panorama.solid_angles(*pixels.shape[:2])
     mean = (pixels * angles[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi)
@@ -88,10 +94,10 @@ def _split(panorama: world_panorama.Panorama) -> WorldData:
 
 
 # --------------------------------------------------------------------------------------------------
-# Whether a world is the same as before
+# Digests of worlds
 # --------------------------------------------------------------------------------------------------
 
-# What moves or looks different in the node editor only.
+# Properties that only matter in the node editor, or are not the node's own.
 _OF_THE_EDITOR = {'rna_type', 'location', 'width', 'width_hidden', 'height', 'dimensions', 'select',
                   'label', 'color', 'use_custom_color', 'show_options', 'show_preview',
                   'show_texture', 'show_expanded', 'hide', 'hide_value', 'parent', 'internal_links',
@@ -102,7 +108,7 @@ _OF_THE_EDITOR = {'rna_type', 'location', 'width', 'width_hidden', 'height', 'di
 
 
 def _digest(world: bpy.types.World, frame: int) -> bytes:
-    """The same for worlds whose nodes, values and images are the same."""
+    """The same for worlds with the same nodes, values, images and other data at a frame."""
     content = hashlib.blake2b(digest_size=16)
     content.update(repr(bpy.app.version).encode())
     _add(content, world.node_tree, frame, set())
@@ -110,6 +116,7 @@ def _digest(world: bpy.types.World, frame: int) -> bytes:
 
 
 def _add(content: hashlib.blake2b, item: bpy.types.bpy_struct, frame: int, seen: set[int]) -> None:
+    """Adds a struct and all it refers to. seen: addresses of those that were added before."""
     if item.as_pointer() in seen:
         return
     seen.add(item.as_pointer())
@@ -117,7 +124,7 @@ def _add(content: hashlib.blake2b, item: bpy.types.bpy_struct, frame: int, seen:
         _add_image(content, item, frame)
         return
     if isinstance(item, bpy.types.ID) and not isinstance(item, bpy.types.NodeTree):
-        # An object gives its coordinates, a text its code.
+        # Of an object nodes read the coordinates, of a text the code.
         content.update(repr((item.name_full, getattr(item, 'matrix_world', None))).encode())
         if isinstance(item, bpy.types.Text):
             content.update(item.as_string().encode())

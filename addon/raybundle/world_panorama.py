@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Any world node tree -> radiance by direction, evaluated by Cycles itself.
+"""Lets Cycles evaluate the node tree of a world, as radiance by direction and suns.
 
-A copy of the world is rendered as diffuse surfaces see it, in a scene of its own that has nothing
-but a camera: as a panorama, again in finer pixels where it is very bright, and the sun discs of Sky
-Textures alone, as small pictures of each. All that is made for it is removed again.
+A copy of the world is rendered, as diffuse surfaces see it, in a scene of its own with nothing but
+a camera: as a panorama, once more with finer pixels where it is very bright, and the sun discs of
+Sky Textures apart, each in a small picture. Everything that is made for it is removed afterwards.
 """
 
 from __future__ import annotations
@@ -22,31 +22,34 @@ from mathutils import Vector
 from .materials.node_links import LIGHT_PATH
 from .scene_data import SunLightData
 
-# Pixels around the horizon: 0.7 degrees each. Suns are far finer, and are dealt with apart.
+# Pixels around the horizon, 0.7 degrees each. Suns are smaller and are rendered apart.
 _WIDTH = 512
 _SAMPLES = 16
-# Pixels that bring more than this share of all light are rendered again, with a margin, _FINER
-# times as fine; the image keeps _KEPT times as many pixels as the first.
+# Pixels with more than this share of all light, and a margin around each, are rendered again with
+# pixels _FINER times as fine. The resulting image has pixels _KEPT times as fine as the first.
 _BRIGHT = 1e-4
 _MARGIN = 2
 _FINER = 16
 _KEPT = 2
 _MAX_TILES = 24
-# A sun disc is looked for with at least this diameter, then measured in a picture this wide.
+# To find a sun it is rendered with at least this diameter; then it is measured in a picture of
+# _DISC_WIDTH pixels in width.
 _LARGE_DISC = 0.06  # radians
 _DISC_WIDTH = 128
-# Larger discs stay in the panorama, which has enough pixels for them.
+# Suns of a larger diameter stay in the panorama, which has enough pixels for them.
 _LARGEST_DISC = 0.5  # radians
 _SKIES_WITHOUT_DISC = ('PREETHAM', 'HOSEK_WILKIE')
-_Part = tuple[tuple[int, int], tuple[int, int]]  # rows and columns: begin, end
+# A rectangle of an image: begin and end of its rows, and of its columns.
+_Part = tuple[tuple[int, int], tuple[int, int]]
 _HANDLERS = ('render_init', 'render_pre', 'render_post', 'render_write', 'render_stats',
              'render_complete', 'render_cancel')
 
 
 @dataclass(frozen=True)
 class Panorama:
-    """pixels: (height, width, 3) W/(m^2 sr), equirectangular, bottom row first, without suns."""
+    """The light of a world by direction."""
 
+    # (height, width, 3) float64, W/(m^2 sr), equirectangular, bottom row first, without the suns.
     pixels: np.ndarray
     suns: tuple[SunLightData, ...]
 
@@ -57,7 +60,7 @@ def is_available() -> bool:
 
 
 def evaluate(world: bpy.types.World, frame: int) -> Panorama:
-    """The world at a frame. Raises RuntimeError when Blender cannot render it."""
+    """Renders a world at a frame. Raises RuntimeError if Blender cannot render it."""
     with _Renderer(world, frame) as renderer:
         discs = renderer.sun_discs()
         for node in discs:
@@ -69,7 +72,8 @@ def evaluate(world: bpy.types.World, frame: int) -> Panorama:
 
 
 def directions(height: int, width: int) -> np.ndarray:
-    """(height, width, 3), unit vectors to the middles of the pixels, as Cycles maps them."""
+    """(height, width, 3): unit vectors to the middles of the pixels of an equirectangular image, as
+    Cycles maps them."""
     elevation = ((np.arange(height) + 0.5) / height - 0.5)[:, None] * np.pi
     azimuth = (1.0 - 2.0 * (np.arange(width) + 0.5) / width)[None, :] * np.pi
     return np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth),
@@ -77,7 +81,7 @@ def directions(height: int, width: int) -> np.ndarray:
 
 
 def solid_angles(height: int, width: int) -> np.ndarray:
-    """(height, 1) sr of a pixel of each row."""
+    """(height, 1): solid angle, sr, of a pixel in each row of an equirectangular image."""
     edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
     return (np.diff(edges) * 2.0 * np.pi / width)[:, None]
 
@@ -88,12 +92,13 @@ def solid_angles(height: int, width: int) -> np.ndarray:
 
 
 def _refined(renderer: _Renderer, base: np.ndarray) -> np.ndarray:
-    """_KEPT times the pixels; those of bright spots from finer ones."""
+    """The panorama with pixels _KEPT times as fine, in which bright spots are rendered anew and all
+    others repeated. base: (height, width, 3)."""
     height, width = base.shape[:2]
     pixels = base.repeat(_KEPT, axis=0).repeat(_KEPT, axis=1)
     power = base.sum(axis=2) * solid_angles(height, width)
     mean = power.sum() / power.size
-    # Never more than a small part: in a sky that is bright all over nothing stands out.
+    # Only pixels well above the mean: in a sky that is bright all over none stands out.
     left = np.where(power > max(_BRIGHT * power.sum(), 4.0 * mean), power, 0.0)
     tiles: list[_Part] = []
     while len(tiles) < _MAX_TILES and left.max() > 0.0:
@@ -113,10 +118,11 @@ def _refined(renderer: _Renderer, base: np.ndarray) -> np.ndarray:
 
 
 def _joined(parts: list[_Part]) -> list[_Part]:
-    """Few rectangles that hold the given ones, with little besides: each is a render of its own."""
+    """Joins rectangles as long as the rectangle around two is not larger than both together, since
+    each is rendered by itself."""
     joined: list[_Part] = []
     for part in parts:
-        # What it is joined with may reach others then.
+        # The joined rectangle may reach further ones.
         while other := next((other for other in joined
                              if _area(_around(part, other)) <= _area(part) + _area(other)), None):
             joined.remove(other)
@@ -126,6 +132,7 @@ def _joined(parts: list[_Part]) -> list[_Part]:
 
 
 def _around(first: _Part, second: _Part) -> _Part:
+    """The smallest rectangle around two."""
     rows, columns = ((min(a[0], b[0]), max(a[1], b[1])) for a, b in zip(first, second))
     return rows, columns
 
@@ -136,11 +143,12 @@ def _area(part: _Part) -> int:
 
 
 def _sun(renderer: _Renderer, node: bpy.types.Node, base: np.ndarray) -> SunLightData | None:
-    """What the disc of a Sky Texture adds to the world, as a light; None if it is below."""
+    """The light that the sun disc of a Sky Texture adds to the world; None if it adds none, as
+    below the horizon. base: the panorama without sun discs."""
     size = node.sun_size
     node.sun_disc = True
     try:
-        # Where it is, through whatever nodes: as a large disc it cannot fall between samples.
+        # Find the direction, which other nodes may change; samples do not miss a large disc.
         node.sun_size = max(size, _LARGE_DISC)
         added = (renderer.panorama(_WIDTH) - base).sum(axis=2)
         added = np.where(added > 0.1 * max(added.max(), 0.0), added, 0.0)
@@ -149,7 +157,7 @@ def _sun(renderer: _Renderer, node: bpy.types.Node, base: np.ndarray) -> SunLigh
         if power.sum() <= 1e-6 * (base.sum(axis=2) * solid_angles(*added.shape)).sum():
             return None
         node.sun_size = size
-        # Wide enough for the error of the place, too.
+        # Render a picture wide enough for the disc and for the error of its direction.
         field_of_view = 1.2 * size + 0.02
         view = Vector(towards / np.linalg.norm(towards))
         added, view_directions, angles = renderer.view(view, field_of_view, _DISC_WIDTH)
@@ -173,14 +181,14 @@ def _sun(renderer: _Renderer, node: bpy.types.Node, base: np.ndarray) -> SunLigh
 
 
 class _Renderer:
-    """A scene with a copy of the world and a camera, for as long as the context lasts."""
+    """A context manager: a scene with a copy of the world and a camera, which renders the world."""
 
     def __init__(self, world: bpy.types.World, frame: int) -> None:
         self._original, self._frame = world, frame
         self._made: list[bpy.types.ID] = []
 
     def __enter__(self) -> _Renderer:
-        # Blender makes these when it renders first.
+        # Blender creates these images at the first render.
         self._had = {name for name in ('Render Result', 'Viewer Node') if name in bpy.data.images}
         try:
             self._build()
@@ -193,25 +201,28 @@ class _Renderer:
         self._remove()
 
     def sun_discs(self) -> list[bpy.types.Node]:
+        """The Sky Textures of the copied world whose sun discs are too small for the panorama."""
         return [node for tree in self._trees for node in tree.nodes
                 if node.type == 'TEX_SKY' and getattr(node, 'sun_disc', False)
                 and node.sky_type not in _SKIES_WITHOUT_DISC and not node.mute
                 and node.sun_size <= _LARGEST_DISC and node.outputs[0].is_linked]
 
     def panorama(self, width: int, part: _Part | None = None) -> np.ndarray:
-        """(height, width, 3) of all directions, or the rows and columns (begin, end) of a part."""
+        """(height, width, 3) W/(m^2 sr): all directions, or a part of the image. width: of the
+        whole image, twice its height."""
         camera = self._camera.data
         camera.type = 'PANO'
-        # 5.0 moved it from Cycles to Blender.
+        # Blender 5.0 moved the property from Cycles to the camera.
         owner = camera if hasattr(camera, 'panorama_type') else camera.cycles
         owner.panorama_type = 'EQUIRECTANGULAR'
-        # The middle of the image looks along +X, as that of an environment texture.
+        # The middle of the image shows the direction +X, as in an environment texture.
         self._camera.rotation_euler = (math.pi / 2.0, 0.0, -math.pi / 2.0)
         return self._render(width, width // 2, part)
 
     def view(self, towards: Vector, field_of_view: float, width: int
              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A square view: (n, n, 3) radiance, (n, n, 3) directions and (n, n) solid angles."""
+        """A square perspective view of width pixels: radiance (width, width, 3) W/(m^2 sr), unit
+        directions (width, width, 3) and solid angles (width, width), sr. field_of_view: radians."""
         camera = self._camera.data
         camera.type = 'PERSP'
         camera.lens_unit, camera.angle = 'FOV', field_of_view
@@ -230,7 +241,7 @@ class _Renderer:
     def _build(self) -> None:
         world = self._keep(self._original.copy())
         world.cycles_visibility.camera = True
-        # No map of where the world is bright: nothing here is lit by it.
+        # Cycles need not build a map for sampling the world: nothing is lit by it here.
         world.cycles.sampling_method = 'NONE'
         self._trees = [world.node_tree]
         for tree in self._trees:
@@ -248,7 +259,7 @@ class _Renderer:
         cycles.device, cycles.samples = 'CPU', _SAMPLES
         cycles.use_adaptive_sampling = cycles.use_denoising = False
         cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
-        # Each pixel is the mean of what it covers.
+        # Each pixel is to be the mean over its own area.
         cycles.pixel_filter_type = 'BOX'
         cycles.film_exposure = 1.0
         render.film_transparent = False
@@ -260,13 +271,14 @@ class _Renderer:
         render.image_settings.color_depth = '32'
 
     def _open_groups(self, tree: bpy.types.NodeTree) -> None:
-        """Copies the groups of a tree, which others may use."""
+        """Replaces the groups of a tree, which other trees may use, by copies."""
         for node in tree.nodes:
             if node.type == 'GROUP' and node.node_tree is not None:
                 node.node_tree = self._keep(node.node_tree.copy())
                 self._trees.append(node.node_tree)
 
     def _keep(self, made: bpy.types.ID) -> bpy.types.ID:
+        """Notes data that was created, to be removed."""
         self._made.append(made)
         return made
 
@@ -285,7 +297,7 @@ class _Renderer:
         render.resolution_x, render.resolution_y = width, height
         rows, columns = part or ((0, height), (0, width))
         render.use_border = render.use_crop_to_border = part is not None
-        # A little inside the pixel, so that neither rounding nor cutting off moves the edge.
+        # Put the border a quarter into a pixel, so that rounding cannot move it to another one.
         render.border_min_x, render.border_max_x = ((x + 0.25) / width for x in columns)
         render.border_min_y, render.border_max_y = ((y + 0.25) / height for y in rows)
         shape = (rows[1] - rows[0], columns[1] - columns[0])
@@ -297,6 +309,8 @@ class _Renderer:
 
 
 def _read(path: Path, shape: tuple[int, int]) -> np.ndarray:
+    """(height, width, 3) float64 of an image file, without negative values or ones that are not
+    finite. Raises RuntimeError if its (height, width) is not `shape`."""
     image = bpy.data.images.load(str(path))
     try:
         if tuple(image.size) != shape[::-1]:
@@ -310,7 +324,8 @@ def _read(path: Path, shape: tuple[int, int]) -> np.ndarray:
 
 
 def _replace_light_paths(tree: bpy.types.NodeTree) -> None:
-    """The camera's ray is to count as one that left a diffuse surface."""
+    """Gives Light Path nodes the outputs of a ray from a diffuse surface, in place of the
+    camera's."""
     for node in [node for node in tree.nodes if node.type == 'LIGHT_PATH']:
         for output in node.outputs:
             for socket in [link.to_socket for link in output.links]:
@@ -321,7 +336,8 @@ def _replace_light_paths(tree: bpy.types.NodeTree) -> None:
 
 @contextmanager
 def _silent_handlers() -> Iterator[None]:
-    """Other add-ons are not told of renders that are none of the user's."""
+    """Removes render handlers in the with block: these renders are not the user's, and other
+    add-ons must not be told of them."""
     lists = [getattr(bpy.app.handlers, name) for name in _HANDLERS]
     kept = [list(handlers) for handlers in lists]
     for handlers in lists:
@@ -334,6 +350,7 @@ def _silent_handlers() -> Iterator[None]:
 
 
 def _collection_of(item: bpy.types.ID) -> bpy.types.bpy_prop_collection:
+    """The collection of bpy.data that an item, created here, is in."""
     for kind, collection in ((bpy.types.Scene, bpy.data.scenes), (bpy.types.World, bpy.data.worlds),
                              (bpy.types.Object, bpy.data.objects),
                              (bpy.types.Camera, bpy.data.cameras)):
