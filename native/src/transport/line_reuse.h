@@ -10,7 +10,7 @@
 //
 // With s_i = sqrt(rho_i / m_i) and R_i = s_i z_i it becomes (I - S C S) z = S M direct, symmetric
 // and positive definite, unit diagonal, solved by conjugate gradients for the three channels at
-// once.
+// once (transport/conjugate_gradients.h).
 //
 // Light that passes through translucent patches is one more source: R_i + tau_i H_k, k the other
 // side of the patch, is what leaves side i. Solving for R with the H_k of the last solve, again and
@@ -35,13 +35,14 @@
 #include "first_shot/directed_light.h"
 #include "first_shot/first_shot.h"
 #include "job/cancellation.h"
-#include "patches/clusters.h"
 #include "patches/patches.h"
 #include "transport/scattered_light.h"
+#include "transport/starved_sides.h"
 #include "transport/transport.h"
-#include "visibility/visibility.h"
 
 namespace raybundle {
+
+class LineSystem;
 
 // Calls body(side) for the sides below n, kInTask of them in a task.
 template <size_t kInTask = 2048, class Body>
@@ -79,14 +80,9 @@ class LineReuse {
     // For a solve: 1 for a half, balanced for both.
     LineWeights lineWeights(Half half) const;
 
-    // Adds local rays (cosine distribution, weighted like the lines the side has) to the irradiance
-    // of wanted sides that have fewer than `minLines` lines, and to that of other such sides that
-    // these rays meet. Rays that start where the side is covered, by a surface not further than
-    // touchDistance (m), do not count. clusters: if the patches are theirs, the visibility is of
-    // those that they are made of; null: it is of the patches. Returns the number of sides.
-    size_t gatherStarvedSides(const Visibility& visibility, const Clusters* clusters,
-                              float touchDistance, uint32_t minLines, uint32_t seed,
-                              const std::vector<bool>& wanted,
+    // Adds what local rays of wanted sides (per side) that few lines met bring to the irradiance
+    // (transport/starved_sides.h). reflected: R of the last solve. Returns the number of sides.
+    size_t gatherStarvedSides(const StarvedRays& rays, const std::vector<bool>& wanted,
                               const std::vector<glm::vec3>& reflected,
                               Irradiance& irradiance) const;
 
@@ -129,6 +125,12 @@ class LineReuse {
     // With what passes through translucent patches.
     Irradiance solvePassed(Half half, float tolerance, LineSolution& guess,
                            const LineWeights& weights, const ByAngle& byAngle) const;
+    // Adds light straight from emission and the world, by the lines, to that of the sources.
+    void addDirect(LineSystem& lines, const HandOver& first, Irradiance& light) const;
+    // Irradiance that lines bring of what is not solved for, W/m^2: light by direction, and what is
+    // passed on (empty: nothing).
+    std::vector<glm::vec3> knownLight(LineSystem& lines, const std::vector<glm::vec3>& passed,
+                                      const ByAngle& byAngle) const;
     // What is passed on (empty: nothing) is known.
     Irradiance solveReflected(Half half, float tolerance, LineSolution& guess,
                               const LineWeights& weights, const ByAngle& byAngle) const;

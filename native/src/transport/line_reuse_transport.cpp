@@ -111,9 +111,10 @@ class LineReuseTransport : public Transport {
         // The first of each half starts from nothing.
         if (input.settings.skipWarmStart && solves > 2)
             report.skip(SkippedWork::WARM_STARTS, solves - 2);
-        const size_t starved = solver.gatherStarvedSides(
-            input.visibility, input.clusters, input.touchDistance, kStarvedLines,
-            uint32_t(input.settings.seed), wanted, last.of[size_t(Half::BOTH)].reflected, result);
+        const size_t starved =
+            solver.gatherStarvedSides({input.visibility, input.clusters, input.touchDistance,
+                                       kStarvedLines, uint32_t(input.settings.seed)},
+                                      wanted, last.of[size_t(Half::BOTH)].reflected, result);
         if (starved) report.skip(SkippedWork::STARVED_SIDES, starved);
         if (!result.isSettled)
             report.warn(
