@@ -123,8 +123,9 @@ double BundleSolve::castRays() {
         const std::vector<ExtraRays> rays = noisyParts->rays(samples, kRaysOfFirstPass << pass);
         if (pass == 0) ofFinish.skip(SkippedWork::RAYED_SIDES, rays.size());
         if (rays.empty()) break;
-        addExtraRays(patches, in.trace.visibility, in.trace.touchDistance, in.trace.exposedShare(),
-                     rays, hash(uint32_t(in.settings.seed), pass), samples, lights, halves);
+        addExtraRays({patches, in.trace.visibility, in.trace.touchDistance, in.trace.exposedShare(),
+                      rays, hash(uint32_t(in.settings.seed), pass)},
+                     samples, lights, halves);
         SetNoise withRays({}, errorOfSets, tileWeight, in.tiles.patches());
         const Halves withThese = seen();
         withRays.look(withThese, bundles, tracer.bias());

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "job/cancellation.h"
+#include "sampling/mix_bits.h"
 
 namespace raybundle {
 namespace {
@@ -35,10 +36,9 @@ int cellOf(const glm::vec3& normal) {
 using Key = std::array<uint32_t, 7>;
 struct HashOf {
     size_t operator()(const Key& key) const {
-        size_t mixed = 0;
-        for (const uint32_t part : key)
-            mixed = (mixed ^ part) * 0x9e3779b97f4a7c15u, mixed ^= mixed >> 29;
-        return mixed;
+        uint64_t mixed = 0;
+        for (const uint32_t part : key) mixed = mixBits(mixed ^ part);
+        return size_t(mixed);
     }
 };
 

@@ -12,6 +12,7 @@
 
 #include "job/cancellation.h"
 #include "patches/patches.h"
+#include "sampling/mix_bits.h"
 
 namespace raybundle {
 namespace {
@@ -51,7 +52,7 @@ struct Place {
 using At = std::array<int, 2>;
 struct HashAt {
     size_t operator()(const At& at) const {
-        return size_t(uint64_t(uint32_t(at[0])) << 32 | uint32_t(at[1])) * 0x9E3779B97F4A7C15u;
+        return size_t(mixBits(uint64_t(uint32_t(at[0])) << 32 | uint32_t(at[1])));
     }
 };
 using Lattice = std::unordered_map<At, Place, HashAt>;

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "job/cancellation.h"
+#include "sampling/mix_bits.h"
 #include "scene/disjoint_sets.h"
 
 namespace raybundle {
@@ -82,9 +83,9 @@ class Places {
     }
     // Other cells may have the same.
     static uint64_t keyOf(const glm::dvec3& cell, int level) {
-        return uint64_t(int64_t(cell.x)) * 0x9E3779B97F4A7C15u ^
-               uint64_t(int64_t(cell.y)) * 0xC2B2AE3D27D4EB4Fu ^
-               uint64_t(int64_t(cell.z)) * 0x165667B19E3779F9u ^ uint64_t(uint32_t(level)) << 48;
+        uint64_t key = uint64_t(uint32_t(level));
+        for (int axis = 0; axis < 3; ++axis) key = mixBits(key ^ uint64_t(int64_t(cell[axis])));
+        return key;
     }
     // The first met in a cell that lies where a vertex does; kNone.
     uint32_t firstIn(uint64_t key, uint32_t vertex) const {

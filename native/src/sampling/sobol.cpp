@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sampling/sobol.h"
 
+#include "sampling/mix_bits.h"
+
 namespace raybundle {
 namespace {
 
@@ -34,12 +36,7 @@ Columns sobolColumns() {
 
 }  // namespace
 
-uint32_t hash(uint32_t a, uint32_t b) {
-    uint64_t z = (uint64_t(a) << 32 | b) + 0x9e3779b97f4a7c15ull;  // splitmix64
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return uint32_t(z ^ (z >> 31));
-}
+uint32_t hash(uint32_t a, uint32_t b) { return uint32_t(mixBits(uint64_t(a) << 32 | b)); }
 
 SobolPoints::SobolPoints(uint32_t seed) : tables(allTables()) {
     for (uint32_t d = 0; d < 4; ++d) shift[d] = hash(seed, d);

@@ -69,100 +69,142 @@ void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought
     light.indirect[side] = already + share * (lines * reflected + kLinesOfRay * brought.reflected);
 }
 
-}  // namespace
+using Samples = std::vector<std::array<float, 2>>;  // per side and half
 
-void addExtraRays(const Patches& patches, const Visibility& visibility, float touchDistance,
-                  const std::vector<float>& exposed, const std::vector<ExtraRays>& wanted,
-                  uint32_t seed, std::vector<std::array<float, 2>>& samples, SetLights& lights,
-                  std::vector<std::array<Irradiance, 2>>& halves) {
-    std::vector<Sent> sent;
-    for (size_t k = 0; k < lights.size(); ++k)
-        sent.emplace_back(patches, exposed, lights[k], halves[k]);
-    // All that is met is read before anything is changed.
-    std::vector<std::array<Brought, 3>> brought(wanted.size() * lights.size());
-    std::vector<std::array<float, 2>> counted(wanted.size(), {0, 0});
-    parallelFor(size_t(0), wanted.size(), [&](size_t w) {
+class ExtraGather {
+  public:
+    ExtraGather(const ExtraRaysInput& input, const Samples& samples, const SetLights& lights)
+        : patches(input.patches),
+          exposed(input.exposed),
+          wanted(input.wanted),
+          samples(samples),
+          brought(wanted.size() * lights.size()),
+          counted(wanted.size(), {0, 0}),
+          lightCount(lights.size()) {
+        for (const ExtraRays& own : wanted)
+            linesMet += double(samples[own.side][0]) + double(samples[own.side][1]);
+    }
+
+    // sent: per light.
+    void cast(const ExtraRaysInput& input, const std::vector<Sent>& sent) {
+        parallelFor(size_t(0), wanted.size(), [&](size_t w) { castThose(w, input, sent); });
+    }
+
+    // Brings light k together with what its rays brought. of: 0 for the light itself, 1 and 2 for
+    // its halves.
+    void bring(size_t k, size_t of, const FirstShot& shot, Irradiance& light) const {
+        std::vector<glm::vec3> change(wanted.size());
+        for (size_t w = 0; w < wanted.size(); ++w) {
+            const uint32_t side = wanted[w].side;
+            const std::array<float, 2>&lines = samples[side], &rays = counted[w];
+            const glm::vec3 already = alreadyIndirect(shot, exposed, side);
+            const glm::vec3 before = broughtTo(side, light, already);
+            blend(light, side, of == 0 ? lines[0] + lines[1] : lines[of - 1],
+                  brought[w * lightCount + k][of], of == 0 ? rays[0] + rays[1] : rays[of - 1],
+                  already);
+            change[w] = broughtTo(side, light, already) - before;
+        }
+        if (linesMet >= kTellingLines) keepBalance(change, shot, light);
+    }
+
+    // Adds these rays to the samples of their sides.
+    void count(Samples& all) const {
+        for (size_t w = 0; w < wanted.size(); ++w)
+            for (size_t h = 0; h < 2; ++h) all[wanted[w].side][h] += kLinesOfRay * counted[w][h];
+    }
+
+  private:
+    void castThose(size_t w, const ExtraRaysInput& input, const std::vector<Sent>& sent) {
         const ExtraRays& own = wanted[w];
-        const SobolPoints points(hash(seed, own.side));
+        const SobolPoints points(hash(input.seed, own.side));
         for (uint32_t i = 0; i < own.rays; ++i) {
             throwIfCancelledAt(i);
             const glm::vec4 u = points[i];
             const glm::vec3 direction = cosineDirection(patches.normal(own.side), {u.z, u.w});
             float distance = 0;
-            const auto hit = visibility.firstHit(own.side, patches.point(own.side / 2, {u.x, u.y}),
-                                                 direction, &distance);
-            if (hit && isCovered(patches, own.side, *hit, direction, distance, touchDistance))
+            const auto hit = input.visibility.firstHit(
+                own.side, patches.point(own.side / 2, {u.x, u.y}), direction, &distance);
+            if (hit && isCovered(patches, own.side, *hit, direction, distance, input.touchDistance))
                 continue;
             if (hit && !(std::min(samples[*hit][0], samples[*hit][1]) > 0)) continue;
             // The first points and the last are each stratified by themselves.
             const size_t half = 2 * i < own.rays ? 0 : 1;
             ++counted[w][half];
-            for (size_t k = 0; k < lights.size(); ++k)
+            for (size_t k = 0; k < sent.size(); ++k)
                 for (const size_t of : {size_t(0), 1 + half}) {
-                    Brought& sum = brought[w * lights.size() + k][of];
+                    Brought& sum = brought[w * lightCount + k][of];
                     sum.carried += hit ? sent[k].emission[*hit] : sent[k].world;
                     if (hit) sum.reflected += sent[k].by[of]->towards(*hit, -direction);
                 }
         }
-    });
-    auto absorbing = [&](uint32_t side) {  // m^2
+    }
+
+    glm::dvec3 absorbing(uint32_t side) const {  // m^2
         return double(patches.area[side / 2] * exposed[side]) *
                glm::dvec3(1.0f - patches.reflectance[side]);
-    };
-    double met = 0;
-    for (const ExtraRays& own : wanted)
-        met += double(samples[own.side][0]) + double(samples[own.side][1]);
-    for (size_t k = 0; k < lights.size(); ++k) {
-        const FirstShot& shot = lights[k].shot;
-        // of: 0 for the light itself, 1 and 2 for the halves.
-        auto bring = [&](Irradiance& light, size_t of) {
-            std::vector<glm::vec3> change(wanted.size());
-            for (size_t w = 0; w < wanted.size(); ++w) {
-                const uint32_t side = wanted[w].side;
-                const std::array<float, 2>&l = samples[side], &rays = counted[w];
-                const glm::vec3 already = alreadyIndirect(shot, exposed, side);
-                const glm::vec3 before = broughtTo(side, light, already);
-                blend(light, side, of == 0 ? l[0] + l[1] : l[of - 1],
-                      brought[w * lights.size() + k][of],
-                      of == 0 ? rays[0] + rays[1] : rays[of - 1], already);
-                change[w] = broughtTo(side, light, already) - before;
-            }
-            if (met < kTellingLines) return;
-            // What rays made beyond that is taken where they changed much: what sees nothing but an
-            // even sky has no noise.
-            glm::dvec3 made(0.0), changed(0.0), all(0.0);  // absorbed, W
-            for (size_t w = 0; w < wanted.size(); ++w) {
-                const glm::dvec3 own = absorbing(wanted[w].side);
-                made += own * glm::dvec3(change[w]);
-                changed += own * glm::abs(glm::dvec3(change[w]));
-            }
-            for (uint32_t side = 0; side < light.gathered.size(); ++side)
-                all += absorbing(side) * glm::dvec3(light.all(side));
-            glm::vec3 share(0.0f);
-            for (int c = 0; c < 3; ++c)
-                if (changed[c] > 0)
-                    share[c] = float(
-                        (made[c] - glm::clamp(made[c], -kMostMade * all[c], kMostMade * all[c])) /
-                        changed[c]);
-            if (share == glm::vec3(0.0f)) return;
-            for (size_t w = 0; w < wanted.size(); ++w) {
-                const uint32_t side = wanted[w].side;
-                const glm::vec3 already = alreadyIndirect(shot, exposed, side);
-                const glm::vec3 now = broughtTo(side, light, already);
-                glm::vec3 factor(1.0f);
-                for (int c = 0; c < 3; ++c)
-                    if (now[c] > 0)
-                        factor[c] = std::max(0.0f, 1 - share[c] * std::abs(change[w][c]) / now[c]);
-                glm::vec3 &direct = light.direct[side], &indirect = light.indirect[side];
-                direct = light.gathered[side] + factor * (direct - light.gathered[side]);
-                indirect = already + factor * (indirect - already);
-            }
-        };
-        bring(lights[k].irradiance, 0);
-        for (size_t h = 0; h < 2; ++h) bring(halves[k][h], 1 + h);
     }
-    for (size_t w = 0; w < wanted.size(); ++w)
-        for (size_t h = 0; h < 2; ++h) samples[wanted[w].side][h] += kLinesOfRay * counted[w][h];
+
+    // What rays made beyond kMostMade is taken where they changed much: what sees nothing but an
+    // even sky has no noise. change: what rays changed, per wanted side.
+    void keepBalance(const std::vector<glm::vec3>& change, const FirstShot& shot,
+                     Irradiance& light) const {
+        glm::dvec3 made(0.0), changed(0.0), all(0.0);  // absorbed, W
+        for (size_t w = 0; w < wanted.size(); ++w) {
+            const glm::dvec3 own = absorbing(wanted[w].side);
+            made += own * glm::dvec3(change[w]);
+            changed += own * glm::abs(glm::dvec3(change[w]));
+        }
+        for (uint32_t side = 0; side < light.gathered.size(); ++side)
+            all += absorbing(side) * glm::dvec3(light.all(side));
+        glm::vec3 share(0.0f);
+        for (int c = 0; c < 3; ++c)
+            if (changed[c] > 0)
+                share[c] =
+                    float((made[c] - glm::clamp(made[c], -kMostMade * all[c], kMostMade * all[c])) /
+                          changed[c]);
+        if (share == glm::vec3(0.0f)) return;
+        for (size_t w = 0; w < wanted.size(); ++w) {
+            const uint32_t side = wanted[w].side;
+            const glm::vec3 already = alreadyIndirect(shot, exposed, side);
+            const glm::vec3 now = broughtTo(side, light, already);
+            glm::vec3 factor(1.0f);
+            for (int c = 0; c < 3; ++c)
+                if (now[c] > 0)
+                    factor[c] = std::max(0.0f, 1 - share[c] * std::abs(change[w][c]) / now[c]);
+            glm::vec3 &direct = light.direct[side], &indirect = light.indirect[side];
+            direct = light.gathered[side] + factor * (direct - light.gathered[side]);
+            indirect = already + factor * (indirect - already);
+        }
+    }
+
+    const Patches& patches;
+    const std::vector<float>& exposed;
+    const std::vector<ExtraRays>& wanted;
+    const Samples& samples;
+    double linesMet = 0;  // by the wanted sides
+    // Per wanted side and light: by the estimates of both halves together and of each.
+    std::vector<std::array<Brought, 3>> brought;
+    std::vector<std::array<float, 2>> counted;  // per wanted side: rays of each half
+    const size_t lightCount;
+};
+
+}  // namespace
+
+void addExtraRays(const ExtraRaysInput& input, std::vector<std::array<float, 2>>& samples,
+                  SetLights& lights, std::vector<std::array<Irradiance, 2>>& halves) {
+    ExtraGather gather(input, samples, lights);
+    {
+        // All that is met is read before anything is changed.
+        std::vector<Sent> sent;
+        for (size_t k = 0; k < lights.size(); ++k)
+            sent.emplace_back(input.patches, input.exposed, lights[k], halves[k]);
+        gather.cast(input, sent);
+    }
+    for (size_t k = 0; k < lights.size(); ++k) {
+        gather.bring(k, 0, lights[k].shot, lights[k].irradiance);
+        for (size_t h = 0; h < 2; ++h) gather.bring(k, 1 + h, lights[k].shot, halves[k][h]);
+    }
+    gather.count(samples);
 }
 
 }  // namespace raybundle

@@ -35,14 +35,23 @@ struct ExtraRays {
     uint32_t rays;  // even
 };
 
+// What rays are cast, and where. References must outlive it.
+struct ExtraRaysInput {
+    const Patches& patches;
+    const Visibility& visibility;
+    // Rays that start where the side is covered, by a surface not further than this, do not count;
+    // metres.
+    const float touchDistance;
+    const std::vector<float>& exposed;  // per side: the share of it that nothing covers
+    const std::vector<ExtraRays>& wanted;
+    const uint32_t seed;
+};
+
 // Adds what the rays of some sides bring to the light of each set, and to the estimates of its two
 // halves, all as they arrive. samples: per side and half, how many lines have met it; these rays
-// are added to them, by what they tell. Rays do not count that start where the side is covered, by
-// a surface not further than touchDistance (m), or meet a side of which a half knows nothing.
-// exposed: per side, the share of it that nothing covers.
-void addExtraRays(const Patches& patches, const Visibility& visibility, float touchDistance,
-                  const std::vector<float>& exposed, const std::vector<ExtraRays>& wanted,
-                  uint32_t seed, std::vector<std::array<float, 2>>& samples, SetLights& lights,
-                  std::vector<std::array<Irradiance, 2>>& halves);
+// are added to them, by what they tell. Rays that meet a side of which a half knows nothing do not
+// count. halves: per light of `lights`.
+void addExtraRays(const ExtraRaysInput& input, std::vector<std::array<float, 2>>& samples,
+                  SetLights& lights, std::vector<std::array<Irradiance, 2>>& halves);
 
 }  // namespace raybundle

@@ -160,15 +160,14 @@ class LineReuseTransport : public Transport {
             const Irradiance start =
                 solver.solve(Half(half), kStartTolerance, last.of[half].reflected);
             const size_t n = input.patches.sideCount();
-            std::vector<float> lines(n);
-            std::vector<glm::vec3> direct(n), indirect(n);
+            StreamingStart byLines{input.counts.bundles / 2, std::vector<float>(n),
+                                   std::vector<glm::vec3>(n), std::vector<glm::vec3>(n)};
             for (size_t i = 0; i < n; ++i) {
-                lines[i] = float(input.counts.total[i][half]);
-                direct[i] = start.direct[i] - start.gathered[i];
-                indirect[i] = start.indirect[i] - first.indirect[i];
+                byLines.lines[i] = float(input.counts.total[i][half]);
+                byLines.direct[i] = start.direct[i] - start.gathered[i];
+                byLines.indirect[i] = start.indirect[i] - first.indirect[i];
             }
-            streaming[half].emplace(input.patches, input.counts.bundles / 2, lines, direct,
-                                    indirect, source, exposed, input.shot.emission,
+            streaming[half].emplace(input.patches, byLines, source, exposed, input.shot.emission,
                                     glm::pi<float>() * input.worldRadiance);
         }
     }

@@ -173,11 +173,10 @@ class Multipath : public Transport {
     }
 
     std::vector<float> openShare() const override {
-        std::vector<float> share(input.patches.sideCount(), 0.0f);
-        for (size_t i = 0; i < share.size(); ++i)
-            if (const double m = halves[0].lines[i] + halves[1].lines[i]; m > 0)
-                share[i] = float((halves[0].skyLines[i] + halves[1].skyLines[i]) / m);
-        return share;
+        return openShareOf(
+            input.patches.sideCount(),
+            [&](size_t side) { return halves[0].lines[side] + halves[1].lines[side]; },
+            [&](size_t side) { return halves[0].skyLines[side] + halves[1].skyLines[side]; });
     }
 
   private:

@@ -197,12 +197,10 @@ class BundleIteration : public Transport {
     }
 
     std::vector<float> openShare() const override {
-        std::vector<float> share(sides.perLine.size(), 0.0f);
-        for (size_t i = 0; i < share.size(); ++i)
-            if (const uint64_t met = halves[0].lines(i) + halves[1].lines(i); met > 0)
-                share[i] =
-                    float(double(halves[0].skyLines(i) + halves[1].skyLines(i)) / double(met));
-        return share;
+        return openShareOf(
+            sides.perLine.size(),
+            [&](size_t side) { return halves[0].lines(side) + halves[1].lines(side); },
+            [&](size_t side) { return halves[0].skyLines(side) + halves[1].skyLines(side); });
     }
 
   private:

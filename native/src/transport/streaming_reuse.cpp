@@ -13,25 +13,26 @@ constexpr float kMostReflectance = 0.95f;
 
 }  // namespace
 
-StreamingReuse::StreamingReuse(
-    const Patches& patches, uint32_t bundles, const std::vector<float>& lineCount,
-    const std::vector<glm::vec3>& direct, const std::vector<glm::vec3>& indirect,
-    const std::vector<glm::vec3>& source, const std::vector<float>& exposed,
-    const std::vector<glm::vec3>& emission, const glm::vec3& worldExitance)
+StreamingReuse::StreamingReuse(const Patches& patches, const StreamingStart& start,
+                               const std::vector<glm::vec3>& source,
+                               const std::vector<float>& exposed,
+                               const std::vector<glm::vec3>& emission,
+                               const glm::vec3& worldExitance)
     : patches(patches),
       emission(emission),
       worldExitance(worldExitance),
       source(source),
       exposed(exposed),
-      bundles(bundles),
-      totalWeight(bundles),
-      directSum(lineCount.size()),
-      indirectSum(lineCount.size()),
-      lines(lineCount.begin(), lineCount.end()),
+      bundles(start.bundles),
+      totalWeight(start.bundles),
+      directSum(start.lines.size()),
+      indirectSum(start.lines.size()),
+      lines(start.lines.begin(), start.lines.end()),
       weight(lines),
-      exitance(lineCount.size()),
-      isMet(lineCount.size(), false),
-      arriving(lineCount.size(), glm::dvec3(0.0)) {
+      exitance(start.lines.size()),
+      isMet(start.lines.size(), false),
+      arriving(start.lines.size(), glm::dvec3(0.0)) {
+    const std::vector<glm::vec3>&direct = start.direct, &indirect = start.indirect;
     float reflectance = 0;
     for (size_t i = 0; i < lines.size(); ++i) {
         const glm::vec3& rho = patches.reflectance[i];

@@ -24,14 +24,20 @@
 
 namespace raybundle {
 
+// The solution of a half on the exchanges that were kept.
+struct StreamingStart {
+    uint32_t bundles;          // that the exchanges are of
+    std::vector<float> lines;  // per side: m_i of those bundles
+    // Per side: irradiance by their lines, W/m^2.
+    std::vector<glm::vec3> direct, indirect;
+};
+
 class StreamingReuse {
   public:
-    // One half, started from the solution on `bundles` bundles. Per side: lines (m_i of those
-    // bundles), direct and indirect (irradiance by their lines, W/m^2). source: exitance that is
-    // there without lines; exposed: per side, the share of it that nothing covers; emission and
-    // worldExitance: what lines bring straight, W/m^2.
-    StreamingReuse(const Patches& patches, uint32_t bundles, const std::vector<float>& lines,
-                   const std::vector<glm::vec3>& direct, const std::vector<glm::vec3>& indirect,
+    // One half. source: per side, exitance that is there without lines; exposed: per side, the share
+    // of it that nothing covers; emission (per side) and worldExitance: what lines bring straight,
+    // W/m^2. patches and emission must outlive the object.
+    StreamingReuse(const Patches& patches, const StreamingStart& start,
                    const std::vector<glm::vec3>& source, const std::vector<float>& exposed,
                    const std::vector<glm::vec3>& emission, const glm::vec3& worldExitance);
 

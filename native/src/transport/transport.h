@@ -132,6 +132,16 @@ class Transport {
     virtual std::vector<float> openShare() const = 0;
 };
 
+// For Transport::openShare: per side, skyLines(side) / lines(side); 0 where no line met it.
+template <class Lines, class SkyLines>
+std::vector<float> openShareOf(size_t sides, const Lines& lines, const SkyLines& skyLines) {
+    std::vector<float> share(sides, 0.0f);
+    for (size_t side = 0; side < sides; ++side)
+        if (const double met = double(lines(side)); met > 0)
+            share[side] = float(double(skyLines(side)) / met);
+    return share;
+}
+
 // The first shot's light at the exposed part of each side, W/m^2.
 struct HandOver {
     std::vector<glm::vec3> gathered;  // direct irradiance
