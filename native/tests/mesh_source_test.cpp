@@ -117,8 +117,8 @@ TEST(MeshSource, HasTheClosedFormOfTheSumOverItsFaces) {
         Scene scene;
         place(scene, lamp.mesh, grey("", 0, 5));
         const Patches patches = subdivide(scene, 10, kMany);
-        const MeshSource fronts(patches, allParents(patches), 0, glm::vec3(5.0f));
-        const MeshSource backs(patches, allParents(patches), 1, glm::vec3(2.0f));
+        const MeshSource fronts(patches, {allParents(patches), 0, glm::vec3(5.0f)});
+        const MeshSource backs(patches, {allParents(patches), 1, glm::vec3(2.0f)});
         std::mt19937 random(1);
         int cut = 0;
         for (int k = 0; k < 1000; ++k) {
@@ -159,7 +159,7 @@ TEST(MeshSource, HasNearlyTheClosedFormWhereItsEmissionVaries) {
         std::vector<glm::vec3> emission(patches.sideCount(), glm::vec3(0.0f));
         for (uint32_t p = 0; p < patches.count(); ++p)
             for (int c = 0; c < 3; ++c) emission[2 * p][c] = std::max(0.0f, brightness(random));
-        const MeshSource source(patches, allParents(patches), 0, glm::vec3(5.0f), &emission);
+        const MeshSource source(patches, {allParents(patches), 0, glm::vec3(5.0f), &emission});
         double errors = 0, light = 0;
         for (int k = 0; k < 200; ++k) {
             const glm::vec3 point = 2.0f * anywhere(random), up = glm::normalize(anywhere(random));
@@ -195,7 +195,7 @@ TEST(MeshSource, SamplesFindTheNearestOfManyFaces) {
         Scene scene;
         place(scene, grid("lamp", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 50, 50), grey("", 0, 5), turn);
         const Patches patches = subdivide(scene, 10, kMany);
-        const MeshSource source(patches, allParents(patches), 0, glm::vec3(5.0f));
+        const MeshSource source(patches, {allParents(patches), 0, glm::vec3(5.0f)});
         std::mt19937 random(3);
         std::uniform_real_distribution<float> within(-0.9f, 0.9f);
         double squares = 0;
@@ -225,7 +225,7 @@ TEST(MeshSource, SamplesHaveTheExpectationOfTheClosedForm) {
         Scene scene;
         place(scene, lamp.mesh, grey("", 0, 5));
         const Patches patches = subdivide(scene, 10, kMany);
-        const MeshSource source(patches, allParents(patches), 0, glm::vec3(5.0f));
+        const MeshSource source(patches, {allParents(patches), 0, glm::vec3(5.0f)});
         std::mt19937 random(2);
         for (int k = 0; k < 20; ++k) {
             const glm::vec3 point = anywhere(random), up = glm::normalize(anywhere(random));

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "job/cancellation.h"
+#include "lights/emissive_meshes.h"
 #include "lights/receiver_place.h"
 #include "visibility/local_lines.h"
 
@@ -38,43 +39,45 @@ bool showAnyByAngle(const Scene& scene) {
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                          uint32_t seed, int32_t lightSet, const Skips& skips)
-    : scene(scene),
-      patches(patches),
-      visibility(visibility),
-      seed(seed),
-      skips(skips),
-      showsByAngle(showAnyByAngle(scene)),
-      split(std::make_unique<const EmissionSplit>(
-          splitEmission(scene, patches, visibility, lightSet, seed, skips))),
-      sources(raybundle::lightSources(scene, patches, split->isSource, split->gathered, lightSet)) {
+    : DirectLight(scene, patches, visibility, seed, skips,
+                  std::make_unique<const EmissionSplit>(
+                      splitEmission(scene, patches, visibility, lightSet, seed, skips))) {
+    sources = raybundle::lightSources(scene, patches, split->isSource, split->gathered, lightSet);
 }
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                          uint32_t seed, const Skips& skips, EmissionSplit reflected)
+    : DirectLight(scene, patches, visibility, seed, skips,
+                  std::make_unique<const EmissionSplit>(std::move(reflected))) {
+    sources = meshSources(scene, patches, split->isSource, split->gathered, split->directed.get());
+}
+
+DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                         uint32_t seed, const Skips& skips,
+                         std::unique_ptr<const EmissionSplit> split)
     : scene(scene),
       patches(patches),
       visibility(visibility),
       seed(seed),
       skips(skips),
       showsByAngle(showAnyByAngle(scene)),
-      split(std::make_unique<const EmissionSplit>(std::move(reflected))),
-      sources(
-          meshSources(scene, patches, split->isSource, split->gathered, split->directed.get())) {}
+      split(std::move(split)) {}
 
-void DirectLight::gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
-                              const std::function<Receiver(size_t)>& receiverAt,
-                              const std::vector<Aim>& aims, Seen& seen,
+void DirectLight::gatherThese(std::vector<Gathered>& results, const Aims& these,
+                              const std::function<Receiver(size_t)>& receiverAt, Seen& seen,
                               const std::function<void(double)>& progress, LightBySource* bySource,
                               std::vector<Sightings>* sightings) const {
     constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
-    for (size_t from = 0; from < these.size(); from += kSlice) {
-        progress(0.5 * double(from) / double(these.size()));
-        parallelFor(from, std::min(from + kSlice, these.size()), [&](size_t k) {
-            Gathered& result = results[these[k]];
+    const size_t count = these.receivers.size();
+    for (size_t from = 0; from < count; from += kSlice) {
+        progress(0.5 * double(from) / double(count));
+        parallelFor(from, std::min(from + kSlice, count), [&](size_t k) {
+            const uint32_t receiver = these.receivers[k];
+            Gathered& result = results[receiver];
             const uint64_t before = result.rays;
-            result = gather(receiverAt(these[k]), aims[k], seen,
-                            bySource ? bySource->of(these[k]) : nullptr,
-                            sightings ? &(*sightings)[these[k]] : nullptr);
+            result = gather(receiverAt(receiver), these.aims[k], seen,
+                            bySource ? bySource->of(receiver) : nullptr,
+                            sightings ? &(*sightings)[receiver] : nullptr);
             result.rays += before;
         });
     }
@@ -94,10 +97,10 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     Seen seen(sources.size());
     std::vector<bool> hasNeighbour(coarse.gathered.size(), false);
     for (const auto& [a, b] : neighbours) hasNeighbour[a] = hasNeighbour[b] = true;
-    std::vector<Aim> aims;
+    Aims first{these, {}};
     for (uint32_t k : these)
-        aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples});
-    gatherThese(coarse.gathered, these, receiverAt, aims, seen, progress, bySource, sightings);
+        first.aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples});
+    gatherThese(coarse.gathered, first, receiverAt, seen, progress, bySource, sightings);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }
 
@@ -124,7 +127,7 @@ std::vector<Gathered> DirectLight::gather(
     std::vector<Aim> last(neighbours.empty() ? 0 : count);  // of each receiver
     for (int pass = 0; pass < kMostPasses && !further.receivers.empty(); ++pass) {
         gatherThese(
-            results, further.receivers, receiverAt, further.aims, seen,
+            results, further, receiverAt, seen,
             [&](double done) { progress(pass == 0 ? 0.5 + done : 1.0); }, bySource, nullptr);
         if (neighbours.empty()) break;  // nobody tells of the edge of a shadow
         for (size_t k = 0; k < further.receivers.size(); ++k)
@@ -193,8 +196,7 @@ std::vector<Gathered> DirectLight::scale(const LightBySource& before,
     });
     Seen seen(sources.size());
     for (std::atomic<bool>& source : seen) source = true;
-    gatherThese(results, further.receivers, receiverAt, further.aims, seen, progress, nullptr,
-                nullptr);
+    gatherThese(results, further, receiverAt, seen, progress, nullptr, nullptr);
     return results;
 }
 
@@ -210,7 +212,7 @@ bool DirectLight::isUnpowered(size_t source, uint32_t side) const {
 }
 
 glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
-    const Place place(patches, receiver);
+    const ReceiverPlace place(patches, receiver);
     glm::vec3 sum(0.0f);
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::vec4 u = sobolPoint(index, hash(seed, hash(receiver.seed, uint32_t(k))));
@@ -227,7 +229,7 @@ glm::vec3 DirectLight::sample(const Receiver& receiver, uint32_t index) const {
 
 void DirectLight::unblocked(uint32_t side, const glm::vec3* points, size_t count, float even,
                             glm::vec3* light) const {
-    const Place place(patches, {side, patches.normal(side), std::nullopt, side});
+    const ReceiverPlace place(patches, {side, patches.normal(side), std::nullopt, side});
     std::fill(light, light + count, glm::vec3(0.0f));
     // The same for all sources, so that sets of them get the same in one bake and in several.
     const SobolPoints samples(hash(seed, side));
@@ -256,7 +258,7 @@ bool DirectLight::hasPassingLight(uint32_t side) const {
                        [](const auto& source) { return !source->castsShadows; });
 }
 
-bool DirectLight::isOutOfSight(const LightSource& source, const Place& place) const {
+bool DirectLight::isOutOfSight(const LightSource& source, const ReceiverPlace& place) const {
     return skips.skipFacing && source.isOutOfSight(place);
 }
 

@@ -111,32 +111,25 @@ class DirectLight {
     std::vector<PowerShares> powerShares(float touchDistance) const;
 
   private:
-    struct Block;
-    struct Origins;
-    using Place = ReceiverPlace;
-    static constexpr size_t kBlocks = 4;          // of a receiver's samples, to see how they differ
+    class SourceGather;
+    // Without sources.
+    DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
+                uint32_t seed, const Skips& skips, std::unique_ptr<const EmissionSplit> split);
+
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
 
-    // aims: of `these`.
-    void gatherThese(std::vector<Gathered>& results, const std::vector<uint32_t>& these,
-                     const std::function<Receiver(size_t)>& receiverAt,
-                     const std::vector<Aim>& aims, Seen& seen,
+    void gatherThese(std::vector<Gathered>& results, const Aims& these,
+                     const std::function<Receiver(size_t)>& receiverAt, Seen& seen,
                      const std::function<void(double)>& progress, LightBySource* bySource,
                      std::vector<Sightings>* sightings) const;
     // parts: per source, to be filled; or null. sightings: likewise, of the source with parts.
     Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,
                     Sightings* sightings) const;
     // Counts what it does in `sum`.
-    LightPart gatherFrom(size_t source, const Receiver& receiver, const Place& place,
+    LightPart gatherFrom(size_t source, const Receiver& receiver, const ReceiverPlace& place,
                          const Aim& aim, Seen& seen, Sightings* sightings, Gathered& sum) const;
     // Whether the light that a side gets from a source comes on top of the source's power.
     bool isUnpowered(size_t source, uint32_t side) const;
-    // sampleAt(point, uv): a sample of the source. origins: to be added to; or null.
-    template <class SampleAt>
-    void takeSamples(const LightSource& source, const SampleAt& sampleAt, const SobolPoints& points,
-                     uint32_t side, const Place& place, int count,
-                     std::array<Block, kBlocks>& blocks, Sightings* sightings, Origins* origins,
-                     Gathered& sum) const;
     const LightSource* surrounding() const;  // the source that has parts, if there is one
     // Gives the aims of receivers that see little of it their outlooks, which are returned: from
     // the sightings of all of them, and then from samples by these. Counts the rays in `results`.
@@ -145,12 +138,8 @@ class DirectLight {
                                        std::vector<Sightings> sightings) const;
     void look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,
               Sightings& sightings, Gathered& sum) const;
-    std::optional<glm::vec3> closedMean(const LightSource& source, const Place& place,
-                                        float tolerance, float& error) const;
-    std::optional<glm::vec3> quadrature(const LightSource& source, const Place& place, int parts,
-                                        glm::vec3& low, glm::vec3& high) const;
-    std::vector<float> unblockedWeights(const Place& place) const;
-    bool isOutOfSight(const LightSource& source, const Place& place) const;
+    std::vector<float> unblockedWeights(const ReceiverPlace& place) const;
+    bool isOutOfSight(const LightSource& source, const ReceiverPlace& place) const;
     // By a side and the means of the angleTerms of its light: what is shown of more of each term,
     // by channel, over all that is shown.
     AngleFactors shownByAngle(uint32_t side, const glm::vec4& angles) const;

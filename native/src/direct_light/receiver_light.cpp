@@ -5,8 +5,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "direct_light/closed_mean.h"
 #include "direct_light/direct_light.h"
 #include "direct_light/outlook.h"
+#include "direct_light/source_samples.h"
 #include "lights/receiver_place.h"
 
 namespace raybundle {
@@ -31,8 +33,6 @@ constexpr float kStepOfSamples = 0.6f;
 // A receiver that is in the dark after so many samples of a source that surrounds it stays there.
 // One whose neighbours are too, after fewer.
 constexpr int kDarkSamples = 256, kDarkSamplesOfDark = 64;
-// A closed form whose largest value is so many times its smallest on a patch takes more points.
-constexpr float kSmooth = 1.1f;
 
 // Share of a source that n samples may have missed of which all are blocked, or none, where a
 // neighbour has so much contrast, as a share of the source: as much as that neighbour sees of it,
@@ -43,67 +43,182 @@ float missedBeside(float contrast, float n) {
     return std::max(kMissedEdge / n, kAsNeighbour * step * std::exp(-0.5f * n * step));
 }
 
+// What a block's angleTerms add to the means of all blocks.
+glm::vec4 surplusAngles(const SampleSums& all, const SampleSums& block) {
+    const float light = brightest(all.visible);
+    return float(kSampleBlocks) * (block.angles - all.angles / light * brightest(block.visible)) /
+           light;
+}
+
 }  // namespace
 
-// Running sums of one source over a block of samples.
-struct DirectLight::Block {
-    glm::vec3 open{0.0f};     // sum of the samples as if unblocked
-    glm::vec3 visible{0.0f};  // sum of those that are not blocked
-    glm::vec4 angles{0.0f};   // the same, of their brightest channels times angleTerms
-    int count = 0;
-
-    void add(const Block& other) {
-        open += other.open;
-        visible += other.visible;
-        angles += other.angles;
-        count += other.count;
+// Takes the samples of one source at one receiver until their error is small enough.
+class DirectLight::SourceGather {
+  public:
+    SourceGather(const DirectLight& light, size_t index, const Receiver& receiver,
+                 const ReceiverPlace& place, const Aim& aim)
+        : light(light),
+          source(*light.sources[index]),
+          receiver(receiver),
+          place(place),
+          aim(aim),
+          hasParts(!source.parts().empty()),
+          outlook(hasParts ? aim.outlook : nullptr),
+          isGuided(outlook && !outlook->seen.empty()),
+          isInside(light.skips.skipInside && !source.staysInside() && receiver.side % 2 == 1 &&
+                   light.patches.parents[light.patches.parentOf[receiver.side / 2]].isSolid),
+          mostSamples(aim.mostGrowth * source.mostSamples()),
+          seed(hash(light.seed, hash(receiver.seed, uint32_t(index)))),
+          samples(light.visibility, source, place, receiver.side, seed),
+          origins(seed) {
+        if (isGuided) samples.guideBy(outlook->seen);
+        if (!light.patches.scattering.empty() && !receiver.point) samples.noteOrigins(&origins);
     }
-    // Means of angleTerms. Less what few samples of which some are much brighter are off in the
-    // mean (Quenouille, "Notes on Bias in Estimation", 1956).
-    template <class Blocks>
-    glm::vec4 meanAngles(const Blocks& blocks) const {
-        const glm::vec4 mean = angles / brightest(visible);
-        glm::vec4 sum(0.0f);
-        for (const Block& block : blocks) {
-            const float rest = brightest(visible - block.visible);
-            if (!(rest > 0)) return mean;
-            sum += (angles - block.angles) / rest;
+
+    // seen: whether any receiver got light of the source. sightings: to be filled; or null.
+    // Counts what it does in `sum`.
+    LightPart run(std::atomic<bool>& seen, Sightings* sightings, Gathered& sum) {
+        if (isInside) ++sum.inside;
+        if (hasParts) samples.noteSightings(sightings);
+        const LightPart part = takeSamples(seen, sum);
+        sum.rays += samples.rays();
+        return part;
+    }
+
+  private:
+    LightPart takeSamples(std::atomic<bool>& seen, Gathered& sum) {
+        const int darkSamples =
+            aim.mostGrowth * (outlook && outlook->isDark ? kDarkSamplesOfDark : kDarkSamples);
+        // Inside a solid it is dark, unless a source is in there too: look before taking all
+        // samples.
+        int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
+        for (;;) {
+            take(next);
+            // No sample faced the receiver: few of them may, beside a source of many faces.
+            if (brightest(all.open) <= 0 && all.count < mostSamples &&
+                (source.isNarrow || (closed && brightest(*closed) > 0))) {
+                next = 4 * all.count;
+                continue;
+            }
+            const float missed = missedShare() * open();
+            if (isDark()) {
+                if (missed > aim.tolerance && all.count < darkSamples && seen) {
+                    next = 4 * all.count;
+                    continue;
+                }
+                return darkPart(missed, sum);
+            }
+            // By the first pass alone, so that the order of the receivers does not matter.
+            if (std::isinf(aim.tolerance)) seen = true;
+            const float wanted = measureVariance(missed);
+            if (all.count >= aim.samples &&
+                (wanted <= aim.tolerance * aim.tolerance || all.count >= mostSamples))
+                return litPart(sum);
+            next = all.count < aim.samples ? aim.samples
+                                           : (isGuided || source.surrounds() ? 2 : 4) * all.count;
         }
-        const float n = float(blocks.size());
-        return glm::clamp(n * mean - (n - 1) / n * sum, 0.0f, 1.0f);
     }
-    // What a block's angleTerms add to the means of all blocks.
-    glm::vec4 surplusAngles(const Block& block) const {
-        const float all = brightest(visible);
-        return float(kBlocks) * (block.angles - angles / all * brightest(block.visible)) / all;
-    }
-    // The closed form times the visible share; the plain mean where there is no closed form.
-    glm::vec3 estimate(const std::optional<glm::vec3>& closed) const {
-        if (count == 0) return glm::vec3(0.0f);
-        if (!closed) return visible / float(count);
-        glm::vec3 mean = *closed;
-        for (int c = 0; c < 3; ++c)
-            if (open[c] > 0) mean[c] *= visible[c] / open[c];
-        return mean;
-    }
-};
 
-// Where the light of a source comes from.
-struct DirectLight::Origins {
-    uint32_t random;  // differs from receiver to receiver
-    Incoming incoming;
-    float brightness = 0;
-
-    void add(const glm::vec3& direction, float more) {
-        brightness += more;
-        random = hash(random, 0);
-        if (more > 0) incoming.add(direction, more / brightness, random);
+    // Until there are so many.
+    void take(int count) {
+        samples.take(count);
+        all = samples.all();
+        if (!light.skips.skipLit || closed || isGuided) return;
+        if (!(brightest(all.open) <= 0 || brightest(all.visible) > 0)) return;
+        if (const auto mean = closedMean(source, place, aim.tolerance)) {
+            closed = mean->irradiance;
+            closedError = mean->error;
+        }
     }
+
+    // By all samples so far.
+    bool isLit() const { return all.visible == all.open; }
+    bool isDark() const { return brightest(all.visible) <= 0; }
+    // Irradiance as if nothing blocked it, W/m^2.
+    float open() const { return brightest(all.open) / float(all.count); }
+
+    // The share of the source that all samples may have missed.
+    float missedShare() const {
+        const float n = float(all.count);
+        if (isInside) return 0;
+        if (source.surrounds()) return kMissed / n;
+        return aim.besideShadow > 0 && (isLit() || isDark())
+                   ? missedBeside(aim.besideShadow / open(), n)
+                   : 0;
+    }
+
+    // Among receivers that look alike a part that one alone sees is missed there alone, and one
+    // that all see is missed by all their samples: in the mean of squares over so many, what is
+    // missed is less by their number at least.
+    float varianceOfMissed(float missed) const {
+        return missed * missed / (outlook ? float(outlook->receivers) : 1.0f);
+    }
+
+    // Finds the variance; returns the one that samples are to take below the aim.
+    float measureVariance(float missed) {
+        const glm::vec3 mean = all.estimate(closed);
+        variance = varianceOfMissed(missed);
+        float wanted = missed * missed;
+        const AngleFactors byAngle =
+            light.shownByAngle(receiver.side, all.angles / brightest(all.visible));
+        for (const SampleSums& block : samples.blocks()) {
+            const glm::vec3 shown = mean * sumOfTerms(byAngle, surplusAngles(all, block));
+            const float d = brightest(glm::abs(block.estimate(closed) - mean + shown));
+            variance += d * d / (kSampleBlocks * (kSampleBlocks - 1));
+            wanted += d * d / (kSampleBlocks * (kSampleBlocks - 1));
+        }
+        if (!isLit()) {
+            const float step = kStepOfSamples * open() / float(all.count);
+            variance += step * step;
+            wanted += step * step;
+        }
+        return wanted;
+    }
+
+    LightPart darkPart(float missed, Gathered& sum) const {
+        if (!source.surrounds()) sum.unblockedLight += open();
+        return {glm::vec3(0.0f), varianceOfMissed(missed), 0, glm::vec4(0.0f), {}};
+    }
+
+    LightPart litPart(Gathered& sum) {
+        if (closed && isLit()) ++sum.unblocked;
+        const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
+        const glm::vec3 irradiance = all.estimate(closed);
+        if (brightest(irradiance) > 0)
+            origins.incoming.weight =
+                brightest(all.visible) / (float(all.count) * brightest(irradiance));
+        const float unblocked = brightest(closed ? *closed : all.open / float(all.count));
+        const float contrast = unblocked * std::sqrt(visible * (1 - visible));
+        if (!source.surrounds()) {
+            sum.unblockedLight += unblocked;
+            sum.lampLight += brightest(irradiance);
+            sum.shadowContrast += contrast;
+        }
+        return {irradiance, variance + closedError * closedError, contrast,
+                brightest(irradiance) * samples.meanAngles(), origins.incoming};
+    }
+
+    const DirectLight& light;
+    const LightSource& source;
+    const Receiver& receiver;
+    const ReceiverPlace& place;
+    const Aim& aim;
+    const bool hasParts;
+    const Outlook* const outlook;  // on the source; null: not known
+    const bool isGuided;           // by what is seen of its parts
+    const bool isInside;           // of a solid
+    const int mostSamples;
+    const uint32_t seed;
+    SourceSamples samples;
+    Origins origins;
+    SampleSums all;                   // so far
+    std::optional<glm::vec3> closed;  // the closed form, W/m^2
+    float closedError = 0, variance = 0;
 };
 
 // About what each source would give without occluders, to share out the samples: by one sample, or
 // another where that gets nothing. Empty where there are so few sources that it does not pay.
-std::vector<float> DirectLight::unblockedWeights(const Place& place) const {
+std::vector<float> DirectLight::unblockedWeights(const ReceiverPlace& place) const {
     if (sources.size() <= kFewSources || !skips.skipWeak) return {};
     static const glm::vec2 kAt[2] = {{0.25f, 0.25f}, {0.5f, 0.75f}};
     std::vector<float> weights(sources.size());
@@ -132,7 +247,7 @@ AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) c
 Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,
                              Sightings* sightings) const {
     Gathered sum;
-    const Place place(patches, receiver);
+    const ReceiverPlace place(patches, receiver);
     const std::vector<float> weights = unblockedWeights(place);
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
     for (size_t k = 0; k < sources.size(); ++k) {
@@ -158,248 +273,24 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
     return sum;
 }
 
-std::optional<glm::vec3> DirectLight::quadrature(const LightSource& source, const Place& place,
-                                                 int parts, glm::vec3& low, glm::vec3& high) const {
-    // The patch cut into parts is like a parent with that grid.
-    Parent grid;
-    grid.isTriangle = place.isTriangle;
-    grid.countA = grid.countB = uint16_t(parts);
-    static constexpr float kGauss = 0.21132487f;  // (1 - 1 / sqrt 3) / 2
-    static const glm::vec2 kSquare[4] = {
-        {kGauss, kGauss}, {1 - kGauss, kGauss}, {kGauss, 1 - kGauss}, {1 - kGauss, 1 - kGauss}};
-    static const glm::vec2 kTriangle[3] = {
-        {1.0f / 6, 1.0f / 6}, {2.0f / 3, 1.0f / 6}, {1.0f / 6, 2.0f / 3}};
-    const int points = place.isTriangle ? 3 : 4;
-    glm::vec3 sum(0.0f);
-    low = glm::vec3(INFINITY);
-    high = glm::vec3(0.0f);
-    for (uint32_t part = 0; part < grid.patchCount(); ++part)
-        for (int k = 0; k < points; ++k) {
-            const glm::vec2 st = grid.pointOn(part, place.isTriangle ? kTriangle[k] : kSquare[k]);
-            const auto value =
-                source.irradiance(place.origin + st.x * place.a + st.y * place.b, place.normal);
-            if (!value) return std::nullopt;
-            sum += *value;
-            low = glm::min(low, *value);
-            high = glm::max(high, *value);
-        }
-    return sum / float(grid.patchCount() * points);
-}
-
-// Mean of the closed form over a patch, if the source does not know it, by Gauss quadrature (degree
-// 3 on a parallelogram, 2 on a triangle), on more parts where it varies much: beside a source it
-// falls from a finite value at the common edge with an infinite slope.
-std::optional<glm::vec3> DirectLight::closedMean(const LightSource& source, const Place& place,
-                                                 float tolerance, float& error) const {
-    glm::vec3 low, high;
-    error = 0;
-    if (place.radius == 0 || place.radius < source.farPatch() * source.distance(place.centroid()))
-        return source.irradiance(place.centroid(), place.normal);
-    if (const auto mean = source.meanIrradiance(place)) return mean;
-    const auto coarse = quadrature(source, place, 1, low, high);
-    if (!coarse) return coarse;
-    // The points of the quadrature alone may be alike by symmetry.
-    const auto middle = source.irradiance(place.centroid(), place.normal);
-    if (brightest(glm::max(high, *middle)) <= kSmooth * brightest(glm::min(low, *middle)))
-        return coarse;
-    const auto fine = quadrature(source, place, 4, low, high);
-    // The error falls with the square of the parts, or at a kink with their number.
-    error = brightest(glm::abs(*fine - *coarse)) / 4;
-    if (error <= tolerance) return fine;
-    const auto finest = quadrature(source, place, 16, low, high);
-    error = brightest(glm::abs(*finest - *fine)) / 4;
-    return finest;
-}
-
-// Takes the first `count` samples, or doubles those in `blocks` until there are so many: powers of
-// two. Each block has consecutive ones, from a multiple of their number on, so that it is
-// stratified like all of them: of others the blocks would differ by more than their mean is off.
-template <class SampleAt>
-void DirectLight::takeSamples(const LightSource& source, const SampleAt& sampleAt,
-                              const SobolPoints& points, uint32_t side, const Place& place,
-                              int count, std::array<Block, kBlocks>& blocks, Sightings* sightings,
-                              Origins* origins, Gathered& sum) const {
-    std::array<ShadowRay, Visibility::kPacket> rays;
-    struct Held {
-        glm::vec3 irradiance;
-        Block* block;
-        uint32_t part;
-    };
-    std::array<Held, Visibility::kPacket> held;
-    int waiting = 0;
-    const bool choosesPlaces = source.choosesPlaces();
-    auto see = [&](Block& block, const glm::vec3& irradiance, const glm::vec3& direction) {
-        block.visible += irradiance;
-        const float brightness = brightest(irradiance);
-        block.angles += brightness * angleTerms(glm::dot(direction, place.normal));
-        if (origins) origins->add(direction, brightness);
-    };
-    auto trace = [&] {
-        std::array<float, Visibility::kPacket> shares;
-        visibility.visibleShares(side, rays.data(), waiting, shares.data());
-        for (size_t k = 0; k < size_t(waiting); ++k) {
-            see(*held[k].block, shares[k] * held[k].irradiance, rays[k].direction);
-            if (sightings) sightings->add(held[k].part, shares[k] > 0);
-        }
-        sum.rays += uint64_t(waiting);
-        waiting = 0;
-    };
-    auto take = [&](int i, Block& block) {
-        const glm::vec4 u = points[uint32_t(i)];
-        const auto [point, weight] =
-            choosesPlaces ? source.placeOn(place, {u.x, u.y}) : PatchPoint{place.at({u.x, u.y})};
-        LightSample sample = sampleAt(point, glm::vec2(u.z, u.w));
-        sample.irradiance *= weight;
-        ++block.count;
-        if (brightest(sample.irradiance) <= 0) return;
-        block.open += sample.irradiance;
-        if (!source.castsShadows) {
-            see(block, sample.irradiance, sample.direction);
-            return;
-        }
-        held[size_t(waiting)] = {sample.irradiance, &block, sample.part};
-        rays[size_t(waiting++)] = sample.ray(point);
-        if (waiting == Visibility::kPacket) trace();
-    };
-    for (int taken = int(kBlocks) * blocks[0].count; taken < count;) {
-        int each = count / int(kBlocks);
-        if (taken > 0) {
-            each = taken / 2;
-            for (size_t k = 0; k < kBlocks / 2; ++k) {
-                const Block second = blocks[2 * k + 1];
-                blocks[k] = blocks[2 * k];
-                blocks[k].add(second);
-            }
-            std::fill(blocks.begin() + kBlocks / 2, blocks.end(), Block());
-        }
-        for (; taken < int(kBlocks) * each; ++taken) take(taken, blocks[size_t(taken / each)]);
-        if (waiting > 0) trace();
-    }
-}
-
-LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver, const Place& place,
-                                  const Aim& aim, Seen& seen, Sightings* sightings,
-                                  Gathered& sum) const {
-    const float tolerance = aim.tolerance;
-    const LightSource& source = *sources[index];
-    const int mostSamples = aim.mostGrowth * source.mostSamples();
-    const bool hasParts = !source.parts().empty();
-    const Outlook* const outlook = hasParts ? aim.outlook : nullptr;
-    const int darkSamples =
-        aim.mostGrowth * (outlook && outlook->isDark ? kDarkSamplesOfDark : kDarkSamples);
-    const bool isGuided = outlook && !outlook->seen.empty();
-    // Among receivers that look alike a part that one alone sees is missed there alone, and one
-    // that all see is missed by all their samples: in the mean of squares over so many, what is
-    // missed is less by their number at least.
-    const float alike = outlook ? float(outlook->receivers) : 1.0f;
-    if (isOutOfSight(source, place)) {
+LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver,
+                                  const ReceiverPlace& place, const Aim& aim, Seen& seen,
+                                  Sightings* sightings, Gathered& sum) const {
+    if (isOutOfSight(*sources[index], place)) {
         ++sum.hidden;
         return {};
     }
-    // Inside a solid it is dark, unless a source is in there too: look before taking all
-    // samples.
-    const bool isInside = skips.skipInside && !source.staysInside() && receiver.side % 2 == 1 &&
-                          patches.parents[patches.parentOf[receiver.side / 2]].isSolid;
-    if (isInside) ++sum.inside;
-    int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
-    std::array<Block, kBlocks> blocks;
-    Block all;
-    const uint32_t ownSeed = hash(seed, hash(receiver.seed, uint32_t(index)));
-    const SobolPoints points(ownSeed);
-    Origins origins{ownSeed, {}};
-    const bool keepsOrigins = !patches.scattering.empty() && !receiver.point;
-    std::optional<glm::vec3> closed;
-    float closedError = 0, variance = 0;
-    const std::vector<float> sumOfSeen =
-        isGuided ? source.sumOfSeen(place.normal, outlook->seen) : std::vector<float>();
-    auto sampleAt = [&](const glm::vec3& point, glm::vec2 uv) {
-        return isGuided ? source.sampleSeen(place.normal, uv, sumOfSeen)
-                        : source.sample(point, place.normal, uv);
-    };
-    for (;;) {
-        takeSamples(source, sampleAt, points, receiver.side, place, next, blocks,
-                    hasParts ? sightings : nullptr, keepsOrigins ? &origins : nullptr, sum);
-        all = {};
-        for (const Block& block : blocks) all.add(block);
-        if (skips.skipLit && !closed && !isGuided &&
-            (brightest(all.open) <= 0 || brightest(all.visible) > 0))
-            closed = closedMean(source, place, tolerance, closedError);
-        // No sample faced the receiver: few of them may, beside a source of many faces.
-        if (brightest(all.open) <= 0 && all.count < mostSamples &&
-            (source.isNarrow || (closed && brightest(*closed) > 0))) {
-            next = 4 * all.count;
-            continue;
-        }
-        const bool isLit = all.visible == all.open, isDark = brightest(all.visible) <= 0;
-        const float n = float(all.count);
-        const float open = brightest(all.open) / n;
-        const float part = isInside             ? 0
-                           : source.surrounds() ? kMissed / n
-                           : aim.besideShadow > 0 && (isLit || isDark)
-                               ? missedBeside(aim.besideShadow / open, n)
-                               : 0;
-        const float missed = part * open;
-        if (isDark) {
-            if (missed > tolerance && all.count < darkSamples && seen[index]) {
-                next = 4 * all.count;
-                continue;
-            }
-            if (!source.surrounds()) sum.unblockedLight += open;
-            return {glm::vec3(0.0f), missed * missed / alike, 0, glm::vec4(0.0f), {}};
-        }
-        // By the first pass alone, so that the order of the receivers does not matter.
-        if (std::isinf(tolerance)) seen[index] = true;
-        const glm::vec3 mean = all.estimate(closed);
-        variance = missed * missed / alike;
-        float wanted = missed * missed;
-        const AngleFactors byAngle =
-            shownByAngle(receiver.side, all.angles / brightest(all.visible));
-        for (const Block& block : blocks) {
-            const glm::vec3 shown = mean * sumOfTerms(byAngle, all.surplusAngles(block));
-            const float d = brightest(glm::abs(block.estimate(closed) - mean + shown));
-            variance += d * d / (kBlocks * (kBlocks - 1));
-            wanted += d * d / (kBlocks * (kBlocks - 1));
-        }
-        if (!isLit) {
-            const float step = kStepOfSamples * open / n;
-            variance += step * step;
-            wanted += step * step;
-        }
-        if (all.count >= aim.samples &&
-            (wanted <= tolerance * tolerance || all.count >= mostSamples))
-            break;
-        next = all.count < aim.samples ? aim.samples
-                                       : (isGuided || source.surrounds() ? 2 : 4) * all.count;
-    }
-    if (closed && all.visible == all.open) ++sum.unblocked;
-    const float visible = std::min(1.0f, brightest(all.visible) / brightest(all.open));
-    const glm::vec3 irradiance = all.estimate(closed);
-    if (brightest(irradiance) > 0)
-        origins.incoming.weight =
-            brightest(all.visible) / (float(all.count) * brightest(irradiance));
-    const float open = brightest(closed ? *closed : all.open / float(all.count));
-    const float contrast = open * std::sqrt(visible * (1 - visible));
-    if (!source.surrounds()) {
-        sum.unblockedLight += open;
-        sum.lampLight += brightest(irradiance);
-        sum.shadowContrast += contrast;
-    }
-    return {irradiance, variance + closedError * closedError, contrast,
-            brightest(irradiance) * all.meanAngles(blocks), origins.incoming};
+    return SourceGather(*this, index, receiver, place, aim).run(seen[index], sightings, sum);
 }
 
 void DirectLight::look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,
                        Sightings& sightings, Gathered& sum) const {
-    const Place place(patches, receiver);
-    const std::vector<float> sumOfSeen = source.sumOfSeen(place.normal, outlook.seen);
-    std::array<Block, kBlocks> blocks;
-    takeSamples(
-        source,
-        [&](const glm::vec3&, glm::vec2 uv) {
-            return source.sampleSeen(place.normal, uv, sumOfSeen);
-        },
-        SobolPoints(hash(seed, ~receiver.seed)), receiver.side, place, Sightings::kMost, blocks,
-        &sightings, nullptr, sum);
+    const ReceiverPlace place(patches, receiver);
+    SourceSamples samples(visibility, source, place, receiver.side, hash(seed, ~receiver.seed));
+    samples.guideBy(outlook.seen);
+    samples.noteSightings(&sightings);
+    samples.take(Sightings::kMost);
+    sum.rays += samples.rays();
 }
 
 }  // namespace raybundle

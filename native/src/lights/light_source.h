@@ -179,16 +179,8 @@ class LightSource {
     virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;
 };
 
-// The emissive faces of sides that are marked, whose emission per side of all patches (W/m^2 of the
-// whole patch, 0 where not marked) is given; directed: what they send towards a direction more than
-// that, or less; null: nothing. All that is passed must outlive them.
-std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
-                                                      const std::vector<bool>& gatheredSides,
-                                                      const std::vector<glm::vec3>& emission,
-                                                      const DirectedEmission* directed);
-
 // All sources of a light set whose light the first shot gathers: its lights, the image of the world
-// if that is in it, and its emissive faces as above.
+// if that is in it, and its emissive faces (lights/emissive_meshes.h).
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
                                                        const std::vector<bool>& gatheredSides,
                                                        const std::vector<glm::vec3>& emission,

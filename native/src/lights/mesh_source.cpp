@@ -62,22 +62,20 @@ std::optional<FaceDirection> directionTo(const LightFace& face, const glm::vec3&
 
 }  // namespace
 
-MeshSource::MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
-                       const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission,
-                       const Extent& whole, bool isEnclosed, const DirectedEmission* directed)
+MeshSource::MeshSource(const Patches& patches, const EmissiveFaces& own)
     : patches(patches),
-      emission(emission),
-      sideEmission(sideEmission),
-      whole(whole),
-      isEnclosed(isEnclosed),
-      directed(directed) {
-    boundSource(parents);
+      emission(own.emission),
+      sideEmission(own.sideEmission),
+      whole(own.whole),
+      isEnclosed(own.isEnclosed),
+      directed(own.directed) {
+    boundSource(own.parents);
     wholeExtent = std::max(double(extent), 0.5 * whole.diagonal());
-    collectFaces(parents, back);
+    collectFaces(own.parents, own.back);
     tree = LightTree(faces);
     for (const LightFace& face : faces) shapes.push_back(shapeOf(face));
     if (!sideEmission)
-        outline = MeshOutline(patches, parents, back == 1, wholeExtent);
+        outline = MeshOutline(patches, own.parents, own.back == 1, wholeExtent);
     else if (!directed && faces.size() <= FaceClusters::kMostFaces)
         clusters = FaceClusters(tree, faces, radiances());
 }

@@ -17,17 +17,23 @@
 
 namespace raybundle {
 
+// The faces of one source.
+struct EmissiveFaces {
+    std::vector<uint32_t> parents;  // into Patches::parents
+    uint32_t back = 0;              // 0: their fronts, 1: their backs
+    glm::vec3 emission{0.0f};       // of those, W/m^2; where it varies, the most of it
+    // Where the emission varies: per side of all patches, W/m^2 of the whole patch; else null.
+    const std::vector<glm::vec3>* sideEmission = nullptr;
+    Extent whole{};           // what the faces are part of
+    bool isEnclosed = false;  // their light does not get out of that
+    // What sides send towards a direction beyond that, where the emission varies; or null.
+    const DirectedEmission* directed = nullptr;
+};
+
 class MeshSource : public LightSource {
   public:
-    // parents: into Patches::parents; back: 0 for their fronts, 1 for their backs; emission: of
-    // those, W/m^2. `patches` must outlive it. Where the emission varies, sideEmission holds it per
-    // side of all patches, W/m^2 of the whole patch, and must outlive the source too. whole: what
-    // the faces are part of; isEnclosed: the light does not get out of that.
-    // directed: what sides send towards a direction beyond that, if emission varies; or null.
-    MeshSource(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
-               const glm::vec3& emission, const std::vector<glm::vec3>* sideEmission = nullptr,
-               const Extent& whole = {}, bool isEnclosed = false,
-               const DirectedEmission* directed = nullptr);
+    // `patches` and what `own` points to must outlive the object.
+    MeshSource(const Patches& patches, const EmissiveFaces& own);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& receiver,
                        glm::vec2 uv) const override;

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Point and spot lamps: spheres, or disks that turn towards each receiver.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <limits>
+
+#include "lights/lamps.h"
+#include "lights/receiver_place.h"
+#include "lights/spot_cone.h"
+#include "patches/plane.h"
+#include "sampling/sphere_sampling.h"
+#include "sampling/spherical_triangle.h"
+
+namespace raybundle {
+namespace {
+
+// A patch larger than this share of its distance from a point lamp gets light that varies over it.
+constexpr float kNearPatch = 0.3f;
+
+class PointSource : public LightSource {
+  public:
+    PointSource(const Light& light, const glm::dvec3& centre)
+        : light(light), position(light.position - centre), intensity(light.strength) {
+        if (light.hasCone) cone.emplace(light);
+        totalPower = 2 * glm::two_pi<float>() * intensity * (cone ? cone->meanOverSphere() : 1);
+    }
+
+    LightSample sample(const glm::vec3& point, const glm::vec3& normal,
+                       glm::vec2 uv) const override {
+        const glm::vec3 towards = position - point;
+        const float distance2 = glm::dot(towards, towards);
+        const float radius = float(light.radius);
+        LightSample sample;
+        if (distance2 <= 0) return sample;
+        if (radius > 0 && light.pointShape == RB_POINT_SPHERE && distance2 <= radius * radius)
+            return sample;  // inside the sphere
+        const float distance = std::sqrt(distance2);
+        const glm::vec3 axis = towards / distance;
+        if (radius == 0) {
+            sample.direction = axis;
+            sample.distance = distance;
+            sample.irradiance = intensity * std::max(0.0f, glm::dot(normal, axis)) / distance2;
+        } else if (light.pointShape == RB_POINT_DISK) {
+            // Disk of radius r facing the receiver with radiance I / (pi r^2).
+            const auto [x, y] = frame(axis);
+            const glm::vec2 d = radius * onDisk(uv);
+            sample = surfaceSample(point, normal, position + d.x * x + d.y * y, -axis,
+                                   intensity / (glm::pi<float>() * radius * radius),
+                                   glm::pi<float>() * radius * radius);
+        } else {
+            // Uniform direction in the cone that the sphere of the same radiance fills.
+            const float cosMax = std::sqrt(std::max(0.0f, 1 - radius * radius / distance2));
+            const float solidAngle =
+                glm::two_pi<float>() * (radius * radius / distance2) / (1 + cosMax);
+            sample.direction = inCone(axis, cosMax, uv);
+            const float b = distance * glm::dot(axis, sample.direction);
+            const float inside = radius * radius - distance2 + b * b;
+            sample.distance = b - std::sqrt(std::max(0.0f, inside));
+            sample.irradiance = intensity / (glm::pi<float>() * radius * radius) * solidAngle *
+                                std::max(0.0f, glm::dot(normal, sample.direction));
+        }
+        if (cone) sample.irradiance *= cone->share(-sample.direction);
+        return sample;
+    }
+
+    // A sphere that is wholly above the horizon gives what its centre would.
+    std::optional<glm::vec3> irradiance(const glm::vec3& point,
+                                        const glm::vec3& normal) const override {
+        const glm::vec3 towards = position - point;
+        const float height = glm::dot(towards, normal), distance2 = glm::dot(towards, towards);
+        if (height <= -float(light.radius)) return glm::vec3(0.0f);
+        if (!isPoint() && (cone || isDisk() || height < float(light.radius))) return std::nullopt;
+        if (!(height > 0)) return glm::vec3(0.0f);
+        const float distance = std::sqrt(distance2);
+        const float share = cone ? cone->share(-towards / distance) : 1.0f;
+        return intensity * (share * height / (distance * distance2));
+    }
+
+    // What leaves towards the patch: its solid angle times the intensity, however near it is.
+    std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& patch) const override {
+        if (cone || isDisk() || !isBefore(patch)) return std::nullopt;
+        const std::array<SphericalTriangle, 2> halves = seen(patch);
+        return intensity * float((halves[0].area() + halves[1].area()) / areaOf(patch));
+    }
+
+    // Uniform by the angle at which the source sees them, as its light is.
+    bool choosesPlaces() const override { return true; }
+    PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const override {
+        if (patch.radius == 0 || patch.radius < kNearPatch * distance(patch.middle) ||
+            !isBefore(patch))
+            return LightSource::placeOn(patch, uv);
+        const std::array<SphericalTriangle, 2> halves = seen(patch);
+        const double all = halves[0].area() + halves[1].area();
+        const float first = float(halves[0].area() / all);
+        const bool isFirst = uv.x < first;
+        const SphericalTriangle& half = halves[isFirst ? 0 : 1];
+        if (!half.isSampled()) return LightSource::placeOn(patch, uv);
+        uv.x = isFirst ? uv.x / first : (uv.x - first) / (1 - first);
+        const glm::dvec3 d = half.sample({std::min(uv.x, 0.9999999f), uv.y});
+        const glm::dvec3 n(patch.normal);
+        const double height = glm::dot(glm::dvec3(position - patch.origin), n);
+        const double cosine = -glm::dot(d, n), along = height / cosine;
+        if (!(cosine > 0)) return LightSource::placeOn(patch, uv);
+        // Over the density at which an equal area of the patch is seen.
+        return {position + glm::vec3(along * d),
+                float(all * along * along / (cosine * areaOf(patch)))};
+    }
+
+    bool isOutOfSight(const ReceiverPlace& place) const override {
+        return glm::dot(place.normal, position - place.middle) <
+               -(place.reach(place.normal) + float(light.radius));
+    }
+
+    float distance(const glm::vec3& point) const override {
+        return glm::length(position - point) - float(light.radius);
+    }
+
+    glm::vec3 power() const override { return isDisk() ? glm::vec3(0.0f) : totalPower; }
+
+    // A disk that faces each receiver has no surface to emit from, but each line through it has
+    // its radiance (see emit), and they carry as much as those of the sphere.
+    glm::vec3 shootingPower(float) const override { return totalPower; }
+
+    EmittedRay emit(const glm::vec4& u, float) const override {
+        EmittedRay ray;
+        ray.origin = position;
+        if (cone) {
+            const SpotCone::Ray along = cone->emit({u.x, u.y});
+            ray.direction = along.direction;
+            ray.weight = glm::vec3(along.weight);
+        } else {
+            ray.direction = uniformDirection({u.x, u.y});
+        }
+        if (light.radius == 0) return ray;
+        // All lines of a direction that pass within the radius r of the centre, at a distance d.
+        const float r2 = float(light.radius * light.radius);
+        const glm::vec2 across = float(light.radius) * onDisk({u.z, u.w});
+        const auto [x, y] = frame(ray.direction);
+        const float d2 = glm::dot(across, across), rest = std::sqrt(std::max(0.0f, r2 - d2));
+        ray.origin += across.x * x + across.y * y;
+        // A sphere emits them where they leave it. The disk that faces a point at t along the line
+        // (t = 0 where it is nearest to the centre) lies across the line only if the point is
+        // far enough, t > d^2 / sqrt(r^2 - d^2): nearer points see the line pass beside the disk.
+        if (isDisk())
+            ray.from = rest > 0 ? d2 / rest : std::numeric_limits<float>::infinity();
+        else
+            ray.origin += rest * ray.direction;
+        return ray;
+    }
+
+  private:
+    bool isPoint() const { return light.radius == 0; }
+    bool isDisk() const { return light.radius > 0 && light.pointShape == RB_POINT_DISK; }
+
+    // Whether the source is wholly in front of a patch, and not in its plane.
+    bool isBefore(const ReceiverPlace& patch) const {
+        const Plane plane(patch.origin, patch.a, patch.b, patch.normal, double(patch.radius));
+        return plane.height(position) >= std::max(double(light.radius), plane.thickness);
+    }
+
+    // A patch as it is seen from the centre; a triangle has no second half.
+    std::array<SphericalTriangle, 2> seen(const ReceiverPlace& patch) const {
+        const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
+        const glm::dvec3 end = o + (patch.isTriangle ? b : a + b);
+        return {SphericalTriangle(o, o + a, o + b), SphericalTriangle(end, o + b, o + a)};
+    }
+
+    static double areaOf(const ReceiverPlace& patch) {
+        return glm::length(glm::cross(glm::dvec3(patch.a), glm::dvec3(patch.b))) *
+               (patch.isTriangle ? 0.5 : 1.0);
+    }
+
+    const Light& light;
+    const glm::vec3 position;
+    const glm::vec3 intensity;
+    std::optional<SpotCone> cone;
+    glm::vec3 totalPower{0.0f};
+};
+
+}  // namespace
+
+std::unique_ptr<LightSource> pointSource(const Light& light, const glm::dvec3& centre) {
+    return std::make_unique<PointSource>(light, centre);
+}
+
+}  // namespace raybundle
