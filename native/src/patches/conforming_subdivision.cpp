@@ -151,16 +151,31 @@ class Doubles {
     std::set<std::vector<int32_t>> met;
 };
 
-}  // namespace
-
-ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
-    omerr().disable();  // what it would print is handled below
+// The triangles of a mesh, and what they are cut from.
+struct Triangles {
     TriMesh mesh;
-    SourceOf sourceTriangle(mesh);
+    SourceOf sourceTriangle{mesh};
     std::vector<SourceTriangle> sourceTriangles;
-    std::vector<TriMesh::VertexHandle> handles;
-    for (const glm::vec3& v : source.vertices) handles.push_back(mesh.add_vertex({v.x, v.y, v.z}));
 
+    // An edge with more than two faces: the last gets vertices of its own.
+    void add(const std::array<TriMesh::VertexHandle, 3>& v, const SourceTriangle& source) {
+        TriMesh::FaceHandle face = mesh.add_face(v[0], v[1], v[2]);
+        if (!face.is_valid()) {
+            // Copied first, since adding one moves the points.
+            const std::array<OpenMesh::Vec3d, 3> p{mesh.point(v[0]), mesh.point(v[1]),
+                                                   mesh.point(v[2])};
+            face =
+                mesh.add_face(mesh.add_vertex(p[0]), mesh.add_vertex(p[1]), mesh.add_vertex(p[2]));
+        }
+        sourceTriangle[face] = int(sourceTriangles.size());
+        sourceTriangles.push_back(source);
+    }
+};
+
+void addFaces(const Mesh& source, Triangles& triangles) {
+    std::vector<TriMesh::VertexHandle> handles;
+    for (const glm::vec3& v : source.vertices)
+        handles.push_back(triangles.mesh.add_vertex({v.x, v.y, v.z}));
     Doubles doubles(source);
     for (size_t f = 0; f < source.faceCount(); ++f) {
         if (!doubles.isFirst(f)) continue;
@@ -176,23 +191,13 @@ ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
                     handles[size_t(source.cornerVertices[size_t(triangle.corner[size_t(k)])])];
             }
             if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) continue;
-            TriMesh::FaceHandle face = mesh.add_face(v[0], v[1], v[2]);
-            // An edge with more than two faces: give this face vertices of its own. (Copied first,
-            // since adding one moves the points.)
-            if (!face.is_valid()) {
-                const std::array<OpenMesh::Vec3d, 3> p{mesh.point(v[0]), mesh.point(v[1]),
-                                                       mesh.point(v[2])};
-                face = mesh.add_face(mesh.add_vertex(p[0]), mesh.add_vertex(p[1]),
-                                     mesh.add_vertex(p[2]));
-            }
-            sourceTriangle[face] = int(sourceTriangles.size());
-            sourceTriangles.push_back(triangle);
+            triangles.add(v, triangle);
         }
     }
+}
 
-    takeOutSlivers(mesh, sourceTriangle);
-
-    // Bisect the longest edge until all are short enough.
+// Bisects the longest edge until all are short enough.
+void bisectEdges(const Mesh& source, float maxEdge, TriMesh& mesh) {
     using Entry = std::pair<double, int>;  // squared length, edge index
     std::priority_queue<Entry> queue;
     const double enough = double(maxEdge) * maxEdge;
@@ -213,6 +218,17 @@ ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
             throw invalidArgument("mesh \"" + source.name + "\": an edge length of " +
                                   std::to_string(maxEdge) + " would need too many triangles");
     }
+}
+
+}  // namespace
+
+ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
+    omerr().disable();  // what it would print is handled here
+    Triangles triangles;
+    addFaces(source, triangles);
+    TriMesh& mesh = triangles.mesh;
+    takeOutSlivers(mesh, triangles.sourceTriangle);
+    bisectEdges(source, maxEdge, mesh);
 
     ConformingSubdivision result;
     for (auto v : mesh.vertices()) {
@@ -220,7 +236,8 @@ ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
         result.vertices.emplace_back(float(p[0]), float(p[1]), float(p[2]));
     }
     for (auto face : mesh.faces()) {
-        const SourceTriangle& origin = sourceTriangles[size_t(sourceTriangle[face])];
+        const SourceTriangle& origin =
+            triangles.sourceTriangles[size_t(triangles.sourceTriangle[face])];
         const std::array<OpenMesh::Vec3d, 3> corners{point(source, origin.corner[0]),
                                                      point(source, origin.corner[1]),
                                                      point(source, origin.corner[2])};

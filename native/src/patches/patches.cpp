@@ -4,13 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "job/cancellation.h"
-#include "job/error.h"
-#include "job/settings.h"
-#include "patches/placement.h"
-#include "patches/reflectance.h"
-#include "patches/subdivision.h"
-
 namespace raybundle {
 
 namespace {
@@ -112,103 +105,6 @@ uint32_t Patches::patchAt(uint32_t parentIndex, const glm::vec3& point) const {
     const Parent& parent = parents[parentIndex];
     const glm::vec2 st = parent.affineAt(glm::dvec3(point));
     return parent.firstPatch + parent.patchAt(st.x, st.y);
-}
-
-namespace {
-
-// Surfaces not further apart than these shares of an island's radius and of its finest patches
-// touch; far from the centre, where rounding tells less apart, than this share of how far it is.
-constexpr float kTouchOfRadius = 1e-4f, kTouchOfPatch = 0.02f, kTouchOfDistance = 1e-6f;
-
-size_t numberPatches(Patches& patches) {
-    size_t count = 0;
-    for (Parent& parent : patches.parents) {
-        parent.firstPatch = parent.firstTile = uint32_t(count);
-        count += parent.patchCount();
-    }
-    return count;
-}
-
-// The grids were made for one patch size; makes them coarser by a factor.
-void coarsen(Patches& patches, double factor) {
-    for (Parent& parent : patches.parents) {
-        parent.countA = uint16_t(std::max(1.0, std::floor(parent.countA / factor)));
-        parent.countB = parent.isTriangle
-                            ? parent.countA
-                            : uint16_t(std::max(1.0, std::floor(parent.countB / factor)));
-    }
-}
-
-// What patches have, after they were numbered.
-void fillPatches(const Scene& scene, Patches& patches) {
-    patches.parentOf.clear();
-    patches.area.clear();
-    for (size_t i = 0; i < patches.parents.size(); ++i) {
-        throwIfCancelledAt(i);
-        const Parent& parent = patches.parents[i];
-        patches.parentOf.resize(parent.firstPatch + parent.patchCount(), uint32_t(i));
-        const float tileArea = parent.area() / float(parent.tileCount());
-        for (uint32_t tile = 0; tile < parent.tileCount(); ++tile) {
-            const uint32_t count = parent.firstOf(tile + 1) - parent.firstOf(tile);
-            patches.area.resize(patches.area.size() + count, tileArea / float(count));
-        }
-    }
-    patches.sheets = findSheets(patches);
-    assignOpacity(scene, patches);
-    assignMaterials(scene, patches);
-}
-
-}  // namespace
-
-Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
-    Patches patches;
-    Placement placed(scene);
-    if (placed.isEmpty()) return patches;
-    placed.findIslands(patches);
-    cutFaces(scene, placed, patchSize, patches);
-
-    // A parent keeps at least one patch. Where many small ones take most of maxPatches, this part
-    // of it is for the grids of the large ones: a ground under dense props is not to be one patch.
-    const size_t most = std::max(maxPatches, patches.parents.size() + maxPatches / 8);
-    while (numberPatches(patches) > most) {
-        coarsen(patches, 1.1);
-        patches.size *= 1.1f;
-        patches.finest *= 1.1f;
-        for (Island& island : patches.islands) {
-            island.size *= 1.1f;
-            island.finest *= 1.1f;
-        }
-    }
-    const size_t count = numberPatches(patches);
-    if (count > kMostPatches)
-        throw invalidArgument("the scene has too many faces: they are " + std::to_string(count) +
-                              " patches at least, and " + std::to_string(kMostPatches) +
-                              " are possible");
-    for (Island& island : patches.islands)
-        island.touchDistance =
-            std::max(std::min(kTouchOfRadius * island.radius, kTouchOfPatch * island.finest),
-                     kTouchOfDistance * (island.reach - island.radius));
-    patches.tileCount = count;
-    for (const Parent& parent : patches.parents) patches.totalArea += parent.area();
-    fillPatches(scene, patches);
-    return patches;
-}
-
-void cutTiles(const Scene& scene, Patches& patches, const std::vector<uint8_t>& levels) {
-    uint32_t next = 0;
-    for (Parent& parent : patches.parents) {
-        parent.firstPatch = next;
-        const auto begin = levels.begin() + ptrdiff_t(parent.firstTile);
-        CutTiles cut{{begin, begin + parent.tileCount()}, {}};
-        for (uint8_t level : cut.level) {
-            cut.first.push_back(next - parent.firstPatch);
-            next += 1u << (2 * level);
-        }
-        cut.first.push_back(next - parent.firstPatch);
-        const bool isCut = next - parent.firstPatch > parent.tileCount();
-        parent.cut = isCut ? std::make_shared<const CutTiles>(std::move(cut)) : nullptr;
-    }
-    fillPatches(scene, patches);
 }
 
 }  // namespace raybundle
