@@ -10,9 +10,7 @@
 // finest lines as its pixel is larger. The expected counts are those of uniform lines.
 //
 // Sources: thesis section 7.3.2 proposes windows of their own for rooms, to save time; density is
-// the same in all of them. The boxes are split where that saves the most lines, as in a surface
-// area heuristic (Goldsmith and Salmon, "Automatic Creation of Object Hierarchies for Ray Tracing",
-// 1987).
+// the same in all of them. Which patches have a window together: bundles/parent_groups.h.
 #pragma once
 
 #include <cstdint>
@@ -29,10 +27,12 @@ struct LineWindow {
     int level;            // its pixels are 2^level times smaller, 1 or more
 };
 
+constexpr int32_t kNoWindow = -1;
+
 struct LineDensity {
     float pixelSize;  // edge of a pixel outside of all windows, metres
     std::vector<LineWindow> windows;
-    // Per parent: the innermost window that was made for it, or -1; empty without windows.
+    // Per parent: the innermost window that was made for it, or kNoWindow; empty without windows.
     std::vector<int32_t> windowOf;
 };
 

@@ -238,11 +238,10 @@ void Rasteriser::findTaken(size_t window) {
     }
 }
 
-bool Rasteriser::findPlane(const glm::vec3& origin, const glm::vec3& a, const glm::vec3& b,
-                           Plane& plane) const {
+bool Rasteriser::findPlane(const Axes& axes, Plane& plane) const {
     // In double from the world's coordinates, so that faces of different objects that coincide have
     // the same depth.
-    const glm::dvec3 o(origin), da(a), db(b), normal = glm::cross(da, db);
+    const glm::dvec3 o(axes.origin), da(axes.a), db(axes.b), normal = glm::cross(da, db);
     const double slant = glm::dot(normal, frame.direction);
     if (slant == 0) return false;
     const double size = double(pixelSize) / zoom;

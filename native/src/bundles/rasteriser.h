@@ -116,13 +116,16 @@ class Rasteriser {
     void sampleSheet(const Sheet& sheet, const Visit& visit);
     template <class Visit>
     void sampleParent(const Parent& parent, const Visit& visit);
+    // Affine coordinates (s, t) in a plane: the point origin + s a + t b; metres.
+    struct Axes {
+        glm::vec3 origin, a, b;
+    };
     // Visits the pixels within a convex outline: edge k runs from vertex edge(k)[0] to edge(k)[1],
-    // around the front; origin, a, b: of its affine coordinates; patchAt(s, t): of all patches;
-    // lookUp(side, count, s, t, dsdx, dtdx): mends the sides of a run where patchAt is not enough.
+    // around the front; patchAt(s, t): of all patches; lookUp(side, count, s, t, dsdx, dtdx): mends
+    // the sides of a run where patchAt is not enough.
     template <class EdgeAt, class PatchAt, class LookUp, class Visit>
-    void sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& origin, const glm::vec3& a,
-                       const glm::vec3& b, const PatchAt& patchAt, const LookUp& lookUp,
-                       const Visit& visit);
+    void sampleOutline(int edges, const EdgeAt& edge, const Axes& axes, const PatchAt& patchAt,
+                       const LookUp& lookUp, const Visit& visit);
     // Patch by patch, for ROULETTE.
     template <class Visit>
     void fillPatches(const Parent& parent, const Visit& visit);
@@ -137,8 +140,7 @@ class Rasteriser {
         double at(glm::dvec2 p) const { return z0 + (p.x - 0.5) * dzdx + (p.y - 0.5) * dzdy; }
     };
     // False where it is seen edge-on.
-    bool findPlane(const glm::vec3& origin, const glm::vec3& a, const glm::vec3& b,
-                   Plane& plane) const;
+    bool findPlane(const Axes& axes, Plane& plane) const;
 
     // On the plane, in pixels of the whole scene's view, before the shift.
     struct Rectangle {
@@ -247,8 +249,8 @@ void Rasteriser::sampleSheet(const Sheet& sheet, const Visit& visit) {
                                             t + float(k) * dtdx) +
                           side[k] % 2;
     };
-    sampleOutline(int(sheet.outline.size()), edge, sheet.origin, sheet.a, sheet.b, patchAt, lookUp,
-                  visit);
+    sampleOutline(int(sheet.outline.size()), edge, {sheet.origin, sheet.a, sheet.b}, patchAt,
+                  lookUp, visit);
 }
 
 template <class Visit>
@@ -260,20 +262,19 @@ void Rasteriser::sampleParent(const Parent& parent, const Visit& visit) {
     };
     const uint32_t first = parent.firstPatch;
     auto isRight = [](uint32_t*, int, float, float, float, float) {};
+    const Axes axes{parent.origin, parent.a, parent.b};
     if (parent.patchCount() == 1)
         sampleOutline(
-            sides, edge, parent.origin, parent.a, parent.b, [first](float, float) { return first; },
-            isRight, visit);
+            sides, edge, axes, [first](float, float) { return first; }, isRight, visit);
     else
         sampleOutline(
-            sides, edge, parent.origin, parent.a, parent.b,
+            sides, edge, axes,
             [&, first](float s, float t) { return first + parent.patchAt(s, t); }, isRight, visit);
 }
 
 template <class EdgeAt, class PatchAt, class LookUp, class Visit>
-void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& origin,
-                               const glm::vec3& a, const glm::vec3& b, const PatchAt& patchAt,
-                               const LookUp& lookUp, const Visit& visit) {
+void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const Axes& axes,
+                               const PatchAt& patchAt, const LookUp& lookUp, const Visit& visit) {
     double xMin = std::numeric_limits<double>::max(), xMax = -xMin;
     double yMin = std::numeric_limits<double>::max(), yMax = -yMin;
     double zMin = std::numeric_limits<double>::max(), zMax = -zMin;
@@ -292,7 +293,7 @@ void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const glm::vec3& o
     const int row1 = std::min(height, int(std::ceil(yMax - 0.5)));
     if (row0 >= row1 || !hasPixels(xMin - kSlack, xMax + kSlack, width)) return;
     Plane plane;
-    if (!findPlane(origin, a, b, plane)) return;
+    if (!findPlane(axes, plane)) return;
 
     // Find the span of each row. An edge is evaluated from its lower end whichever way the outline
     // turns, so that two outlines with a common edge find the same crossing to the last bit.
@@ -349,7 +350,7 @@ void Rasteriser::fillPatches(const Parent& parent, const Visit& visit) {
     const glm::dvec2 eb = inView(parent.vertex[size_t(sides) - 1]) - q0;
     const double det = ea.x * eb.y - ea.y * eb.x;
     Plane plane;
-    if (det == 0 || !findPlane(parent.origin, parent.a, parent.b, plane)) return;
+    if (det == 0 || !findPlane({parent.origin, parent.a, parent.b}, plane)) return;
     auto visitPixel = [&](int x, int y, double z, uint32_t patch) {
         if (x < 0 || y < 0 || x >= width || y >= height) return;
         const uint32_t side = 2 * patch + plane.facing;
