@@ -203,7 +203,7 @@ void LeastSquares(benchmark::State& state) {
             const SmoothRegions regions =
                 smoothRegions(scene.meshes[size_t(instance.mesh)], patches.cells,
                               ranges[i].firstCell, ranges[i].lastCell);
-            benchmark::DoNotOptimize(leastSquares(patches, ranges[i], regions, instance.side,
+            benchmark::DoNotOptimize(leastSquares(patches, {ranges[i], regions, instance.side},
                                                   exposed, subject->settings.regularization,
                                                   {&field}));
         }

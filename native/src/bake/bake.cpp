@@ -282,8 +282,9 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
     Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
     const Patches& patches = trace->patches;
     std::vector<InstanceLight> made =
-        reconstruct(in.scene, patches, trace->visibility, trace->touchDistance, lights, in.shown,
-                    exchanged.exposed, settings, progress, report);
+        reconstruct({in.scene, patches, trace->visibility, trace->touchDistance, lights, in.shown,
+                     exchanged.exposed, settings},
+                    progress, report);
     std::vector<float> weight = patches.sideAreas();
     const std::vector<float> exposedOfTiles = in.tiles.mean(exchanged.exposed, weight);
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exchanged.exposed[side];

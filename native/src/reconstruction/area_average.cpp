@@ -8,8 +8,9 @@
 namespace raybundle {
 
 std::vector<std::vector<glm::vec3>> areaAverage(
-    const Patches& patches, const InstanceRange& range, const SmoothRegions& regions, rb_side side,
-    const std::vector<float>& exposed, const std::vector<const std::vector<glm::vec3>*>& fields) {
+    const Patches& patches, const InstanceSide& surface, const std::vector<float>& exposed,
+    const std::vector<const std::vector<glm::vec3>*>& fields) {
+    const auto& [range, regions, side] = surface;
     std::vector<std::vector<glm::dvec3>> sums(
         fields.size(), std::vector<glm::dvec3>(regions.nodeCount, glm::dvec3(0.0)));
     std::vector<double> weights(regions.nodeCount, 0.0);

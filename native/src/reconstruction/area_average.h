@@ -20,14 +20,14 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "reconstruction/instance_side.h"
 #include "reconstruction/least_squares.h"
-#include "reconstruction/smooth_regions.h"
 
 namespace raybundle {
 
 // Arguments and result as in leastSquares.
 std::vector<std::vector<glm::vec3>> areaAverage(
-    const Patches& patches, const InstanceRange& range, const SmoothRegions& regions, rb_side side,
-    const std::vector<float>& exposed, const std::vector<const std::vector<glm::vec3>*>& fields);
+    const Patches& patches, const InstanceSide& surface, const std::vector<float>& exposed,
+    const std::vector<const std::vector<glm::vec3>*>& fields);
 
 }  // namespace raybundle

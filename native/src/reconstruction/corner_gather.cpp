@@ -60,28 +60,34 @@ std::vector<bool> gatheringInstances(const Scene& scene, const Settings& setting
     return gathers;
 }
 
-CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                           float touchDistance, const SetLights& lights, const ShownLight& shown,
+CornerGather::CornerGather(const ReconstructionInput& input,
                            const std::vector<InstanceRange>& ranges,
                            const std::vector<bool>& gathers,
                            const std::vector<SmoothRegions>& regions,
-                           const std::vector<float>& exposed, const Settings& settings,
-                           const Progress& progress)
-    : scene(scene),
-      shown(shown),
+                           const std::vector<float>& exposed, const Progress& progress)
+    : scene(input.scene),
+      shown(input.shown),
       ranges(ranges),
       regions(regions),
       exposed(exposed),
-      skips(settings),
-      gathersSparse(gathersSparseResults(settings)) {
+      skips(input.settings),
+      gathersSparse(gathersSparseResults(input.settings)) {
+    findCorners(input, gathers);
+    gatherSources(input, progress);
+}
+
+void CornerGather::findCorners(const ReconstructionInput& input, const std::vector<bool>& gathers) {
+    const Patches& patches = input.patches;
+    const Visibility& visibility = input.visibility;
     // Whether another surface lies against the corner, though not against all of its patch.
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
         float distance = 0;
         const auto met = visibility.firstHit(
             receiver.side, *receiver.point, normal, &distance,
-            2 * std::min(touchDistance, patches.islandAt(receiver.side).touchDistance));
-        return met && isCovered(patches, receiver.side, *met, normal, distance, touchDistance);
+            2 * std::min(input.touchDistance, patches.islandAt(receiver.side).touchDistance));
+        return met &&
+               isCovered(patches, receiver.side, *met, normal, distance, input.touchDistance);
     };
     for (size_t i = 0; i < ranges.size(); ++i) {
         first.push_back(corners.size());
@@ -103,6 +109,12 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
         if (isSparse(i)) sparse += corners.size() - first.back();
     }
     first.push_back(corners.size());
+}
+
+void CornerGather::gatherSources(const ReconstructionInput& input, const Progress& progress) {
+    const Patches& patches = input.patches;
+    const SetLights& lights = input.lights;
+    const Settings& settings = input.settings;
     // After the corners, the other sides of those that show their light.
     std::vector<uint32_t> behind;
     for (size_t c = 0; c < corners.size(); ++c)
@@ -133,8 +145,8 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
         for (const Gathered& one : gathered) rays += one.rays;
         const double mean = meanLight(scene, patches, ranges, exposed, lights[k].irradiance);
         others.push_back(settings.finalGather && mean > 0
-                             ? std::make_unique<const FinalGather>(patches, visibility, lights[k],
-                                                                   exposed, float(mean),
+                             ? std::make_unique<const FinalGather>(patches, input.visibility,
+                                                                   lights[k], exposed, float(mean),
                                                                    settings.targetError)
                              : nullptr);
     }
@@ -142,6 +154,7 @@ CornerGather::CornerGather(const Scene& scene, const Patches& patches, const Vis
 
 CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
                                             const std::vector<float>& cornerAngles,
+                                            const std::vector<glm::vec3>& shownShare,
                                             NodeLight& light) const {
     Outcome outcome;
     const std::vector<uint32_t>& nodeOf = regions[instance].nodeOf;
@@ -186,9 +199,9 @@ CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
         outcome.smooth = size_t(std::count(wanted.begin(), wanted.end(), false));
     }
     const auto means = nodeMeans(instance, cornerAngles, [&](size_t c) { return sources[k][c]; });
-    for (size_t node = 0; node < light.shownShare.size(); ++node) {
-        light.carried[node] *= light.shownShare[node];
-        light.indirect[node] *= light.shownShare[node];
+    for (size_t node = 0; node < shownShare.size(); ++node) {
+        light.carried[node] *= shownShare[node];
+        light.indirect[node] *= shownShare[node];
     }
     for (size_t node = 0; node < means.size(); ++node)
         if (means[node]) light.direct[node] = light.carried[node] + *means[node];

@@ -12,15 +12,13 @@
 
 #include "job/progress.h"
 #include "job/settings.h"
-#include "patches/patches.h"
 #include "reconstruction/corner_receivers.h"
 #include "reconstruction/final_gather.h"
-#include "reconstruction/least_squares.h"
+#include "reconstruction/node_light.h"
+#include "reconstruction/reconstruction_input.h"
 #include "reconstruction/shown_light.h"
 #include "reconstruction/smooth_regions.h"
 #include "scene/scene.h"
-#include "transport/set_light.h"
-#include "visibility/visibility.h"
 
 namespace raybundle {
 
@@ -33,29 +31,18 @@ std::vector<bool> gatheringInstances(const Scene& scene, const Settings& setting
 class CornerGather {
   public:
     // Gathers the light of the sources, of all light sets, on both sides where both show. gathers:
-    // see gatheringInstances. regions: per instance, of those. exposed: per side, the share of it
-    // that nothing covers; surfaces not further apart than touchDistance (m) touch. References must
-    // outlive the object.
-    CornerGather(const Scene& scene, const Patches& patches, const Visibility& visibility,
-                 float touchDistance, const SetLights& lights, const ShownLight& shown,
-                 const std::vector<InstanceRange>& ranges, const std::vector<bool>& gathers,
-                 const std::vector<SmoothRegions>& regions, const std::vector<float>& exposed,
-                 const Settings& settings, const Progress& progress);
+    // see gatheringInstances. ranges, regions: per instance, the latter of those that gather.
+    // exposed: per side, the share of it that counts (exposedOutside). References must outlive the
+    // object.
+    CornerGather(const ReconstructionInput& input, const std::vector<InstanceRange>& ranges,
+                 const std::vector<bool>& gathers, const std::vector<SmoothRegions>& regions,
+                 const std::vector<float>& exposed, const Progress& progress);
 
     // Whether an instance has sparse results that its corners gather, and the number of all such.
     bool isSparse(size_t instance) const {
         return gathersSparse && scene.instances[instance].hasSparseResults;
     }
     size_t sparseCorners() const { return sparse; }
-
-    // Light at the nodes of an instance, as interpolation has it, W/m^2.
-    struct NodeLight {
-        std::vector<glm::vec3> direct, indirect;
-        std::vector<glm::vec3> carried;  // of the direct light what is not from sources
-        // What is shown of the indirect and the carried light, which are as they arrive; empty:
-        // all.
-        std::vector<glm::vec3> shownShare;
-    };
 
     struct Outcome {
         size_t smooth = 0;  // nodes where interpolation was good enough
@@ -64,14 +51,19 @@ class CornerGather {
         size_t gathered = 0;
         double noise = 0;
     };
-    // Puts what corners gather of light k in its place; nodes none of whose corners can gather keep
-    // their light.
+    // Puts what corners gather of light k in place of that which interpolation has at the nodes of
+    // an instance; nodes none of whose corners can gather keep their light. The indirect and the
+    // carried light are as they arrive; shownShare: per node, what is shown of them; empty: all.
     Outcome improve(size_t instance, size_t k, const std::vector<float>& cornerAngles,
-                    NodeLight& light) const;
+                    const std::vector<glm::vec3>& shownShare, NodeLight& light) const;
 
     uint64_t shadowRays() const { return rays; }
 
   private:
+    // The corners that gather, of all instances.
+    void findCorners(const ReconstructionInput& input, const std::vector<bool>& gathers);
+    // The light of the sources at them, and what gathers that of other surfaces.
+    void gatherSources(const ReconstructionInput& input, const Progress& progress);
     // Per node the mean of its corners' light, weighted by angle; nothing where it has no corners.
     template <class LightOf>
     std::vector<std::optional<glm::vec3>> nodeMeans(size_t instance,

@@ -13,10 +13,11 @@ constexpr float kOffCorner = 1e-4f;
 
 }  // namespace
 
-void addFaceSlopes(const Patches& patches, const InstanceRange& range, const SmoothRegions& regions,
-                   rb_side side, const ShownLight& shown, const SetLight& light, float targetError,
-                   std::vector<glm::vec3>& direct, std::vector<glm::vec3>& exitance) {
+void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const ShownLight& shown,
+                   const SetLight& light, float targetError, NodeLight& nodes) {
     if (light.direct.lightSources().empty()) return;
+    const InstanceRange& range = surface.range;
+    const SmoothRegions& regions = surface.regions;
     std::vector<uint32_t> cells(regions.nodeCount, 0), patchesOf(range.lastCell - range.firstCell);
     auto forEachNode = [&](const Cell& cell, const auto& visit) {
         for (int k = 0; k < 4; ++k)
@@ -33,16 +34,16 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
         if (patchesOf[parent.cell - range.firstCell] != 1) continue;
         bool isAlone = true;
         std::array<glm::vec3, 4> points, values;
-        std::array<uint32_t, 4> nodes;
+        std::array<uint32_t, 4> own;
         size_t count = 0;
         const glm::vec3 middle =
             cell.position(0) + (cell.isTriangle() ? 1 / 3.0f : 0.5f) * (cell.a + cell.b);
         forEachNode(cell, [&](int k, uint32_t node) {
             isAlone = isAlone && cells[node] == 1;
             points[count] = glm::mix(cell.position(k), middle, kOffCorner);
-            nodes[count++] = node;
+            own[count++] = node;
         });
-        const uint32_t at = 2 * parent.firstPatch + uint32_t(side);
+        const uint32_t at = 2 * parent.firstPatch + uint32_t(surface.side);
         const glm::vec3 gathered = light.irradiance.gathered[at];
         // Of what shows both sides' light the slopes would be those of both.
         if (!isAlone || gathered == glm::vec3(0.0f) ||
@@ -58,10 +59,10 @@ void addFaceSlopes(const Patches& patches, const InstanceRange& range, const Smo
         for (int c = 0; c < 3; ++c)
             if (mean[c] > 0) share[c] = std::min(1.0f, gathered[c] / mean[c]);
         for (size_t k = 0; k < count; ++k) {
-            const glm::vec3 flat = direct[nodes[k]];
-            direct[nodes[k]] = glm::max(flat + factor * share * (values[k] - mean), 0.0f);
-            glm::vec3& sent = exitance[nodes[k]];
-            sent = glm::max(sent + shown.color()[at] * (direct[nodes[k]] - flat), 0.0f);
+            glm::vec3 &direct = nodes.direct[own[k]], &exitance = nodes.exitance[own[k]];
+            const glm::vec3 flat = direct;
+            direct = glm::max(flat + factor * share * (values[k] - mean), 0.0f);
+            exitance = glm::max(exitance + shown.color()[at] * (direct - flat), 0.0f);
         }
     }
 }

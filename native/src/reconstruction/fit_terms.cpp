@@ -136,86 +136,131 @@ void FitTerms::forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWant
     }
 }
 
+// Cuts what the terms add to the mean until values keep within bounds.
+class FitTerms::Limiter {
+  public:
+    using Vector = Eigen::VectorXd;  // per node
+
+    Limiter(const FitTerms& terms, const Vector& low, const Vector& high, const Vector& mean,
+            const Vector& solution)
+        : terms(terms),
+          low(low),
+          high(high),
+          mean(mean),
+          solution(solution),
+          settled(kSettled * std::max(mean.cwiseAbs().maxCoeff(), solution.cwiseAbs().maxCoeff())) {
+    }
+
+    bool isWithin() const {
+        bool isWithin = true;
+        for (Eigen::Index v = 0; v < solution.size(); ++v)
+            isWithin = isWithin && !isOut(v, solution[v]);
+        return isWithin;
+    }
+
+    void addAll() {
+        added = Vector::Zero(mean.size());
+        terms.forEachFlux(solution, kAny, [&](size_t, const auto& node, const auto& amount) {
+            for (size_t a = 0; a < node.size(); ++a) added[node[a]] += amount[a];
+        });
+        share.assign(terms.ofPatches.size() + terms.squares.size(), 1.0f);
+    }
+
+    // Keeps per node the share of what all its terms add that keeps it within bounds, for as long
+    // as that settles.
+    void cutAround() {
+        Vector kept(mean.size());
+        for (int pass = 0; pass < kMaxPasses; ++pass) {
+            kept.setOnes();
+            bool isSettled = true;
+            for (Eigen::Index v = 0; v < mean.size(); ++v)
+                if (const double value = valueAt(v); terms.mass[v] > 0 && isOut(v, value)) {
+                    const double bound = value < low[v] ? low[v] : high[v];
+                    kept[v] = std::clamp((bound - mean[v]) / (value - mean[v]), 0.0, 1.0);
+                    isSettled = false;
+                }
+            if (isSettled) return;
+            keep([&](uint32_t v, double) { return kept[v]; },
+                 [&](const auto& node) {
+                     return std::any_of(node.begin(), node.end(),
+                                        [&](uint32_t v) { return kept[v] < 1; });
+                 });
+        }
+    }
+
+    bool isAnyOut() const {
+        bool isAny = false;
+        for (Eigen::Index v = 0; v < mean.size(); ++v)
+            isAny = isAny || (terms.mass[v] > 0 && isOut(v, valueAt(v)));
+        return isAny;
+    }
+
+    // Zalesak's limiter, which leaves nothing out of bounds.
+    void cutAll() {
+        Vector more = Vector::Zero(mean.size()), less = more;
+        terms.forEachFlux(solution, kAny, [&](size_t term, const auto& node, const auto& amount) {
+            for (size_t a = 0; a < node.size(); ++a)
+                (amount[a] > 0 ? more : less)[node[a]] += double(share[term]) * amount[a];
+        });
+        keep(
+            [&](uint32_t v, double amount) {
+                const double wanted = (amount > 0 ? more : less)[v];
+                if (terms.mass[v] <= 0 || wanted == 0) return 1.0;
+                const double room = terms.mass[v] * ((amount > 0 ? high : low)[v] - mean[v]);
+                return std::clamp(room / wanted, 0.0, 1.0);
+            },
+            kAny);
+    }
+
+    Vector values() const {
+        Vector values(mean.size());
+        for (Eigen::Index v = 0; v < mean.size(); ++v) values[v] = valueAt(v);
+        return values;
+    }
+    Vector bounded(const Vector& values) const { return values.cwiseMax(low).cwiseMin(high); }
+
+  private:
+    static constexpr auto kAny = [](const auto&) { return true; };
+
+    bool isOut(Eigen::Index v, double value) const {
+        return value < low[v] - settled || value > high[v] + settled;
+    }
+    double valueAt(Eigen::Index v) const {
+        return terms.mass[v] > 0 ? mean[v] + added[v] / terms.mass[v] : solution[v];
+    }
+    // Keeps of each term what its nodes keep of all that they get, at most.
+    template <class KeptOf, class IsWanted>
+    void keep(const KeptOf& keptOf, const IsWanted& isWanted) {
+        terms.forEachFlux(solution, isWanted,
+                          [&](size_t term, const auto& node, const auto& amount) {
+                              double least = 1;
+                              for (size_t a = 0; a < node.size(); ++a)
+                                  if (amount[a] != 0)
+                                      least = std::min(least, keptOf(node[a], amount[a]));
+                              const double before = double(share[term]);
+                              share[term] = float(before * least);
+                              for (size_t a = 0; a < node.size(); ++a)
+                                  added[node[a]] -= (before - double(share[term])) * amount[a];
+                          });
+    }
+
+    const FitTerms& terms;
+    const Vector &low, &high, &mean, &solution;
+    const double settled;      // values so little out of bounds are within
+    Vector added;              // what the kept shares of the terms add, m^2 times the values
+    std::vector<float> share;  // kept, per term
+};
+
 Eigen::VectorXd FitTerms::within(const Eigen::VectorXd& low, const Eigen::VectorXd& high,
                                  const Eigen::VectorXd& mean,
                                  const Eigen::VectorXd& solution) const {
-    const double settled =
-        kSettled * std::max(mean.cwiseAbs().maxCoeff(), solution.cwiseAbs().maxCoeff());
-    auto isOut = [&](Eigen::Index v, double value) {
-        return value < low[v] - settled || value > high[v] + settled;
-    };
-    auto bounded = [&](const Eigen::VectorXd& values) {
-        return Eigen::VectorXd(values.cwiseMax(low).cwiseMin(high));
-    };
-    bool isWithin = true;
-    for (Eigen::Index v = 0; v < solution.size(); ++v)
-        isWithin = isWithin && !isOut(v, solution[v]);
-    if (isWithin) return bounded(solution);
-
-    auto isAny = [](const auto&) { return true; };
-    Eigen::VectorXd added = Eigen::VectorXd::Zero(mean.size());
-    forEachFlux(solution, isAny, [&](size_t, const auto& node, const auto& amount) {
-        for (size_t a = 0; a < node.size(); ++a) added[node[a]] += amount[a];
-    });
-    auto valueAt = [&](Eigen::Index v) {
-        return mass[v] > 0 ? mean[v] + added[v] / mass[v] : solution[v];
-    };
-    std::vector<float> share(ofPatches.size() + squares.size(), 1.0f);  // kept, per term
-    // Keeps of each term what its nodes keep of all that they get, at most.
-    auto keep = [&](const auto& keptOf, const auto& isWanted) {
-        forEachFlux(solution, isWanted, [&](size_t term, const auto& node, const auto& amount) {
-            double least = 1;
-            for (size_t a = 0; a < node.size(); ++a)
-                if (amount[a] != 0) least = std::min(least, keptOf(node[a], amount[a]));
-            const double before = double(share[term]);
-            share[term] = float(before * least);
-            for (size_t a = 0; a < node.size(); ++a)
-                added[node[a]] -= (before - double(share[term])) * amount[a];
-        });
-    };
-
-    // Per node the share of what all its terms add that keeps it within bounds, for as long as that
-    // settles.
-    Eigen::VectorXd kept(mean.size());
-    for (int pass = 0; pass < kMaxPasses; ++pass) {
-        kept.setOnes();
-        bool isSettled = true;
-        for (Eigen::Index v = 0; v < mean.size(); ++v)
-            if (const double value = valueAt(v); mass[v] > 0 && isOut(v, value)) {
-                const double bound = value < low[v] ? low[v] : high[v];
-                kept[v] = std::clamp((bound - mean[v]) / (value - mean[v]), 0.0, 1.0);
-                isSettled = false;
-            }
-        if (isSettled) break;
-        keep([&](uint32_t v, double) { return kept[v]; },
-             [&](const auto& node) {
-                 return std::any_of(node.begin(), node.end(),
-                                    [&](uint32_t v) { return kept[v] < 1; });
-             });
-    }
-
-    // Zalesak's limiter, which leaves nothing out of bounds, for what has not settled.
-    Eigen::VectorXd values(mean.size());
-    for (Eigen::Index v = 0; v < mean.size(); ++v) values[v] = valueAt(v);
-    bool isLeft = false;
-    for (Eigen::Index v = 0; v < mean.size(); ++v)
-        isLeft = isLeft || (mass[v] > 0 && isOut(v, values[v]));
-    if (!isLeft) return bounded(values);
-    Eigen::VectorXd more = Eigen::VectorXd::Zero(mean.size()), less = more;
-    forEachFlux(solution, isAny, [&](size_t term, const auto& node, const auto& amount) {
-        for (size_t a = 0; a < node.size(); ++a)
-            (amount[a] > 0 ? more : less)[node[a]] += double(share[term]) * amount[a];
-    });
-    keep(
-        [&](uint32_t v, double amount) {
-            const double wanted = (amount > 0 ? more : less)[v];
-            if (mass[v] <= 0 || wanted == 0) return 1.0;
-            const double room = mass[v] * ((amount > 0 ? high : low)[v] - mean[v]);
-            return std::clamp(room / wanted, 0.0, 1.0);
-        },
-        isAny);
-    for (Eigen::Index v = 0; v < mean.size(); ++v) values[v] = valueAt(v);
-    return bounded(values);
+    Limiter limiter(*this, low, high, mean, solution);
+    if (limiter.isWithin()) return limiter.bounded(solution);
+    limiter.addAll();
+    limiter.cutAround();
+    // What has not settled.
+    if (limiter.isAnyOut()) limiter.cutAll();
+    return limiter.bounded(limiter.values());
 }
 
 }  // namespace raybundle

@@ -47,6 +47,7 @@ class FitTerms {
                            const Eigen::VectorXd& mean, const Eigen::VectorXd& solution) const;
 
   private:
+    class Limiter;
     struct CellTerm {
         std::array<uint32_t, 4> node;
         std::array<std::array<float, 4>, 4> square;  // m^2

@@ -84,9 +84,10 @@ EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
 // openness: per cell from range.firstCell on, the share of its area that is exposed, and not parted
 // from the rest by a wall. Light on the two sides of a covered strip (a wall on a floor) has
 // nothing to do with each other.
-void addRegularization(const Patches& patches, const InstanceRange& range,
-                       const SmoothRegions& regions, const std::vector<double>& openness,
-                       double weight, FitTerms& terms) {
+void addRegularization(const Patches& patches, const InstanceSide& surface,
+                       const std::vector<double>& openness, double weight, FitTerms& terms) {
+    const InstanceRange& range = surface.range;
+    const SmoothRegions& regions = surface.regions;
     std::array<uint32_t, 8> node;
     std::array<double, 8> stencil;
     size_t step = 0;
@@ -170,45 +171,86 @@ Range around(const Range& range, const std::vector<std::array<uint32_t, 4>>& cel
     return wide;
 }
 
-}  // namespace
+using Fields = std::vector<const std::vector<glm::vec3>*>;  // each per side
 
-LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
-                             const SmoothRegions& regions, rb_side side,
-                             const std::vector<float>& exposed, float regularization,
-                             const std::vector<const std::vector<glm::vec3>*>& fields) {
-    const size_t columns = 3 * fields.size();
-    const Eigen::Index nodes = regions.nodeCount;
-    if (nodes == 0) return {std::vector<std::vector<glm::vec3>>(fields.size())};
-    FitTerms terms(regions.nodeCount);
-    Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(nodes, Eigen::Index(columns));
-    std::vector<PatchAtNode> patchesAt;
-    std::vector<float> mostExposed(size_t(nodes), 0.0f);
-    std::vector<double> openness;
-    for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
-        openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);  // nothing covers slivers
+// The normal equations of an instance, a column for each channel of each field, and what bounds
+// their solutions.
+class NormalEquations {
+  public:
+    // exposed: see leastSquares.
+    NormalEquations(const Patches& patches, const InstanceSide& surface,
+                    const std::vector<float>& exposed, float regularization, const Fields& fields)
+        : patches(patches),
+          surface(surface),
+          exposed(exposed),
+          fields(fields),
+          terms(surface.regions.nodeCount),
+          rhs(Eigen::MatrixXd::Zero(nodes(), Eigen::Index(columns()))),
+          mostExposed(size_t(nodes()), 0.0f) {
+        const InstanceRange& range = surface.range;
+        for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+            openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);  // nothing covers slivers
+        const CornerWeights weights(patches, range, surface.side, exposed);
+        for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
+            throwIfCancelledAt(p);
+            addParent(p, weights);
+        }
+        addRegularization(patches, surface, openness, double(regularization), terms);
+        matrix = terms.matrix();
+        throwIfCancelled();
+        findOpenAt();
+    }
 
-    const CornerWeights weights(patches, range, side, exposed);
-    // Add up the patches of each parent in a 4 x 4 matrix over the corners of its cell.
-    for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
-        throwIfCancelledAt(p);
+    size_t columns() const { return 3 * fields.size(); }
+
+    // The solution of a column within its bounds, per node; empty where the column has no light.
+    // isSolved: whether the iteration came to a solution; else the means bound the result.
+    Eigen::VectorXd solve(size_t column, bool& isSolved) const {
+        isSolved = true;
+        // Start from the area-weighted mean; nodes without a patch (degenerate faces) keep zero.
+        Eigen::VectorXd mean = Eigen::VectorXd::Zero(nodes());
+        for (Eigen::Index v = 0; v < nodes(); ++v)
+            if (terms.areas()[v] > 0) mean[v] = rhs(v, Eigen::Index(column)) / terms.areas()[v];
+        const Range bounds = findBounds(mean, column);
+        if (mean.maxCoeff() <= 0) return {};
+        Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper,
+                                 CancellableJacobi>
+            solver;
+        solver.setTolerance(kTolerance);
+        solver.setMaxIterations(kMaxIterations);
+        solver.compute(matrix);
+        Eigen::VectorXd fit = solver.solveWithGuess(rhs.col(Eigen::Index(column)), mean);
+        // What does not come near to a solution could be anything.
+        if (!(solver.error() <= kMostResidual)) {
+            fit = mean;
+            isSolved = false;
+        }
+        return terms.within(bounds.least, bounds.most, mean, fit);
+    }
+
+  private:
+    Eigen::Index nodes() const { return surface.regions.nodeCount; }
+
+    // Adds up the patches of a parent in a 4 x 4 matrix over the corners of its cell.
+    void addParent(uint32_t p, const CornerWeights& weights) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
-        const std::array<uint32_t, 4> node = nodesOf(cell, regions);
+        const std::array<uint32_t, 4> node = nodesOf(cell, surface.regions);
         const std::array<float, 4>& counts = weights.countsAt(p);
         const double joined = double(*std::min_element(counts.begin(), counts.end()));
         std::array<std::array<double, 4>, 4> square{};
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
-            const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
+            const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(surface.side);
             const auto [w, all] = weights.of(p, k);
             const float open = std::max(exposed[index], kLeastExposure);
             const double weight = double(patches.area[index / 2]) * open * double(all);
-            openness[parent.cell - range.firstCell] += joined * weight / cell.area();
+            openness[parent.cell - surface.range.firstCell] += joined * weight / cell.area();
             for (int a = 0; a < 4; ++a) {
                 for (int b = 0; b < 4; ++b) square[a][b] += weight * w[a] * w[b];
                 if (w[a] == 0) continue;
                 patchesAt.push_back({node[a], index, open * counts[size_t(a)]});
                 mostExposed[node[a]] = std::max(mostExposed[node[a]], patchesAt.back().share);
-                for (size_t c = 0; c < columns; ++c) {
+                for (size_t c = 0; c < columns(); ++c) {
                     const double value = double((*fields[c / 3])[index][int(c % 3)]);
                     rhs(node[a], Eigen::Index(c)) += weight * w[a] * value;
                 }
@@ -216,63 +258,74 @@ LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
         }
         terms.addPatches(node, square);
     }
-    addRegularization(patches, range, regions, openness, double(regularization), terms);
-    const Eigen::SparseMatrix<double> matrix = terms.matrix();
-    throwIfCancelled();
 
-    // Least exposed share of the faces at each node. At a contact the exposed part of a face is
-    // small, and its slope uncertain: no value is above what is seen around it, and the more is
-    // covered, the less it is below.
-    std::vector<double> openAt(size_t(nodes), 1.0);
-    std::vector<std::array<uint32_t, 4>> cells;
-    for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
-        throwIfCancelledAt(c);
-        cells.push_back(nodesOf(patches.cells[c], regions));
-        for (uint32_t v : cells.back())
-            openAt[v] = std::min(openAt[v], openness[c - range.firstCell]);
+    // At a contact the exposed part of a face is small, and its slope uncertain.
+    void findOpenAt() {
+        openAt.assign(size_t(nodes()), 1.0);
+        for (uint32_t c = surface.range.firstCell; c < surface.range.lastCell; ++c) {
+            throwIfCancelledAt(c);
+            cells.push_back(nodesOf(patches.cells[c], surface.regions));
+            for (uint32_t v : cells.back())
+                openAt[v] = std::min(openAt[v], openness[c - surface.range.firstCell]);
+        }
     }
 
-    std::vector<std::vector<glm::vec3>> result(fields.size(),
-                                               std::vector<glm::vec3>(size_t(nodes)));
-    std::atomic<bool> isSolved = true;
-    parallelFor(size_t(0), columns, [&](size_t c) {
-        throwIfCancelled();
-        // Start from the area-weighted mean; nodes without a patch (degenerate faces) keep zero.
-        Eigen::VectorXd mean = Eigen::VectorXd::Zero(nodes), low = mean;
-        Eigen::VectorXd high = Eigen::VectorXd::Constant(nodes, INFINITY);
-        for (Eigen::Index v = 0; v < nodes; ++v)
-            if (terms.areas()[v] > 0) mean[v] = rhs(v, Eigen::Index(c)) / terms.areas()[v];
-        const Range seen = rangeAround(mean, patchesAt, mostExposed, *fields[c / 3], int(c % 3));
+    // At a contact no value is above what is seen around it, and the more is covered, the less it
+    // is below.
+    Range findBounds(const Eigen::VectorXd& mean, size_t column) const {
+        const Range seen =
+            rangeAround(mean, patchesAt, mostExposed, *fields[column / 3], int(column % 3));
         const Range wide = around(seen, cells);
         throwIfCancelled();
-        for (Eigen::Index v = 0; v < nodes; ++v) {
+        Range bounds(nodes());
+        bounds.least = Eigen::VectorXd::Zero(nodes());
+        bounds.most = Eigen::VectorXd::Constant(nodes(), INFINITY);
+        for (Eigen::Index v = 0; v < nodes(); ++v) {
             const double least = seen.least[v], most = seen.most[v];
             if (!(least <= most)) continue;
             const double open = openAt[size_t(v)];
             const double below = kBeyond * std::max(0.0, 2 * open - 1) * (wide.most[v] - least);
             const double above = std::clamp((open - kTouched) / (1 - kTouched), 0.0, 1.0) *
                                  std::min(kBeyond * (most - wide.least[v]), kMostAbove * most);
-            low[v] = std::min(std::max(least - below, 0.0), mean[v]);
-            high[v] = std::max(most + above, mean[v]);
+            bounds.least[v] = std::min(std::max(least - below, 0.0), mean[v]);
+            bounds.most[v] = std::max(most + above, mean[v]);
         }
-        if (mean.maxCoeff() <= 0) return;
-        Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper,
-                                 CancellableJacobi>
-            solver;
-        solver.setTolerance(kTolerance);
-        solver.setMaxIterations(kMaxIterations);
-        solver.compute(matrix);
-        Eigen::VectorXd fit = solver.solveWithGuess(rhs.col(Eigen::Index(c)), mean);
-        // What does not come near to a solution could be anything.
-        if (!(solver.error() <= kMostResidual)) {
-            fit = mean;
-            isSolved = false;
-        }
-        const Eigen::VectorXd solution = terms.within(low, high, mean, fit);
-        for (Eigen::Index v = 0; v < nodes; ++v)
+        return bounds;
+    }
+
+    const Patches& patches;
+    const InstanceSide& surface;
+    const std::vector<float>& exposed;
+    const Fields& fields;
+    FitTerms terms;
+    Eigen::MatrixXd rhs;
+    Eigen::SparseMatrix<double> matrix;
+    std::vector<PatchAtNode> patchesAt;
+    std::vector<float> mostExposed;              // per node
+    std::vector<double> openness;                // per cell, see addRegularization
+    std::vector<double> openAt;                  // per node: the least of its cells
+    std::vector<std::array<uint32_t, 4>> cells;  // nodes of each
+};
+
+}  // namespace
+
+LeastSquaresFit leastSquares(const Patches& patches, const InstanceSide& surface,
+                             const std::vector<float>& exposed, float regularization,
+                             const std::vector<const std::vector<glm::vec3>*>& fields) {
+    const size_t nodes = surface.regions.nodeCount;
+    if (nodes == 0) return {std::vector<std::vector<glm::vec3>>(fields.size())};
+    const NormalEquations equations(patches, surface, exposed, regularization, fields);
+    std::vector<std::vector<glm::vec3>> result(fields.size(), std::vector<glm::vec3>(nodes));
+    std::atomic<bool> areSolved = true;
+    parallelFor(size_t(0), equations.columns(), [&](size_t c) {
+        throwIfCancelled();
+        bool isSolved = true;
+        const Eigen::VectorXd solution = equations.solve(c, isSolved);
+        if (!isSolved) areSolved = false;
+        for (Eigen::Index v = 0; v < solution.size(); ++v)
             result[c / 3][size_t(v)][int(c % 3)] = float(std::max(solution[v], 0.0));
     });
-    return {std::move(result), isSolved};
+    return {std::move(result), areSolved};
 }
 
 }  // namespace raybundle

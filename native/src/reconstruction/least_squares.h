@@ -24,7 +24,7 @@
 
 #include "patches/patches.h"
 #include "reconstruction/corner_weights.h"
-#include "reconstruction/smooth_regions.h"
+#include "reconstruction/instance_side.h"
 #include "scene/scene.h"
 
 namespace raybundle {
@@ -40,8 +40,7 @@ struct LeastSquaresFit {
 
 // exposed: per side, the share of it that counts. Reconstructs several fields (each per side) on
 // one side of an instance.
-LeastSquaresFit leastSquares(const Patches& patches, const InstanceRange& range,
-                             const SmoothRegions& regions, rb_side side,
+LeastSquaresFit leastSquares(const Patches& patches, const InstanceSide& surface,
                              const std::vector<float>& exposed, float regularization,
                              const std::vector<const std::vector<glm::vec3>*>& fields);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <cmath>
 #include <optional>
 
@@ -10,7 +11,9 @@
 #include "reconstruction/area_average.h"
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/face_slopes.h"
+#include "reconstruction/instance_side.h"
 #include "reconstruction/least_squares.h"
+#include "reconstruction/node_light.h"
 #include "reconstruction/shown_light.h"
 #include "reconstruction/smooth_regions.h"
 
@@ -90,16 +93,234 @@ double meanSquare(const Instance& instance, const InstanceLight& light) {
 }
 
 // One value per corner from one per node.
-CornerLight cornerLight(const SmoothRegions& regions, const Field& direct, const Field& indirect,
-                        const Field& exitance) {
+CornerLight cornerLight(const SmoothRegions& regions, const NodeLight& nodes) {
     CornerLight light;
     for (uint32_t node : regions.nodeOf) {
-        light.direct.push_back(direct[node]);
-        light.indirect.push_back(indirect[node]);
-        light.exitance.push_back(exitance[node]);
+        light.direct.push_back(nodes.direct[node]);
+        light.indirect.push_back(nodes.indirect[node]);
+        light.exitance.push_back(nodes.exitance[node]);
     }
     return light;
 }
+
+// Fields per side that are brought to the nodes of an instance together, each with its place there.
+class NodeFields {
+  public:
+    void add(const Field& ofSides, Field& atNodes) {
+        sides.push_back(&ofSides);
+        nodes.push_back(&atNodes);
+    }
+    const std::vector<const Field*>& ofSides() const { return sides; }
+    void put(std::vector<Field> values) {
+        for (size_t k = 0; k < nodes.size(); ++k) *nodes[k] = std::move(values[k]);
+    }
+
+  private:
+    std::vector<const Field*> sides;
+    std::vector<Field*> nodes;
+};
+
+using FieldList = std::vector<const Field*>;
+
+LeastSquaresFit byLeastSquares(const Patches& patches, const InstanceSide& surface,
+                               const std::vector<float>& exposed, const Settings& settings,
+                               const FieldList& fields) {
+    return leastSquares(patches, surface, exposed, settings.regularization, fields);
+}
+
+LeastSquaresFit byAreaAverage(const Patches& patches, const InstanceSide& surface,
+                              const std::vector<float>& exposed, const Settings& /*settings*/,
+                              const FieldList& fields) {
+    return {areaAverage(patches, surface, exposed, fields)};
+}
+
+// A reconstruction. What POINT's corners gather is put in the place of what it fits.
+struct Kind {
+    const char* name;
+    // From fields per side to fields per node.
+    LeastSquaresFit (*fit)(const Patches& patches, const InstanceSide& surface,
+                           const std::vector<float>& exposed, const Settings& settings,
+                           const FieldList& fields);
+    bool addsSlopes;  // where nothing is gathered, see reconstruction/face_slopes.h
+};
+
+constexpr Kind kKinds[] = {
+    {"LEAST_SQUARES", byLeastSquares, true},
+    {"AREA_AVERAGE", byAreaAverage, false},
+    {"POINT", byLeastSquares, false},
+};
+
+const Kind& kindOf(const std::string& name) {
+    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
+                                  [&](const Kind& kind) { return name == kind.name; });
+    assert(row != std::end(kKinds) && "settings know the names");
+    return *row;
+}
+
+// Reconstructs the instances, each by itself.
+class Reconstruction {
+  public:
+    Reconstruction(const ReconstructionInput& input, const Progress& progress)
+        : input(input),
+          kind(kindOf(input.settings.reconstruction)),
+          ranges(instanceRanges(input.scene, input.patches)),
+          outside(exposedOutside(input.patches, input.visibility, input.exposed)),
+          gathers(gatheringInstances(input.scene, input.settings)),
+          onSides(
+              sideLights(input.patches, input.shown, input.exposed, input.lights, anyGathers())),
+          regionsOf(input.scene.instances.size()),
+          warnings(input.scene.instances.size()) {
+        parallelFor(size_t(0), regionsOf.size(), [&](size_t i) {
+            if (gathers[i]) regionsOf[i] = findRegions(i);
+        });
+        if (anyGathers())
+            atCorners.emplace(input, ranges, gathers, regionsOf, outside, progress.part(0, 2));
+    }
+
+    bool anyGathers() const {
+        return std::find(gathers.begin(), gathers.end(), true) != gathers.end();
+    }
+
+    // Also what the report says of it. Different instances may be reconstructed at once.
+    void reconstruct(size_t i, InstanceLight& out, Report::Object& said) {
+        const Instance& instance = input.scene.instances[i];
+        const Mesh& mesh = input.scene.meshes[instance.mesh];
+        out.name = instance.name;
+        said = {instance.name, mesh.cornerCount(), "occluder", {}};
+        out.isBaked = instance.role == RB_ROLE_BAKE;
+        if (!out.isBaked && input.settings.skipOccluders) {
+            ++occluders;
+            return;
+        }
+        if (out.isBaked) said.status = "baked";
+        out.cornerVertices = mesh.cornerVertices;
+        out.vertexCount = mesh.vertices.size();
+        out.cornerAngles = cornerAngles(mesh);
+        if (!gathers[i]) regionsOf[i] = findRegions(i);
+        const double noise = addLight(i, out);
+        regionsOf[i] = {};
+        if (isSparse(i))
+            if (const double signal = meanSquare(instance, out); signal > 0)
+                out.gatheredNoise = float(std::sqrt(noise / signal));
+        if (out.isBaked && isInsideOut(input.patches, ranges[i], instance.side, onSides)) {
+            said.status = "baked; no light on this side";
+            warnings[i] = {WarningId::NO_LIGHT_ON_SIDE,
+                           "object \"" + instance.name +
+                               "\": the baked sides of its faces get no light but the other sides "
+                               "do; flip its normals or choose the other side"};
+        }
+    }
+
+    // What all instances together say.
+    void addTo(Report& report) const {
+        for (const std::optional<Warning>& warning : warnings)
+            if (warning) report.warnings.push_back(*warning);
+        if (atCorners) {
+            report.shadowRays += atCorners->shadowRays();
+            report.skip(SkippedWork::SMOOTH_CORNERS, smooth.load());
+            report.skip(SkippedWork::SPARSE_CORNERS, atCorners->sparseCorners());
+        }
+        if (occluders) report.skip(SkippedWork::OCCLUDERS, occluders.load());
+    }
+
+  private:
+    SmoothRegions findRegions(size_t i) const {
+        return smoothRegions(input.scene.meshes[input.scene.instances[i].mesh], input.patches.cells,
+                             ranges[i].firstCell, ranges[i].lastCell);
+    }
+    bool isSparse(size_t i) const { return gathers[i] && atCorners->isSparse(i); }
+
+    // What is reconstructed of an instance.
+    struct AtNodes {
+        std::vector<NodeLight> lights;  // per light
+        // Where corners gather, per node: the colour, and what is shown of light from everywhere
+        // (empty: all of it).
+        Field color, shownShare;
+    };
+    // The light of all sets at the corners of an instance. Returns the noise of what corners
+    // gathered of it, mean square.
+    double addLight(size_t i, InstanceLight& out) {
+        const InstanceSide surface{ranges[i], regionsOf[i], input.scene.instances[i].side};
+        AtNodes nodes = fitted(i, surface);
+        double noise = 0;
+        for (size_t k = 0; k < nodes.lights.size(); ++k) {
+            NodeLight& light = nodes.lights[k];
+            if (gathers[i])
+                noise += gather(i, k, out.cornerAngles, nodes);
+            else if (kind.addsSlopes)
+                addFaceSlopes(input.patches, surface, input.shown, input.lights[k],
+                              input.settings.targetError, light);
+            CornerLight atCorner = cornerLight(regionsOf[i], light);
+            if (k == 0)
+                static_cast<CornerLight&>(out) = std::move(atCorner);
+            else
+                out.sets.push_back(std::move(atCorner));
+        }
+        for (const CornerLight& light : out.sets) out.add(light);
+        return noise;
+    }
+
+    // By the light of patches.
+    AtNodes fitted(size_t i, const InstanceSide& surface) {
+        AtNodes nodes;
+        nodes.lights.resize(onSides.size());
+        NodeFields fields;
+        for (size_t k = 0; k < onSides.size(); ++k) {
+            const SideLight& side = onSides[k];
+            NodeLight& node = nodes.lights[k];
+            fields.add(side.shown.direct, node.direct);
+            if (gathers[i]) {
+                fields.add(side.indirect, node.indirect);
+                fields.add(side.carried, node.carried);
+                fields.add(side.emission, node.emission);
+            } else {
+                fields.add(side.shown.indirect, node.indirect);
+                fields.add(side.exitance, node.exitance);
+            }
+        }
+        if (gathers[i]) fields.add(input.shown.color(), nodes.color);
+        if (gathers[i] && !input.shown.everywhere().empty())
+            fields.add(input.shown.everywhere(), nodes.shownShare);
+        // Of sparse results only corners that cannot gather have the light of patches.
+        const auto fit = isSparse(i) ? byAreaAverage : kind.fit;
+        LeastSquaresFit result =
+            fit(input.patches, surface, outside, input.settings, fields.ofSides());
+        fields.put(std::move(result.fields));
+        if (!result.isSolved)
+            warnings[i] = {
+                WarningId::UNSOLVED_FIT,
+                "object \"" + input.scene.instances[i].name +
+                    "\": the least squares came to no solution, and its vertices have the "
+                    "mean of the light around them; merge vertices by distance, or choose "
+                    "the reconstruction AREA_AVERAGE"};
+        return nodes;
+    }
+
+    // Puts what corners gather of light k in place of what was fitted. Returns its noise, mean
+    // square.
+    double gather(size_t i, size_t k, const std::vector<float>& cornerAngles, AtNodes& nodes) {
+        NodeLight& light = nodes.lights[k];
+        const CornerGather::Outcome outcome =
+            atCorners->improve(i, k, cornerAngles, nodes.shownShare, light);
+        smooth += outcome.smooth;
+        light.exitance.resize(light.direct.size());
+        for (size_t v = 0; v < light.direct.size(); ++v)
+            light.exitance[v] =
+                light.emission[v] + nodes.color[v] * (light.direct[v] + light.indirect[v]);
+        return outcome.gathered > 0 ? outcome.noise / double(outcome.gathered) : 0;
+    }
+
+    const ReconstructionInput& input;
+    const Kind& kind;
+    const std::vector<InstanceRange> ranges;
+    const std::vector<float> outside;  // per side: the share of it that counts
+    const std::vector<bool> gathers;   // per instance
+    const std::vector<SideLight> onSides;
+    std::vector<SmoothRegions> regionsOf;  // of those that gather, and of those in hand
+    std::optional<CornerGather> atCorners;
+    std::atomic<size_t> occluders = 0, smooth = 0;
+    std::vector<std::optional<Warning>> warnings;  // per instance
+};
 
 }  // namespace
 
@@ -120,138 +341,21 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
     return ranges;
 }
 
-std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const Visibility& visibility, float touchDistance,
-                                       const SetLights& lights, const ShownLight& shown,
-                                       const std::vector<float>& exposed, const Settings& settings,
-                                       const Progress& progress, Report& report) {
-    const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
-    const std::vector<float> outside = exposedOutside(patches, visibility, exposed);
-    const std::vector<bool> gathers = gatheringInstances(scene, settings);
-    const bool anyGathers = std::find(gathers.begin(), gathers.end(), true) != gathers.end();
-    const std::vector<SideLight> onSides = sideLights(patches, shown, exposed, lights, anyGathers);
-    auto findRegions = [&](size_t i) {
-        return smoothRegions(scene.meshes[scene.instances[i].mesh], patches.cells,
-                             ranges[i].firstCell, ranges[i].lastCell);
-    };
-    std::vector<SmoothRegions> regionsOf(scene.instances.size());  // of those that gather
-    parallelFor(size_t(0), regionsOf.size(), [&](size_t i) {
-        if (gathers[i]) regionsOf[i] = findRegions(i);
-    });
-    std::optional<CornerGather> atCorners;
-    if (anyGathers)
-        atCorners.emplace(scene, patches, visibility, touchDistance, lights, shown, ranges, gathers,
-                          regionsOf, outside, settings, progress.part(0, 2));
-
-    std::vector<InstanceLight> result(scene.instances.size());
-    report.objects.resize(scene.instances.size());
-    std::atomic<size_t> occluders = 0, smooth = 0;
-    std::vector<std::optional<Warning>> warnings(scene.instances.size());
-    auto reconstructInstance = [&](size_t i) {
-        const Instance& instance = scene.instances[i];
-        const Mesh& mesh = scene.meshes[instance.mesh];
-        InstanceLight& out = result[i];
-        out.name = instance.name;
-        report.objects[i] = {instance.name, mesh.cornerCount(), "occluder", {}};
-        out.isBaked = instance.role == RB_ROLE_BAKE;
-        if (!out.isBaked && settings.skipOccluders) {
-            ++occluders;
-            return;
-        }
-        if (out.isBaked) report.objects[i].status = "baked";
-        out.cornerVertices = mesh.cornerVertices;
-        out.vertexCount = mesh.vertices.size();
-        out.cornerAngles = cornerAngles(mesh);
-        const bool isGathered = gathers[i];
-        if (!isGathered) regionsOf[i] = findRegions(i);
-        const SmoothRegions& regions = regionsOf[i];
-        // Three fields of each light, one after the other; where corners gather the colour, and
-        // what is shown of light from everywhere, are the last.
-        std::vector<const Field*> fields;
-        for (const SideLight& light : onSides) {
-            fields.push_back(&light.shown.direct);
-            if (isGathered)
-                fields.insert(fields.end(), {&light.indirect, &light.carried});
-            else
-                fields.insert(fields.end(), {&light.shown.indirect, &light.exitance});
-        }
-        for (const SideLight& light : onSides)
-            if (isGathered) fields.push_back(&light.emission);
-        if (isGathered) fields.push_back(&shown.color());
-        if (isGathered && !shown.everywhere().empty()) fields.push_back(&shown.everywhere());
-        std::vector<Field> nodes;
-        // Of sparse results only corners that cannot gather have the light of patches.
-        if (settings.reconstruction == "AREA_AVERAGE" || (isGathered && atCorners->isSparse(i))) {
-            nodes = areaAverage(patches, ranges[i], regions, instance.side, outside, fields);
-        } else {
-            LeastSquaresFit fit = leastSquares(patches, ranges[i], regions, instance.side, outside,
-                                               settings.regularization, fields);
-            nodes = std::move(fit.fields);
-            if (!fit.isSolved)
-                warnings[i] = {
-                    WarningId::UNSOLVED_FIT,
-                    "object \"" + instance.name +
-                        "\": the least squares came to no solution, and its vertices have the "
-                        "mean of the light around them; merge vertices by distance, or choose "
-                        "the reconstruction AREA_AVERAGE"};
-        }
-        double noise = 0;  // of what corners gather: mean square
-        for (size_t k = 0; k < lights.size(); ++k) {
-            Field &direct = nodes[3 * k], &indirect = nodes[3 * k + 1];
-            Field& exitance = nodes[3 * k + 2];
-            if (isGathered) {
-                CornerGather::NodeLight atNodes{
-                    std::move(direct), std::move(indirect), std::move(exitance), {}};
-                if (!shown.everywhere().empty()) atNodes.shownShare = nodes.back();
-                const CornerGather::Outcome outcome =
-                    atCorners->improve(i, k, out.cornerAngles, atNodes);
-                smooth += outcome.smooth;
-                if (outcome.gathered > 0) noise += outcome.noise / double(outcome.gathered);
-                direct = std::move(atNodes.direct);
-                indirect = std::move(atNodes.indirect);
-                exitance.resize(direct.size());
-                const Field& emission = nodes[3 * lights.size() + k];
-                const Field& colors = nodes[4 * lights.size()];
-                for (size_t v = 0; v < direct.size(); ++v)
-                    exitance[v] = emission[v] + colors[v] * (direct[v] + indirect[v]);
-            } else if (settings.reconstruction == "LEAST_SQUARES") {
-                addFaceSlopes(patches, ranges[i], regions, instance.side, shown, lights[k],
-                              settings.targetError, direct, exitance);
-            }
-            CornerLight light = cornerLight(regions, direct, indirect, exitance);
-            if (k == 0)
-                static_cast<CornerLight&>(out) = std::move(light);
-            else
-                out.sets.push_back(std::move(light));
-        }
-        for (const CornerLight& light : out.sets) out.add(light);
-        regionsOf[i] = {};
-        if (isGathered && atCorners->isSparse(i))
-            if (const double signal = meanSquare(instance, out); signal > 0)
-                out.gatheredNoise = float(std::sqrt(noise / signal));
-
-        if (out.isBaked && isInsideOut(patches, ranges[i], instance.side, onSides)) {
-            report.objects[i].status = "baked; no light on this side";
-            warnings[i] = {WarningId::NO_LIGHT_ON_SIDE,
-                           "object \"" + instance.name +
-                               "\": the baked sides of its faces get no light but the other sides "
-                               "do; flip its normals or choose the other side"};
-        }
-    };
+std::vector<InstanceLight> reconstruct(const ReconstructionInput& input, const Progress& progress,
+                                       Report& report) {
+    Reconstruction reconstruction(input, progress);
+    const size_t count = input.scene.instances.size();
+    std::vector<InstanceLight> result(count);
+    report.objects.resize(count);
     // Some at a time, so that this thread can report, and cancel, between them.
-    for (size_t i = 0; i < scene.instances.size(); i += kTogether) {
-        const double share = double(i) / double(scene.instances.size());
-        progress.report(RB_STAGE_RECONSTRUCTION, anyGathers ? 0.5 + 0.5 * share : share);
-        parallelFor(i, std::min(i + kTogether, scene.instances.size()), reconstructInstance);
+    for (size_t i = 0; i < count; i += kTogether) {
+        const double share = double(i) / double(count);
+        progress.report(RB_STAGE_RECONSTRUCTION,
+                        reconstruction.anyGathers() ? 0.5 + 0.5 * share : share);
+        parallelFor(i, std::min(i + kTogether, count),
+                    [&](size_t k) { reconstruction.reconstruct(k, result[k], report.objects[k]); });
     }
-    for (std::optional<Warning>& warning : warnings)
-        if (warning) report.warnings.push_back(std::move(*warning));
-    if (atCorners) {
-        report.shadowRays += atCorners->shadowRays();
-        report.skip(SkippedWork::SMOOTH_CORNERS, smooth.load());
-        report.skip(SkippedWork::SPARSE_CORNERS, atCorners->sparseCorners());
-    }
-    if (occluders) report.skip(SkippedWork::OCCLUDERS, occluders.load());
+    reconstruction.addTo(report);
     progress.report(RB_STAGE_RECONSTRUCTION, 1);
     return result;
 }

@@ -14,17 +14,13 @@
 
 #include <vector>
 
-#include "bundles/line_counts.h"
 #include "job/progress.h"
 #include "job/report.h"
-#include "job/settings.h"
 #include "patches/patches.h"
+#include "reconstruction/corner_weights.h"
 #include "reconstruction/instance_light.h"
-#include "reconstruction/least_squares.h"
-#include "reconstruction/shown_light.h"
+#include "reconstruction/reconstruction_input.h"
 #include "scene/scene.h"
-#include "transport/set_light.h"
-#include "visibility/visibility.h"
 
 namespace raybundle {
 
@@ -32,12 +28,8 @@ namespace raybundle {
 std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches);
 
 // Light of every instance, by all lights and by each light set; of those that only occlude, empty.
-// exposed: per side, the share of it that nothing covers; surfaces not further apart than
-// touchDistance (m) touch. Adds the objects, warnings and skips to the report.
-std::vector<InstanceLight> reconstruct(const Scene& scene, const Patches& patches,
-                                       const Visibility& visibility, float touchDistance,
-                                       const SetLights& lights, const ShownLight& shown,
-                                       const std::vector<float>& exposed, const Settings& settings,
-                                       const Progress& progress, Report& report);
+// Adds the objects, warnings and skips to the report.
+std::vector<InstanceLight> reconstruct(const ReconstructionInput& input, const Progress& progress,
+                                       Report& report);
 
 }  // namespace raybundle

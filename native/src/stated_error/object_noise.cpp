@@ -56,7 +56,7 @@ std::vector<double> shownOverForetold(const Scene& scene, const Patches& tiles, 
         if (instance.role != RB_ROLE_BAKE || range.firstCell == range.lastCell) return;
         const SmoothRegions regions = smoothRegions(scene.meshes[instance.mesh], tiles.cells,
                                                     range.firstCell, range.lastCell);
-        const LeastSquaresFit fit = leastSquares(tiles, range, regions, instance.side, exposed,
+        const LeastSquaresFit fit = leastSquares(tiles, {range, regions, instance.side}, exposed,
                                                  regularization, {&light[0], &light[1]});
         double shown = 0, foretold = 0, count = 0;
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
