@@ -290,11 +290,10 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exchanged.exposed[side];
     const std::vector<InstanceRange> ranges = instanceRanges(in.scene, patches);
     const SideNoise& noise = exchanged.noise;
-    stateErrors(
-        in.scene, in.tiles, ranges,
-        meanOver(in.tiles, in.shown.of(lights, exchanged.exposed), weight),
-        {exposedOfTiles, noise.ofBundles, noise.direct, noise.ofObjects, noise.isOutOfReach},
-        settings.targetError, settings.hasIndependentDirections(), made, report);
+    stateErrors(in.scene, in.tiles, ranges,
+                {meanOver(in.tiles, in.shown.of(lights, exchanged.exposed), weight), exposedOfTiles,
+                 noise.ofBundles, noise.direct, noise.ofObjects, noise.isOutOfReach},
+                settings, made, report);
     fillLeftOutCorners(patches, ranges, made, report);
     checkFinite(made);
     return made;

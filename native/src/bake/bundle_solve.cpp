@@ -48,8 +48,9 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
                 input.settings.minBundles < input.settings.maxBundles),
       halves(lights.size()) {
     if (input.settings.solver == "LINE_REUSE")
-        noisyParts.emplace(in.tiles, in.trace.looks, in.tiles.sum(area), in.shown, growth,
-                           overForetold, projectionsOfFaces(in.trace), in.settings.targetError);
+        noisyParts.emplace(NoisyPartsInput{in.tiles, in.trace.looks, in.tiles.sum(area), in.shown,
+                                           growth, overForetold, projectionsOfFaces(in.trace),
+                                           in.settings.targetError});
 }
 
 SideNoise BundleSolve::run(Report& report) {

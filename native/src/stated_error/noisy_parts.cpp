@@ -50,17 +50,15 @@ constexpr double kOfLooksBefore = 0.5;
 
 }  // namespace
 
-NoisyParts::NoisyParts(const Tiles& tiles, const Looks& before, const std::vector<float>& weight,
-                       const ShownLight& shown, const std::vector<double>& growth,
-                       const std::vector<double>& shownOverForetold, double projections,
-                       double target)
-    : tiles(tiles),
-      before(before),
+NoisyParts::NoisyParts(const NoisyPartsInput& input)
+    : tiles(input.tiles),
+      before(input.before),
       partOf(tiles.sideCount(), kNone),
-      growth(growth),
-      shownOverForetold(shownOverForetold),
-      projections(projections),
-      target(target) {
+      growth(input.growth),
+      shownOverForetold(input.shownOverForetold),
+      projections(input.projections),
+      target(input.target) {
+    const std::vector<float>& weight = input.weight;
     const Patches& patches = tiles.patches();
     std::vector<uint32_t> sides;
     for (uint32_t side = 0; side < weight.size(); ++side)
@@ -87,7 +85,7 @@ NoisyParts::NoisyParts(const Tiles& tiles, const Looks& before, const std::vecto
         Part& part = parts[cells[cell].part];
         part.instance = parent.instance;
         ++part.sides;
-        if (shown.isGathered(tiles.firstSide(side))) part.isGathered = true;
+        if (input.shown.isGathered(tiles.firstSide(side))) part.isGathered = true;
     }
 }
 

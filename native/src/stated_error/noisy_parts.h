@@ -24,17 +24,25 @@
 
 namespace raybundle {
 
+// What NoisyParts are made of. References must outlive it.
+struct NoisyPartsInput {
+    const Tiles& tiles;
+    const Looks& before;               // of earlier bakes with these lines
+    const std::vector<float>& weight;  // per side of the tiles, positive where it has a result
+    // Where corners gather instead of showing their side's light, rays do not help.
+    const ShownLight& shown;
+    // Per instance, see stated_error/object_noise.h; the second as of the halves that are looked at.
+    const std::vector<double>& growth;
+    const std::vector<double>& shownOverForetold;
+    // Of sheets and single faces, of each bundle, where there are windows of finer lines; else 0.
+    const double projections;
+    const double target;  // relative
+};
+
 class NoisyParts {
   public:
-    // before: of earlier bakes with these lines. weight: per side of the tiles, positive where it
-    // has a result. shown: where corners gather instead of showing their side's light, rays do not
-    // help. projections: of sheets and single faces, of each bundle, where there are windows of
-    // finer lines; else 0. target: relative. growth, shownOverForetold: per instance, see
-    // stated_error/object_noise.h, the second as of the halves that are looked at; they and the tiles must
-    // outlive the object.
-    NoisyParts(const Tiles& tiles, const Looks& before, const std::vector<float>& weight,
-               const ShownLight& shown, const std::vector<double>& growth,
-               const std::vector<double>& shownOverForetold, double projections, double target);
+    // The tiles, growth and shownOverForetold must outlive the object.
+    explicit NoisyParts(const NoisyPartsInput& input);
 
     // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
     // those of all sides, not shown ones included.

@@ -73,19 +73,17 @@ std::string inMetres(double length) {
 class InstanceErrors {
   public:
     InstanceErrors(const Instance& instance, const Tiles& tiles, const InstanceRange& range,
-                   const Irradiance& irradiance, const SideErrors& sides,
-                   const InstanceLight& light)
+                   const SideErrors& sides, const InstanceLight& light)
         : instance(instance),
           tiles(tiles),
           patches(tiles.patches()),
           range(range),
           side(uint32_t(instance.side)),
-          irradiance(irradiance),
           sides(sides),
           isGathered(light.gatheredNoise.has_value()),
           light(light),
-          surplus(surplusOf(patches, range.firstParent, range.lastParent, instance.side, irradiance,
-                            sides.exposed, sides.directError)) {
+          surplus(surplusOf(patches, range.firstParent, range.lastParent, instance.side,
+                            sides.irradiance, sides.exposed, sides.directError)) {
         std::vector<double> exposed(range.lastCell - range.firstCell, 0.0);  // per cell, m^2
         forEachPatch([&](uint32_t at, double weight, const Cell& cell, const auto&, double residual,
                          const Surplus& s) {
@@ -154,7 +152,7 @@ class InstanceErrors {
 
   private:
     static double square(const glm::vec3& v) { return double(glm::dot(v, v)); }
-    glm::vec3 lightAt(uint32_t at) const { return irradiance.direct[at] + irradiance.indirect[at]; }
+    glm::vec3 lightAt(uint32_t at) const { return sides.irradiance.all(at); }
     bool hasResult(uint32_t at) const {
         return instance.hasResultOnFace(size_t(patches.parentAt(at).face));
     }
@@ -223,7 +221,6 @@ class InstanceErrors {
     const Patches& patches;  // a tile each
     const InstanceRange& range;
     const uint32_t side;
-    const Irradiance& irradiance;
     const SideErrors& sides;
     const bool isGathered;
     const InstanceLight& light;
@@ -310,12 +307,14 @@ void warnOf(std::vector<CoarseMesh> meshes, Report& report) {
 }  // namespace
 
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
-                 const Irradiance& irradiance, const SideErrors& sides, float targetError,
-                 bool errsAlike, std::vector<InstanceLight>& light, Report& report) {
+                 const SideErrors& sides, const Settings& settings,
+                 std::vector<InstanceLight>& light, Report& report) {
+    const double targetError = double(settings.targetError);
+    const bool errsAlike = settings.hasIndependentDirections();
     std::vector<std::optional<InstanceErrors>> errors(light.size());
     parallelFor(size_t(0), light.size(), [&](size_t i) {
         if (light[i].isBaked)
-            errors[i].emplace(scene.instances[i], tiles, ranges[i], irradiance, sides, light[i]);
+            errors[i].emplace(scene.instances[i], tiles, ranges[i], sides, light[i]);
     });
     Squares all;
     for (const auto& e : errors)
@@ -328,7 +327,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
     // As the bake has measured what is shown of it, relative to what is shown.
     const double shown = all.shown > 0 ? report.error.noise * std::sqrt(all.signal / all.shown) : 0;
-    const double limit = std::max(kCoarse, kCoarseTargets * double(targetError));
+    const double limit = std::max(kCoarse, kCoarseTargets * targetError);
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;
     std::vector<std::pair<double, std::string>> noisy;
@@ -346,14 +345,14 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         const double noise = report.objects[i].error.noise;
         const double brightness = own.signal / own.area * all.area / all.signal;
-        if (!errsAlike && noise > kNoisyTargets * double(targetError) &&
+        if (!errsAlike && noise > kNoisyTargets * targetError &&
             brightness > kNearlyBlack * kNearlyBlack)
             noisy.push_back({noise, light[i].name});
         if (!(brightness > kDark)) continue;
         if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
             coarse.push_back(std::move(*mesh));
     }
-    warnOfNoise(std::move(noisy), double(targetError), sides.isOutOfReach, report);
+    warnOfNoise(std::move(noisy), targetError, sides.isOutOfReach, report);
     warnOf(std::move(coarse), report);
     report.error = relative(all, noiseScale, shown, discretisation);
     report.error.ofPatches = report.estimatedError;

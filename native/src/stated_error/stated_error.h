@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "job/report.h"
+#include "job/settings.h"
 #include "patches/tiles.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/least_squares.h"
@@ -23,6 +24,7 @@ namespace raybundle {
 
 // What is known about the light on the sides of the tiles; references must outlive it.
 struct SideErrors {
+    const Irradiance& irradiance;           // mean over each side
     const std::vector<float>& exposed;      // share of each side that nothing covers
     const std::vector<glm::vec3>& noise;    // a sample of that of the bundles, W/m^2; empty: none
     const std::vector<float>& directError;  // standard error of the sources' light, W/m^2
@@ -31,14 +33,13 @@ struct SideErrors {
 };
 
 // Adds the errors, and warnings of objects whose mesh is too coarse, to the report, and the error
-// per corner to the light. report.error.noise is the shown noise in all; targetError: that of the
-// settings. ranges: of the patches; irradiance: mean over each tile's side. errsAlike: the
-// directions of bundles are independent, so that all objects get too much light together, or too
+// per corner to the light. report.error.noise is the shown noise in all. ranges: of the patches.
+// Where the directions of bundles are independent, all objects get too much light together, or too
 // little: what the halves tell of one object is a single sample then, and none has less noise than
 // all together. Sparse results that are gathered are the light of points
 // (InstanceLight::gatheredNoise), whose error is noise alone.
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
-                 const Irradiance& irradiance, const SideErrors& sides, float targetError,
-                 bool errsAlike, std::vector<InstanceLight>& light, Report& report);
+                 const SideErrors& sides, const Settings& settings,
+                 std::vector<InstanceLight>& light, Report& report);
 
 }  // namespace raybundle

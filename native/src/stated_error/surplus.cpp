@@ -71,77 +71,113 @@ glm::vec3 slope(const Gradient& g, glm::vec2 direction) {
     return direction.x * g.alongA + direction.y * g.alongB;
 }
 
-}  // namespace
-
-std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uint32_t lastParent,
-                               rb_side side, const Irradiance& irradiance,
-                               const std::vector<float>& exposed,
-                               const std::vector<float>& directError) {
-    if (firstParent >= lastParent) return {};
-    const uint32_t first = patches.parents[firstParent].firstPatch;
-    const Parent& last = patches.parents[lastParent - 1];
-    std::vector<Site> sites(last.firstPatch + last.patchCount() - first);
-    for (uint32_t p = firstParent; p < lastParent; ++p) {
-        throwIfCancelledAt(p);
-        const Parent& parent = patches.parents[p];
-        const glm::vec3 axisA = glm::normalize(parent.a);
-        const glm::vec3 axisB = glm::cross(parent.normal, axisA);
-        const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
-        const float longest =
-            std::max({glm::length(parent.a), glm::length(parent.b),
-                      parent.isTriangle ? glm::distance(parent.a, parent.b) : 0.0f});
-        const bool isThin = glm::length(glm::cross(parent.a, parent.b)) < kThin * longest * longest;
-        for (uint32_t k = 0; k < parent.patchCount(); ++k) {
-            const uint32_t patch = parent.firstPatch + k;
-            Site& site = sites[patch - first];
-            site.centre = parent.position(parent.pointOn(k, middle));
-            site.axisA = axisA;
-            site.axisB = axisB;
-            site.isUsed = !isThin && exposed[2 * patch + uint32_t(side)] > kHalfCovered;
-            site.wanted = parent.isTriangle ? 3 : 4;
-        }
+// The patches of some parents, one side of each.
+class Sites {
+  public:
+    // The arguments of surplusOf.
+    Sites(const Patches& patches, uint32_t firstParent, uint32_t lastParent, rb_side side,
+          const Irradiance& irradiance)
+        : patches(patches),
+          side(side),
+          irradiance(irradiance),
+          first(patches.parents[firstParent].firstPatch) {
+        const Parent& last = patches.parents[lastParent - 1];
+        sites.resize(last.firstPatch + last.patchCount() - first);
     }
 
-    auto lightAt = [&](size_t field, uint32_t patch) {
-        const uint32_t at = 2 * patch + uint32_t(side);
-        return field == 0 ? irradiance.direct[at] + irradiance.indirect[at]
-                          : irradiance.gathered[at];
-    };
-    std::vector<TilePair> pairs = neighbouringTiles(patches, firstParent, lastParent);
-    pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
-                               [&](const TilePair& pair) {
-                                   return !sites[pair.first - first].isUsed ||
-                                          !sites[pair.second - first].isUsed;
-                               }),
-                pairs.end());
-    size_t looked = 0;
-    for (const TilePair& pair : pairs) {
-        throwIfCancelledAt(looked++);
-        for (const auto& [a, b] :
-             {std::make_pair(pair.first, pair.second), std::make_pair(pair.second, pair.first)}) {
-            Site& site = sites[a - first];
-            const glm::vec2 d = site.offset(sites[b - first]);
-            // All neighbours count alike, however far.
-            const float weight = 1 / std::max(glm::dot(d, d), 1e-30f);
-            ++site.neighbours;
-            site.aa += weight * d.x * d.x;
-            site.ab += weight * d.x * d.y;
-            site.bb += weight * d.y * d.y;
-            for (size_t f = 0; f < 2; ++f) {
-                const glm::vec3 change = lightAt(f, b) - lightAt(f, a);
-                site.ra[f] += weight * d.x * change;
-                site.rb[f] += weight * d.y * change;
+    void place(uint32_t firstParent, uint32_t lastParent, const std::vector<float>& exposed) {
+        for (uint32_t p = firstParent; p < lastParent; ++p) {
+            throwIfCancelledAt(p);
+            const Parent& parent = patches.parents[p];
+            const glm::vec3 axisA = glm::normalize(parent.a);
+            const glm::vec3 axisB = glm::cross(parent.normal, axisA);
+            const glm::vec2 middle = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
+            const float longest =
+                std::max({glm::length(parent.a), glm::length(parent.b),
+                          parent.isTriangle ? glm::distance(parent.a, parent.b) : 0.0f});
+            const bool isThin =
+                glm::length(glm::cross(parent.a, parent.b)) < kThin * longest * longest;
+            for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+                const uint32_t patch = parent.firstPatch + k;
+                Site& site = of(patch);
+                site.centre = parent.position(parent.pointOn(k, middle));
+                site.axisA = axisA;
+                site.axisB = axisB;
+                site.isUsed = !isThin && exposed[2 * patch + uint32_t(side)] > kHalfCovered;
+                site.wanted = parent.isTriangle ? 3 : 4;
             }
         }
+        pairs = neighbouringTiles(patches, firstParent, lastParent);
+        pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                                   [&](const TilePair& pair) {
+                                       return !of(pair.first).isUsed || !of(pair.second).isUsed;
+                                   }),
+                    pairs.end());
     }
-    for (Site& site : sites) site.solve();
 
-    for (const TilePair& pair : pairs) {
-        throwIfCancelledAt(looked++);
-        Site& a = sites[pair.first - first];
-        Site& b = sites[pair.second - first];
+    void findGradients() {
+        for (const TilePair& pair : pairs) {
+            throwIfCancelledAt(looked++);
+            addNeighbour(pair.first, pair.second);
+            addNeighbour(pair.second, pair.first);
+        }
+        for (Site& site : sites) site.solve();
+    }
+
+    // directError: see surplusOf.
+    void comparePairs(const std::vector<float>& directError) {
+        for (const TilePair& pair : pairs) {
+            throwIfCancelledAt(looked++);
+            compare(pair, directError);
+        }
+    }
+
+    std::vector<Surplus> surplus() const {
+        std::vector<Surplus> result(sites.size());
+        for (size_t k = 0; k < sites.size(); ++k) {
+            const Site& site = sites[k];
+            if (site.pairs == 0) continue;
+            const glm::vec3 light = allLight(first + uint32_t(k));
+            // Half of the neighbours along each of the two axes.
+            const float turn = kTurn * kTurn * kSpread * 2 * site.turn / float(site.pairs);
+            result[k] = {true,
+                         (kStraight * site.straight + kMixed * site.mixed) / float(site.pairs) +
+                             turn * glm::dot(light, light),
+                         kStep * site.step};
+        }
+        return result;
+    }
+
+  private:
+    Site& of(uint32_t patch) { return sites[patch - first]; }
+    uint32_t sideOf(uint32_t patch) const { return 2 * patch + uint32_t(side); }
+    glm::vec3 allLight(uint32_t patch) const { return irradiance.all(sideOf(patch)); }
+    const glm::vec3& lightOfSources(uint32_t patch) const {
+        return irradiance.gathered[sideOf(patch)];
+    }
+
+    // To the normal equations of the gradients at a.
+    void addNeighbour(uint32_t a, uint32_t b) {
+        Site& site = of(a);
+        const glm::vec2 d = site.offset(of(b));
+        // All neighbours count alike, however far.
+        const float weight = 1 / std::max(glm::dot(d, d), 1e-30f);
+        ++site.neighbours;
+        site.aa += weight * d.x * d.x;
+        site.ab += weight * d.x * d.y;
+        site.bb += weight * d.y * d.y;
+        const std::array<glm::vec3, 2> changes{allLight(b) - allLight(a),
+                                               lightOfSources(b) - lightOfSources(a)};
+        for (size_t f = 0; f < 2; ++f) {
+            site.ra[f] += weight * d.x * changes[f];
+            site.rb[f] += weight * d.y * changes[f];
+        }
+    }
+
+    void compare(const TilePair& pair, const std::vector<float>& directError) {
+        Site &a = of(pair.first), &b = of(pair.second);
         // A gradient at the border looks to one side only: beside another one it says nothing.
-        if (!a.hasGradient || !b.hasGradient || (!a.isInside() && !b.isInside())) continue;
+        if (!a.hasGradient || !b.hasGradient || (!a.isInside() && !b.isInside())) return;
         const glm::vec2 dA = a.offset(b), dB = -b.offset(a);
         const glm::vec2 acrossA(-dA.y, dA.x), acrossB(-dB.y, dB.x);
         const glm::vec3 straight = slope(b.gradient[0], dB) - slope(a.gradient[0], dA);
@@ -153,9 +189,10 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
         float step = 0;
         if (a.isInside() && b.isInside()) {
             const glm::vec3 foretold = 0.5f * (slope(a.gradient[1], dA) + slope(b.gradient[1], dB));
-            const glm::vec3 off = lightAt(1, pair.second) - lightAt(1, pair.first) - foretold;
-            const float errorA = directError[2 * pair.first + uint32_t(side)];
-            const float errorB = directError[2 * pair.second + uint32_t(side)];
+            const glm::vec3 off =
+                lightOfSources(pair.second) - lightOfSources(pair.first) - foretold;
+            const float errorA = directError[sideOf(pair.first)];
+            const float errorB = directError[sideOf(pair.second)];
             // The error is that of the brightest channel.
             const glm::vec3 bend = slope(b.gradient[1], dB) - slope(a.gradient[1], dA);
             step = std::max(0.0f, glm::dot(off, off) - glm::dot(bend, bend)) -
@@ -171,19 +208,27 @@ std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uin
         }
     }
 
-    std::vector<Surplus> result(sites.size());
-    for (size_t k = 0; k < sites.size(); ++k) {
-        const Site& site = sites[k];
-        if (site.pairs == 0) continue;
-        const glm::vec3 light = lightAt(0, first + uint32_t(k));
-        // Half of the neighbours along each of the two axes.
-        const float turn = kTurn * kTurn * kSpread * 2 * site.turn / float(site.pairs);
-        result[k] = {true,
-                     (kStraight * site.straight + kMixed * site.mixed) / float(site.pairs) +
-                         turn * glm::dot(light, light),
-                     kStep * site.step};
-    }
-    return result;
+    const Patches& patches;
+    const rb_side side;
+    const Irradiance& irradiance;
+    const uint32_t first;  // patch
+    std::vector<Site> sites;
+    std::vector<TilePair> pairs;  // of neighbours that both count
+    size_t looked = 0;            // at pairs
+};
+
+}  // namespace
+
+std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uint32_t lastParent,
+                               rb_side side, const Irradiance& irradiance,
+                               const std::vector<float>& exposed,
+                               const std::vector<float>& directError) {
+    if (firstParent >= lastParent) return {};
+    Sites sites(patches, firstParent, lastParent, side, irradiance);
+    sites.place(firstParent, lastParent, exposed);
+    sites.findGradients();
+    sites.comparePairs(directError);
+    return sites.surplus();
 }
 
 }  // namespace raybundle
