@@ -6,25 +6,15 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <new>
 #include <vector>
 
 #include "job/error.h"
-#include "patches/coincidence.h"
 #include "patches/opacity.h"
-#include "visibility/embree3.h"
 #include "visibility/embree_device.h"
+#include "visibility/ray_query.h"
 
 namespace raybundle {
 namespace {
-
-// Share of how far an island reaches: some tens of float rounding errors.
-constexpr float kRelativeOffset = 2e-6f;
-
-// Some tens of float rounding errors at a parent, metres.
-float offsetAt(const Patches& patches, uint32_t parent) {
-    return kRelativeOffset * patches.islands[patches.parents[parent].island].reach;
-}
 
 [[noreturn]] void fail(RTCError code, const char* what) {
     // A tree that is built in several threads knows of an allocation that failed in one of them
@@ -38,17 +28,6 @@ float offsetAt(const Patches& patches, uint32_t parent) {
 }
 
 }  // namespace
-
-struct Visibility::Embree {
-    RTCDevice device = nullptr;
-    RTCScene scene = nullptr;
-    std::vector<uint32_t> parentOf;
-
-    ~Embree() {
-        if (scene) embree3.releaseScene(scene);
-        if (device) embree3.releaseDevice(device);
-    }
-};
 
 Visibility::Visibility(const Patches& patches, Blockers blockers)
     : patches(patches),
@@ -96,244 +75,9 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
 
 Visibility::~Visibility() = default;
 
-namespace {
-
-// A list that filters write to. Embree swallows their exceptions: that there is no memory left is
-// kept until the ray is done.
-struct ParentList {
-    std::vector<uint32_t> all;
-    bool isIncomplete = false;
-
-    bool has(uint32_t parent) const {
-        return std::find(all.begin(), all.end(), parent) != all.end();
-    }
-    void add(uint32_t parent) {
-        try {
-            all.push_back(parent);
-        } catch (const std::bad_alloc&) {
-            isIncomplete = true;
-        }
-    }
-    void check() const {
-        if (isIncomplete) throw std::bad_alloc();
-    }
-};
-
-// How a ray passes what lets light through: in part, or by chance.
-struct Passage {
-    const Patches* patches;
-    const uint32_t* parentOf;
-    std::optional<uint64_t> line;  // its name, where it passes by chance
-    float share = 1;               // that has come through, where it passes in part
-    // Parents that have taken their part: a ray along the diagonal of a quad meets both of its
-    // triangles, and Embree may offer a hit twice.
-    ParentList passed;
-
-    // Whether the ray goes on through a parent that it meets at a point.
-    bool goesOn(uint32_t parent, const glm::vec3& point) {
-        if (patches->opacity.empty()) return false;
-        const uint32_t patch = patches->patchAt(parent, point);
-        const float opacity = patches->opacity[patch];
-        if (opacity >= 1) return false;
-        if (line) return !stops(*patches, patch, *line);
-        if (!passed.has(parent)) {
-            passed.add(parent);
-            share *= 1 - opacity;
-        }
-        return share > 0;
-    }
-};
-
-struct Hit {
-    explicit Hit(const RTCFilterFunctionNArguments* args, uint32_t k = 0)
-        : direction(RTCRayN_dir_x(args->ray, args->N, k), RTCRayN_dir_y(args->ray, args->N, k),
-                    RTCRayN_dir_z(args->ray, args->N, k)),
-          distance(RTCRayN_tfar(args->ray, args->N, k)),
-          point(glm::vec3(RTCRayN_org_x(args->ray, args->N, k),
-                          RTCRayN_org_y(args->ray, args->N, k),
-                          RTCRayN_org_z(args->ray, args->N, k)) +
-                distance * direction) {}
-
-    const glm::vec3 direction;
-    const float distance;
-    const glm::vec3 point;
-};
-
-// What a ray meets first. Of surfaces that coincide there it is the one that comesBefore the
-// others; so a ray that has met one goes on a little, through all that may coincide with it.
-struct Nearest {
-    struct Other {
-        uint32_t parent;
-        float distance;  // metres along the ray
-    };
-    uint32_t parent = kNoParent;
-    float distance = 0;  // metres along the ray
-    float zone = 0;      // what it meets less than this behind may coincide, metres
-    // What it has met about as far away; of more than that, those that it met first. Without memory
-    // of its own: Embree would swallow the exception if there were none left.
-    std::array<Other, 16> others;
-    size_t count = 0;
-
-    // Notes what the ray meets; returns how far it goes on, metres.
-    float meet(uint32_t other, float at, float otherZone) {
-        if (parent == kNoParent || at < distance) {
-            if (parent != kNoParent && distance <= at + otherZone) keep({parent, distance});
-            parent = other;
-            distance = at;
-            zone = otherZone;
-        } else if (at <= distance + zone) {
-            keep({other, at});
-        }
-        return distance + zone;
-    }
-    void keep(const Other& other) {
-        if (count == others.size()) {
-            // What was about as far away as one that was nearer meanwhile.
-            const auto isFar = [&](const Other& o) { return o.distance > distance + zone; };
-            count = size_t(std::remove_if(others.begin(), others.end(), isFar) - others.begin());
-        }
-        if (count < others.size()) others[count++] = other;
-    }
-
-    // Of the nearest one and those that coincide with it, the first.
-    uint32_t first(const Patches& patches, const glm::vec3& direction) const {
-        uint32_t result = parent;
-        auto enters = [&](uint32_t k) {
-            return glm::dot(patches.parents[k].normal, direction) < 0;
-        };
-        for (size_t k = 0; k < count; ++k) {
-            const auto& [other, at] = others[k];
-            if (other != result && at <= distance + zone &&
-                areParallel(patches.parents[result], patches.parents[other]) &&
-                comesBefore(patches, other, enters(other), result, enters(result)))
-                result = other;
-        }
-        return result;
-    }
-};
-
-// What the filters need to know of a ray; starts with Embree's own part.
-struct Query {
-    RTCIntersectContext context;
-    Passage passage;
-    Nearest nearest;
-
-    explicit Query(const Patches& patches, const uint32_t* parentOf) {
-        rtcInitIntersectContext(&context);
-        passage.patches = &patches;
-        passage.parentOf = parentOf;
-    }
-    // Of a ray that is to find the first surface and meets one.
-    void meet(const RTCFilterFunctionNArguments* args, uint32_t parent, const Hit& hit) {
-        const float cosine =
-            std::abs(glm::dot(passage.patches->parents[parent].normal, hit.direction));
-        RTCRayN_tfar(args->ray, args->N, 0) = nearest.meet(
-            parent, hit.distance, 2 * offsetAt(*passage.patches, parent) / std::max(0.01f, cosine));
-    }
-};
-
-struct Start : Query {
-    using Query::Query;
-    uint32_t parent;
-    bool isFront;      // the ray leaves the front of the parent
-    glm::vec3 normal;  // of the side
-    float zone;        // height over the side within which a hit coincides with it, metres
-    // Of each ray, by its id in the packet: how far behind the surface it starts, metres along it,
-    // and the parent that it ends on. A parent whose corners lie in a plane but for a rounding
-    // error may stand before a point of its plane.
-    std::array<float, Visibility::kPacket> behind;
-    std::array<uint32_t, Visibility::kPacket> target;
-};
-
-// Lets a ray pass the surface that it starts on, what coincides with it on its other side, and what
-// it meets behind: the next face of a box whose edge is near.
-bool passesStart(const Start& start, uint32_t other, const glm::vec3& direction, float distance,
-                 float behind) {
-    if (other == start.parent) return true;
-    const float height = distance * glm::dot(direction, start.normal);
-    if (height > start.zone) return false;
-    const Patches& patches = *start.passage.patches;
-    const Parent& a = patches.parents[start.parent];
-    const Parent& b = patches.parents[other];
-    if (distance < behind && !areParallel(a, b)) return true;
-    const float turn = glm::dot(glm::cross(b.a, b.b), direction);
-    // Faces of one object that the ray crosses the same way lie beside its start; of others, those
-    // that coincide with it may lie behind it.
-    const bool alike = a.instance == b.instance && (turn > 0) == start.isFront;
-    return alike || (areParallel(a, b) &&
-                     !comesBefore(patches, start.parent, !start.isFront, other, turn < 0));
-}
-
-// Whether a ray goes on through a parent that it hits; id: of the ray in its packet.
-bool goesOn(Start& start, uint32_t id, uint32_t other, const Hit& hit) {
-    return other == start.target[id] ||
-           passesStart(start, other, hit.direction, hit.distance, start.behind[id]) ||
-           start.passage.goesOn(other, hit.point);
-}
-
-// Of rays that are blocked or not.
-void passStart(const RTCFilterFunctionNArguments* args) {
-    Start& start = *reinterpret_cast<Start*>(args->context);
-    for (uint32_t k = 0; k < args->N; ++k) {
-        if (args->valid[k] == 0) continue;
-        const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, k)];
-        if (goesOn(start, RTCRayN_id(args->ray, args->N, k), other, Hit(args, k)))
-            args->valid[k] = 0;
-    }
-}
-
-// Of a ray that is to find the first surface.
-void meetAfterStart(const RTCFilterFunctionNArguments* args) {
-    Start& start = *reinterpret_cast<Start*>(args->context);
-    const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
-    const Hit hit(args);
-    if (goesOn(start, 0, other, hit))
-        args->valid[0] = 0;
-    else
-        start.meet(args, other, hit);
-}
-
-// Embree's assertions end the process for rays from or to where squares leave the range of floats.
-// Such a ray, of points that are no numbers too, meets nothing and is blocked.
-bool isValid(const glm::vec3& v) {
-    constexpr float kMost = 1e18f;
-    return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
-}
-
-void setRay(RTCRay& ray, glm::vec3 origin, glm::vec3 direction, float distance) {
-    if (!isValid(origin) || !isValid(direction)) {
-        origin = glm::vec3(0.0f);
-        direction = glm::vec3(0, 0, 1);
-        distance = -1;
-    }
-    ray.org_x = origin.x;
-    ray.org_y = origin.y;
-    ray.org_z = origin.z;
-    ray.dir_x = direction.x;
-    ray.dir_y = direction.y;
-    ray.dir_z = direction.z;
-    ray.tnear = 0;
-    ray.tfar = distance;
-    ray.mask = ~0u;
-    ray.id = 0;
-}
-
-// Of a ray that starts on no surface.
-void meet(const RTCFilterFunctionNArguments* args) {
-    Query& query = *reinterpret_cast<Query*>(args->context);
-    const uint32_t parent = query.passage.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
-    const Hit hit(args);
-    if (query.passage.goesOn(parent, hit.point))
-        args->valid[0] = 0;
-    else
-        query.meet(args, parent, hit);
-}
-
-}  // namespace
-
-struct Visibility::FromSide : Start {
+struct Visibility::FromSide : SideQuery {
     FromSide(const Visibility& visibility, uint32_t side)
-        : Start(visibility.patches, visibility.embree->parentOf.data()) {
+        : SideQuery(visibility.patches, visibility.embree->parentOf.data()) {
         context.filter = passStart;
         const Patches& patches = visibility.patches;
         parent = patches.parentOf[side / 2];
@@ -434,7 +178,7 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
     setRay(query.ray, origin, direction, farthest + start.behind[0]);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     embree3.intersect1(embree->scene, &start.context, &query);
-    const Nearest& nearest = start.nearest;
+    const NearestHit& nearest = start.nearest;
     if (nearest.parent == kNoParent) return std::nullopt;
     if (distance) *distance = std::max(0.0f, nearest.distance - glm::length(point - origin));
     // What coincides with the start has its order already.
@@ -445,92 +189,18 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
 
 std::optional<uint32_t> Visibility::firstHit(const glm::vec3& origin, const glm::vec3& direction,
                                              float* distance) const {
-    Query from(patches, embree->parentOf.data());
-    from.context.filter = meet;
+    RayQuery from(patches, embree->parentOf.data());
+    from.context.filter = meetFirst;
     if (!patches.opacity.empty()) from.passage.line = lineName(origin, direction);
     RTCRayHit query{};
     setRay(query.ray, origin, direction, std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     embree3.intersect1(embree->scene, &from.context, &query);
-    const Nearest& nearest = from.nearest;
+    const NearestHit& nearest = from.nearest;
     if (nearest.parent == kNoParent) return std::nullopt;
     if (distance) *distance = nearest.distance;
     return sideOf(nearest.first(patches, direction), origin + nearest.distance * direction,
                   direction);
-}
-
-namespace {
-
-// Collects the parents that a line crosses; starts with Embree's own part.
-struct Crossed {
-    RTCIntersectContext context;
-    const uint32_t* parentOf;
-    ParentList parents;
-};
-
-// Notes a hit and lets the ray go on. A parent is plane and crossed once: a line along the diagonal
-// of a quad meets both of its triangles, and Embree may offer a hit twice.
-void collect(const RTCFilterFunctionNArguments* args) {
-    Crossed& crossed = *reinterpret_cast<Crossed*>(args->context);
-    const uint32_t parent = crossed.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
-    if (!crossed.parents.has(parent)) crossed.parents.add(parent);
-    args->valid[0] = 0;
-}
-
-bool haveCommonVertex(const Parent& a, const Parent& b) {
-    for (int i = 0; i < (a.isTriangle ? 3 : 4); ++i)
-        for (int j = 0; j < (b.isTriangle ? 3 : 4); ++j)
-            if (a.vertex[size_t(i)] == b.vertex[size_t(j)]) return true;
-    return false;
-}
-
-}  // namespace
-
-void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
-                          std::vector<LineHit>& hits) const {
-    Crossed crossed;
-    rtcInitIntersectContext(&crossed.context);
-    crossed.context.filter = collect;
-    crossed.parentOf = embree->parentOf.data();
-    RTCRayHit query{};
-    setRay(query.ray, glm::vec3(point - 2.5 * double(patches.radius) * direction),
-           glm::vec3(direction), std::numeric_limits<float>::infinity());
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    embree3.intersect1(embree->scene, &crossed.context, &query);
-
-    hits.clear();
-    const uint64_t name = lineName(glm::vec3(point), glm::vec3(direction));
-    crossed.parents.check();
-    for (uint32_t index : crossed.parents.all) {
-        // In double and from the plane of the parent, as the rasteriser does: surfaces that
-        // coincide then have the same depth.
-        const Parent& parent = patches.parents[index];
-        const glm::dvec3 normal = glm::cross(glm::dvec3(parent.a), glm::dvec3(parent.b));
-        const double slant = glm::dot(normal, direction);
-        if (slant == 0) continue;
-        double low = std::numeric_limits<double>::max(), high = -low;
-        for (int k = 0; k < (parent.isTriangle ? 3 : 4); ++k) {
-            const double z =
-                glm::dot(glm::dvec3(patches.vertices[parent.vertex[size_t(k)]]) - point, direction);
-            low = std::min(low, z);
-            high = std::max(high, z);
-        }
-        const double depth =
-            std::clamp(glm::dot(normal, glm::dvec3(parent.origin) - point) / slant, low, high);
-        const uint32_t patch = patches.patchAt(index, glm::vec3(point + depth * direction));
-        if (!patches.opacity.empty() && !stops(patches, patch, name)) continue;
-        hits.push_back({depth, 2 * patch + (slant < 0 ? 0 : 1)});
-    }
-    std::sort(hits.begin(), hits.end(), [](const LineHit& a, const LineHit& b) {
-        return a.depth != b.depth ? a.depth < b.depth : a.side < b.side;
-    });
-    auto isSameCrossing = [&](const LineHit& a, const LineHit& b) {
-        return b.depth - a.depth <= 2 * double(offsetAt(patches, patches.parentOf[a.side / 2])) &&
-               a.side % 2 == b.side % 2 &&
-               haveCommonVertex(patches.parents[patches.parentOf[a.side / 2]],
-                                patches.parents[patches.parentOf[b.side / 2]]);
-    };
-    hits.erase(std::unique(hits.begin(), hits.end(), isSameCrossing), hits.end());
 }
 
 }  // namespace raybundle
