@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "bake/bake.h"
+#include "command.h"
 #include "job/error.h"
 #include "patches/tiles.h"
 #include "scene_file.h"
@@ -67,14 +68,7 @@ struct Options {
 
 Options parseOptions(const std::vector<std::string>& arguments) {
     Options options;
-    for (size_t a = 0; a < arguments.size(); ++a) {
-        const std::string& name = arguments[a];
-        if (name.rfind("--", 0) != 0) {
-            options.scenes.push_back(name);
-            continue;
-        }
-        if (++a == arguments.size()) throw invalidArgument(name + " needs a value");
-        const std::string& value = arguments[a];
+    auto takeOption = [&](const std::string& name, const std::string& value) {
         if (name == "--seeds") {
             options.seeds = std::stoi(value);
         } else if (name == "--targets") {
@@ -91,9 +85,12 @@ Options parseOptions(const std::vector<std::string>& arguments) {
         } else if (name == "--out") {
             options.out = value;
         } else {
-            throw invalidArgument("there is no option " + name);
+            return false;
         }
-    }
+        return true;
+    };
+    readArguments(
+        arguments, [&](const std::string& scene) { options.scenes.push_back(scene); }, takeOption);
     if (options.scenes.empty()) throw invalidArgument("a scene is needed");
     return options;
 }
@@ -335,12 +332,7 @@ void calibrate(const std::string& path, const Options& options, std::ostream& ou
 
 int main(int count, char** values) {
     using namespace raybundle::bench;
-    try {
-        const std::vector<std::string> arguments(values + 1, values + count);
-        if (arguments.empty() || arguments[0] == "--help") {
-            std::fputs(kUsage, stdout);
-            return 0;
-        }
+    return runCommand("calibrate", kUsage, count, values, [](const auto& arguments) {
         const Options options = parseOptions(arguments);
         std::ofstream file;
         if (!options.out.empty()) {
@@ -350,8 +342,5 @@ int main(int count, char** values) {
         for (const std::string& scene : options.scenes)
             calibrate(scene, options, options.out.empty() ? std::cout : file);
         return 0;
-    } catch (const std::exception& error) {
-        std::fprintf(stderr, "calibrate: %s\n", error.what());
-        return 2;
-    }
+    });
 }

@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "bake/bake.h"
+#include "command.h"
 #include "job/error.h"
 #include "patch_light.h"
 #include "scene_file.h"
@@ -138,14 +139,7 @@ Options parseOptions(const std::vector<std::string>& arguments) {
     Options options;
     std::vector<std::string> texts;
     std::string common;
-    for (size_t a = 0; a < arguments.size(); ++a) {
-        const std::string& name = arguments[a];
-        if (name.rfind("--", 0) != 0) {
-            options.scenes.push_back(name);
-            continue;
-        }
-        if (++a == arguments.size()) throw invalidArgument(name + " needs a value");
-        const std::string& value = arguments[a];
+    auto takeOption = [&](const std::string& name, const std::string& value) {
         if (name == "--run") {
             texts.push_back(value);
         } else if (name == "--runs") {
@@ -169,9 +163,12 @@ Options parseOptions(const std::vector<std::string>& arguments) {
         } else if (name == "--limit") {
             options.limit = number<unsigned>(name, value);
         } else {
-            throw invalidArgument("there is no option " + name);
+            return false;
         }
-    }
+        return true;
+    };
+    readArguments(
+        arguments, [&](const std::string& scene) { options.scenes.push_back(scene); }, takeOption);
     for (const std::string& text : texts) options.runs.push_back(parseRun(common + text));
     if (options.scenes.empty() || options.runs.empty())
         throw invalidArgument("a scene and a run are needed");
@@ -364,15 +361,7 @@ bool compareAll(const Options& options) {
 
 int main(int count, char** values) {
     using namespace raybundle::bench;
-    try {
-        const std::vector<std::string> arguments(values + 1, values + count);
-        if (arguments.empty() || arguments[0] == "--help") {
-            std::fputs(kUsage, stdout);
-            return 0;
-        }
+    return runCommand("compare", kUsage, count, values, [](const auto& arguments) {
         return compareAll(parseOptions(arguments)) ? 0 : 1;
-    } catch (const std::exception& error) {
-        std::fprintf(stderr, "compare: %s\n", error.what());
-        return 2;
-    }
+    });
 }

@@ -149,6 +149,24 @@ Mesh star() {
     return polygons("star", std::move(vertices), {face});
 }
 
+// Instances that are mirrored, flattened and sheared.
+void addTransformed(std::vector<Case>& cases) {
+    cases.push_back(transformed("mirrored", glm::scale(glm::dmat4(1), glm::dvec3(-1, 1, 1))));
+    cases.push_back(
+        transformed("flattened to a plane", glm::scale(glm::dmat4(1), glm::dvec3(1, 1, 0))));
+    cases.push_back(transformed("shrunk to a point", glm::scale(glm::dmat4(1), glm::dvec3(0))));
+    cases.back().says = "area";
+    const auto sheared = [](const std::string& name, double factor) {
+        return transformed(name,
+                           glm::dmat4({1, 0, 0, 0}, {factor, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}));
+    };
+    cases.push_back(sheared("sheared tenfold", 10));
+    // A kilometre long and a millimetre wide, which few lines meet. The answer is exact with few of
+    // them; as many as the noise asks for take minutes.
+    cases.push_back(sheared("sheared a thousandfold, 64 bundles", 1000));
+    cases.back().settings.maxBundles = 64;
+}
+
 }  // namespace
 
 std::vector<Case> geometryCases(bool isQuick) {
@@ -216,20 +234,7 @@ std::vector<Case> geometryCases(bool isQuick) {
     cases.back().name = "one patch";
     cases.back().settings.patchSize = 100;
     cases.push_back(manyObjects(isQuick ? 1000 : 10000));
-    cases.push_back(transformed("mirrored", glm::scale(glm::dmat4(1), glm::dvec3(-1, 1, 1))));
-    cases.push_back(
-        transformed("flattened to a plane", glm::scale(glm::dmat4(1), glm::dvec3(1, 1, 0))));
-    cases.push_back(transformed("shrunk to a point", glm::scale(glm::dmat4(1), glm::dvec3(0))));
-    cases.back().says = "area";
-    const auto sheared = [](const std::string& name, double factor) {
-        return transformed(name,
-                           glm::dmat4({1, 0, 0, 0}, {factor, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}));
-    };
-    cases.push_back(sheared("sheared tenfold", 10));
-    // A kilometre long and a millimetre wide, which few lines meet. The answer is exact with few of
-    // them; as many as the noise asks for take minutes.
-    cases.push_back(sheared("sheared a thousandfold, 64 bundles", 1000));
-    cases.back().settings.maxBundles = 64;
+    addTransformed(cases);
     return cases;
 }
 

@@ -35,28 +35,14 @@ TEST(RandomWalk, TheMeanIsExactOnACube) {
     Cube cube(0.1f);  // 236 walks per bundle
     for (const char* estimator : kEstimators) {
         cube.settings.estimator = estimator;
-        Statistics faces[3];
+        CubeExitance exitance;
         for (int seed = 0; seed < 200; ++seed) {
             const auto walk = cube.make("RANDOM_WALK", seed);
             walk->advance(2, Progress());
-            const Irradiance h = walk->irradiance(Half::BOTH, 0);
-            double exitance[3] = {0, 0, 0};
-            for (uint32_t p = 0; p < 6; ++p) {
-                const glm::vec3 all = h.direct[2 * p] + h.indirect[2 * p];
-                exitance[cubeFace(cube.patches, p)] +=
-                    double(cube.shot.emission[2 * p].x + 0.5f * all.x);
-            }
-            exitance[2] /= 4;
-            for (int k = 0; k < 3; ++k) faces[k].add(exitance[k]);
+            exitance.add(cube.patches, cube.shot, walk->irradiance(Half::BOTH, 0));
             EXPECT_EQ(walk->bias(), 0);
         }
-        // Three standard errors of the mean of 200 seeds: one comparison in 370 would fail by
-        // chance if the seeds were not always the same.
-        for (int k = 0; k < 3; ++k) {
-            EXPECT_NEAR(faces[k].mean(), kCubeExitance[k], 3 * faces[k].standardError())
-                << estimator << ", face " << k;
-            EXPECT_LT(faces[k].standardError(), 0.01 * kCubeExitance[k]);
-        }
+        exitance.expectExact(estimator);
     }
 }
 

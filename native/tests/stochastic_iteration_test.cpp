@@ -51,28 +51,15 @@ TEST(StochasticIteration, TheMeanIsExactOnACube) {
     cube.shot.emission[0] = glm::vec3(1);
     for (const Operator& op : kOperators) {
         cube.settings.linesPerBundle = op.linesPerBundle;
-        Statistics faces[3];
+        CubeExitance exitance;
         for (int seed = 0; seed < 200; ++seed) {
             const auto iteration = cube.make(kSolver, seed);
             iteration->advance(2 * op.bundles, Progress());
             EXPECT_EQ(iteration->bundleCount(), 2 * op.bundles);
             EXPECT_LT(iteration->bias(), 1e-3);
-            const Irradiance h = iteration->irradiance(Half::BOTH, 0);
-            double exitance[3] = {0, 0, 0};
-            for (uint32_t p = 0; p < 6; ++p) {
-                const glm::vec3 all = h.direct[2 * p] + h.indirect[2 * p];
-                exitance[cubeFace(cube.patches, p)] +=
-                    double(cube.shot.emission[2 * p].x + 0.5f * all.x);
-            }
-            exitance[2] /= 4;
-            for (int k = 0; k < 3; ++k) faces[k].add(exitance[k]);
+            exitance.add(cube.patches, cube.shot, iteration->irradiance(Half::BOTH, 0));
         }
-        // Three standard errors of the mean of 200 seeds; six comparisons.
-        for (int k = 0; k < 3; ++k) {
-            EXPECT_NEAR(faces[k].mean(), kCubeExitance[k], 3 * faces[k].standardError())
-                << op.name << ", face " << k;
-            EXPECT_LT(faces[k].standardError(), 0.01 * kCubeExitance[k]);
-        }
+        exitance.expectExact(op.name);
     }
 }
 

@@ -30,6 +30,23 @@ int cubeFace(const Patches& patches, uint32_t patch) {
     return patches.normal(2 * patch) == -patches.normal(0) ? 1 : 2;
 }
 
+void CubeExitance::add(const Patches& patches, const FirstShot& shot, const Irradiance& light) {
+    double exitance[3] = {0, 0, 0};
+    for (uint32_t p = 0; p < 6; ++p)
+        exitance[cubeFace(patches, p)] +=
+            double(shot.emission[2 * p].x + 0.5f * light.all(2 * p).x);
+    exitance[2] /= 4;
+    for (size_t k = 0; k < 3; ++k) faces[k].add(exitance[k]);
+}
+
+void CubeExitance::expectExact(const std::string& what) const {
+    for (size_t k = 0; k < 3; ++k) {
+        EXPECT_NEAR(faces[k].mean(), kCubeExitance[k], 3 * faces[k].standardError())
+            << what << ", face " << k;
+        EXPECT_LT(faces[k].standardError(), 0.01 * kCubeExitance[k]) << what << ", face " << k;
+    }
+}
+
 std::array<double, 3> cubeExitance(const std::array<double, 3>& direct) {
     const double opposite = parallelRectangles(1, 1, 1);
     const double beside = perpendicularRectangles(1, 1, 1), rho = 0.5;
