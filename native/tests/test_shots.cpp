@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "test_scenes.h"
+
 namespace raybundle::test {
 
 ShotScene::ShotScene(const Scene& scene, float patchSize)
@@ -18,6 +20,27 @@ FirstShot ShotScene::shoot(const std::string& kind, int lines, int seed, float t
     const DirectLight light(scene, patches, visibility, uint32_t(seed));
     return firstShot(kind, {light, patches, visibility, settings, Progress(),
                             1e-4f * patches.radius, linesPerBundle});
+}
+
+float GatheredShot::at(uint32_t instance, uint32_t side) const {
+    for (const Parent& parent : patches.parents)
+        if (parent.instance == instance) return light.irradiance[2 * parent.firstPatch + side].x;
+    return NAN;
+}
+
+GatheredShot gatherFinely(const Scene& scene, float patchSize) {
+    GatheredShot shot{subdivide(scene, patchSize, kMany), {}};
+    const Visibility visibility(shot.patches);
+    Settings settings;
+    settings.targetError = 0.002f;
+    shot.light = gather({DirectLight(scene, shot.patches, visibility, 0), shot.patches, visibility,
+                         settings, Progress()});
+    return shot;
+}
+
+void placeReceiver(Scene& scene, const glm::vec3& at, const glm::vec3& u, const glm::vec3& v) {
+    place(scene, rectangle("receiver", at - 0.001f * (u + v), 0.002f * u, 0.002f * v),
+          grey("", 0.5f));
 }
 
 Mean meanLight(const Patches& patches, const FirstShot& shot, uint32_t instance, uint32_t side) {

@@ -25,7 +25,7 @@ constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
 constexpr float kMissed = 0.37f;
 // The same beside the edge of a shadow, where most receivers are wholly lit or dark after all; and
 // the root of the probability that one has what its neighbour has. The true error is 0.47 of the
-// stated one in the edge of a plate's shadow, steps of samples included (first_shot_test.cpp).
+// stated one in the edge of a plate's shadow, steps of samples included (shadows_test.cpp).
 constexpr float kMissedEdge = 0.2f, kAsNeighbour = 0.5f;
 // Where part of the samples is blocked: stratified samples of a straight edge are alike in all
 // blocks, though they tell its place no better than to this share of one of them.

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What lamps give without occluders, against closed forms.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "first_shot/first_shot.h"
+#include "lights/light_source.h"
+#include "lights/mesh_outline.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+#include "test_shots.h"
+#include "visibility/visibility.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+TEST(PointLight, FallsWithTheSquareOfTheDistanceAndTheCosine) {
+    Scene scene;
+    placeReceiver(scene, {0, 0, 0});
+    placeReceiver(scene, {3, 0, 0});
+    placeReceiver(scene, {0, 1, 0}, {0, 0, 1}, {1, 0, 0});  // upright, facing +y
+    scene.addLight(pointLight({0, 0, 2}, glm::dvec3(5)));
+    const GatheredShot shot = gatherFinely(scene);
+    EXPECT_NEAR(shot.front(0), 5.0 / 4, kExact * 5 / 4);
+    const double d2 = 13, exact = 5 * 2 / std::sqrt(d2) / d2;
+    EXPECT_NEAR(shot.front(1), exact, kExact * exact);
+    EXPECT_EQ(shot.back(0), 0);
+    EXPECT_EQ(shot.front(2), 0) << "the light is behind it";
+    const double side = 5 * 1 / std::sqrt(5.0) / 5;
+    EXPECT_NEAR(shot.back(2), side, kExact * side);
+}
+
+TEST(PointLight, APatchGetsTheMeanOverItsArea) {
+    Scene scene;
+    place(scene, rectangle("square", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0.5f));
+    scene.addLight(pointLight({0.2, 0.1, 1}, glm::dvec3(1)));
+    double mean = 0;
+    constexpr int kSteps = 400;
+    for (int i = 0; i < kSteps; ++i)
+        for (int j = 0; j < kSteps; ++j) {
+            const glm::dvec3 d(0.2 - (2 * (i + 0.5) / kSteps - 1),
+                               0.1 - (2 * (j + 0.5) / kSteps - 1), 1);
+            mean += 1 / std::pow(glm::dot(d, d), 1.5) / (kSteps * kSteps);
+        }
+    EXPECT_NEAR(gatherFinely(scene).front(), mean, kSampled * mean);
+}
+
+TEST(PointLight, ASphereOutsideGivesWhatAPointGives) {
+    for (double radius : {0.1, 1.0, 1.9}) {
+        Scene scene;
+        placeReceiver(scene);
+        placeReceiver(scene, {0.5f, 0, -1});
+        Light light = pointLight({0, 0, 2}, glm::dvec3(3));
+        light.radius = radius;
+        light.pointShape = RB_POINT_SPHERE;
+        scene.addLight(light);
+        const GatheredShot shot = gatherFinely(scene);
+        EXPECT_NEAR(shot.front(0), 3.0 / 4, kSampled * 3 / 4) << "radius " << radius;
+        const double exact = 3 * 3 / std::pow(9.25, 1.5);
+        EXPECT_NEAR(shot.front(1), exact, kSampled * exact) << "radius " << radius;
+    }
+}
+
+TEST(PointLight, ADiskFacesItsReceiver) {
+    Scene scene;
+    placeReceiver(scene);
+    Light light = pointLight({0, 0, 2}, glm::dvec3(3));
+    light.radius = 1;
+    light.pointShape = RB_POINT_DISK;
+    scene.addLight(light);
+    // Radiance I / (pi r^2) over a coaxial disk: I / (r^2 + h^2).
+    EXPECT_NEAR(gatherFinely(scene).front(), 3.0 / 5, kSampled * 3 / 5);
+}
+
+TEST(SpotLight, TheConeCutsAndBlends) {
+    Scene scene;
+    const double angle = 1.0, blend = 0.5, height = 2;
+    const double edge = std::cos(0.5 * angle), soft = (1 - edge) * blend;
+    const double cosines[] = {0.9999, edge + 0.75 * soft, edge + 0.5 * soft, edge + 0.1 * soft,
+                              edge - 0.01};
+    for (double c : cosines) placeReceiver(scene, {float(height * std::tan(std::acos(c))), 0, 0});
+    Light light = pointLight({0, 0, height}, glm::dvec3(1));
+    light.hasCone = true;
+    light.coneAngle = angle;
+    light.coneBlend = blend;
+    scene.addLight(light);
+    const GatheredShot shot = gatherFinely(scene);
+    for (uint32_t k = 0; k < 5; ++k) {
+        const double t = std::clamp((cosines[k] - edge) / soft, 0.0, 1.0);
+        const double exact = t * t * (3 - 2 * t) * std::pow(cosines[k], 3) / (height * height);
+        // Across 2 mm the smoothstep changes by up to 0.0006 of the full light.
+        EXPECT_NEAR(shot.front(k), exact, kSampled * exact + 2e-4) << "receiver " << k;
+    }
+    EXPECT_EQ(shot.front(4), 0);
+}
+
+TEST(SpotLight, DimsWithTheCosineWhereItIsAskedTo) {
+    Scene scene;
+    placeReceiver(scene, {2, 0, 0});
+    Light light = pointLight({0, 0, 2}, glm::dvec3(1));
+    light.hasCone = true;
+    light.coneAngle = 3;
+    light.coneDims = true;
+    scene.addLight(light);
+    const double exact = std::pow(std::cos(0.25 * kPi), 4) / 4;
+    EXPECT_NEAR(gatherFinely(scene).front(), exact, kSampled * exact);
+}
+
+TEST(SunLight, GivesItsIrradianceTimesTheCosine) {
+    for (double angle : {0.0, 0.1}) {
+        Scene scene;
+        placeReceiver(scene);
+        place(scene, rectangle("slope", {5, 0, 0}, {1, 0, 1}, {0, 1, 0}), grey("", 0.5f));
+        scene.addLight(sunLight({0.3, 0.4, 2}, {2, 3, 4}, angle));
+        const GatheredShot shot = gatherFinely(scene);
+        const glm::dvec3 d = glm::normalize(glm::dvec3(0.3, 0.4, 2));
+        const double slope = glm::dot(d, glm::normalize(glm::dvec3(-1, 0, 1)));
+        EXPECT_NEAR(shot.front(0), 2 * d.z, 1e-5);
+        EXPECT_NEAR(shot.front(1), 2 * slope, 1e-5);
+        EXPECT_NEAR(shot.light.irradiance[0].z, 4 * d.z, 1e-5);
+        EXPECT_EQ(shot.back(0), 0);
+    }
+}
+
+TEST(SunLight, AWideSunOnTheHorizonIsHalfSeen) {
+    Scene scene;
+    placeReceiver(scene);
+    const double half = 0.3;
+    scene.addLight(sunLight({1, 0, 0}, glm::dvec3(1), 2 * half));
+    // Radiance 1 / (pi sin^2 half); the integral of sin^2(theta) sin(phi) over the upper half of
+    // the disk.
+    const double exact =
+        (half - 0.5 * std::sin(2 * half)) / (kPi * std::sin(half) * std::sin(half));
+    const GatheredShot shot = gatherFinely(scene);
+    EXPECT_NEAR(shot.front(), exact, 2 * kSampled * exact) << "half of the samples see nothing";
+    EXPECT_NEAR(shot.back(), exact, 2 * kSampled * exact);
+}
+
+TEST(AreaLight, ARectangleHasLambertsClosedForm) {
+    Scene scene;
+    placeReceiver(scene);
+    placeReceiver(scene, {1.5f, 0.7f, 0});
+    placeReceiver(scene, {1.5f, 0, 1}, {0, 0, 1}, {0, 1, 0});  // upright, facing the light in part
+    scene.addLight(areaLight({0, 0, 1.2}, {0.5, 0, 0}, {0, -0.8, 0}, glm::dvec3(7)));
+    const GatheredShot shot = gatherFinely(scene);
+    const glm::dvec3 lamp[4] = {
+        {-0.5, 0.8, 1.2}, {0.5, 0.8, 1.2}, {0.5, -0.8, 1.2}, {-0.5, -0.8, 1.2}};
+    const double below = 7 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4);
+    const double beside = 7 * polygonIrradiance({1.5, 0.7, 0}, {0, 0, 1}, lamp, 4);
+    const double upright = 7 * polygonIrradiance({1.5, 0, 1}, {-1, 0, 0}, lamp, 4);
+    EXPECT_NEAR(shot.front(0), below, kExact * below);
+    EXPECT_NEAR(shot.front(1), beside, kExact * beside);
+    // At 0.2 m below the lamp's plane 2 mm matter more.
+    EXPECT_NEAR(shot.front(2), upright, 10 * kExact * upright);
+}
+
+// Of a lamp as large as it is near few samples see much of its rim, from where little comes.
+TEST(AreaLight, ALargeOneNearByShinesFromWhereItIs) {
+    constexpr int kCells = 60, kSteps = 40;
+    constexpr double kWidth = 3, kHeight = 0.98, kLamp = 1.5;
+    Scene scene;
+    scene.addLight(
+        areaLight({0.2, 0.1, kHeight}, {kLamp / 2, 0, 0}, {0, -kLamp / 2, 0}, glm::dvec3(7)));
+    Material rough = grey("", 0.5f);
+    rough.scattering[0].diffuseModel = RB_DIFFUSE_OREN_NAYAR;
+    place(scene,
+          grid("floor", {-kWidth / 2, -kWidth / 2, 0}, {kWidth, 0, 0}, {0, kWidth, 0}, kCells,
+               kCells),
+          rough);
+    const GatheredShot shot = gatherFinely(scene);
+    // Means over all light of 1 - c and its square, by its angles and by its directions.
+    glm::dvec2 expected(0.0), angles(0.0), directions(0.0);
+    for (uint32_t p = 0; p < shot.patches.count(); ++p) {
+        const glm::dvec3 point(shot.patches.point(p, glm::vec2(0.5f)));
+        double all = 0;
+        glm::dvec2 terms(0.0);
+        for (int i = 0; i < kSteps; ++i)
+            for (int j = 0; j < kSteps; ++j) {
+                const glm::dvec3 way =
+                    glm::dvec3(0.2 + kLamp * ((i + 0.5) / kSteps - 0.5),
+                               0.1 + kLamp * ((j + 0.5) / kSteps - 0.5), kHeight) -
+                    point;
+                const double c = way.z / glm::length(way), e = c * c / glm::dot(way, way);
+                all += e;
+                terms += e * glm::dvec2(1 - c, (1 - c) * (1 - c));
+            }
+        const FirstShot& light = shot.light;
+        const double here = double(light.irradiance[2 * p].x);
+        expected += here / all * terms;
+        angles += here * glm::dvec2(light.angles[2 * p].x, light.angles[2 * p].y);
+        const Incoming& incoming = light.incoming[2 * p];
+        for (size_t k = 0; k < Incoming::kCount; ++k) {
+            const double rest = 1 - double(incoming.direction(k).z);
+            directions +=
+                here * double(incoming.weight) / Incoming::kCount * glm::dvec2(rest, rest * rest);
+        }
+    }
+    // Uncorrected both are 4 and 6 % too grazing. Of the angles' error 1.2 and 1.5 % are left, for
+    // what is corrected falls with the square of the samples only; the directions have noise alone.
+    for (int k = 0; k < 2; ++k) {
+        EXPECT_NEAR(angles[k] / expected[k], 1, 0.02) << k;
+        EXPECT_NEAR(directions[k] / expected[k], 1, 0.02) << k;
+    }
+}
+
+TEST(AreaLight, AnEllipseUnderItsCentreHasAClosedForm) {
+    Scene scene;
+    placeReceiver(scene);
+    const double r = 0.6, h = 1.1;
+    scene.addLight(areaLight({0, 0, h}, {0, r, 0}, {r, 0, 0}, glm::dvec3(7), RB_AREA_ELLIPSE));
+    const double exact = 7 * kPi * r * r / (r * r + h * h);
+    EXPECT_NEAR(gatherFinely(scene).front(), exact, kSampled * exact);
+}
+
+TEST(AreaLight, ShinesToItsFrontOnly) {
+    for (rb_area_shape shape : {RB_AREA_RECTANGLE, RB_AREA_ELLIPSE}) {
+        Scene scene;
+        placeReceiver(scene);
+        scene.addLight(areaLight({0, 0, 1}, {1, 0, 0}, {0, 1, 0}, glm::dvec3(7), shape));
+        EXPECT_EQ(gatherFinely(scene).front(), 0);
+    }
+}
+
+}  // namespace
+}  // namespace raybundle
