@@ -101,9 +101,9 @@ double formFactorByBundles(const FormFactor& f, uint32_t lines, uint32_t bundles
                            std::mt19937_64& random) {
     const double perBundle = double(lines) / bundles;
     const float pixelSize = f.patches.radius * float(std::sqrt(glm::pi<double>() / perBundle));
-    BundleTracer tracer("FRAGMENT_LISTS",
-                        {f.patches, f.visibility, pixelSize, 1e-4f * f.patches.radius}, "RANDOM",
-                        uint32_t(random()));
+    BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS,
+                        {f.patches, f.visibility, pixelSize, 1e-4f * f.patches.radius},
+                        DirectionKind::RANDOM, uint32_t(random()));
     uint64_t leaving = 0, between = 0;
     for (const TracedBundle& traced : tracer.trace(bundles)) {
         for (const Exchange& e : traced.lines.exchanges) {

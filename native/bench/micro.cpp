@@ -58,7 +58,8 @@ struct Subject {
         return {patches, visibility, pixels, kTouchDistance};
     }
     std::vector<TracedBundle> trace(uint32_t count) const {
-        BundleTracer tracer("FRAGMENT_LISTS", input(float(pixelSize)), "LOW_DISCREPANCY", 0);
+        BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS, input(float(pixelSize)),
+                            DirectionKind::LOW_DISCREPANCY, 0);
         return tracer.trace(count);
     }
 
@@ -73,7 +74,7 @@ std::unique_ptr<const Subject> subject;
 
 void project(benchmark::State& state, const Patches& patches, float pixelSize) {
     FragmentLists lists(patches, pixelSize, kTouchDistance, SmallPatches::CENTRE_SAMPLING, {});
-    const std::vector<Bundle> bundles = Directions("LOW_DISCREPANCY", 0).next(64);
+    const std::vector<Bundle> bundles = Directions(DirectionKind::LOW_DISCREPANCY, 0).next(64);
     size_t lines = 0, fragments = 0, exchanges = 0, k = 0;
     for (auto _ : state) {
         BundleLines out;

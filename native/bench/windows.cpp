@@ -144,7 +144,8 @@ double secondsToPassPixels(size_t pixels) {
 
 void measure(const std::string& name, const Patches& patches, uint32_t bundleCount) {
     const float pixel = pixelSize(patches);
-    const std::vector<Bundle> bundles = Directions("LOW_DISCREPANCY", 1).next(bundleCount);
+    const std::vector<Bundle> bundles =
+        Directions(DirectionKind::LOW_DISCREPANCY, 1).next(bundleCount);
     const std::vector<Patches> parts{patches};
     Windows window(parts, pixel);
     const double whole = seconds([&] { window.project(bundles); });
@@ -202,7 +203,8 @@ void measureBuilding(int rooms, uint32_t bundleCount) {
     measure(std::to_string(rooms) + " x " + std::to_string(rooms) + " rooms", whole, bundleCount);
 
     const float pixel = pixelSize(whole);
-    const std::vector<Bundle> bundles = Directions("LOW_DISCREPANCY", 1).next(bundleCount);
+    const std::vector<Bundle> bundles =
+        Directions(DirectionKind::LOW_DISCREPANCY, 1).next(bundleCount);
     std::vector<Patches> parts;
     for (int row = 0; row < rooms; ++row)
         for (int column = 0; column < rooms; ++column) {

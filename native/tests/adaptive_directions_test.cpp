@@ -35,7 +35,7 @@ void learnUneven(Directions& directions, uint32_t batches, uint32_t perBatch,
 }
 
 TEST(AdaptiveDirections, AreUniformUntilTheyLearn) {
-    Directions directions("ADAPTIVE", 4);
+    Directions directions(DirectionKind::ADAPTIVE, 4);
     glm::dmat3 second(0.0);
     constexpr uint32_t kCount = 4096;
     for (const Bundle& b : directions.next(kCount)) {
@@ -57,7 +57,7 @@ TEST(AdaptiveDirections, WeightedMeansAreUnbiased) {
         {[](const glm::dvec3& d) { return d.z; }, 0.5},
         {[](const glm::dvec3& d) { return d.x * d.y; }, 0.0}};
     for (uint32_t seed : {1u, 2u, 3u}) {
-        Directions directions("ADAPTIVE", seed);
+        Directions directions(DirectionKind::ADAPTIVE, seed);
         std::vector<double> sum(functions.size(), 0.0), squares(sum);
         double count = 0;
         learnUneven(directions, 2000, 8, [&](const Bundle& b) {
@@ -79,7 +79,7 @@ TEST(AdaptiveDirections, WeightedMeansAreUnbiased) {
 }
 
 TEST(AdaptiveDirections, WeightsReachTheirBoundWhereNoPowerFlows) {
-    Directions directions("ADAPTIVE", 5);
+    Directions directions(DirectionKind::ADAPTIVE, 5);
     double most = 0, least = 10;
     learnUneven(directions, 2000, 8, [&](const Bundle& b) {
         most = std::max(most, b.weight);
@@ -98,8 +98,8 @@ TEST(AdaptiveDirections, EstimateTheLearnedPowerWithLessNoise) {
             wanted += unevenPower(onHemisphere((i + 0.5) / kGrid, (j + 0.5) / kGrid)) /
                       (double(kGrid) * kGrid);
     double squares[2] = {0, 0}, sum = 0, count = 0;
-    for (const char* kind : {"RANDOM", "ADAPTIVE"}) {
-        const bool isAdaptive = kind[0] == 'A';
+    for (DirectionKind kind : {DirectionKind::RANDOM, DirectionKind::ADAPTIVE}) {
+        const bool isAdaptive = kind == DirectionKind::ADAPTIVE;
         Directions directions(kind, 6);
         learnUneven(directions, 2000, 8, [&](const Bundle& b) {
             const double x = b.weight * unevenPower(b.direction) - wanted;
@@ -128,7 +128,8 @@ TEST(AdaptiveDirections, HaveLessThanHalfTheVarianceOfRandomOnesOnABroadLobe) {
         double sum = 0, squares = 0;
         constexpr int kSeeds = 40;
         for (uint32_t seed = 0; seed < kSeeds; ++seed) {
-            Directions directions(isAdaptive ? "ADAPTIVE" : "RANDOM", seed);
+            Directions directions(isAdaptive ? DirectionKind::ADAPTIVE : DirectionKind::RANDOM,
+                                  seed);
             double carried = 0;
             for (int batch = 0; batch < 250; ++batch)
                 for (const Bundle& b : directions.next(16)) {
@@ -145,7 +146,7 @@ TEST(AdaptiveDirections, HaveLessThanHalfTheVarianceOfRandomOnesOnABroadLobe) {
 
 TEST(AdaptiveDirections, HalvesLearnByThemselves) {
     // What the second half learns does not change the first.
-    Directions alone("ADAPTIVE", 7), both("ADAPTIVE", 7);
+    Directions alone(DirectionKind::ADAPTIVE, 7), both(DirectionKind::ADAPTIVE, 7);
     for (int k = 0; k < 50; ++k) {
         const std::vector<Bundle> a = alone.next(8), b = both.next(8);
         for (size_t i = 0; i < a.size(); ++i) {
@@ -161,7 +162,7 @@ TEST(AdaptiveDirections, HalvesLearnByThemselves) {
 }
 
 TEST(AdaptiveDirections, NoPowerAtAllTeachesNothing) {
-    Directions directions("ADAPTIVE", 8);
+    Directions directions(DirectionKind::ADAPTIVE, 8);
     for (int k = 0; k < 4; ++k)
         for (const Bundle& b : directions.next(64)) {
             EXPECT_NEAR(b.weight, 1, 1e-12);

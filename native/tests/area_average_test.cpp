@@ -83,7 +83,7 @@ TEST(AreaAverage, CoveredPartsDoNotCount) {
 TEST(AreaAverage, IsASettingOfABake) {
     Bake bake, leastSquares;
     for (Bake* b : {&bake, &leastSquares}) setQuick(*b);
-    bake.settings.set("reconstruction", std::string("AREA_AVERAGE"));
+    bake.settings.reconstruction = Reconstruction::AREA_AVERAGE;
     bake.run(litRoom());
     leastSquares.run(litRoom());
     // The same light, blurred differently over one face per wall.

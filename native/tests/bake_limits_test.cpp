@@ -50,15 +50,15 @@ TEST(BadScenes, SmallThingsThatFewLinesMeetAreNamed) {
     place(scene, grid("plain", {-50, -50, 0}, {100, 0, 0}, {0, 100, 0}, 8, 8), grey("", 0.5f));
     place(scene, box("crate", {0, 0, 0.01f}, {0.1f, 0.1f, 0.1f}, false), grey("", 0.5f));
     scene.worldRadiance = glm::vec3(1);
-    for (const char* solver : {"LINE_REUSE", "MULTIPATH", "STOCHASTIC_ITERATION"}) {
+    for (Solver solver : {Solver::LINE_REUSE, Solver::MULTIPATH, Solver::STOCHASTIC_ITERATION}) {
         Bake bake;
         setQuick(bake);
         bake.settings.patchSize = 0;
         bake.settings.solver = solver;
-        bake.settings.directions = "RANDOM";
+        bake.settings.directions = DirectionKind::RANDOM;
         bake.run(scene);
         const Json warnings = reportOf(bake)["warnings"];
-        const bool hasWindows = bake.settings.solver == "LINE_REUSE";
+        const bool hasWindows = bake.settings.solver == Solver::LINE_REUSE;
         EXPECT_EQ(mentions(warnings, "lines meet each patch of \\\"crate\\\""), !hasWindows)
             << warnings;
     }

@@ -168,7 +168,7 @@ TEST(Relighting, SeesChangedGeometryAndSettings) {
     EXPECT_FALSE(reuses(moved));
     bake.settings.linesPerBundle = 5000;
     EXPECT_FALSE(reuses(moved));
-    bake.settings.directions = "RANDOM";
+    bake.settings.directions = DirectionKind::RANDOM;
     EXPECT_FALSE(reuses(moved));
     bake.settings.threads = 1;
     EXPECT_TRUE(reuses(moved));
@@ -343,7 +343,7 @@ TEST(Cancel, EachCallCanCancelLightSetsGatheredAtCorners) {
     };
     Bake quick;
     setQuick(quick, 32);
-    quick.settings.reconstruction = "POINT";
+    quick.settings.reconstruction = Reconstruction::POINT;
     quick.settings.finalGather = 1;
     cancelAtEachCall(room(0.3f), room(0.6f), quick.settings);
 }

@@ -51,7 +51,7 @@ TEST(FragmentLists, NoLineLeavesAClosedScene) {
         const Patches patches = subdivide(*scene, 0.2f, kMany);
         FragmentLists projector(patches, 0.01f * patches.radius, 1e-4f * patches.radius);
         uint64_t all = 0, open = 0, disordered = 0;
-        for (const Bundle& bundle : Directions("RANDOM", 9).next(200)) {
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 9).next(200)) {
             BundleLines lines;
             projector.project(bundle, lines);
             // A line that enters closed surfaces leaves them: their crossings are even in number.
@@ -121,7 +121,7 @@ TEST(FragmentLists, CommonEdgesNeitherDoubleNorMissAPixel) {
         const Patches many = subdivide(cut, size, kMany);
         ASSERT_EQ(many.degenerateFaces, 0u);
         FragmentLists projectOne(one, 0.003f, 0), projectMany(many, 0.003f, 0);
-        for (const Bundle& bundle : Directions("RANDOM", 4).next(40)) {
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 4).next(40)) {
             BundleLines wanted, found;
             projectOne.project(bundle, wanted);
             projectMany.project(bundle, found);

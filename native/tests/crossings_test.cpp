@@ -85,12 +85,13 @@ double fromMiddle(const SealedRoom& room, const glm::dvec3& corner) {
 
 TEST(Crossings, ASealedRoomIsDarkInside) {
     for (const SealedRoom& room : sealedRooms())
-        for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE"}) {
+        for (Reconstruction reconstruction :
+             {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE}) {
             // Both where the walls lie between the edges of the floor.
-            if (std::string(reconstruction) == "AREA_AVERAGE" &&
+            if (reconstruction == Reconstruction::AREA_AVERAGE &&
                 (room.turn == 0 || room.pose != glm::dmat4(1) || room.wallCells > 12))
                 continue;
-            SCOPED_TRACE(std::string(room.name) + ", " + reconstruction);
+            SCOPED_TRACE(std::string(room.name) + ", " + choiceName(reconstruction));
             const Scene scene = sceneOf(room);
             Bake bake;
             setQuick(bake);
@@ -188,8 +189,11 @@ TEST(Crossings, WhatAPatchCountsAtCornersIsWhole) {
 TEST(Crossings, ACornerUnderABoxHasTheLightOfWhatIsSeen) {
     for (float low : {0.0f, -0.1f})
         for (double turn : {0.0, 0.3})
-            for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
-                SCOPED_TRACE(std::string(reconstruction) + (low < 0 ? ", sunk" : ", standing"));
+            for (Reconstruction reconstruction :
+                 {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE,
+                  Reconstruction::POINT}) {
+                SCOPED_TRACE(std::string(choiceName(reconstruction)) +
+                             (low < 0 ? ", sunk" : ", standing"));
                 const glm::dmat4 pose = glm::rotate(glm::dmat4(1), turn, glm::dvec3(1, 2, 3));
                 Scene scene = closedCube(0.6f, 0.4f);
                 scene.instances.front().transform = pose;

@@ -173,7 +173,7 @@ Mesh meshOf(const Polygons& polygons_) {
 
 // A floor under a box, lit by a lamp and a sky. clean: the floor and the box.
 Result bakeMeshes(const std::vector<Mesh>& clean, std::vector<Mesh> meshes,
-                  const std::string& reconstruction, const glm::dmat4& turn, bool inMeshes) {
+                  Reconstruction reconstruction, const glm::dmat4& turn, bool inMeshes) {
     Scene scene;
     std::vector<Mesh> wanted = clean;
     for (size_t k = 0; k < meshes.size(); ++k) {
@@ -220,10 +220,10 @@ TEST(DegenerateMeshes, HaveTheLightOfCleanOnesAtTheirCost) {
                                      box("box", {-1, -1, 1}, {1, 1, 2}, false)};
     double mostOff = 0, mostPatches = 0, mostBundles = 0, mostRays = 0;
     for (int seed = 0; seed < (count ? std::atoi(count) : kMeshes); ++seed) {
-        const char* const reconstruction =
-            std::array<const char*, 3>{"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}[size_t(seed % 3)];
+        const Reconstruction reconstruction =
+            kReconstructions[size_t(seed) % std::size(kReconstructions)].value;
         const bool isSubdivided = seed % 2 == 1, inMeshes = seed / 2 % 2 == 1;
-        SCOPED_TRACE("seed " + std::to_string(seed) + ", " + reconstruction +
+        SCOPED_TRACE("seed " + std::to_string(seed) + ", " + choiceName(reconstruction) +
                      (isSubdivided ? ", SUBDIVIDE" : ", KEEP"));
         std::mt19937 random{uint32_t(seed)};
         auto uniform = [&] { return std::uniform_real_distribution<double>(-1, 1)(random); };

@@ -118,7 +118,7 @@ TEST_P(Studio, IsGatheredAtPointsToo) {
     Bake bake;
     bake.settings.patchSize = 1;
     bake.settings.targetError = 0.005f;
-    bake.settings.reconstruction = "POINT";
+    bake.settings.reconstruction = Reconstruction::POINT;
     bake.run(scene);
     double most = 0, worst = 0;
     for (int32_t instance = 1; instance < 6; ++instance) {

@@ -12,8 +12,8 @@ namespace raybundle {
 namespace {
 
 TEST(Directions, FramesAreOrthonormalAndRightHanded) {
-    for (const DirectionMethod& kind : directionMethods())
-        for (const Bundle& b : Directions(kind.name, 3).next(1000)) {
+    for (const DirectionRow& kind : kDirectionKinds)
+        for (const Bundle& b : Directions(kind.value, 3).next(1000)) {
             EXPECT_NEAR(glm::length(b.right), 1, 1e-6);
             EXPECT_NEAR(glm::length(b.up), 1, 1e-6);
             EXPECT_NEAR(glm::length(b.direction), 1, 1e-6);
@@ -25,12 +25,12 @@ TEST(Directions, FramesAreOrthonormalAndRightHanded) {
 
 TEST(Directions, LinesAreUniformOverTheSphere) {
     constexpr uint32_t kCount = 4096;
-    for (const DirectionMethod& kind : directionMethods())
+    for (const DirectionRow& kind : kDirectionKinds)
         for (uint32_t seed : {0u, 1u, 2u}) {
             glm::dmat3 second(0.0);
             glm::dvec3 fourth(0.0), rightSecond(0.0);
             glm::dvec2 shift(0.0);
-            for (const Bundle& b : Directions(kind.name, seed).next(kCount)) {
+            for (const Bundle& b : Directions(kind.value, seed).next(kCount)) {
                 const glm::dvec3 d(b.direction), r(b.right);
                 second += b.weight * glm::outerProduct(d, d) / double(kCount);
                 fourth += b.weight * d * d * d * d / double(kCount);
@@ -53,12 +53,12 @@ TEST(Directions, LinesAreUniformOverTheSphere) {
 }
 
 TEST(Directions, TheSequenceDoesNotDependOnHowItIsRequested) {
-    for (const DirectionMethod& kind : directionMethods()) {
-        std::vector<Bundle> parts = Directions(kind.name, 7).next(4);
-        for (const Bundle& b : Directions(kind.name, 7, 4).next(4)) parts.push_back(b);
+    for (const DirectionRow& kind : kDirectionKinds) {
+        std::vector<Bundle> parts = Directions(kind.value, 7).next(4);
+        for (const Bundle& b : Directions(kind.value, 7, 4).next(4)) parts.push_back(b);
         std::stable_sort(parts.begin(), parts.end(),
                          [](const Bundle& a, const Bundle& b) { return a.half < b.half; });
-        const std::vector<Bundle> whole = Directions(kind.name, 7).next(8);
+        const std::vector<Bundle> whole = Directions(kind.value, 7).next(8);
         ASSERT_EQ(whole.size(), parts.size());
         for (size_t k = 0; k < whole.size(); ++k) {
             EXPECT_EQ(whole[k].half, k / 4);
@@ -67,7 +67,7 @@ TEST(Directions, TheSequenceDoesNotDependOnHowItIsRequested) {
             EXPECT_EQ(whole[k].right, parts[k].right);
             EXPECT_EQ(whole[k].shift, parts[k].shift);
         }
-        EXPECT_NE(Directions(kind.name, 8).next(8)[0].direction, whole[0].direction)
+        EXPECT_NE(Directions(kind.value, 8).next(8)[0].direction, whole[0].direction)
             << "another seed";
         EXPECT_NE(whole[0].direction, whole[4].direction) << "the halves are independent";
     }

@@ -42,7 +42,7 @@ Scene floorWithLegs(float reflectance) {
     return scene;
 }
 
-struct CoveredInPart : testing::TestWithParam<std::tuple<std::string, float>> {};
+struct CoveredInPart : testing::TestWithParam<std::tuple<Solver, float>> {};
 
 TEST_P(CoveredInPart, HasTheLightThatItHasBeside) {
     const auto [solver, reflectance] = GetParam();
@@ -50,7 +50,7 @@ TEST_P(CoveredInPart, HasTheLightThatItHasBeside) {
     scene.addLight(sunLight({0, 0, 1}, glm::dvec3(kPi)));
     Bake bake;
     bake.settings.solver = solver;
-    if (solver != "LINE_REUSE") bake.settings.directions = "RANDOM";
+    if (solver != Solver::LINE_REUSE) bake.settings.directions = DirectionKind::RANDOM;
     bake.settings.patchSize = 0.25f;
     bake.settings.minBundles = bake.settings.maxBundles = 64;
     bake.run(scene);
@@ -63,7 +63,8 @@ TEST_P(CoveredInPart, HasTheLightThatItHasBeside) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Solvers, CoveredInPart,
-                         testing::Combine(testing::Values("LINE_REUSE", "MULTIPATH", "RANDOM_WALK"),
+                         testing::Combine(testing::Values(Solver::LINE_REUSE, Solver::MULTIPATH,
+                                                          Solver::RANDOM_WALK),
                                           testing::Values(0.0f, 0.5f)));
 
 }  // namespace

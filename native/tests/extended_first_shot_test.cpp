@@ -67,7 +67,7 @@ TEST(LocalToGlobalRatio, GivesTheExamplesOfTheThesis) {
 TEST(ExtendedFirstShot, LosesNoPowerInAClosedRoom) {
     for (float reflectance : {0.0f, 0.3f, 0.7f, 0.97f}) {
         const ShotScene room(lampToTheCeiling(reflectance), 0.5f);
-        const FirstShot shot = room.shoot("EXTENDED", 20000);
+        const FirstShot shot = room.shoot(FirstShotKind::EXTENDED, 20000);
         glm::dvec3 absorbed(0.0), left(0.0);
         for (size_t side = 0; side < room.patches.sideCount(); ++side) {
             const double area = double(room.patches.area[side / 2]);
@@ -80,14 +80,14 @@ TEST(ExtendedFirstShot, LosesNoPowerInAClosedRoom) {
             EXPECT_NEAR(absorbed[c] + left[c], power[c], 1e-5 * power[c]) << reflectance;
         EXPECT_NEAR(shot.escaped.x, 0, 1e-5 * power.x);
         // The sources' light is that of SHOOT with the same lines.
-        EXPECT_EQ(shot.irradiance, room.shoot("SHOOT", 20000).irradiance);
+        EXPECT_EQ(shot.irradiance, room.shoot(FirstShotKind::SHOOT, 20000).irradiance);
     }
 }
 
 TEST(ExtendedFirstShot, SpreadsTheLightOfALampThatShinesAtTheCeiling) {
     const ShotScene room(lampToTheCeiling(0.6f), 0.25f);
     const Patches& patches = room.patches;
-    const FirstShot shot = room.shoot("EXTENDED", 300000);
+    const FirstShot shot = room.shoot(FirstShotKind::EXTENDED, 300000);
     double lit = 0, reached = 0, area = 0, brightest = 0, brightestBefore = 0;
     for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
         const double a = double(patches.area[side / 2]);
@@ -116,7 +116,7 @@ TEST(ExtendedFirstShot, TakesTheLinesOfTheThesisWithFixedBundles) {
     const double intersections =
         patches.totalArea / (2 * kPi * double(patches.radius) * double(patches.radius));
     const double wanted = localToGlobalRatio(intersections, 0.6, 0.6, 1) * 32 * 500;
-    const FirstShot shot = room.shoot("EXTENDED", 0, 0, 0.02f, 500, 32);
+    const FirstShot shot = room.shoot(FirstShotKind::EXTENDED, 0, 0, 0.02f, 500, 32);
     EXPECT_GE(double(shot.rays), wanted - 1);
     EXPECT_LT(double(shot.rays), 2.5 * wanted) << "with the rounds' lines";
 }
@@ -131,7 +131,7 @@ TEST(ExtendedFirstShot, GivesTheLightOfThePlainBake) {
             setQuick(plain, 256);
             setQuick(extended, 256);
             plain.settings.contacts = 0;  // the same patches for both
-            extended.settings.firstShot = "EXTENDED";
+            extended.settings.firstShot = FirstShotKind::EXTENDED;
             extended.settings.localRays = 1 << 18;
             plain.run(scene);
             extended.run(scene);
@@ -154,7 +154,7 @@ TEST(ExtendedFirstShot, CountsNothingTwiceInAFurnaceWithAStrongLamp) {
     scene.addLight(pointLight({2.2, 1.7, 2}, glm::dvec3(20)));
     Bake bake;
     setQuick(bake);
-    bake.settings.firstShot = "EXTENDED";
+    bake.settings.firstShot = FirstShotKind::EXTENDED;
     bake.settings.localRays = 50000;
     bake.run(scene);
     double walls = 0;
@@ -167,7 +167,7 @@ TEST(ExtendedFirstShot, CountsNothingTwiceInAFurnaceWithAStrongLamp) {
 }
 
 TEST(ExtendedFirstShot, BalancesAnOpenScene) {
-    for (const char* kind : {"SHOOT", "EXTENDED"})
+    for (FirstShotKind kind : {FirstShotKind::SHOOT, FirstShotKind::EXTENDED})
         for (bool isSun : {false, true}) {
             Scene scene;
             place(scene, rectangle("ground", {-3, -3, 0}, {6, 0, 0}, {0, 6, 0}), grey("", 0.7f));
@@ -184,7 +184,7 @@ TEST(ExtendedFirstShot, BalancesAnOpenScene) {
             bake.run(scene);
             const Json energy = reportOf(bake)["energy"];
             EXPECT_LT(energy["balance_error"].get<double>(), 0.01)
-                << kind << ", sun " << isSun << ": " << energy;
+                << choiceName(kind) << ", sun " << isSun << ": " << energy;
             EXPECT_GT(energy["escaped"].get<double>(), 0.2 * energy["emitted"].get<double>());
         }
 }
@@ -194,7 +194,7 @@ TEST(ExtendedFirstShot, OfABakeDoesNotDependOnTheNumberOfThreads) {
     for (int k = 0; k < 2; ++k) {
         Bake bake;
         setQuick(bake, 16);
-        bake.settings.firstShot = "EXTENDED";
+        bake.settings.firstShot = FirstShotKind::EXTENDED;
         bake.settings.localRays = 20000;
         bake.settings.threads = k ? 2 : 1;
         bake.run(lampToTheCeiling(0.6f));
@@ -218,7 +218,7 @@ TEST(ExtendedFirstShot, IsUnbiasedFromSeedToSeed) {
             bake.settings.contacts = 0;  // the same patches for both
             bake.settings.targetError = 0.005f;
             bake.settings.seed = seed;
-            bake.settings.firstShot = k ? "EXTENDED" : "GATHER";
+            bake.settings.firstShot = k ? FirstShotKind::EXTENDED : FirstShotKind::GATHER;
             bake.settings.localRays = 4000;
             bake.run(scene);
         }

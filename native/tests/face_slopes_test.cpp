@@ -15,7 +15,7 @@ namespace {
 using namespace test;
 
 // A flat face of one patch, which is 4 m wide at most, with a lamp above.
-std::vector<glm::vec3> directOnOneFace(const Scene& scene, const char* reconstruction,
+std::vector<glm::vec3> directOnOneFace(const Scene& scene, Reconstruction reconstruction,
                                        rb_output output = RB_OUTPUT_DIRECT) {
     Bake bake;
     setQuick(bake);
@@ -35,8 +35,8 @@ Scene faceUnder(const Light& lamp) {
 TEST(FaceSlopes, AreThoseOfAPointLight) {
     const glm::dvec3 lamp(0.9, 0.3, 2);
     const Scene scene = faceUnder(pointLight(lamp, glm::dvec3(5)));
-    const auto flat = directOnOneFace(scene, "AREA_AVERAGE");
-    const auto sloped = directOnOneFace(scene, "LEAST_SQUARES");
+    const auto flat = directOnOneFace(scene, Reconstruction::AREA_AVERAGE);
+    const auto sloped = directOnOneFace(scene, Reconstruction::LEAST_SQUARES);
     ASSERT_EQ(sloped.size(), 4u);
     std::vector<double> exact;
     double mean = 0, flatMean = 0, slopedMean = 0;
@@ -56,13 +56,13 @@ TEST(FaceSlopes, AreThoseOfAPointLight) {
         EXPECT_NEAR(double(flat[k].x), flatMean, 1e-5 * mean);
     }
     // Its colour with it.
-    const auto combined = directOnOneFace(scene, "LEAST_SQUARES", RB_OUTPUT_COMBINED);
+    const auto combined = directOnOneFace(scene, Reconstruction::LEAST_SQUARES, RB_OUTPUT_COMBINED);
     for (size_t k = 0; k < 4; ++k) EXPECT_NEAR(combined[k].x, 0.5f * sloped[k].x, 1e-5);
 }
 
 TEST(FaceSlopes, OfASunThereAreNone) {
-    const auto light =
-        directOnOneFace(faceUnder(sunLight({0.3, 0, 1}, glm::dvec3(3))), "LEAST_SQUARES");
+    const auto light = directOnOneFace(faceUnder(sunLight({0.3, 0, 1}, glm::dvec3(3))),
+                                       Reconstruction::LEAST_SQUARES);
     for (const glm::vec3& corner : light) EXPECT_NEAR(corner.x, light[0].x, 1e-5f * light[0].x);
 }
 

@@ -17,7 +17,7 @@ using namespace test;
 constexpr float kGatherTarget = 0.01f;
 
 void bakePoint(Bake& bake, const Scene& scene, bool gathers = true) {
-    bake.settings.reconstruction = "POINT";
+    bake.settings.reconstruction = Reconstruction::POINT;
     bake.settings.finalGather = gathers;
     bake.settings.targetError = kGatherTarget;
     bake.settings.maxBundles = 1024;

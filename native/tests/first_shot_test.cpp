@@ -105,7 +105,7 @@ TEST(FirstShot, GathersDimEmissionThatLinesSeldomMeet) {
     place(scene, rectangle("receiver", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.8f));
     place(scene, grid("emitter", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}, 10, 10), grey("", 0, 1, 1));
     const ShotScene shots(scene, 0.05f);
-    const FirstShot shot = shots.shoot("GATHER", 0);
+    const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0);
     for (const glm::vec3& left : shot.emission) EXPECT_EQ(left, glm::vec3(0));
     // In closed form: the error is that of the quadrature over the patches.
     EXPECT_NEAR(meanLight(shots.patches, shot, 0).value, parallelRectangles(1, 1, 1), 1e-4);

@@ -20,7 +20,8 @@ using namespace test;
 
 TEST(Gloss, IsNoPartOfWhatLeaves) {
     for (float opacity : {1.0f, 0.5f})
-        for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
+        for (Reconstruction reconstruction :
+             {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT}) {
             // A furnace: the exitance of the room is 1.
             Scene scene = closedCube(0.6f, 0.4f);
             Material shell = grey("shell", 0.3f * opacity, 0.7f * opacity);
@@ -84,7 +85,8 @@ Material shownByAngle(Material material) {
 }
 
 TEST(ShownByAngle, OfTheSunIsExact) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
+    for (Reconstruction reconstruction :
+         {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT})
         for (double cosine : {1.0, 0.5, 0.1}) {
             Scene scene;
             const Material white = shownByAngle(grey("white", 0.5f));
@@ -109,7 +111,8 @@ TEST(ShownByAngle, OfTheSunIsExact) {
 }
 
 TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}) {
+    for (Reconstruction reconstruction :
+         {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT}) {
         // A furnace: the irradiance is 1.
         Scene scene = closedCube(0.6f, 0.4f);
         for (Material& material : scene.materials) material = shownByAngle(material);
@@ -126,7 +129,7 @@ TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
                            white.shownByAngle[0][1][c] / 6 + white.shownByAngle[0][2][c] / 21 +
                            white.shownByAngle[0][3][c] / 84),
                     1e-4)
-                    << reconstruction;
+                    << choiceName(reconstruction);
         EXPECT_LT(reportOf(bake)["estimated_error"].get<double>(), 1e-3);
         EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 1e-4);
     }
@@ -145,10 +148,10 @@ TEST(ShownByAngle, TheStatedErrorHasThatOfTheAngles) {
     auto shown = [&](const FirstShot& shot, size_t side) {
         return double((white.shown(0, shot.angles[side]) * shot.irradiance[side]).x);
     };
-    const FirstShot exact = shots.shoot("GATHER", 0, 0, 1e-5f);
+    const FirstShot exact = shots.shoot(FirstShotKind::GATHER, 0, 0, 1e-5f);
     double found = 0, stated = 0, light = 0;
     for (int seed = 1; seed <= 64; ++seed) {
-        const FirstShot shot = shots.shoot("GATHER", 0, seed);
+        const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0, seed);
         for (size_t side = 0; side < shots.patches.sideCount(); side += 2) {
             const double error = double(white.shown(0, shot.angles[side]).x * shot.error[side]);
             found += std::pow(shown(shot, side) - shown(exact, side), 2);

@@ -235,7 +235,7 @@ TEST(Islands, LinesAreThoseOfTheWholePlane) {
     one.islands[0].reach = one.islands[0].radius = one.radius;
     for (Parent& parent : one.parents) parent.island = 0;
     FragmentLists apart(patches, 0.1f, kTouch), together(one, 0.1f, kTouch);
-    Directions directions("LOW_DISCREPANCY", 1);
+    Directions directions(DirectionKind::LOW_DISCREPANCY, 1);
     std::vector<Bundle> bundles = directions.next(64);
     // Along the two boxes, where one is behind the other.
     bundles[0].direction = glm::dvec3(1, 0, 0);

@@ -19,7 +19,8 @@ namespace {
 using namespace test;
 
 const double kSpreads[] = {0.02, 0.3, 1.0, 2.0, 3.0, kPi};
-const char* const kShots[] = {"GATHER", "SHOOT", "EXTENDED"};
+constexpr FirstShotKind kShots[] = {FirstShotKind::GATHER, FirstShotKind::SHOOT,
+                                    FirstShotKind::EXTENDED};
 
 // Integral of a function of the angle over the half space, per steradian of the projected one.
 template <class Function>
@@ -115,7 +116,7 @@ TEST(AreaLight, WithASpreadGivesItsIntegral) {
                 light.spread = spread;
                 scene.addLight(light);
                 const ShotScene shot(scene, 10);
-                const FirstShot gathered = shot.shoot("GATHER", 0, 0, 0.002f);
+                const FirstShot gathered = shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
                 for (uint32_t k = 0; k < 3; ++k) {
                     const double exact = exactSpread(light, glm::dvec3(points[k]));
                     // 16 to 256 stratified samples of a factor that ends in a kink, or at the rim
@@ -133,8 +134,8 @@ TEST(AreaLight, WithASpreadIsTheSameGatheredAndShot) {
     light.spread = 1.2;
     scene.addLight(light);
     const ShotScene room(scene, 0.5f);
-    const FirstShot gathered = room.shoot("GATHER", 0, 0, 0.005f);
-    const FirstShot shot = room.shoot("SHOOT", 1 << 18);
+    const FirstShot gathered = room.shoot(FirstShotKind::GATHER, 0, 0, 0.005f);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 18);
     const double power = kPi * 2 * 0.36;
     EXPECT_NEAR(arriving(room.patches, shot).x, power, 1e-4 * power);
     EXPECT_NEAR(arriving(room.patches, gathered).x, power, 0.005 * power);
@@ -165,8 +166,9 @@ TEST(DirectLight, PassesWhatDoesNotStopIt) {
     Scene open = Roofed(true, true).scene;
     open.instances.pop_back();
     const ShotScene lit(open, 0.25f), covered(Roofed(true, true).scene, 0.25f);
-    const double ground = meanLight(lit.patches, lit.shoot("GATHER", 0, 0, 0.003f), 0).value;
-    const FirstShot shadow = covered.shoot("GATHER", 0, 0, 0.003f);
+    const double ground =
+        meanLight(lit.patches, lit.shoot(FirstShotKind::GATHER, 0, 0, 0.003f), 0).value;
+    const FirstShot shadow = covered.shoot(FirstShotKind::GATHER, 0, 0, 0.003f);
     const double roof = meanLight(covered.patches, shadow, 1).value;
     ASSERT_GT(ground, 0.3);
     EXPECT_EQ(meanLight(covered.patches, shadow, 0).value, 0);
@@ -177,17 +179,20 @@ TEST(DirectLight, PassesWhatDoesNotStopIt) {
         const DirectLight light(scene, patches, direct, 0);
         Settings settings;
         settings.localRays = 1 << 16;
-        for (const char* kind : kShots) {
+        for (FirstShotKind kind : kShots) {
             const FirstShot shot = firstShot(
                 kind, {light, patches, direct, settings, Progress(), 1e-4f, 100, &exchange});
             const Mean onGround = meanLight(patches, shot, 0), onRoof = meanLight(patches, shot, 1);
             // At most 1 % of noise where shot, half of it where gathered.
-            EXPECT_NEAR(onGround.value, ground, kSigmas * onGround.error + 0.005 * ground) << kind;
-            EXPECT_NEAR(onRoof.value, roof, kSigmas * onRoof.error + 0.005 * roof) << kind;
-            EXPECT_EQ(meanLight(patches, shot, 0, 1).value, 0) << kind << ": the back";
+            EXPECT_NEAR(onGround.value, ground, kSigmas * onGround.error + 0.005 * ground)
+                << choiceName(kind);
+            EXPECT_NEAR(onRoof.value, roof, kSigmas * onRoof.error + 0.005 * roof)
+                << choiceName(kind);
+            EXPECT_EQ(meanLight(patches, shot, 0, 1).value, 0) << choiceName(kind) << ": the back";
             // What arrives without being stopped counts as emitted, and all that is left escapes.
             const double arrived = arriving(patches, shot).x;
-            EXPECT_NEAR(shot.emitted.x, arrived + shot.escaped.x, 0.03 * arrived) << kind;
+            EXPECT_NEAR(shot.emitted.x, arrived + shot.escaped.x, 0.03 * arrived)
+                << choiceName(kind);
         }
     }
 }
@@ -247,8 +252,8 @@ TEST(Exchange, StopsDirectLightOnlyIfItIsToldTo) {
 TEST(Exchange, SaysWhereItIsNotExact) {
     Bake bake;
     setQuick(bake, 16);
-    bake.settings.solver = "RANDOM_WALK";
-    bake.settings.directions = "RANDOM";
+    bake.settings.solver = Solver::RANDOM_WALK;
+    bake.settings.directions = DirectionKind::RANDOM;
     bake.run(furnaceWithBox(0.5f, true, false));
     EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "inside"));
     EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "LINE_REUSE"));

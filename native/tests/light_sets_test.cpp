@@ -58,7 +58,8 @@ Scene court(const Lit& lit = {}, bool isSplit = false) {
     return scene;
 }
 
-std::unique_ptr<Bake> baked(const Scene& scene, const std::string& reconstruction = "LEAST_SQUARES",
+std::unique_ptr<Bake> baked(const Scene& scene,
+                            Reconstruction reconstruction = Reconstruction::LEAST_SQUARES,
                             float megabytes = 4096, int bundleCount = 128) {
     auto bake = std::make_unique<Bake>();
     setQuick(*bake, bundleCount);
@@ -88,8 +89,8 @@ std::vector<glm::vec3> sum(std::vector<glm::vec3> a, const std::vector<glm::vec3
 
 // Both sets of a court, of which the light in none is `rest`, are those of courts with their lights
 // alone, from the same lines.
-void expectSetsAsAlone(const std::string& reconstruction, bool rest) {
-    SCOPED_TRACE(reconstruction);
+void expectSetsAsAlone(Reconstruction reconstruction, bool rest) {
+    SCOPED_TRACE(choiceName(reconstruction));
     const auto together = baked(court({true, true, rest}, true), reconstruction);
     const auto first = baked(court({true, false, false}), reconstruction);
     const auto second = baked(court({false, true, false}), reconstruction);
@@ -99,12 +100,14 @@ void expectSetsAsAlone(const std::string& reconstruction, bool rest) {
 }
 
 TEST(LightSets, EachIsWhatABakeOfItsLightsAloneGives) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
+    for (Reconstruction reconstruction :
+         {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT})
         expectSetsAsAlone(reconstruction, true);
 }
 
 TEST(LightSets, EachIsThatWhereAllLightIsInOne) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
+    for (Reconstruction reconstruction :
+         {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT})
         expectSetsAsAlone(reconstruction, false);
 }
 
@@ -168,8 +171,8 @@ TEST(LightSets, KeepTheirLinesWhenALampChanges) {
 
 // The same bundles are used once and forgotten in all bakes.
 TEST(LightSets, ShareTheLinesBeyondTheMemoryLimit) {
-    const auto together = baked(court({}, true), "LEAST_SQUARES", 1, 512);
-    const auto second = baked(court({false, true, false}), "LEAST_SQUARES", 1, 512);
+    const auto together = baked(court({}, true), Reconstruction::LEAST_SQUARES, 1, 512);
+    const auto second = baked(court({false, true, false}), Reconstruction::LEAST_SQUARES, 1, 512);
     const Json warnings = reportOf(*together)["warnings"];
     ASSERT_TRUE(mentions(warnings, "memory_limit")) << warnings;
     EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),
@@ -210,13 +213,13 @@ TEST(LightSets, WithoutLightAreBlackAndNamed) {
 }
 
 TEST(LightSets, AreForLineReuseAlone) {
-    for (const char* solver : {"MULTIPATH", "STOCHASTIC_ITERATION", "RANDOM_WALK"}) {
+    for (Solver solver : {Solver::MULTIPATH, Solver::STOCHASTIC_ITERATION, Solver::RANDOM_WALK}) {
         Bake bake;
         bake.settings.solver = solver;
-        bake.settings.directions = "RANDOM";
+        bake.settings.directions = DirectionKind::RANDOM;
         try {
             bake.run(court({}, true));
-            ADD_FAILURE() << solver << " baked light sets";
+            ADD_FAILURE() << choiceName(solver) << " baked light sets";
         } catch (const Error& error) {
             EXPECT_EQ(error.code, RB_ERROR_INVALID_ARGUMENT);
             EXPECT_NE(std::string(error.what()).find("light sets"), std::string::npos)
@@ -226,7 +229,7 @@ TEST(LightSets, AreForLineReuseAlone) {
 }
 
 TEST(LightSets, WorkWithEveryFirstShot) {
-    for (const char* kind : {"SHOOT", "EXTENDED"}) {
+    for (FirstShotKind kind : {FirstShotKind::SHOOT, FirstShotKind::EXTENDED}) {
         Bake together, alone;
         for (Bake* bake : {&together, &alone}) {
             setQuick(*bake);
@@ -235,7 +238,8 @@ TEST(LightSets, WorkWithEveryFirstShot) {
         }
         together.run(court({}, true));
         alone.run(court({false, true, false}));
-        EXPECT_LT(difference(light(together, 1), light(alone)), kSolverTolerance) << kind;
+        EXPECT_LT(difference(light(together, 1), light(alone)), kSolverTolerance)
+            << choiceName(kind);
     }
 }
 

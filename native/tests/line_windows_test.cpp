@@ -53,7 +53,7 @@ Traced trace(const Patches& patches, float pixelSize, const std::vector<LineWind
     const Visibility visibility(patches);
     ProjectorInput input{patches, visibility, pixelSize, 1e-5f};
     input.windows = windows;
-    BundleTracer tracer("FRAGMENT_LISTS", input, "LOW_DISCREPANCY", seed);
+    BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS, input, DirectionKind::LOW_DISCREPANCY, seed);
     LineCounts counts(patches.sideCount());
     for (uint32_t done = 0; done < count; done += 64)
         counts.add(tracer.trace(std::min(64u, count - done)));

@@ -262,7 +262,7 @@ TEST(MeshSource, TheOrderOfItsFacesDoesNotMatter) {
         place(scene, k ? polygons("ring", mesh.vertices, faces) : mesh, grey("lamp", 0, 5));
         place(scene, grid("floor", {-2, -2, -1}, {4, 0, 0}, {0, 4, 0}, 16, 16), grey("floor", 0));
         const ShotScene shots(scene);
-        light[k] = meanLight(shots.patches, shots.shoot("GATHER", 0), 1).value;
+        light[k] = meanLight(shots.patches, shots.shoot(FirstShotKind::GATHER, 0), 1).value;
     }
     // The rings hide 0.2 % of themselves from the floor, and samples tell how much to 2 %.
     EXPECT_NEAR(light[0] / light[1], 1, 2e-3);
@@ -280,7 +280,7 @@ TEST(MeshSource, WhatIsConvexDoesNotLightItself) {
                 place(scene, rectangle("far", {0, 0, float(-shift)}, {1, 0, 0}, {0, 1, 0}),
                       grey("far", 0));
             const ShotScene shots(scene);
-            const FirstShot shot = shots.shoot("GATHER", 0);
+            const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0);
             for (uint32_t p = 0; p < shots.patches.count(); ++p) {
                 if (shots.patches.parents[shots.patches.parentOf[p]].instance != 0) continue;
                 EXPECT_LT(shot.irradiance[2 * p].x, 1e-4f) << lamp.name << ", " << shift;
@@ -300,7 +300,7 @@ TEST(MeshSource, FillsTheHemisphereInsideOfItself) {
             // Beside much that is dark it is a source.
             place(scene, rectangle("floor", {-5, -5, -2}, {10, 0, 0}, {0, 10, 0}), grey("", 0));
             const ShotScene shots(scene, 0.1f);
-            const FirstShot shot = shots.shoot("GATHER", 0, 0, 0.01f);
+            const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0, 0, 0.01f);
             const Mean inside = meanLight(shots.patches, shot, 0, 1);
             EXPECT_NEAR(inside.value, 5, 5 * 2e-3) << lamp.name << (isTurned ? ", turned" : "");
         }
@@ -374,7 +374,7 @@ TEST(MeshSource, APartOfAWallThatIsPlaneButForRoundingLightsNothingOfIt) {
             if (f % 16 >= 6 && f % 16 < 10 && f / 16 >= 4 && f / 16 < 8) materials[f] = lamp;
         place(scene, grid("floor", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("floor", 0.5f));
         const ShotScene shots(scene, 0.1f);
-        const FirstShot shot = shots.shoot("GATHER", 0);
+        const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0);
         for (uint32_t side = 0; side < shots.patches.sideCount(); ++side) {
             if (shots.patches.parentAt(side).instance != 0) continue;
             // Beside the lamp's edge the wall may look at it under a hundred thousandth of a turn.
@@ -397,7 +397,7 @@ TEST(AreaLight, InThePlaneOfATurnedCeilingLightsTheFloorAlone) {
         scene.addLight(areaLight(turn * glm::dvec4(0.1, 0.2, 2, 1), turn * glm::dvec4(0.5, 0, 0, 0),
                                  turn * glm::dvec4(0, -0.5, 0, 0), glm::dvec3(7)));
         const ShotScene shots(scene);
-        const FirstShot shot = shots.shoot("GATHER", 0);
+        const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0);
         EXPECT_EQ(meanLight(shots.patches, shot, 0).value, 0);
         floor[k] = float(meanLight(shots.patches, shot, 1).value);
     }

@@ -17,7 +17,8 @@ using namespace test;
 
 struct MultipathBake : Bake {
     MultipathBake(const Scene& scene, int bundleCount, int seed, float patchSize,
-                  const char* solver = "MULTIPATH", const char* directions = "RANDOM") {
+                  Solver solver = Solver::MULTIPATH,
+                  DirectionKind directions = DirectionKind::RANDOM) {
         settings.solver = solver;
         settings.directions = directions;
         settings.patchSize = patchSize;
@@ -46,7 +47,8 @@ double fieldError(const Bake& bake, const Bake& reference) {
 
 TEST(Multipath, ConvergesToTheSolutionOfLineReuseWithinTheStatedError) {
     const Scene scene = litRoom(0.6f);
-    const MultipathBake reference(scene, 8192, 999, 0.3f, "LINE_REUSE", "LOW_DISCREPANCY");
+    const MultipathBake reference(scene, 8192, 999, 0.3f, Solver::LINE_REUSE,
+                                  DirectionKind::LOW_DISCREPANCY);
     for (int bundles : {64, 256, 1024}) {
         const MultipathBake bake(scene, bundles, 1, 0.3f);
         // The stated error is that of one pair of halves, whose patches share their directions: a
@@ -86,7 +88,8 @@ TEST(Multipath, AnOpenSceneBalancesItsEnergy) {
 
 TEST(Multipath, ThePseudoCodeOfTheThesisDoesNotConverge) {
     const Scene scene = litRoom(0.6f);
-    const MultipathBake reference(scene, 8192, 999, 0.3f, "LINE_REUSE", "LOW_DISCREPANCY");
+    const MultipathBake reference(scene, 8192, 999, 0.3f, Solver::LINE_REUSE,
+                                  DirectionKind::LOW_DISCREPANCY);
     const MultipathBake corrected(scene, 4096, 1, 0.3f);
     Bake literal;
     literal.settings = corrected.settings;
@@ -109,7 +112,7 @@ TEST(Multipath, TheNumberOfThreadsDoesNotMatter) {
 
 TEST(Multipath, RefusesDirectionsThatAreNotIndependent) {
     Bake bake;
-    bake.settings.solver = "MULTIPATH";
+    bake.settings.solver = Solver::MULTIPATH;
     try {
         bake.run(litRoom());
         FAIL();
@@ -123,8 +126,8 @@ TEST(Multipath, RefusesDirectionsThatAreNotIndependent) {
 
 TEST(Multipath, ThePseudoCodeOfTheThesisRefusesWeights) {
     Bake bake;
-    bake.settings.solver = "MULTIPATH";
-    bake.settings.directions = "ADAPTIVE";
+    bake.settings.solver = Solver::MULTIPATH;
+    bake.settings.directions = DirectionKind::ADAPTIVE;
     bake.settings.thesisLiteral = 1;
     try {
         bake.run(litRoom());

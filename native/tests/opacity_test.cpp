@@ -57,20 +57,21 @@ void expectFurnace(Bake& bake, const std::string& what, double tolerance = 1e-4)
 }
 
 TEST(Opacity, AFurnaceWithAHalfTransparentShellIsExact) {
-    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"}) {
+    for (Reconstruction reconstruction : {Reconstruction::LEAST_SQUARES, Reconstruction::POINT}) {
         Bake bake;
         setQuick(bake);
         bake.settings.reconstruction = reconstruction;
-        expectFurnace(bake, reconstruction);
+        expectFurnace(bake, choiceName(reconstruction));
     }
 }
 
 TEST(Opacity, AFurnaceIsExactWithEveryProjector) {
-    for (const char* projector : {"FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL", "PLANES"}) {
+    for (ProjectorKind projector : {ProjectorKind::FRAGMENT_LISTS, ProjectorKind::PAINTER,
+                                    ProjectorKind::PAINTER_NEWELL, ProjectorKind::PLANES}) {
         Bake bake;
         setQuick(bake);
         bake.settings.projector = projector;
-        expectFurnace(bake, projector);
+        expectFurnace(bake, choiceName(projector));
     }
 }
 
@@ -80,7 +81,7 @@ TEST(Opacity, APlateUnderASunLetsItsShareThrough) {
         placePlate(scene, veil(opacity));
         const ShotScene shot(scene);
         const double whole = 3 / std::sqrt(1.05);
-        EXPECT_NEAR(meanLight(shot.patches, shot.shoot("GATHER", 0), 0).value,
+        EXPECT_NEAR(meanLight(shot.patches, shot.shoot(FirstShotKind::GATHER, 0), 0).value,
                     double(1 - opacity) * whole, 1e-5 * whole)
             << opacity;
     }
@@ -92,9 +93,10 @@ TEST(Opacity, PlatesMultiply) {
     placePlate(scene, veil(0.2f), 0.8f);
     const ShotScene shot(scene);
     const double exact = 0.5 * 0.8 * 3 / std::sqrt(1.05);
-    EXPECT_NEAR(meanLight(shot.patches, shot.shoot("GATHER", 0), 0).value, exact, 1e-5 * exact);
+    EXPECT_NEAR(meanLight(shot.patches, shot.shoot(FirstShotKind::GATHER, 0), 0).value, exact,
+                1e-5 * exact);
     // By rays that a plate stops or not: the standard error of 40,000 lines is known.
-    const Mean shotMean = meanLight(shot.patches, shot.shoot("SHOOT", 400000), 0);
+    const Mean shotMean = meanLight(shot.patches, shot.shoot(FirstShotKind::SHOOT, 400000), 0);
     EXPECT_NEAR(shotMean.value, exact, 4 * shotMean.error);
     EXPECT_LT(shotMean.error, 0.02 * exact);
 }
@@ -102,7 +104,7 @@ TEST(Opacity, PlatesMultiply) {
 TEST(Opacity, ABlackVeilTakesItsShareOfTheSky) {
     // Every line from the floor to the sky crosses the dome once. 64 bundles of default lines count
     // hits by chance: about 1e5 lines of the floor leave a standard error of 0.3 %.
-    for (const char* directions : {"LOW_DISCREPANCY", "RANDOM"}) {
+    for (DirectionKind directions : {DirectionKind::LOW_DISCREPANCY, DirectionKind::RANDOM}) {
         Scene scene;
         place(scene, rectangle("floor", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
         place(scene, icosphere("dome", 1, 2, true), veil(0.4f), glm::dmat4(1), RB_ROLE_OCCLUDE);
@@ -114,7 +116,7 @@ TEST(Opacity, ABlackVeilTakesItsShareOfTheSky) {
         double mean = 0;
         for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
             mean += 0.25 * double(light.x);
-        EXPECT_NEAR(mean, 0.6, 0.012) << directions;
+        EXPECT_NEAR(mean, 0.6, 0.012) << choiceName(directions);
     }
 }
 
@@ -196,7 +198,7 @@ TEST(VaryingEmission, ACheckerShinesAsItsMean) {
     const ShotScene shot(scene, 0.125f);
     const glm::dvec3 lamp[4] = {{-0.5, -0.5, 2}, {0.5, -0.5, 2}, {0.5, 0.5, 2}, {-0.5, 0.5, 2}};
     const double exact = 300 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
-    const FirstShot light = shot.shoot("GATHER", 0, 0, 0.002f);
+    const FirstShot light = shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
     // At most 256 stratified samples: half a per cent of noise.
     EXPECT_NEAR(meanLight(shot.patches, light, 0).value, exact, 0.01 * exact);
     EXPECT_NEAR(light.emitted.x, 300, 0.1);
@@ -251,8 +253,8 @@ TEST(VaryingEmission, EachPatchShinesByItself) {
     // the light comes from one side.
     const glm::dvec3 lamp[4] = {{-0.5, -0.5, 2}, {0, -0.5, 2}, {0, 0.5, 2}, {-0.5, 0.5, 2}};
     const double exact = 600 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
-    EXPECT_NEAR(meanLight(shot.patches, shot.shoot("GATHER", 0, 0, 0.002f), 0).value, exact,
-                0.02 * exact);
+    EXPECT_NEAR(meanLight(shot.patches, shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f), 0).value,
+                exact, 0.02 * exact);
 }
 
 TEST(VaryingEmission, ShotAndGatheredLightHaveTheSameColours) {
@@ -263,8 +265,8 @@ TEST(VaryingEmission, ShotAndGatheredLightHaveTheSameColours) {
     for (size_t x = 0; x < 4; ++x) scene.images[0].pixels[x] = glm::vec3(0.3f, 0.0f, 0.0f);
     place(scene, rectangle("side", {-2, -1, 0}, {0, 0, 1.5f}, {0, 2, 0}), grey("", 0));
     const ShotScene shot(scene, 0.5f);
-    const FirstShot gathered = shot.shoot("GATHER", 0, 0, 0.002f);
-    const FirstShot sent = shot.shoot("SHOOT", 400000);
+    const FirstShot gathered = shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
+    const FirstShot sent = shot.shoot(FirstShotKind::SHOOT, 400000);
     const glm::dvec3 a = arriving(shot.patches, gathered), b = arriving(shot.patches, sent);
     // Both have noise of some tenths of a per cent.
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(b[c], a[c], 0.02 * a[c]) << "channel " << c;
@@ -278,8 +280,8 @@ TEST(VaryingEmission, SidesOfOtherColoursAreShotInTheirColours) {
     place(scene, rectangle("below", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0));
     place(scene, rectangle("above", {-1, -1, 4}, {0, 2, 0}, {2, 0, 0}), grey("", 0));
     const ShotScene shot(scene, 0.5f);
-    const glm::dvec3 a = arriving(shot.patches, shot.shoot("GATHER", 0, 0, 0.002f));
-    const glm::dvec3 b = arriving(shot.patches, shot.shoot("SHOOT", 400000));
+    const glm::dvec3 a = arriving(shot.patches, shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f));
+    const glm::dvec3 b = arriving(shot.patches, shot.shoot(FirstShotKind::SHOOT, 400000));
     // Red gets 4 % of the lines: noise of half a per cent.
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(b[c], a[c], 0.02 * a[c]) << "channel " << c;
 }

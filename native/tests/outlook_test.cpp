@@ -107,7 +107,7 @@ TEST(Outlook, ARoomGetsTheSkyOfItsWindow) {
     double found = 0, exact = 0, squares = 0, errors = 0, rays = 0;
     size_t sides = 0;
     for (int seed = 0; seed < kSeeds; ++seed) {
-        const FirstShot shot = shots.shoot("GATHER", 0, seed, 0.02f);
+        const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0, seed, 0.02f);
         rays += double(shot.rays);
         for (uint32_t side = 0; side < patches.sideCount(); side += 2) {
             const double area = patches.area[side / 2];

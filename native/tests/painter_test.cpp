@@ -47,7 +47,7 @@ class PaintedScene {
           visibility(patches),
           input{patches, visibility, pixelSize, kTouchInOrder} {}
 
-    BundleLines along(const char* projector, const Bundle& bundle) const {
+    BundleLines along(ProjectorKind projector, const Bundle& bundle) const {
         BundleLines lines;
         makeProjector(projector, input)->project(bundle, lines);
         return lines;
@@ -88,9 +88,9 @@ TEST(PainterNewell, HasTheExchangesOfFragmentLists) {
                  {"solids, coarse", separatedSolids(), 100.0f}};
     for (const auto& c : cases) {
         const PaintedScene projection(c.scene, c.patchSize, 0.03f);
-        for (const Bundle& bundle : Directions("RANDOM", 11).next(12)) {
-            const BundleLines exact = projection.along("FRAGMENT_LISTS", bundle);
-            const BundleLines found = projection.along("PAINTER_NEWELL", bundle);
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 11).next(12)) {
+            const BundleLines exact = projection.along(ProjectorKind::FRAGMENT_LISTS, bundle);
+            const BundleLines found = projection.along(ProjectorKind::PAINTER_NEWELL, bundle);
             EXPECT_TRUE(Merged(found) == Merged(exact)) << c.name;
             EXPECT_GT(exact.lines, 1000u);
             EXPECT_EQ(found.disordered, 0u) << c.name;
@@ -105,8 +105,8 @@ TEST(PainterNewell, NoLineLeavesAClosedScene) {
     for (const Scene* scene : {&cube, &ball}) {
         const PaintedScene projection(*scene, 0.1f, 0.01f);
         uint64_t all = 0, open = 0;
-        for (const Bundle& bundle : Directions("RANDOM", 9).next(10)) {
-            const BundleLines lines = projection.along("PAINTER_NEWELL", bundle);
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 9).next(10)) {
+            const BundleLines lines = projection.along(ProjectorKind::PAINTER_NEWELL, bundle);
             ASSERT_EQ(lines.sky.size(), 2 * lines.lines);
             EXPECT_EQ(exchangedLines(lines), lines.lines) << "two crossings";
             all += lines.lines;
@@ -121,9 +121,9 @@ TEST(Painter, IsRightButForAFewLinesWherePatchesAreSmall) {
     uint64_t disordered = 0, all = 0;
     for (const Scene& scene : {roomWithBoxes(0.5f), separatedSolids()}) {
         const PaintedScene projection(scene, 0.1f, 0.03f);
-        for (const Bundle& bundle : Directions("RANDOM", 11).next(10)) {
-            const BundleLines exact = projection.along("FRAGMENT_LISTS", bundle);
-            const BundleLines found = projection.along("PAINTER", bundle);
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 11).next(10)) {
+            const BundleLines exact = projection.along(ProjectorKind::FRAGMENT_LISTS, bundle);
+            const BundleLines found = projection.along(ProjectorKind::PAINTER, bundle);
             EXPECT_EQ(Merged(found) == Merged(exact), found.disordered == 0)
                 << "the count tells whether the order is right";
             EXPECT_EQ(found.lines, exact.lines) << "coverage is the same";
@@ -143,8 +143,8 @@ TEST(Painter, IsWrongWhereALongPatchReachesBehindASmallOne) {
     place(scene, rectangle("small", {1, 0.25f, 3}, {0.5f, 0, 0}, {0, 0.5f, 0}), grey("", 0.5f));
     const PaintedScene projection(scene, 100, 0.05f);
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
-    const BundleLines centroid = projection.along("PAINTER", upwards);
-    const BundleLines newell = projection.along("PAINTER_NEWELL", upwards);
+    const BundleLines centroid = projection.along(ProjectorKind::PAINTER, upwards);
+    const BundleLines newell = projection.along(ProjectorKind::PAINTER_NEWELL, upwards);
     constexpr uint32_t kSlope = 0, kSmall = 2;  // their fronts, which look up
     EXPECT_EQ(centroid.disordered, 100u) << "all lines through the small patch";
     EXPECT_EQ(Merged(centroid).exchanges.count({kSlope + 1, kSmall}), 1u);
@@ -172,28 +172,28 @@ TEST(PainterNewell, CountsTheCyclesOfInterlockedClosedObjects) {
     const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), direction));
     const Bundle bundle{right, glm::cross(direction, right), direction, {0.4, 0.6}, 0, 0};
 
-    const BundleLines broken = whole.along("PAINTER_NEWELL", bundle);
+    const BundleLines broken = whole.along(ProjectorKind::PAINTER_NEWELL, bundle);
     EXPECT_GT(broken.cycles, 0u);
     EXPECT_GT(broken.disordered, 0u) << "one of the three overlaps must come out wrong";
-    EXPECT_FALSE(Merged(broken) == Merged(whole.along("FRAGMENT_LISTS", bundle)));
+    EXPECT_FALSE(Merged(broken) == Merged(whole.along(ProjectorKind::FRAGMENT_LISTS, bundle)));
 
-    const BundleLines parted = cut.along("PAINTER_NEWELL", bundle);
+    const BundleLines parted = cut.along(ProjectorKind::PAINTER_NEWELL, bundle);
     EXPECT_EQ(parted.cycles, 0u) << "no patch reaches from one overlap to the next";
     EXPECT_EQ(parted.disordered, 0u);
-    EXPECT_TRUE(Merged(parted) == Merged(cut.along("FRAGMENT_LISTS", bundle)));
+    EXPECT_TRUE(Merged(parted) == Merged(cut.along(ProjectorKind::FRAGMENT_LISTS, bundle)));
 }
 
 TEST(PainterNewell, ABakeReportsBrokenCycles) {
     Scene scene = interlockedBars();
     scene.worldRadiance = {1, 1, 1};
-    for (const char* projector : {"PAINTER_NEWELL", "AUTO"}) {
+    for (ProjectorKind projector : {ProjectorKind::PAINTER_NEWELL, ProjectorKind::AUTO}) {
         Bake bake;
         bake.settings.projector = projector;
         bake.settings.patchSize = 100;
         bake.settings.maxBundles = 64;
         bake.run(scene);
         EXPECT_EQ(warns(reportOf(bake), WarningId::BROKEN_CYCLES),
-                  std::string(projector) == "PAINTER_NEWELL");
+                  projector == ProjectorKind::PAINTER_NEWELL);
     }
 }
 
@@ -203,7 +203,7 @@ TEST(PainterNewell, CountsIntersectingPatchesAsACycle) {
     place(scene, rectangle("other", {-1, -1, 1}, {2, 0, -2}, {0, 2, 0}), grey("", 0.5f));
     const PaintedScene projection(scene, 100, 0.05f);
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
-    const BundleLines lines = projection.along("PAINTER_NEWELL", upwards);
+    const BundleLines lines = projection.along(ProjectorKind::PAINTER_NEWELL, upwards);
     EXPECT_EQ(lines.cycles, 1u);
     EXPECT_NEAR(double(lines.disordered), 0.5 * double(lines.lines), 41) << "one side of the cut";
 }
@@ -216,10 +216,10 @@ TEST(PainterNewell, OrdersPatchesThatCutEachOthersPlanesApart) {
     place(scene, rectangle("high", {-0.4f, -3, 1.4f}, {0.8f, 0, 0}, {0, 6, -2.2f}), grey("", 0.5f));
     const PaintedScene projection(scene, 100, 0.05f);
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
-    const BundleLines lines = projection.along("PAINTER_NEWELL", upwards);
+    const BundleLines lines = projection.along(ProjectorKind::PAINTER_NEWELL, upwards);
     EXPECT_EQ(lines.cycles, 0u);
     EXPECT_EQ(lines.disordered, 0u);
-    EXPECT_TRUE(Merged(lines) == Merged(projection.along("FRAGMENT_LISTS", upwards)));
+    EXPECT_TRUE(Merged(lines) == Merged(projection.along(ProjectorKind::FRAGMENT_LISTS, upwards)));
     EXPECT_EQ(exchangedLines(lines), 16u * 20u) << "0.8 m by 1 m of overlap";
 }
 
@@ -229,7 +229,7 @@ struct FurnaceError {
     double stated;  // by the bake
 };
 
-FurnaceError furnace(const Scene& scene, const char* projector, bool boxesStand) {
+FurnaceError furnace(const Scene& scene, ProjectorKind projector, bool boxesStand) {
     Bake bake;
     setQuick(bake);
     bake.settings.projector = projector;
@@ -252,22 +252,25 @@ FurnaceError furnace(const Scene& scene, const char* projector, bool boxesStand)
 }
 
 TEST(PainterFurnace, IsExactInTheOrderOfNewell) {
-    EXPECT_LT(furnace(closedCube(0.7f, 0.3f), "PAINTER_NEWELL", false).worst, 1e-4);
+    EXPECT_LT(furnace(closedCube(0.7f, 0.3f), ProjectorKind::PAINTER_NEWELL, false).worst, 1e-4);
     for (float gap : {0.1f, 0.0f})
-        EXPECT_LT(furnace(roomWithBoxes(0.5f, 0.5f, gap), "PAINTER_NEWELL", gap == 0).worst, 1e-4)
+        EXPECT_LT(
+            furnace(roomWithBoxes(0.5f, 0.5f, gap), ProjectorKind::PAINTER_NEWELL, gap == 0).worst,
+            1e-4)
             << gap;
 }
 
 TEST(PainterFurnace, IsExactInTheOrderOfCentroidsWherePatchesAreFarApart) {
-    EXPECT_LT(furnace(closedCube(0.7f, 0.3f), "PAINTER", false).worst, 1e-4);
-    EXPECT_LT(furnace(roomWithBoxes(0.5f, 0.5f, 0.6f), "PAINTER", false).worst, 1e-4);
+    EXPECT_LT(furnace(closedCube(0.7f, 0.3f), ProjectorKind::PAINTER, false).worst, 1e-4);
+    EXPECT_LT(furnace(roomWithBoxes(0.5f, 0.5f, 0.6f), ProjectorKind::PAINTER, false).worst, 1e-4);
 }
 
 TEST(PainterFurnace, StatesTheErrorOfTheOrderOfCentroidsWherePatchesAreClose) {
     // With patches of 0.25 m the dark inside of a box 0.1 m above the floor sees the room now and
     // then; where it stands on the floor, at half of the lines.
     for (float gap : {0.1f, 0.0f}) {
-        const FurnaceError error = furnace(roomWithBoxes(0.5f, 0.5f, gap), "PAINTER", gap == 0);
+        const FurnaceError error =
+            furnace(roomWithBoxes(0.5f, 0.5f, gap), ProjectorKind::PAINTER, gap == 0);
         EXPECT_GT(error.mean, 1e-4) << gap;
         EXPECT_LT(error.mean, error.stated) << gap;
         EXPECT_LT(error.stated, 0.03) << gap;
@@ -275,7 +278,7 @@ TEST(PainterFurnace, StatesTheErrorOfTheOrderOfCentroidsWherePatchesAreClose) {
 }
 
 TEST(PainterSameness, TheNumberOfThreadsDoesNotMatter) {
-    for (const char* projector : {"PAINTER", "PAINTER_NEWELL"}) {
+    for (ProjectorKind projector : {ProjectorKind::PAINTER, ProjectorKind::PAINTER_NEWELL}) {
         std::vector<glm::vec3> light[2];
         for (int threads : {1, 2}) {
             Bake bake;
@@ -285,7 +288,7 @@ TEST(PainterSameness, TheNumberOfThreadsDoesNotMatter) {
             bake.run(litRoom());
             light[threads - 1] = everything(bake);
         }
-        EXPECT_LT(difference(light[0], light[1]), 1e-5) << projector;
+        EXPECT_LT(difference(light[0], light[1]), 1e-5) << choiceName(projector);
     }
 }
 

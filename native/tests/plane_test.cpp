@@ -22,18 +22,18 @@ using namespace test;
 
 // A projector of the table with its settings.
 struct Kind {
-    const char* row;
+    ProjectorKind row;
     int planeCount;
     PlanePlacement placement;
 };
-const Kind kKinds[] = {{"PLANE", 1, PlanePlacement::SYSTEMATIC},
-                       {"PLANES", 4, PlanePlacement::SYSTEMATIC},
-                       {"PLANES", 4, PlanePlacement::STRATIFIED},
-                       {"PLANES", 4, PlanePlacement::CLOSE_DISTANCE}};
+const Kind kKinds[] = {{ProjectorKind::PLANE, 1, PlanePlacement::SYSTEMATIC},
+                       {ProjectorKind::PLANES, 4, PlanePlacement::SYSTEMATIC},
+                       {ProjectorKind::PLANES, 4, PlanePlacement::STRATIFIED},
+                       {ProjectorKind::PLANES, 4, PlanePlacement::CLOSE_DISTANCE}};
 
 std::string nameOf(const Kind& kind) {
-    return std::string(kind.row) + " " + std::to_string(kind.planeCount) + " placement " +
-           std::to_string(int(kind.placement));
+    return std::string(choiceName(kind.row)) + " " + std::to_string(kind.planeCount) +
+           " placement " + std::to_string(int(kind.placement));
 }
 
 // Patches of a scene and projectors over them.
@@ -52,7 +52,7 @@ struct Scenery {
         return makeProjector(kind.row, input);
     }
     std::unique_ptr<Projector> lists() const {
-        return projector({"FRAGMENT_LISTS", 1, PlanePlacement::SYSTEMATIC});
+        return projector({ProjectorKind::FRAGMENT_LISTS, 1, PlanePlacement::SYSTEMATIC});
     }
     uint32_t instanceOf(uint32_t side) const {
         return patches.parents[patches.parentOf[side / 2]].instance;
@@ -88,7 +88,7 @@ void expectSameLines(const Scenery& scenery, const Kind& kind, uint32_t bundleCo
                      const Group& group, double most) {
     const auto exact = scenery.lists(), found = scenery.projector(kind);
     Groups mean(groups, 0.0), difference(groups, 0.0), squares(groups, 0.0);
-    for (const Bundle& bundle : Directions("RANDOM", 5).next(bundleCount)) {
+    for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 5).next(bundleCount)) {
         const Groups a = countGroups(*exact, bundle, groups, group);
         const Groups b = countGroups(*found, bundle, groups, group);
         for (size_t g = 0; g < groups; ++g) {
@@ -152,7 +152,7 @@ TEST(Planes, TheFormFactorOfTwoPlatesIsItsClosedForm) {
         const auto projector = scenery.projector(kind);
         LineCounts counts(scenery.patches.sideCount());
         std::vector<TracedBundle> traced;
-        for (const Bundle& bundle : Directions("LOW_DISCREPANCY", 2).next(2000)) {
+        for (const Bundle& bundle : Directions(DirectionKind::LOW_DISCREPANCY, 2).next(2000)) {
             traced.push_back({bundle, {}});
             projector->project(bundle, traced.back().lines);
         }
@@ -186,10 +186,10 @@ TEST(Planes, CoherenceChangesNothing) {
         for (PlanePlacement placement : {PlanePlacement::SYSTEMATIC, PlanePlacement::STRATIFIED,
                                          PlanePlacement::CLOSE_DISTANCE})
             for (int planeCount : {1, 4, 13}) {
-                const Kind kind{"PLANES", planeCount, placement};
+                const Kind kind{ProjectorKind::PLANES, planeCount, placement};
                 const auto with = scenery.projector(kind, true),
                            without = scenery.projector(kind, false);
-                for (const Bundle& bundle : Directions("RANDOM", 3).next(6)) {
+                for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 3).next(6)) {
                     BundleLines a, b;
                     with->project(bundle, a);
                     without->project(bundle, b);
@@ -205,7 +205,7 @@ TEST(Planes, LinesThatMeetTheSceneAreThoseOfTheLists) {
     const auto exact = scenery.lists();
     for (const Kind& kind : kKinds) {
         const auto projector = scenery.projector(kind);
-        for (const Bundle& bundle : Directions("RANDOM", 6).next(8)) {
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 6).next(8)) {
             BundleLines wanted, found;
             exact->project(bundle, wanted);
             projector->project(bundle, found);
@@ -218,11 +218,12 @@ TEST(Planes, NothingShinesBetweenSurfacesThatTouch) {
     // Boxes that stand on the floor: their undersides and what they cover exchange nothing, and the
     // room's light does not leak into them.
     const Scenery scenery(roomWithBoxes(0.5f, 0, 0), 0.3f, 0.05f, 1e-3f);
-    for (const Kind& kind : {kKinds[0], kKinds[2], Kind{"PLANES", 40, PlanePlacement::SYSTEMATIC},
-                             Kind{"PLANES", 40, PlanePlacement::CLOSE_DISTANCE}}) {
+    for (const Kind& kind :
+         {kKinds[0], kKinds[2], Kind{ProjectorKind::PLANES, 40, PlanePlacement::SYSTEMATIC},
+          Kind{ProjectorKind::PLANES, 40, PlanePlacement::CLOSE_DISTANCE}}) {
         const auto projector = scenery.projector(kind);
         uint64_t all = 0, leaks = 0;
-        for (const Bundle& bundle : Directions("RANDOM", 7).next(100)) {
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 7).next(100)) {
             BundleLines lines;
             projector->project(bundle, lines);
             for (const Exchange& e : lines.exchanges) {
@@ -279,9 +280,11 @@ TEST(Planes, CloseDistanceFindsContactsWithLessNoise) {
     constexpr uint32_t kBundles = 600;
     double squares[2] = {0, 0};
     const auto exact = scenery.lists();
-    const auto systematic = scenery.projector({"PLANES", 16, PlanePlacement::SYSTEMATIC});
-    const auto close = scenery.projector({"PLANES", 16, PlanePlacement::CLOSE_DISTANCE});
-    for (const Bundle& bundle : Directions("RANDOM", 8).next(kBundles)) {
+    const auto systematic =
+        scenery.projector({ProjectorKind::PLANES, 16, PlanePlacement::SYSTEMATIC});
+    const auto close =
+        scenery.projector({ProjectorKind::PLANES, 16, PlanePlacement::CLOSE_DISTANCE});
+    for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 8).next(kBundles)) {
         const double wanted = countGroups(*exact, bundle, 1, underside)[0];
         for (int k = 0; k < 2; ++k) {
             Projector& projector = k == 0 ? *systematic : *close;
@@ -302,10 +305,7 @@ TEST(Planes, FurnacesAreExact) {
         setQuick(bake, 512);
         bake.settings.contacts = 0;
         bake.settings.projector = kind.row;
-        bake.settings.planePlacement = kind.placement == PlanePlacement::STRATIFIED ? "STRATIFIED"
-                                       : kind.placement == PlanePlacement::SYSTEMATIC
-                                           ? "SYSTEMATIC"
-                                           : "CLOSE_DISTANCE";
+        bake.settings.planePlacement = kind.placement;
         bake.run(scene);
         double worst = 0;
         for (int32_t i = 0; i < 3; ++i)
@@ -326,7 +326,7 @@ TEST(Planes, FurnacesAreExactWhereLinesCameForAnyNumberOfBundles) {
         for (uint32_t bundleCount : {2u, 64u}) {
             const auto projector = scenery.projector(kind);
             std::vector<TracedBundle> traced;
-            for (const Bundle& bundle : Directions("RANDOM", 1).next(bundleCount)) {
+            for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 1).next(bundleCount)) {
                 traced.push_back({bundle, {}});
                 projector->project(bundle, traced.back().lines);
             }
@@ -349,7 +349,7 @@ TEST(Planes, TheResultDoesNotDependOnThreadsOrCoherence) {
     for (const auto& [threads, coherence] : {std::pair(1, 1), std::pair(2, 1), std::pair(2, 0)}) {
         Bake bake;
         setQuick(bake, 16);
-        bake.settings.projector = "PLANES";
+        bake.settings.projector = ProjectorKind::PLANES;
         bake.settings.threads = threads;
         bake.settings.planeCoherence = coherence;
         bake.run(scene);
@@ -360,7 +360,7 @@ TEST(Planes, TheResultDoesNotDependOnThreadsOrCoherence) {
 }
 
 TEST(Planes, AnEmptySceneIsNoError) {
-    for (const char* projector : {"PLANE", "PLANES"}) {
+    for (ProjectorKind projector : {ProjectorKind::PLANE, ProjectorKind::PLANES}) {
         Bake bake;
         bake.settings.projector = projector;
         bake.run(Scene());

@@ -21,7 +21,7 @@ using namespace test;
 constexpr double kReceiverOffset = 0.01;
 
 struct PointBake : Bake {
-    explicit PointBake(const Scene& scene, const char* reconstruction = "POINT") {
+    explicit PointBake(const Scene& scene, Reconstruction reconstruction = Reconstruction::POINT) {
         settings.reconstruction = reconstruction;
         settings.targetError = 0.005f;
         settings.maxBundles = 256;
@@ -130,7 +130,7 @@ TEST(PointReconstruction, CoveredCornersKeepTheLeastSquares) {
     Scene scene = groundBelowLamp(0.5f);
     place(scene, box("box", {-1, -1, 0}, {1, 1, 0.25f}, false), grey("", 0.5f));
     const PointBake point(scene);
-    const PointBake leastSquares(scene, "LEAST_SQUARES");
+    const PointBake leastSquares(scene, Reconstruction::LEAST_SQUARES);
     const auto expected = cornerLight(leastSquares, 0, RB_OUTPUT_LIGHTING);
     size_t covered = 0;
     forEachCorner(scene, point, [&](const glm::vec3& at, size_t c, double found) {
@@ -149,7 +149,7 @@ TEST(PointReconstruction, ACornerUnderASmallBoxIsNotBlack) {
           glm::dmat4(1), RB_ROLE_OCCLUDE);
     scene.worldRadiance = glm::vec3(1);
     Bake bake;
-    bake.settings.reconstruction = "POINT";
+    bake.settings.reconstruction = Reconstruction::POINT;
     bake.settings.patchSize = 1;
     bake.run(scene);
     for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))

@@ -16,12 +16,10 @@ namespace {
 
 using namespace test;
 
-constexpr const char* kEstimators[] = {"COLLISION", "SURVIVAL", "ABSORPTION"};
-
 void setWalks(Bake& bake, int bundleCount) {
     setQuick(bake, bundleCount);
-    bake.settings.solver = "RANDOM_WALK";
-    bake.settings.directions = "RANDOM";
+    bake.settings.solver = Solver::RANDOM_WALK;
+    bake.settings.directions = DirectionKind::RANDOM;
 }
 
 // A cube with one patch per face of which one shines, and walks whose results are gathered.
@@ -33,16 +31,16 @@ struct Cube : TransportScene {
 
 TEST(RandomWalk, TheMeanIsExactOnACube) {
     Cube cube(0.1f);  // 236 walks per bundle
-    for (const char* estimator : kEstimators) {
-        cube.settings.estimator = estimator;
+    for (const auto& estimator : kEstimators) {
+        cube.settings.estimator = estimator.value;
         CubeExitance exitance;
         for (int seed = 0; seed < 200; ++seed) {
-            const auto walk = cube.make("RANDOM_WALK", seed);
+            const auto walk = cube.make(Solver::RANDOM_WALK, seed);
             walk->advance(2, Progress());
             exitance.add(cube.patches, cube.shot, walk->irradiance(Half::BOTH, 0));
             EXPECT_EQ(walk->bias(), 0);
         }
-        exitance.expectExact(estimator);
+        exitance.expectExact(estimator.name);
     }
 }
 
@@ -65,11 +63,11 @@ TEST(RandomWalk, TheVariancesAreThoseOfTheory) {
     const double walks =
         std::round(kPi * double(cube.patches.radius) * double(cube.patches.radius) / (0.15 * 0.15));
     constexpr int kRuns = 4096;
-    for (const char* estimator : kEstimators) {
-        cube.settings.estimator = estimator;
+    for (const auto& row : kEstimators) {
+        cube.settings.estimator = row.value;
         Statistics faces[6];
         for (int seed = 0; seed < kRuns / 2; ++seed) {
-            const auto walk = cube.make("RANDOM_WALK", seed);
+            const auto walk = cube.make(Solver::RANDOM_WALK, seed);
             walk->advance(2, Progress());
             for (Half half : {Half::FIRST, Half::SECOND}) {
                 const Irradiance h = walk->irradiance(half, 0);
@@ -82,15 +80,15 @@ TEST(RandomWalk, TheVariancesAreThoseOfTheory) {
         found[2] /= 4;
         for (int k = 0; k < 3; ++k) {
             const double b = kCubeExitance[k] - (k == 0 ? 1 : 0);
-            const double factor = estimator == kEstimators[0]   ? rho * (1 + 2 * zeta)
-                                  : estimator == kEstimators[1] ? 1 + 2 * zeta
-                                                                : rho / (1 - rho);
+            const double factor = row.value == Estimator::COLLISION  ? rho * (1 + 2 * zeta)
+                                  : row.value == Estimator::SURVIVAL ? 1 + 2 * zeta
+                                                                     : rho / (1 - rho);
             const double exact = (factor * b - b * b) / walks;
             std::printf("[ figures  ] %-10s face %d: variance %.4g, theory %.4g, ratio %.3f\n",
-                        estimator, k, found[k], exact, found[k] / exact);
+                        row.name, k, found[k], exact, found[k] / exact);
             // The variance of 4096 runs has a standard error of sqrt(2 / 4095) = 2.2 %: 10 % are
             // 4.5 of them, one failure in 10^5.
-            EXPECT_NEAR(found[k] / exact, 1, 0.1) << estimator << ", face " << k;
+            EXPECT_NEAR(found[k] / exact, 1, 0.1) << row.name << ", face " << k;
         }
     }
 }
@@ -100,9 +98,9 @@ TEST(RandomWalk, ColoursAreUnbiased) {
     Cube cube(0.1f);
     for (glm::vec3& rho : cube.patches.reflectance) rho = {0, 0.5f, 0.8f};
     cube.shot.emission[0] = {1, 2, 0.5f};
-    for (const char* estimator : kEstimators) {
-        cube.settings.estimator = estimator;
-        const auto walk = cube.make("RANDOM_WALK", 1);
+    for (const auto& row : kEstimators) {
+        cube.settings.estimator = row.value;
+        const auto walk = cube.make(Solver::RANDOM_WALK, 1);
         walk->advance(1000, Progress());
         const Irradiance h = walk->irradiance(Half::BOTH, 0);
         // Mean irradiance of all faces: E / (6 (1 - rho)), and it is E / 6 straight.
@@ -115,24 +113,24 @@ TEST(RandomWalk, ColoursAreUnbiased) {
         // ABSORPTION are the worst).
         for (int c = 0; c < 3; ++c) {
             const double e = double(cube.shot.emission[0][c]) / 6;
-            EXPECT_NEAR(direct[c], e, 0.02 * e) << estimator << ", channel " << c;
+            EXPECT_NEAR(direct[c], e, 0.02 * e) << row.name << ", channel " << c;
             const double rho = double(cube.patches.reflectance[0][c]);
             EXPECT_NEAR(all[c], e / (1 - rho), 0.02 * e / (1 - rho))
-                << estimator << ", channel " << c;
+                << row.name << ", channel " << c;
         }
     }
 }
 
 TEST(RandomWalk, BlackSidesGetTheirLightToo) {
-    for (const char* estimator : kEstimators) {
+    for (const auto& row : kEstimators) {
         TransportScene cube(closedCube(0, 1), 10, 0.05f);
-        cube.settings.estimator = estimator;
-        const auto walk = cube.make("RANDOM_WALK", 1);
+        cube.settings.estimator = row.value;
+        const auto walk = cube.make(Solver::RANDOM_WALK, 1);
         walk->advance(100, Progress());
         const Irradiance h = walk->irradiance(Half::BOTH, 0);
         // 94 000 walks, 16 000 of them at each face: 0.8 %.
         for (uint32_t i = 0; i < 12; i += 2) {
-            EXPECT_NEAR(h.direct[i].x, 1, 0.04) << estimator;
+            EXPECT_NEAR(h.direct[i].x, 1, 0.04) << row.name;
             EXPECT_EQ(h.indirect[i], glm::vec3(0));
         }
     }
@@ -143,7 +141,7 @@ TEST(RandomWalk, AConvexObjectGetsAllTheWorldsLight) {
     place(scene, icosphere("ball", 1, 0, false), grey("", 0.5f));
     TransportScene ball(scene, 10, 0.05f);
     ball.world = {1, 2, 0.5f};
-    const auto walk = ball.make("RANDOM_WALK", 1);
+    const auto walk = ball.make(Solver::RANDOM_WALK, 1);
     walk->advance(200, Progress());
     const Irradiance h = walk->irradiance(Half::BOTH, 0);
     const std::vector<float> open = walk->openShare();
@@ -191,15 +189,15 @@ TEST(RandomWalk, AgreesWithLineReuse) {
     reference.settings.contacts = 0;  // the same patches for both solvers
     reference.run(litRoom());
     setWalks(bake, 256);
-    for (const char* estimator : kEstimators) {
-        bake.settings.estimator = estimator;
+    for (const auto& row : kEstimators) {
+        bake.settings.estimator = row.value;
         bake.run(litRoom());
         const double stated = reportOf(bake)["estimated_error"];
         const double found =
             frontNoise(bake.patches(), bake.patchIrradiance(), reference.patchIrradiance());
         // The reference has 0.2 % of noise, and both have that of the gathered light in common.
-        EXPECT_LT(found, 1.3 * stated) << estimator;
-        EXPECT_GT(found, 0.7 * stated) << estimator;
+        EXPECT_LT(found, 1.3 * stated) << row.name;
+        EXPECT_GT(found, 0.7 * stated) << row.name;
         // What is alike on all patches: less than the noise by the root of their number (1000).
         double sum = 0, exact = 0;
         for (size_t i = 0; i < bake.patches().sideCount(); i += 2) {
@@ -207,7 +205,7 @@ TEST(RandomWalk, AgreesWithLineReuse) {
             sum += area * double(bake.patchIrradiance().indirect[i].y);
             exact += area * double(reference.patchIrradiance().indirect[i].y);
         }
-        EXPECT_NEAR(sum / exact, 1, 0.01) << estimator;
+        EXPECT_NEAR(sum / exact, 1, 0.01) << row.name;
     }
 }
 
@@ -240,7 +238,7 @@ TEST(RandomWalk, TheNumberOfThreadsDoesNotMatter) {
 
 TEST(RandomWalk, SeedsAreIndependent) {
     Cube cube(0.1f);
-    const auto one = cube.make("RANDOM_WALK", 1);
+    const auto one = cube.make(Solver::RANDOM_WALK, 1);
     one->advance(2, Progress());
     const Irradiance a = one->irradiance(Half::FIRST, 0), b = one->irradiance(Half::SECOND, 0);
     EXPECT_NE(a.direct[2], b.direct[2]);

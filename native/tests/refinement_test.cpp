@@ -369,7 +369,7 @@ TEST(RefinedBake, ProjectorsThatDrawPatchesAgree) {
     exact.settings.refine = 1;
     exact.settings.targetError = 0.003f;
     exact.run(scene);
-    for (const char* projector : {"PAINTER_NEWELL", "PAINTER"}) {
+    for (ProjectorKind projector : {ProjectorKind::PAINTER_NEWELL, ProjectorKind::PAINTER}) {
         Bake bake;
         setQuick(bake, 512);
         bake.settings.refine = 1;
@@ -377,7 +377,7 @@ TEST(RefinedBake, ProjectorsThatDrawPatchesAgree) {
         bake.settings.projector = projector;
         bake.run(scene);
         // The noise of 512 bundles is 1 % in either.
-        EXPECT_LT(noise(everything(bake), everything(exact)), 0.03) << projector;
+        EXPECT_LT(noise(everything(bake), everything(exact)), 0.03) << choiceName(projector);
     }
 }
 

@@ -53,7 +53,7 @@ std::vector<glm::vec3> lightAt(const Bake& bake, const std::vector<int32_t>& cor
     return some;
 }
 
-class ResultCorners : public testing::TestWithParam<const char*> {};
+class ResultCorners : public testing::TestWithParam<Reconstruction> {};
 
 TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
     Scene scene = ballInTheOpen();
@@ -63,7 +63,7 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
         bake->settings.maxPatches = 4000;
     }
     // Without the rays of noisy sides, which only those have whose own light is shown.
-    const bool isOfPatches = std::string(GetParam()) == "LEAST_SQUARES";
+    const bool isOfPatches = GetParam() == Reconstruction::LEAST_SQUARES;
     for (Bake* bake : {&whole, &part})
         if (isOfPatches) bake->settings.maxBundles = bake->settings.minBundles;
     whole.run(scene);
@@ -79,7 +79,8 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
     // pairs.
     const double ofPart = noise(lightAt(part, corners), right),
                  ofWhole = noise(lightAt(whole, corners), right);
-    std::printf("[ figures  ] %s: noise %.4f, of all %.4f\n", GetParam(), ofPart, ofWhole);
+    std::printf("[ figures  ] %s: noise %.4f, of all %.4f\n", choiceName(GetParam()), ofPart,
+                ofWhole);
     EXPECT_LT(ofPart, 1.5 * ofWhole + 0.01);
     const Json less = reportOf(part), more = reportOf(whole);
     const double fewer = less["shadow_rays"].get<double>() / more["shadow_rays"].get<double>();
@@ -95,8 +96,9 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, ResultCorners,
-                         testing::Values("LEAST_SQUARES", "POINT", "AREA_AVERAGE"),
-                         [](const auto& test) { return test.param; });
+                         testing::Values(Reconstruction::LEAST_SQUARES, Reconstruction::POINT,
+                                         Reconstruction::AREA_AVERAGE),
+                         [](const auto& test) { return choiceName(test.param); });
 
 // One corner of each vertex of a ball with 80 faces, which finer ones have as their first vertices.
 std::vector<int32_t> cornersOfCoarseBall(const Mesh& mesh) {
@@ -198,7 +200,7 @@ TEST(ResultCorners, MayBeNone) {
     Scene scene = litRoom();
     for (int32_t instance = 0; instance < int32_t(scene.instances.size()); ++instance)
         scene.setResultCorners(instance, nullptr, 0);
-    for (const char* reconstruction : {"LEAST_SQUARES", "POINT"}) {
+    for (Reconstruction reconstruction : {Reconstruction::LEAST_SQUARES, Reconstruction::POINT}) {
         Bake bake;
         setQuick(bake);
         bake.settings.reconstruction = reconstruction;

@@ -30,9 +30,9 @@ class RouletteScene {
     RouletteScene(const Scene& scene, float patchSize, float pixelSize)
         : patches(subdivide(scene, patchSize, kMany)), visibility(patches), pixelSize(pixelSize) {}
 
-    std::unique_ptr<Projector> projector(SmallPatches kind,
-                                         const char* name = "FRAGMENT_LISTS") const {
-        return makeProjector(name, {patches, visibility, pixelSize, 1e-5f, kind});
+    std::unique_ptr<Projector> projector(
+        SmallPatches kind, ProjectorKind projector = ProjectorKind::FRAGMENT_LISTS) const {
+        return makeProjector(projector, {patches, visibility, pixelSize, 1e-5f, kind});
     }
     // Crofton: of the fragments of n bundles.
     double expectedFragments(uint32_t n) const {
@@ -41,7 +41,7 @@ class RouletteScene {
     double fragments(SmallPatches kind, uint32_t n) const {
         const auto lists = projector(kind);
         double sum = 0;
-        for (const Bundle& bundle : Directions("RANDOM", 21).next(n)) {
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 21).next(n)) {
             BundleLines lines;
             lists->project(bundle, lines);
             sum += fragmentCount(lines);
@@ -132,7 +132,7 @@ TEST(Roulette, ClosedSurfacesOfSmallPatchesLeak) {
     const auto exact = projection.projector(SmallPatches::CENTRE_SAMPLING);
     const auto roulette = projection.projector(SmallPatches::ROULETTE);
     double crossed = 0, met = 0, inside = 0, all = 0;
-    for (const Bundle& bundle : Directions("RANDOM", 2).next(20)) {
+    for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 2).next(20)) {
         BundleLines closed, leaking;
         exact->project(bundle, closed);
         roulette->project(bundle, leaking);
@@ -155,18 +155,20 @@ TEST(Roulette, ClosedSurfacesOfSmallPatchesLeak) {
 
 TEST(Roulette, AllProjectorsHaveTheSameFragments) {
     const RouletteScene projection(roomWithBoxes(0.5f), 0.1f, 0.06f);
-    for (const Bundle& bundle : Directions("RANDOM", 6).next(4)) {
+    for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 6).next(4)) {
         std::vector<double> counts;
         std::vector<uint64_t> lines;
-        for (const char* name : {"FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL"}) {
+        for (ProjectorKind projector : {ProjectorKind::FRAGMENT_LISTS, ProjectorKind::PAINTER,
+                                        ProjectorKind::PAINTER_NEWELL}) {
             BundleLines found, again;
-            projection.projector(SmallPatches::ROULETTE, name)->project(bundle, found);
-            projection.projector(SmallPatches::ROULETTE, name)->project(bundle, again);
+            projection.projector(SmallPatches::ROULETTE, projector)->project(bundle, found);
+            projection.projector(SmallPatches::ROULETTE, projector)->project(bundle, again);
             counts.push_back(fragmentCount(found));
             lines.push_back(found.lines);
-            EXPECT_EQ(found.sky, again.sky) << name << ": chance is that of the bundle";
-            EXPECT_EQ(found.sky.size(), 2 * found.lines) << name;
-            EXPECT_GT(found.disordered, 0u) << name;
+            EXPECT_EQ(found.sky, again.sky)
+                << choiceName(projector) << ": chance is that of the bundle";
+            EXPECT_EQ(found.sky.size(), 2 * found.lines) << choiceName(projector);
+            EXPECT_GT(found.disordered, 0u) << choiceName(projector);
         }
         for (double count : counts) EXPECT_EQ(count, counts[0]);
         for (uint64_t count : lines) EXPECT_EQ(count, lines[0]);
@@ -178,7 +180,7 @@ TEST(Roulette, BakesAndIsTheSameForAnyNumberOfThreads) {
     for (int threads : {1, 2}) {
         Bake bake;
         setQuick(bake, 32);
-        bake.settings.smallPatches = "ROULETTE";
+        bake.settings.smallPatches = SmallPatches::ROULETTE;
         bake.settings.threads = threads;
         bake.run(litRoom());
         light[threads - 1] = everything(bake);

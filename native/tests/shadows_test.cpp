@@ -106,7 +106,7 @@ Scene floorUnderSlit(float width) {
 TEST(Shadows, ErrorsFollowTheTargetBehindASlit) {
     const ShotScene shots(floorUnderSlit(0.2f), 0.25f);
     auto floor = [&](float target, int seed) {
-        std::vector<glm::vec3> light = shots.shoot("GATHER", 0, seed, target).irradiance;
+        std::vector<glm::vec3> light = shots.shoot(FirstShotKind::GATHER, 0, seed, target).irradiance;
         light.resize(32);  // both sides of its patches
         return light;
     };
@@ -135,7 +135,7 @@ TEST(Shadows, LightThroughANarrowSlitIsFound) {
         const ShotScene shots(scene, 0.25f);
         int dark = 0, lit = 0;
         for (int seed = 0; seed < 20; ++seed) {
-            const FirstShot shot = shots.shoot("GATHER", 0, seed, 0.02f);
+            const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0, seed, 0.02f);
             int found = 0;
             for (uint32_t patch = 0; patch < 16; ++patch) found += shot.irradiance[2 * patch].x > 0;
             lit += found;
@@ -160,7 +160,7 @@ TEST(Shadows, ErrorsOfManyLampsAddUp) {
         for (int k = 0; k < lamps; ++k)
             scene.addLight(
                 areaLight({0.1, 0, 2}, {0.03, 0, 0}, {0, -0.03, 0}, glm::dvec3(10.0 / lamps)));
-        return ShotScene(scene, 0.2f).shoot("GATHER", 0, 1, target).irradiance;
+        return ShotScene(scene, 0.2f).shoot(FirstShotKind::GATHER, 0, 1, target).irradiance;
     };
     const double found = noise(shot(64, kTarget), shot(1, 0.0002f));
     // Measured 0.0029, and 0.0051 when each was allowed as much as one.

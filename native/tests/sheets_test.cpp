@@ -229,7 +229,7 @@ void expectSameBundles(const Patches& patches) {
     single.sheets = withoutSheets(single);
     FragmentLists bySheet(patches, 0.02f, 1e-4f), byParent(single, 0.02f, 1e-4f);
     uint64_t all = 0, different = 0;
-    for (const Bundle& bundle : Directions("RANDOM", 7).next(100)) {
+    for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 7).next(100)) {
         BundleLines a, b;
         bySheet.project(bundle, a);
         byParent.project(bundle, b);
@@ -283,7 +283,8 @@ TEST(Sheets, NothingThatExchangesMakesNoLines) {
     EXPECT_TRUE(patches.sheets.sheets.empty());
     EXPECT_TRUE(patches.sheets.loose.empty());
     BundleLines lines;
-    FragmentLists(patches, 0.1f, 1e-4f).project(Directions("RANDOM", 3).next(2).front(), lines);
+    FragmentLists(patches, 0.1f, 1e-4f)
+        .project(Directions(DirectionKind::RANDOM, 3).next(2).front(), lines);
     EXPECT_EQ(lines.lines, 0u);
     EXPECT_TRUE(lines.sky.empty());
 }

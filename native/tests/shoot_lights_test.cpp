@@ -37,7 +37,7 @@ double meanOverSquare(const std::function<double(const glm::dvec3&)>& irradiance
 // says something.
 void expectMean(const Scene& scene, double exact, uint32_t side = 0, double smallest = 0.01) {
     const ShotScene room(scene);
-    const FirstShot shot = room.shoot("SHOOT", 1 << 17);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 17);
     const Mean mean = meanLight(room.patches, shot, 0, side);
     EXPECT_NEAR(mean.value, exact, kSigmas * mean.error + 1e-5 * exact);
     EXPECT_LT(mean.error, smallest * exact);
@@ -81,8 +81,8 @@ TEST(ShootPointLight, ADiskBehindAnObstacleGivesWhatIsGathered) {
     place(scene, rectangle("obstacle", {-0.1f, -0.2f, 0.5f}, {0.4f, 0, 0}, {0, 0.4f, 0}),
           grey("", 0.5f));
     const ShotScene room(scene, 0.5f);
-    const FirstShot shot = room.shoot("SHOOT", 1 << 18),
-                    gathered = room.shoot("GATHER", 0, 0, 0.002f);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 18),
+                    gathered = room.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
     for (uint32_t instance : {0u, 1u})
         for (uint32_t side : {0u, 1u}) {
             const Mean a = meanLight(room.patches, shot, instance, side);
@@ -134,7 +134,7 @@ TEST(ShootSunLight, AWideSunOnTheHorizonIsHalfSeen) {
 
 TEST(ShootSunLight, CountsWhatArrivesOnly) {
     const ShotScene room(underLight(sunLight({0, 0, 1}, glm::dvec3(1))));
-    const FirstShot shot = room.shoot("SHOOT", 1 << 16);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 16);
     EXPECT_EQ(shot.escaped, glm::dvec3(0));
     EXPECT_NEAR(shot.emitted.x, arriving(room.patches, shot).x, 1e-6 * shot.emitted.x);
 }
@@ -144,14 +144,14 @@ TEST(ShootAreaLight, ARectangleFollowsTheFormFactor) {
                7 * kPi * parallelRectangles(2, 2, 1));
     const Scene behind = underLight(areaLight({0, 0, 1}, {1, 0, 0}, {0, 1, 0}, glm::dvec3(7)));
     const ShotScene room(behind);
-    EXPECT_EQ(meanLight(room.patches, room.shoot("SHOOT", 1 << 14), 0).value, 0);
+    EXPECT_EQ(meanLight(room.patches, room.shoot(FirstShotKind::SHOOT, 1 << 14), 0).value, 0);
 }
 
 TEST(ShootAreaLight, AnEllipseGivesWhatIsGathered) {
     const ShotScene room(underLight(
         areaLight({0.3, 0, 0.8}, {0, 0.6, 0}, {0.4, 0, 0}, glm::dvec3(7), RB_AREA_ELLIPSE)));
-    const Mean exact = meanLight(room.patches, room.shoot("GATHER", 0, 0, 0.0002f), 0);
-    const Mean mean = meanLight(room.patches, room.shoot("SHOOT", 1 << 17), 0);
+    const Mean exact = meanLight(room.patches, room.shoot(FirstShotKind::GATHER, 0, 0, 0.0002f), 0);
+    const Mean mean = meanLight(room.patches, room.shoot(FirstShotKind::SHOOT, 1 << 17), 0);
     // Of at most 256 samples.
     EXPECT_NEAR(mean.value, exact.value, kSigmas * mean.error + 0.01 * exact.value);
 }
@@ -161,7 +161,7 @@ TEST(ShootAreaLight, InTheCeilingNothingHitsTheCeiling) {
     place(scene, box("room", {0, 0, 0}, {4, 3, 3}, true), grey("", 0.5f));
     scene.addLight(areaLight({2, 1.5, 3}, {0.5, 0, 0}, {0, -0.5, 0}, glm::dvec3(1)));
     const ShotScene room(scene);
-    const FirstShot shot = room.shoot("SHOOT", 1 << 16);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 16);
     for (uint32_t side = 0; side < room.patches.sideCount(); ++side)
         if (side % 2 == 1 || room.patches.normal(side).z < -0.9f) {
             EXPECT_EQ(shot.irradiance[side], glm::vec3(0)) << "side " << side;
@@ -178,7 +178,7 @@ TEST(ShootEmissiveMesh, ShinesFromTheSidesThatEmit) {
               grey("lamp", 0, 800, backEmission));
         place(scene, rectangle("ground", {-20, -20, -5}, {40, 0, 0}, {0, 40, 0}), grey("", 0));
         const ShotScene room(scene);
-        const FirstShot shot = room.shoot("SHOOT", 1 << 17);
+        const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 17);
         const double f = parallelRectangles(1, 1, 1);
         const Mean below = meanLight(room.patches, shot, 0),
                    above = meanLight(room.patches, shot, 1);
@@ -195,7 +195,8 @@ TEST(ShootEmissiveMesh, ALampThatLiesAgainstTheCeilingKeepsOutOfIt) {
     Scene scene = roomWithBoxes(0.5f);
     place(scene, box("lamp", {1.5f, 1, 2.75f}, {2.5f, 2, 2.8f}, false), grey("lamp", 0, 60));
     const ShotScene room(scene, 0.25f);
-    const FirstShot shot = room.shoot("SHOOT", 1 << 18), gathered = room.shoot("GATHER", 0);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 18),
+                    gathered = room.shoot(FirstShotKind::GATHER, 0);
     // The covered top's light goes nowhere; what the other five faces give arrives, but for the
     // lines that start at an edge of the lamp and meet its inside.
     const double power = 60 * (1 + 4 * 0.05);

@@ -63,7 +63,7 @@ TEST(ShootPower, IsConservedInEachChannel) {
         // Weak, and of another colour.
         scene.addLight(pointLight({1, 2, 2}, {0.003, 0.001, 0}));
         const ShotScene room(scene, 0.5f);
-        const FirstShot shot = room.shoot("SHOOT", 10000, kind);
+        const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 10000, kind);
         const double one = kind == 2   ? kPi * 0.64
                            : kind == 3 ? 2 * kPi * (1 - std::cos(0.5))
                                        : 4 * kPi;
@@ -89,7 +89,7 @@ TEST(ShootPower, OfWeakSourcesIsRightInTheMean) {
     double blue = 0;
     constexpr int kRuns = 200;
     for (int seed = 0; seed < kRuns; ++seed) {
-        const FirstShot shot = room.shoot("SHOOT", 20, seed);
+        const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 20, seed);
         blue += arriving(room.patches, shot).z / kRuns;
         EXPECT_NEAR(arriving(room.patches, shot).x, 4 * kPi, 1e-4);
     }
@@ -104,7 +104,7 @@ TEST(ShootPower, LeavesAnOpenSceneOrArrives) {
     place(scene, rectangle("ground", {-3, -3, 0}, {6, 0, 0}, {0, 6, 0}), grey("", 0.5f));
     scene.addLight(pointLight({0, 0, 1}, {1, 2, 3}));
     const ShotScene room(scene, 0.5f);
-    const FirstShot shot = room.shoot("SHOOT", 1 << 15);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 15);
     const glm::dvec3 arrived = arriving(room.patches, shot);
     for (int c = 0; c < 3; ++c) {
         const double power = 4 * kPi * (c + 1);
@@ -128,7 +128,7 @@ TEST(ShootVariance, IsThatOfTheFormula) {
     constexpr int kRuns = 1000, kLines = 1000;
     std::vector<double> first(n, 0), second(n, 0), stated(n, 0);
     for (int seed = 0; seed < kRuns; ++seed) {
-        const FirstShot shot = room.shoot("SHOOT", kLines, seed);
+        const FirstShot shot = room.shoot(FirstShotKind::SHOOT, kLines, seed);
         for (size_t i = 0; i < n; ++i) {
             const double h = double(shot.irradiance[i].x), e = double(shot.error[i]);
             first[i] += h / kRuns;
@@ -136,7 +136,7 @@ TEST(ShootVariance, IsThatOfTheFormula) {
             stated[i] += e * e / kRuns;
         }
     }
-    const FirstShot exact = room.shoot("GATHER", 0, 0, 0.002f);
+    const FirstShot exact = room.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
     const double power = kPi * 0.36;
     int lit = 0;
     double worst = 0, found = 0, predicted = 0, saying = 0;
@@ -170,7 +170,7 @@ TEST(ShootVariance, TheMeanOfManySeedsIsTheGatheredLight) {
     const size_t n = room.patches.sideCount();
     std::vector<double> first(n, 0), second(n, 0);
     for (int seed = 0; seed < kSeeds; ++seed) {
-        const FirstShot shot = room.shoot("SHOOT", 4000, seed);
+        const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 4000, seed);
         for (size_t i = 0; i < n; ++i) {
             const double h = double(shot.irradiance[i].x);
             first[i] += h / kSeeds;
@@ -179,7 +179,7 @@ TEST(ShootVariance, TheMeanOfManySeedsIsTheGatheredLight) {
     }
     // The exact light of each whole face, from small patches.
     const ShotScene fine(scene, 0.2f);
-    const FirstShot exact = fine.shoot("GATHER", 0, 0, 0.005f);
+    const FirstShot exact = fine.shoot(FirstShotKind::GATHER, 0, 0, 0.005f);
     std::vector<double> mean(n, 0);
     for (uint32_t i = 0; i < fine.patches.sideCount(); ++i) {
         const uint32_t parent = fine.patches.parentOf[i / 2];
@@ -208,10 +208,10 @@ TEST(Shoot, GoesOnToTheTargetError) {
     Scene scene = roomWithBoxes(0.5f);
     scene.addLight(areaLight({2, 1.6, 2.6}, {0.3, 0, 0}, {0, -0.3, 0}, glm::dvec3(1, 0.5, 0.2)));
     const ShotScene room(scene, 0.5f);
-    const FirstShot exact = room.shoot("GATHER", 0, 0, 0.002f);
+    const FirstShot exact = room.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
     uint64_t before = 0;
     for (float target : {0.08f, 0.04f}) {
-        const FirstShot shot = room.shoot("SHOOT", 0, 1, target);
+        const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 0, 1, target);
         double noise = 0, signal = 0;
         for (size_t i = 0; i < room.patches.sideCount(); ++i) {
             const glm::dvec3 h(exact.irradiance[i]), d = glm::dvec3(shot.irradiance[i]) - h;
@@ -232,7 +232,7 @@ TEST(Shoot, DoesNotDependOnTheNumberOfThreads) {
     scene.addLight(areaLight({2, 1.6, 2.6}, {0.3, 0, 0}, {0, -0.3, 0}, glm::dvec3(1)));
     scene.addLight(pointLight({1, 2, 2}, {0.3, 0.1, 0}));
     const ShotScene room(scene, 0.3f);
-    for (const char* kind : {"SHOOT", "EXTENDED"}) {
+    for (FirstShotKind kind : {FirstShotKind::SHOOT, FirstShotKind::EXTENDED}) {
         FirstShot shots[2];
         for (size_t k = 0; k < 2; ++k) {
             const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
@@ -257,7 +257,8 @@ TEST(Shoot, OfSurfacesThatCoincideTheFirstGetsTheLight) {
               grey("", 0.5f));
     scene.addLight(pointLight({0.2, 0.1, 1}, glm::dvec3(1)));
     const ShotScene room(scene);
-    const FirstShot shot = room.shoot("SHOOT", 1 << 14), gathered = room.shoot("GATHER", 0);
+    const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 14),
+                    gathered = room.shoot(FirstShotKind::GATHER, 0);
     double all = 0;
     for (uint32_t instance : {0u, 1u, 2u})
         for (uint32_t side : {0u, 1u}) {
@@ -272,7 +273,7 @@ TEST(Shoot, OfSurfacesThatCoincideTheFirstGetsTheLight) {
 
 TEST(Shoot, WithoutLightThereIsNone) {
     const ShotScene room(roomWithBoxes(0.5f));
-    for (const char* kind : {"SHOOT", "EXTENDED"}) {
+    for (FirstShotKind kind : {FirstShotKind::SHOOT, FirstShotKind::EXTENDED}) {
         const FirstShot shot = room.shoot(kind, 0);
         EXPECT_EQ(shot.rays, 0u);
         EXPECT_EQ(arriving(room.patches, shot), glm::dvec3(0));

@@ -25,7 +25,7 @@ struct LineScenery {
     std::unique_ptr<Projector> singleLines() const {
         ProjectorInput input{patches, visibility, 0, 1e-5f};
         input.singleLine = true;
-        return makeProjector("AUTO", input);
+        return makeProjector(ProjectorKind::AUTO, input);
     }
     // The lines per bundle that stand for the same: one, of this cross-section.
     double lineArea() const { return kPi * double(patches.radius) * double(patches.radius); }
@@ -83,7 +83,7 @@ TEST(SingleLines, NoLineLeavesAClosedScene) {
         const LineScenery scenery(scene);
         const auto projector = scenery.singleLines();
         uint64_t met = 0;
-        for (const Bundle& bundle : Directions("RANDOM", 9).next(20000)) {
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 9).next(20000)) {
             BundleLines lines;
             projector->project(bundle, lines);
             ASSERT_EQ(lines.sky.size(), 2 * lines.lines);
@@ -105,7 +105,7 @@ TEST(SingleLines, CrossAreasAsCroftonSays) {
     auto instanceOf = [&](uint32_t side) {
         return scenery.patches.parents[scenery.patches.parentOf[side / 2]].instance;
     };
-    for (const Bundle& bundle : Directions("RANDOM", 1).next(kLines)) {
+    for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 1).next(kLines)) {
         BundleLines lines;
         projector->project(bundle, lines);
         met += lines.lines;
@@ -141,7 +141,7 @@ TEST(SingleLines, ExchangeAsInTheLists) {
         constexpr uint32_t kLines = 40000, kBundles = 1000;
         constexpr float kPixel = 0.08f;
         const auto single = scenery.singleLines();
-        for (const Bundle& bundle : Directions("RANDOM", 2).next(kLines)) {
+        for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 2).next(kLines)) {
             BundleLines found;
             single->project(bundle, found);
             touching += double(found.touching.size());
@@ -149,7 +149,7 @@ TEST(SingleLines, ExchangeAsInTheLists) {
                 if (const int g = groupOf(e.i, e.j); g >= 0) lines[size_t(g)] += e.lines;
         }
         const auto lists = fragmentLists({scenery.patches, scenery.visibility, kPixel, 1e-5f});
-        for (const Bundle& bundle : Directions("LOW_DISCREPANCY", 2).next(kBundles)) {
+        for (const Bundle& bundle : Directions(DirectionKind::LOW_DISCREPANCY, 2).next(kBundles)) {
             BundleLines found;
             lists->project(bundle, found);
             wantedTouching += double(found.touching.size());

@@ -100,30 +100,30 @@ TEST_P(Skip, ChangesNoLight) {
 
 INSTANTIATE_TEST_SUITE_P(
     Skips, Skip,
-    testing::Values(Case{"darkness", SkippedWork::EXCHANGE_WITHOUT_LIGHT, 1e-5,
-                         [] { return roomWithBoxes(0.5f); }},
-                    Case{"reflection", SkippedWork::EXCHANGE_WITHOUT_REFLECTION, 1e-5,
-                         [] { return litRoom(0); }},
-                    Case{"geometry", SkippedWork::UNCHANGED_GEOMETRY, 1e-5},
-                    Case{"lights", SkippedWork::UNCHANGED_LIGHTS, 1e-5},
-                    Case{"facing", SkippedWork::FACING_AWAY, 1e-5},
-                    Case{"occluders", SkippedWork::OCCLUDERS, 1e-5},
-                    Case{"sheets", SkippedWork::SHEETS, 0, roomWithCarpet,
-                         [](Settings& settings) { settings.skipGeometry = 0; }},
-                    Case{"lit", SkippedWork::WHOLLY_LIT, 0},
-                    Case{"weak", SkippedWork::WEAK_SOURCES, 0},
-                    Case{"inside", SkippedWork::INSIDE_OF_SOLIDS, 0},
-                    Case{"clusters", SkippedWork::CLUSTERED_PATCHES, 0, roomWithFineBall},
-                    Case{"lamp_insides", SkippedWork::LAMP_INSIDES, 0, roomOfBulbs},
-                    Case{"gather", SkippedWork::SMOOTH_CORNERS, 0, roomOfLamps,
-                         [](Settings& settings) { settings.reconstruction = "POINT"; }},
-                    Case{"bundles", SkippedWork::REACHED_TARGET, 0, roomOfLamps,
-                         [](Settings& settings) {
-                             settings.minBundles = 32;
-                             settings.maxBundles = 512;
-                             settings.targetError = 0.05f;
-                         }},
-                    Case{"warm_start", SkippedWork::WARM_STARTS, 1e-3}),
+    testing::Values(
+        Case{"darkness", SkippedWork::EXCHANGE_WITHOUT_LIGHT, 1e-5,
+             [] { return roomWithBoxes(0.5f); }},
+        Case{"reflection", SkippedWork::EXCHANGE_WITHOUT_REFLECTION, 1e-5,
+             [] { return litRoom(0); }},
+        Case{"geometry", SkippedWork::UNCHANGED_GEOMETRY, 1e-5},
+        Case{"lights", SkippedWork::UNCHANGED_LIGHTS, 1e-5},
+        Case{"facing", SkippedWork::FACING_AWAY, 1e-5},
+        Case{"occluders", SkippedWork::OCCLUDERS, 1e-5},
+        Case{"sheets", SkippedWork::SHEETS, 0, roomWithCarpet,
+             [](Settings& settings) { settings.skipGeometry = 0; }},
+        Case{"lit", SkippedWork::WHOLLY_LIT, 0}, Case{"weak", SkippedWork::WEAK_SOURCES, 0},
+        Case{"inside", SkippedWork::INSIDE_OF_SOLIDS, 0},
+        Case{"clusters", SkippedWork::CLUSTERED_PATCHES, 0, roomWithFineBall},
+        Case{"lamp_insides", SkippedWork::LAMP_INSIDES, 0, roomOfBulbs},
+        Case{"gather", SkippedWork::SMOOTH_CORNERS, 0, roomOfLamps,
+             [](Settings& settings) { settings.reconstruction = Reconstruction::POINT; }},
+        Case{"bundles", SkippedWork::REACHED_TARGET, 0, roomOfLamps,
+             [](Settings& settings) {
+                 settings.minBundles = 32;
+                 settings.maxBundles = 512;
+                 settings.targetError = 0.05f;
+             }},
+        Case{"warm_start", SkippedWork::WARM_STARTS, 1e-3}),
     [](const testing::TestParamInfo<Case>& c) { return std::string(c.param.name); });
 
 }  // namespace

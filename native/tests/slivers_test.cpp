@@ -26,8 +26,8 @@ struct Result {
 };
 
 // A floor of 8 m under a box, lit by a lamp, all turned by a matrix or in the meshes.
-Result bakeFloor(Mesh floor, const std::string& reconstruction, const glm::dmat4& turn,
-                 bool inMeshes, int seed = 0) {
+Result bakeFloor(Mesh floor, Reconstruction reconstruction, const glm::dmat4& turn, bool inMeshes,
+                 int seed = 0) {
     Scene scene;
     for (glm::vec3& v : floor.vertices) v -= glm::vec3(4, 4, 0);
     Mesh above = box("box", {-1, -1, 1}, {1, 1, 2}, false);
@@ -54,7 +54,8 @@ Result bakeFloor(Mesh floor, const std::string& reconstruction, const glm::dmat4
 
 TEST(Slivers, CostAndChangeNothing) {
     const glm::dmat4 turn = glm::rotate(glm::dmat4(1), 0.7, glm::dvec3(0.3, 0.5, 0.8));
-    for (const char* reconstruction : {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"})
+    for (Reconstruction reconstruction :
+         {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT})
         for (bool inMeshes : {false, true}) {
             const Result wanted =
                 bakeFloor(floorWithSlivers(8, 1e-2f), reconstruction, turn, inMeshes);
@@ -67,7 +68,7 @@ TEST(Slivers, CostAndChangeNothing) {
                     square += double(glm::dot(off, off));
                     all += double(glm::dot(wanted.light[c], wanted.light[c]));
                 }
-                const std::string what = std::string(reconstruction) + ", height " +
+                const std::string what = std::string(choiceName(reconstruction)) + ", height " +
                                          std::to_string(height) + (inMeshes ? ", in mesh" : "");
                 EXPECT_LT(std::sqrt(square / all), std::max(wanted.error, 0.02)) << what;
                 EXPECT_LE(found.bundles, 2 * wanted.bundles) << what;
@@ -84,8 +85,8 @@ TEST(Slivers, SubdividedMeshesHaveNone) {
         const ConformingSubdivision cut = subdivideConforming(floorWithSlivers(8, height), 0.5f);
         std::vector<std::vector<int32_t>> faces;
         for (const auto& t : cut.triangles) faces.push_back({t[0], t[1], t[2]});
-        return bakeFloor(polygons("floor", cut.vertices, faces), "LEAST_SQUARES", glm::dmat4(1),
-                         false, seed);
+        return bakeFloor(polygons("floor", cut.vertices, faces), Reconstruction::LEAST_SQUARES,
+                         glm::dmat4(1), false, seed);
     };
     // A single bake ends after one look at the noise or two, with half as many bundles or twice.
     constexpr int kSeeds = 4;

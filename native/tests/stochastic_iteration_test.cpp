@@ -19,12 +19,12 @@ namespace {
 
 using namespace test;
 
-constexpr const char* kSolver = "STOCHASTIC_ITERATION";
+constexpr Solver kSolver = Solver::STOCHASTIC_ITERATION;
 
 void setIteration(Bake& bake, int bundleCount) {
     setQuick(bake, bundleCount);
     bake.settings.solver = kSolver;
-    bake.settings.directions = "RANDOM";
+    bake.settings.directions = DirectionKind::RANDOM;
 }
 
 // The message of the refusal, or nothing.
@@ -285,7 +285,7 @@ TEST(StochasticIterationLimit, GrowthIsThatOfTheory) {
     TransportScene ball(scene, 10, 0.02f);
     LineCounts counts(ball.patches.sideCount());
     const ProjectorInput projector{ball.patches, ball.visibility, 0.02f, 1e-5f};
-    BundleTracer tracer("AUTO", projector, "RANDOM", 1);
+    BundleTracer tracer(ProjectorKind::AUTO, projector, DirectionKind::RANDOM, 1);
     const TransportInput input{ball.patches, ball.visibility, ball.shot, ball.world, ball.exposed,
                                1e-5f,        ball.settings,   tracer,    counts};
     const std::vector<TracedBundle> traced = tracer.trace(16);

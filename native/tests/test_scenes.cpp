@@ -180,7 +180,7 @@ Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double
 }
 
 LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed,
-                      const std::string& directions, float touchDistance) {
+                      DirectionKind directions, float touchDistance) {
     FragmentLists projector(patches, pixelSize, touchDistance);
     Directions sequence(directions, seed);
     LineCounts counts(patches.sideCount());

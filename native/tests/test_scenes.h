@@ -65,7 +65,7 @@ Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double
 
 // Lines of the first `count` bundles of a sequence through the patches.
 LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed = 1,
-                      const std::string& directions = "LOW_DISCREPANCY",
+                      DirectionKind directions = DirectionKind::LOW_DISCREPANCY,
                       float touchDistance = kTouch);
 
 // Lines that the pairs of a bundle exchange.

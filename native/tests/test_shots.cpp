@@ -10,7 +10,7 @@ namespace raybundle::test {
 ShotScene::ShotScene(const Scene& scene, float patchSize)
     : scene(scene), patches(subdivide(this->scene, patchSize, 10000000)), visibility(patches) {}
 
-FirstShot ShotScene::shoot(const std::string& kind, int lines, int seed, float targetError,
+FirstShot ShotScene::shoot(FirstShotKind kind, int lines, int seed, float targetError,
                            double linesPerBundle, int bundles) const {
     Settings settings;
     settings.localRays = lines;

@@ -19,7 +19,7 @@ class ShotScene {
   public:
     explicit ShotScene(const Scene& scene, float patchSize = 10);
 
-    FirstShot shoot(const std::string& kind, int lines, int seed = 0, float targetError = 0.02f,
+    FirstShot shoot(FirstShotKind kind, int lines, int seed = 0, float targetError = 0.02f,
                     double linesPerBundle = 0, int bundles = 0) const;
 
     const Scene scene;

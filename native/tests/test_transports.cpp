@@ -18,9 +18,10 @@ TransportScene::TransportScene(const Scene& scene, float patchSize, float pixelS
     shot.emission = patches.emission;
 }
 
-std::unique_ptr<Transport> TransportScene::make(const std::string& solver, int seed) {
+std::unique_ptr<Transport> TransportScene::make(Solver solver, int seed) {
     settings.seed = seed;
-    tracer = std::make_unique<BundleTracer>("AUTO", projector, "RANDOM", uint32_t(seed));
+    tracer = std::make_unique<BundleTracer>(ProjectorKind::AUTO, projector, DirectionKind::RANDOM,
+                                            uint32_t(seed));
     return makeTransport(solver, {patches, visibility, shot, world, exposed, 1e-4f * patches.radius,
                                   settings, *tracer, counts});
 }

@@ -19,7 +19,7 @@ struct TransportScene {
     TransportScene(const Scene& scene, float patchSize, float pixelSize);
 
     // A transport from here on, with bundles and random numbers of its own.
-    std::unique_ptr<Transport> make(const std::string& solver, int seed);
+    std::unique_ptr<Transport> make(Solver solver, int seed);
 
     Patches patches;
     const Visibility visibility;

@@ -39,7 +39,7 @@ void expectLight(const Bake& bake, int32_t instance, rb_output output, double ir
         EXPECT_NEAR(double(v.x) * kPi, irradiance, tolerance * irradiance);
 }
 
-class Translucence : public ::testing::TestWithParam<const char*> {
+class Translucence : public ::testing::TestWithParam<Reconstruction> {
   protected:
     Translucence() {
         bake.settings.reconstruction = GetParam();
@@ -114,8 +114,9 @@ TEST_P(Translucence, AFloorGetsTheSunThroughASheet) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Reconstructions, Translucence,
-                         ::testing::Values("LEAST_SQUARES", "AREA_AVERAGE", "POINT"),
-                         [](const auto& one) { return std::string(one.param); });
+                         ::testing::Values(Reconstruction::LEAST_SQUARES,
+                                           Reconstruction::AREA_AVERAGE, Reconstruction::POINT),
+                         [](const auto& one) { return std::string(choiceName(one.param)); });
 
 // What goes to and fro through a sheet between mirrors of light takes a thousand passes: right, or
 // said.
@@ -170,7 +171,7 @@ TEST(TranslucenceOfMaterials, AnExtendedFirstShotGoesThroughToo) {
     Bake bake;
     bake.settings.patchSize = 0.1f;
     bake.settings.targetError = 0.005f;
-    auto meanOutside = [&](const std::string& firstShot) {
+    auto meanOutside = [&](FirstShotKind firstShot) {
         bake.settings.firstShot = firstShot;
         bake.run(scene);
         double sum = 0;
@@ -178,8 +179,8 @@ TEST(TranslucenceOfMaterials, AnExtendedFirstShotGoesThroughToo) {
             sum += double(v.x) / 24;
         return sum;
     };
-    const double gathered = meanOutside("GATHER");
-    EXPECT_NEAR(meanOutside("EXTENDED"), gathered, 0.01 * gathered);
+    const double gathered = meanOutside(FirstShotKind::GATHER);
+    EXPECT_NEAR(meanOutside(FirstShotKind::EXTENDED), gathered, 0.01 * gathered);
 }
 
 TEST(TranslucenceOfMaterials, AnImageVariesIt) {
@@ -217,8 +218,8 @@ TEST(TranslucenceOfMaterials, ItIsThatOfTheWholeSurfaceHolesIncluded) {
 TEST(TranslucenceOfMaterials, OtherSolversSayThatTheyDoNotCarryIt) {
     Bake bake;
     bake.settings.patchSize = 0.2f;
-    bake.settings.solver = "MULTIPATH";
-    bake.settings.directions = "RANDOM";
+    bake.settings.solver = Solver::MULTIPATH;
+    bake.settings.directions = DirectionKind::RANDOM;
     bake.run(paperCube(0.5f, 0.3f));
     EXPECT_NE(bake.reportJson().find("material \\\"paper\\\": MULTIPATH does not carry on"),
               std::string::npos)

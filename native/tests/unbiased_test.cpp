@@ -51,7 +51,7 @@ const Method kMethods[] = {
 };
 
 void setMethod(Bake& bake, const Method& method, float patchSize, int seed) {
-    bake.settings.directions = "RANDOM";
+    bake.settings.directions = DirectionKind::RANDOM;
     for (const auto& [name, value] : method.choices) bake.settings.set(name, value);
     bake.settings.patchSize = patchSize;
     bake.settings.linesPerBundle = method.linesPerBundle;

@@ -153,7 +153,8 @@ TEST(WorldImage, ABrightPixelIsASun) {
     lit.setWorldImage(image);
     sunny.addLight(sunLight(direction, {7, 5, 3}));
     const ShotScene one(lit, 0.25f), other(sunny, 0.25f);
-    const FirstShot found = one.shoot("GATHER", 0), exact = other.shoot("GATHER", 0);
+    const FirstShot found = one.shoot(FirstShotKind::GATHER, 0),
+                    exact = other.shoot(FirstShotKind::GATHER, 0);
     for (size_t side = 0; side < exact.irradiance.size(); ++side)
         for (int c = 0; c < 3; ++c)
             // The wall's shadow has a soft edge now, far from all receivers.
@@ -172,7 +173,7 @@ TEST(WorldImage, AnOccluderTakesItsFormFactor) {
     const glm::dvec3 canopy[4] = {
         {-0.6, -0.8, 0.7}, {0.9, -0.8, 0.7}, {0.9, 0.3, 0.7}, {-0.6, 0.3, 0.7}};
     const double exact = 2 * (kPi - polygonIrradiance({0, 0, 0}, {0, 0, 1}, canopy, 4));
-    const FirstShot shot = shots.shoot("GATHER", 0, 0, 0.002f);
+    const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
     EXPECT_NEAR(shot.irradiance[0].x, exact, kFiveErrors * exact);
     EXPECT_NEAR(shot.irradiance[1].x, 2 * kPi, 1e-3);
     EXPECT_NEAR(shot.irradiance[0].x, exact, 5 * double(shot.error[0]));
@@ -232,8 +233,8 @@ Scene houseUnder(const WorldImage& image) {
 
 TEST(WorldImage, EveryFirstShotBringsTheSame) {
     const ShotScene house(houseUnder(painted(256, 128, sunAndSky)), 0.5f);
-    const FirstShot exact = house.shoot("GATHER", 0, 0, 0.002f);
-    for (const char* kind : {"SHOOT", "EXTENDED"}) {
+    const FirstShot exact = house.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
+    for (FirstShotKind kind : {FirstShotKind::SHOOT, FirstShotKind::EXTENDED}) {
         const FirstShot shot = house.shoot(kind, 1 << 19);
         for (int c = 0; c < 3; ++c) {
             double found = 0, wanted = 0, variance = 0;
@@ -243,7 +244,8 @@ TEST(WorldImage, EveryFirstShotBringsTheSame) {
                 wanted += area * double(exact.irradiance[side][c]);
                 variance += std::pow(area * double(shot.error[side]), 2);
             }
-            EXPECT_NEAR(found, wanted, 4 * std::sqrt(variance) + 0.002 * wanted) << kind << c;
+            EXPECT_NEAR(found, wanted, 4 * std::sqrt(variance) + 0.002 * wanted)
+                << choiceName(kind) << c;
         }
         EXPECT_NEAR(shot.emitted.z, arriving(house.patches, shot).z, 1e-6 * shot.emitted.z);
     }
@@ -286,16 +288,18 @@ TEST(WorldImage, EveryTransportCarriesItsLight) {
     reference.run(scene);
     const glm::dvec3 exact = meanOf(reference, RB_OUTPUT_COMBINED);
     EXPECT_GT(meanOf(reference, RB_OUTPUT_INDIRECT).x, 0.02 * exact.x);
-    for (const char* solver : {"MULTIPATH", "STOCHASTIC_ITERATION", "RANDOM_WALK"}) {
+    for (Solver solver : {Solver::MULTIPATH, Solver::STOCHASTIC_ITERATION, Solver::RANDOM_WALK}) {
         Bake bake;
         setQuick(bake, 512);
         bake.settings.solver = solver;
-        bake.settings.directions = "RANDOM";
+        bake.settings.directions = DirectionKind::RANDOM;
         bake.run(scene);
         const glm::dvec3 found = meanOf(bake, RB_OUTPUT_COMBINED);
         // Most of the light is direct; the rest has up to 5 % of noise.
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], exact[c], 0.02 * exact[c]) << solver;
-        EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 0.02) << solver;
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(found[c], exact[c], 0.02 * exact[c]) << choiceName(solver);
+        EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 0.02)
+            << choiceName(solver);
     }
 }
 

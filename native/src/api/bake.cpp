@@ -61,7 +61,7 @@ rb_error rb_get_bake_string(rb_bake bake, const char* name, const char** value) 
     return guarded([&] {
         const HeldBake held(bake, "bake");
         need(value, "value");
-        *value = held->settings.get(nameOf(name)).c_str();
+        *value = held->settings.get(nameOf(name));
     });
 }
 

@@ -216,7 +216,7 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     }
     // Other solvers follow the lines of single patches and other first shots meet them with rays:
     // smaller ones are noisier.
-    if (settings.solver != "LINE_REUSE" || settings.firstShot != "GATHER") {
+    if (!settings.countsLines() || !settings.gathersFirstShot()) {
         trace->uncutGaps = cuts.contacts;
         return {};
     }
@@ -267,12 +267,11 @@ Bake::Exchanged Bake::exchange(const SolveInput& in, SetLights& lights, Report& 
 Transports Bake::transportsOf(const SetLights& lights, const ShownLight& shown) const {
     std::vector<TransportInput> inputs;
     for (const SetLight& light : lights)
-        inputs.push_back(
-            {trace->patches, trace->visibility, light.shot, light.worldRadiance,
-             trace->surrounding.exposed, trace->touchDistance, settings, *trace->tracer,
-             trace->counts,
-             settings.solver == "LINE_REUSE" ? &trace->solutionsOf(light.set) : nullptr,
-             &shown.sides(), &trace->clusters});
+        inputs.push_back({trace->patches, trace->visibility, light.shot, light.worldRadiance,
+                          trace->surrounding.exposed, trace->touchDistance, settings,
+                          *trace->tracer, trace->counts,
+                          settings.countsLines() ? &trace->solutionsOf(light.set) : nullptr,
+                          &shown.sides(), &trace->clusters});
     return makeTransports(settings.solver, inputs);
 }
 

@@ -37,20 +37,21 @@ void warnOfVisibility(const Scene& scene, const SetLights& lights, const Setting
                         object +
                             "it blocks the light of dim emission as it blocks that of "
                             "the world and not as it blocks that of lights");
-        if (!instance.exchanges && instance.role == RB_ROLE_BAKE && settings.solver != "LINE_REUSE")
+        if (!instance.exchanges && instance.role == RB_ROLE_BAKE &&
+            !can(settings.solver, SolverCan::LIGHT_WITHOUT_EXCHANGE))
             report.warn(WarningId::NO_EXCHANGE,
                         object + "it takes no part in the exchange of light, so that " +
-                            settings.solver + " finds no light of the world and of " +
+                            choiceName(settings.solver) + " finds no light of the world and of " +
                             "other surfaces on it; LINE_REUSE does");
     }
 }
 
 void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& report) {
-    if (settings.solver == "LINE_REUSE") return;
+    if (can(settings.solver, SolverCan::CARRY_TRANSLUCENCE)) return;
     for (const Material& material : scene.materials)
         if (material.isTranslucent())
             report.warn(WarningId::NO_TRANSLUCENCE,
-                        "material \"" + material.name + "\": " + settings.solver +
+                        "material \"" + material.name + "\": " + choiceName(settings.solver) +
                             " does not carry on the light that passes through it; "
                             "LINE_REUSE does");
 }
@@ -66,8 +67,10 @@ void warnOfAngles(const Patches& patches, const Settings& settings, Report& repo
                                               "some percent off; " +
                                               remedy + " is right");
     };
-    if (settings.firstShot != "GATHER") warn("first_shot " + settings.firstShot, "GATHER");
-    if (settings.solver != "LINE_REUSE") warn("solver " + settings.solver, "LINE_REUSE");
+    if (!settings.gathersFirstShot())
+        warn(std::string("first_shot ") + choiceName(settings.firstShot), "GATHER");
+    if (!can(settings.solver, SolverCan::CARRY_ANGLES))
+        warn(std::string("solver ") + choiceName(settings.solver), "LINE_REUSE");
 }
 
 void warnOfGaps(size_t patches, Report& report) {
@@ -83,8 +86,8 @@ void warnOfGaps(size_t patches, Report& report) {
 
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
                     const Settings& settings, Report& report) {
-    // The first has windows, the second no bundles.
-    if (settings.solver == "LINE_REUSE" || settings.solver == "RANDOM_WALK") return;
+    // Counted lines are denser where patches are small; local rays are no bundles.
+    if (settings.countsLines() || !can(settings.solver, SolverCan::TRACE_BUNDLES)) return;
     std::vector<double> area(scene.instances.size(), 0.0), count(area.size(), 0.0);
     for (const Parent& parent : patches.parents) {
         area[parent.instance] += double(parent.area());
@@ -107,7 +110,7 @@ void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize,
                     names +
                     ", whose noise may be more "
                     "than is stated: solver " +
-                    settings.solver +
+                    std::string(choiceName(settings.solver)) +
                     " has the same lines everywhere; LINE_REUSE has more where patches "
                     "are small");
 }

@@ -44,10 +44,10 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       growth(cornerGrowth(input.scene, input.tiles.patches())),
       rule(input.settings, mostBundles(patches, input.trace.density), tracer.bundleCount()),
       // Who fixes or limits the number of bundles wants what these tell.
-      castsRays(input.settings.solver == "LINE_REUSE" && input.settings.skipBundles &&
+      castsRays(input.settings.countsLines() && input.settings.skipBundles &&
                 input.settings.minBundles < input.settings.maxBundles),
       halves(lights.size()) {
-    if (input.settings.solver == "LINE_REUSE")
+    if (input.settings.countsLines())
         noisyParts.emplace(NoisyPartsInput{in.tiles, in.trace.looks, in.tiles.sum(area), in.shown,
                                            growth, overForetold, projectionsOfFaces(in.trace),
                                            in.settings.targetError});
@@ -199,7 +199,7 @@ SideNoise BundleSolve::conclude(Stop stop, Report& report) {
 double BundleSolve::errorOfWrongLines(Report& report) const {
     warnOfBrokenCycles(in.trace.tracer->cycleCount(), report);
     double share = in.trace.tracer->disorderedShare();
-    if (in.settings.smallPatches == "ROULETTE")
+    if (in.settings.smallPatches == SmallPatches::ROULETTE)
         share +=
             leakedShare(in.scene, patches, weight, in.trace.surrounding.open, tracer.openShare());
     if (!(share > 0)) return 0;

@@ -24,7 +24,7 @@ void noteSkips(const DirectLight& direct, const FirstShot& shot, Report& report)
 // The first shot of one light set; aims: shotHash. Of the last bake's it takes what still holds.
 FirstShot shootOrKeep(const StageInput& in, const FirstShotInput& input, uint64_t aims,
                       Trace::Shot& last, Report& report) {
-    const bool isGather = in.settings.firstShot == "GATHER";
+    const bool isGather = in.settings.gathersFirstShot();
     const uint64_t hash = lightHash(input.light, aims);
     if (in.settings.skipLights && isGather && last.hash == hash) {
         report.skip(SkippedWork::UNCHANGED_LIGHTS, 1);
@@ -71,7 +71,7 @@ SetLights shootSources(const StageInput& in, const ShownLight& shown,
     const Visibility& visibility = trace.visibilityOfLights();
     const uint64_t aims = shotHash(in.scene, settings, shown.sides(), !patches.scattering.empty());
     const StandIns standIns(patches, settings.skipClusters ? &shown.sides() : nullptr);
-    const bool isGather = settings.firstShot == "GATHER";
+    const bool isGather = settings.gathersFirstShot();
     SetLights lights;
     const int32_t count = int32_t(in.scene.lightSets.size());
     for (int32_t set = kNoLightSet; set < count; ++set) {
@@ -92,7 +92,7 @@ SetLights shootSources(const StageInput& in, const ShownLight& shown,
                                    &shown.sides(),
                                    &standIns};
         FirstShot shot = shootOrKeep(in, input, aims, last, report);
-        if (isGather && settings.solver == "LINE_REUSE")
+        if (isGather && settings.countsLines())
             if (const size_t spots =
                     gatherBrightSpots(in.scene, input, trace.visibility, trace.density, shot))
                 report.skip(SkippedWork::BRIGHT_SPOTS, spots);

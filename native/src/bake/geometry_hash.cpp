@@ -44,10 +44,8 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
     }
     hasher.add(settings.patchSize, settings.maxPatches, settings.refine, settings.contacts,
                settings.linesPerBundle, settings.seed, settings.planeCount, settings.planeCoherence,
-               settings.hasLineWindows());
-    for (const std::string* name : {&settings.solver, &settings.directions, &settings.projector,
-                                    &settings.smallPatches, &settings.planePlacement})
-        hasher.add(*name);
+               settings.hasLineWindows(), settings.solver, settings.directions, settings.projector,
+               settings.smallPatches, settings.planePlacement);
     return hasher.value();
 }
 

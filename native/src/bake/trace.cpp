@@ -51,7 +51,7 @@ LineDensity densityOf(const Patches& patches) {
 }  // namespace
 
 Clusters clustersOf(const Scene& scene, const Patches& patches, const Settings& settings) {
-    if (!settings.skipClusters || !settings.hasLineWindows() || settings.firstShot != "GATHER")
+    if (!settings.skipClusters || !settings.hasLineWindows() || !settings.gathersFirstShot())
         return Clusters(patches);
     return Clusters(patches, shownSides(scene, patches, gathersSparseResults(settings)));
 }
@@ -84,7 +84,7 @@ void Trace::startLines(const Settings& settings) {
     tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                             uint32_t(settings.seed), &clusters);
     // Only line reuse on exact projection sees what lies against what while it traces.
-    if (settings.solver != "LINE_REUSE" || !settings.isProjectionExact())
+    if (!settings.countsLines() || !settings.isProjectionExact())
         surrounding = surroundingsOf(settings);
 }
 
@@ -113,9 +113,9 @@ ProjectorInput Trace::projectorInput(const Settings& settings) const {
             visibility,
             density.pixelSize,
             touchDistance,
-            settings.smallPatchesKind(),
+            settings.smallPatches,
             settings.planeCount,
-            settings.planePlacementKind(),
+            settings.planePlacement,
             settings.planeCoherence != 0,
             settings.linesPerBundle == 1,
             density.windows};

@@ -18,8 +18,8 @@ void joinClusters(const Clusters& clusters, BundleLines& lines) {
 
 }  // namespace
 
-BundleTracer::BundleTracer(const std::string& projector, const ProjectorInput& input,
-                           const std::string& directions, uint32_t seed, const Clusters* clusters)
+BundleTracer::BundleTracer(ProjectorKind projector, const ProjectorInput& input,
+                           DirectionKind directions, uint32_t seed, const Clusters* clusters)
     : pixelArea(double(input.pixelSize) * double(input.pixelSize)),
       directions(directions, seed),
       clusters(clusters && !clusters->isNone() ? clusters : nullptr),
@@ -50,7 +50,7 @@ Surroundings surroundings(const ProjectorInput& input, uint32_t seed) {
     // Not by ROULETTE, which lets neighbouring patches of a surface lie against each other.
     ProjectorInput exact = input;
     exact.smallPatches = SmallPatches::CENTRE_SAMPLING;
-    BundleTracer tracer("FRAGMENT_LISTS", exact, "LOW_DISCREPANCY", seed);
+    BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS, exact, DirectionKind::LOW_DISCREPANCY, seed);
     std::vector<uint32_t> lines(input.patches.sideCount(), 0), sky(lines), touching(lines);
     for (const TracedBundle& traced : tracer.trace(kExactBundles)) {
         for (const Exchange& e : traced.lines.exchanges) {

@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "bundles/directions.h"
@@ -23,11 +22,10 @@ struct TracedBundle {
 
 class BundleTracer {
   public:
-    // projector, directions: names of their tables. clusters: of the patches, whose sides lines are
-    // to join; null: those of the patches themselves. What `input` refers to and the clusters must
-    // outlive it.
-    BundleTracer(const std::string& projector, const ProjectorInput& input,
-                 const std::string& directions, uint32_t seed, const Clusters* clusters = nullptr);
+    // clusters: of the patches, whose sides lines are to join; null: those of the patches
+    // themselves. What `input` refers to and the clusters must outlive it.
+    BundleTracer(ProjectorKind projector, const ProjectorInput& input, DirectionKind directions,
+                 uint32_t seed, const Clusters* clusters = nullptr);
 
     // Traces the next `count` bundles (even; see Directions::next) in parallel.
     std::vector<TracedBundle> trace(uint32_t count);

@@ -16,15 +16,16 @@ std::unique_ptr<DirectionSequence> adaptiveDirections(std::mt19937_64& random);
 
 namespace {
 
-struct DirectionKind {
-    const char* name;                                                     // of directionMethods()
+struct SequenceKind {
+    DirectionKind value;
     std::unique_ptr<DirectionSequence> (*make)(std::mt19937_64& random);  // `random`: of the half
 };
-constexpr DirectionKind kKinds[] = {
-    {"LOW_DISCREPANCY", lowDiscrepancyDirections},
-    {"RANDOM", randomDirections},
-    {"ADAPTIVE", adaptiveDirections},
+constexpr SequenceKind kKinds[] = {
+    {DirectionKind::LOW_DISCREPANCY, lowDiscrepancyDirections},
+    {DirectionKind::RANDOM, randomDirections},
+    {DirectionKind::ADAPTIVE, adaptiveDirections},
 };
+static_assert(hasEveryValue(kKinds));
 
 // RANDOM: uniform and independent (thesis section 4.2.1).
 class RandomDirections : public DirectionSequence {
@@ -75,16 +76,13 @@ std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64&) {
     return std::make_unique<RandomDirections>();
 }
 
-Directions::Directions(const std::string& kind, uint32_t seed, uint32_t first)
+Directions::Directions(DirectionKind kind, uint32_t seed, uint32_t first)
     : seed(seed), done(first) {
     assert(first % 2 == 0 && "two halves of equal size");
-    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
-                                  [&](const DirectionKind& k) { return kind == k.name; });
-    assert(row != std::end(kKinds) && "settings know the names");
     for (uint32_t half = 0; half < 2; ++half) {
         std::seed_seq words{seed, half};
         std::mt19937_64 random(words);
-        sequences[half] = row->make(random);
+        sequences[half] = kKinds[size_t(kind)].make(random);
     }
 }
 

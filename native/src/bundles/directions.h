@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Directions of bundles. Each kind is a DirectionSequence in a file of its own, a row of the table
-// in directions.cpp, and a row of directionMethods() (job/settings.h), which says what it can do.
+// in directions.cpp, and a row of kDirectionKinds (job/choices.h), which says what it can do.
 // What all kinds have in common (two independent halves, roll, shift) is here.
 //
 // Sources: thesis sections 4.2.1 (uniform random), 4.5 (adaptive) and 7.3.1 (quasi-Monte Carlo).
@@ -14,9 +14,9 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <random>
-#include <string>
 #include <vector>
 
+#include "job/choices.h"
 #include "sampling/mix_bits.h"
 
 namespace raybundle {
@@ -73,11 +73,10 @@ glm::dvec3 onHemisphere(double u, double v);
 // Shoemake, "Uniform Random Rotations" (Graphics Gems III, 1992).
 glm::dmat3 randomRotation(std::mt19937_64& random);
 
-// The bundles of an endless sequence given by kind (a name of directionMethods(), job/settings.h)
-// and seed.
+// The bundles of an endless sequence given by kind and seed.
 class Directions {
   public:
-    Directions(const std::string& kind, uint32_t seed, uint32_t first = 0);
+    Directions(DirectionKind kind, uint32_t seed, uint32_t first = 0);
 
     // The next `count` bundles: count is even and half of them belong to each half, those of the
     // first coming first.

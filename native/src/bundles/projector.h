@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "bundles/directions.h"
@@ -106,8 +105,8 @@ std::unique_ptr<Projector> planes(const ProjectorInput& input);
 // The projector of bundles that are one line, instead of any row.
 std::unique_ptr<Projector> singleLine(const ProjectorInput& input);
 
-// A projector by the name of its row, or that of single lines. One object per thread: it keeps its
-// memory from bundle to bundle.
-std::unique_ptr<Projector> makeProjector(const std::string& kind, const ProjectorInput& input);
+// A projector of a kind, or that of single lines. One object per thread: it keeps its memory from
+// bundle to bundle.
+std::unique_ptr<Projector> makeProjector(ProjectorKind kind, const ProjectorInput& input);
 
 }  // namespace raybundle

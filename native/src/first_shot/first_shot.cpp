@@ -1,22 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "first_shot/first_shot.h"
 
-#include <algorithm>
-#include <cassert>
-
 namespace raybundle {
 namespace {
 
 struct Kind {
-    const char* name;
+    FirstShotKind value;
     FirstShot (*shoot)(const FirstShotInput& input);
 };
 
 constexpr Kind kKinds[] = {
-    {"GATHER", gather},
-    {"SHOOT", shoot},
-    {"EXTENDED", extendedFirstShot},
+    {FirstShotKind::GATHER, gather},
+    {FirstShotKind::SHOOT, shoot},
+    {FirstShotKind::EXTENDED, extendedFirstShot},
 };
+static_assert(hasEveryValue(kKinds));
 
 }  // namespace
 
@@ -27,11 +25,8 @@ glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t 
                       0.0f, 1.0f);
 }
 
-FirstShot firstShot(const std::string& kind, const FirstShotInput& input) {
-    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
-                                  [&](const Kind& k) { return kind == k.name; });
-    assert(row != std::end(kKinds) && "settings know the names");
-    return row->shoot(input);
+FirstShot firstShot(FirstShotKind kind, const FirstShotInput& input) {
+    return kKinds[size_t(kind)].shoot(input);
 }
 
 }  // namespace raybundle

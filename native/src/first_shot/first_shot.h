@@ -86,7 +86,7 @@ glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t 
 // that gather, for themselves or for others; the patches of a cut one stand beside each other.
 std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns);
 
-// A first shot by the name of its row.
-FirstShot firstShot(const std::string& kind, const FirstShotInput& input);
+// A first shot of a kind.
+FirstShot firstShot(FirstShotKind kind, const FirstShotInput& input);
 
 }  // namespace raybundle

@@ -1,106 +1,99 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "job/combination.h"
 
-#include <algorithm>
 #include <string>
-#include <vector>
 
 #include "job/error.h"
 
 namespace raybundle {
 namespace {
 
-using Names = std::vector<std::string>;
-
-bool contains(const Names& names, const std::string& name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
+bool accepts(const SolverRow& solver, const DirectionRow& directions) {
+    return (directions.isIndependent || can(solver.value, SolverCan::USE_DEPENDENT_DIRECTIONS)) &&
+           (!directions.isWeighted || can(solver.value, SolverCan::USE_WEIGHTED_DIRECTIONS));
 }
 
-// What a solver works with besides every first shot.
-struct Solver {
-    const char* name;
-    bool needsIndependence, needsEqualWeights;  // of directions
-    const char* whyDirections;
-    Names projectors;
-    const char* whyProjectors;
-};
+bool accepts(const SolverRow& solver, const ProjectorRow& projector) {
+    if (!can(solver.value, SolverCan::TRACE_BUNDLES)) return projector.isAutomatic;
+    return !projector.isByChance || can(solver.value, SolverCan::USE_CHANCE_EXCHANGES);
+}
 
-const Names kAllProjectors = {"AUTO",           "FRAGMENT_LISTS", "PAINTER",
-                              "PAINTER_NEWELL", "PLANE",          "PLANES"};
-const Names kWholeLines = {"AUTO", "FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL"};
-
-const Solver kSolvers[] = {
-    {"LINE_REUSE", false, true, "it moves no power while it traces, which directions could follow",
-     kAllProjectors, ""},
-    {"MULTIPATH", true, false,
-     "light goes on from one bundle to the next, so that their directions must be independent",
-     kAllProjectors, ""},
-    {"STOCHASTIC_ITERATION", true, true,
-     "light goes on from one bundle to the next whole, so that their directions must be "
-     "independent and of equal weight",
-     kWholeLines,
-     "exchanges found with a small probability have a weight without bound, with which the "
-     "iteration does not converge"},
-    {"RANDOM_WALK",
-     true,
-     true,
-     "it walks along random local rays and has no bundles",
-     {"AUTO"},
-     "it walks along local rays and has no bundles to project"},
-};
-
-std::string join(const Names& names) {
+// What is to be chosen instead: the setting and the names of the rows that will do.
+template <class Row, size_t count, class WillDo>
+std::string remedy(const char* setting, const Row (&rows)[count], const WillDo& willDo) {
     std::string text;
-    for (const std::string& name : names) text += (text.empty() ? "" : " or ") + name;
-    return text;
+    for (const Row& row : rows)
+        if (willDo(row)) text += (text.empty() ? "" : " or ") + std::string(row.name);
+    return std::string(setting) + " " + text;
+}
+
+std::string solversThatCan(SolverCan::Ability ability) {
+    return remedy("solver", kSolvers,
+                  [&](const SolverRow& row) { return can(row.value, ability); });
+}
+
+std::string smallPatchesWithoutPixels() {
+    return remedy("small_patches", kSmallPatches,
+                  [](const SmallPatchesRow& row) { return !row.needsPixels; });
 }
 
 [[noreturn]] void refuse(const std::string& what, const std::string& why,
-                         const std::string& remedy) {
-    throw invalidArgument(what + ": " + why + "; choose " + remedy);
+                         const std::string& instead) {
+    throw invalidArgument(what + ": " + why + "; choose " + instead);
+}
+
+void checkDirections(const Settings& settings) {
+    const SolverRow& solver = rowOf(settings.solver);
+    const DirectionRow& directions = rowOf(settings.directions);
+    if (!accepts(solver, directions))
+        refuse(std::string("solver ") + solver.name + " does not work with directions " +
+                   directions.name,
+               solver.whyDirections, remedy("directions", kDirectionKinds, [&](const auto& row) {
+                   return accepts(solver, row);
+               }));
+    if (settings.thesisLiteral && directions.isWeighted)
+        refuse(std::string("thesis_literal does not work with directions ") + directions.name,
+               "the pseudo-code of the thesis knows no weights",
+               remedy("directions", kDirectionKinds,
+                      [&](const auto& row) { return accepts(solver, row) && !row.isWeighted; }));
+}
+
+void checkProjector(const Settings& settings) {
+    const SolverRow& solver = rowOf(settings.solver);
+    const ProjectorRow& projector = rowOf(settings.projector);
+    const SmallPatchesRow& smallPatches = rowOf(settings.smallPatches);
+    if (!accepts(solver, projector))
+        refuse(std::string("solver ") + solver.name + " does not work with projector " +
+                   projector.name,
+               solver.whyProjectors, remedy("projector", kProjectorKinds, [&](const auto& row) {
+                   return accepts(solver, row);
+               }));
+    if (!can(settings.solver, SolverCan::TRACE_BUNDLES) && smallPatches.needsPixels)
+        refuse(std::string("solver ") + solver.name + " does not work with small_patches " +
+                   smallPatches.name,
+               "local rays have no pixels", smallPatchesWithoutPixels());
+    if (settings.linesPerBundle == 1 && (smallPatches.needsPixels || !projector.isAutomatic))
+        refuse(std::string("lines_per_bundle 1 does not work with projector ") + projector.name +
+                   " and small_patches " + smallPatches.name,
+               "single lines are traced and not projected",
+               remedy("projector", kProjectorKinds,
+                      [](const ProjectorRow& row) { return row.isAutomatic; }) +
+                   " and " + smallPatchesWithoutPixels());
 }
 
 }  // namespace
 
 void checkCombination(const Settings& settings, size_t lightSetCount) {
-    const Solver& solver =
-        *std::find_if(std::begin(kSolvers), std::end(kSolvers),
-                      [&](const Solver& s) { return settings.solver == s.name; });
-    Names directions, equallyWeighted;
-    for (const DirectionMethod& method : directionMethods())
-        if ((method.isIndependent || !solver.needsIndependence) &&
-            (!method.isWeighted || !solver.needsEqualWeights)) {
-            directions.push_back(method.name);
-            if (!method.isWeighted) equallyWeighted.push_back(method.name);
-        }
-    if (settings.thesisLiteral && contains(directions, settings.directions) &&
-        !contains(equallyWeighted, settings.directions))
-        refuse("thesis_literal does not work with directions " + settings.directions,
-               "the pseudo-code of the thesis knows no weights",
-               "directions " + join(equallyWeighted));
-    if (!contains(directions, settings.directions))
-        refuse(
-            "solver " + settings.solver + " does not work with directions " + settings.directions,
-            solver.whyDirections, "directions " + join(directions));
-    if (!contains(solver.projectors, settings.projector))
-        refuse("solver " + settings.solver + " does not work with projector " + settings.projector,
-               solver.whyProjectors, "projector " + join(solver.projectors));
-    const bool isRoulette = settings.smallPatches == "ROULETTE";
-    if (settings.solver == "RANDOM_WALK" && isRoulette)
-        refuse("solver RANDOM_WALK does not work with small_patches ROULETTE",
-               "local rays have no pixels", "small_patches CENTRE_SAMPLING");
-    if (settings.linesPerBundle == 1 && (isRoulette || settings.projector != "AUTO"))
-        refuse("lines_per_bundle 1 does not work with projector " + settings.projector +
-                   " and small_patches " + settings.smallPatches,
-               "single lines are traced and not projected",
-               "projector AUTO and small_patches CENTRE_SAMPLING");
-    if (settings.thesisLiteral && settings.solver != "MULTIPATH")
-        refuse("thesis_literal does not work with solver " + settings.solver,
-               "it is a variant of one method", "solver MULTIPATH");
-    if (lightSetCount > 0 && settings.solver != "LINE_REUSE")
-        refuse("solver " + settings.solver + " does not work with light sets",
+    const std::string solver = choiceName(settings.solver);
+    checkDirections(settings);
+    checkProjector(settings);
+    if (settings.thesisLiteral && !can(settings.solver, SolverCan::FOLLOW_THE_THESIS))
+        refuse("thesis_literal does not work with solver " + solver,
+               "it is a variant of one method", solversThatCan(SolverCan::FOLLOW_THE_THESIS));
+    if (lightSetCount > 0 && !can(settings.solver, SolverCan::CARRY_LIGHT_SETS))
+        refuse("solver " + solver + " does not work with light sets",
                "it moves the light of all sets while it traces and cannot tell them apart",
-               "solver LINE_REUSE");
+               solversThatCan(SolverCan::CARRY_LIGHT_SETS));
 }
 
 }  // namespace raybundle

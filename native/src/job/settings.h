@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <vector>
 
+#include "job/choices.h"
 #include "job/skips.h"
 
 namespace raybundle {
@@ -16,69 +16,60 @@ constexpr size_t kMostPatches = size_t(1) << 23;
 // be counted.
 constexpr int kMostWindowBundles = 1 << 16;
 
-enum class SmallPatches { CENTRE_SAMPLING, ROULETTE };
-enum class PlanePlacement { STRATIFIED, SYSTEMATIC, CLOSE_DISTANCE };
-
-// What methods can be combined with a sequence of directions (bundles/directions.h) follows from
-// this.
-struct DirectionMethod {
-    const char* name;    // a value of Settings::directions
-    bool isIndependent;  // each direction is independent of those before
-    bool isWeighted;     // directions have weights other than 1
-};
-const std::vector<DirectionMethod>& directionMethods();
-
-// Settings of a bake and, in this one place, their defaults. Settable by name (see raybundle.h).
+// Settings of a bake and, in this one place, their defaults. What each one means, its name in the C
+// interface, its range and unit are in job/setting_table.h; an int of 0 or 1 is a switch.
 struct Settings : Skips {
-    float targetError = 0.02f;  // relative noise at which bundles stop
-    float patchSize = 0;        // metres; 0 = automatic
+    float targetError = 0.02f;
+    float patchSize = 0;
     int maxPatches = 100000;
-    int refine = 0;    // 1: patches smaller than patchSize where that pays
-    int contacts = 1;  // 1: patches smaller than patchSize beside narrow gaps
+    int refine = 0;
+    int contacts = 1;
     int minBundles = 64;
     int maxBundles = kMostWindowBundles;
-    int linesPerBundle = 0;    // 0 = automatic
-    float memoryLimit = 4096;  // of the exchanges, MB
+    int linesPerBundle = 0;
+    float memoryLimit = 4096;
     int seed = 0;
-    int threads = 0;                // 0 = all
-    float regularization = 0.005f;  // of the reconstruction
-    std::string solver = "LINE_REUSE";
-    std::string firstShot = "GATHER";
-    std::string directions = "LOW_DISCREPANCY";
-    std::string projector = "AUTO";
-    std::string smallPatches = "CENTRE_SAMPLING";
-    std::string reconstruction = "LEAST_SQUARES";
-    int finalGather = 1;  // of POINT and sparse results; 0: other surfaces' light is interpolated
-    int planeCount = 4;   // of the projector PLANES
-    std::string planePlacement = "SYSTEMATIC";
-    int planeCoherence = 1;               // 0: makes the planes' depth buffers one by one
-    int localRays = 0;                    // of a first shot that shoots; 0 = to targetError
-    std::string estimator = "COLLISION";  // of RANDOM_WALK
-    int thesisLiteral = 0;  // 1: MULTIPATH as the thesis' pseudo-code says, for comparison
+    int threads = 0;
+    float regularization = 0.005f;
+    Solver solver = Solver::LINE_REUSE;
+    FirstShotKind firstShot = FirstShotKind::GATHER;
+    DirectionKind directions = DirectionKind::LOW_DISCREPANCY;
+    ProjectorKind projector = ProjectorKind::AUTO;
+    SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING;
+    Reconstruction reconstruction = Reconstruction::LEAST_SQUARES;
+    int finalGather = 1;
+    int planeCount = 4;
+    PlanePlacement planePlacement = PlanePlacement::SYSTEMATIC;
+    int planeCoherence = 1;
+    int localRays = 0;
+    Estimator estimator = Estimator::COLLISION;
+    int thesisLiteral = 0;
 
-    // Throw Error(INVALID_ARGUMENT) for unknown names, other types, and values out of range.
+    // By the names of the table. Throw Error(INVALID_ARGUMENT) for unknown names, other types, and
+    // values out of range. Choices are set and read by the names of their values, which are in
+    // static memory.
     void set(const std::string& name, int value);
     void set(const std::string& name, float value);
     void set(const std::string& name, const std::string& value);
     void get(const std::string& name, int& value) const;
     void get(const std::string& name, float& value) const;
-    const std::string& get(const std::string& name) const;
+    const char* get(const std::string& name) const;
 
-    SmallPatches smallPatchesKind() const {
-        return smallPatches == "ROULETTE" ? SmallPatches::ROULETTE : SmallPatches::CENTRE_SAMPLING;
-    }
-    PlanePlacement planePlacementKind() const;
+    // Whether the solver keeps the lines of all bundles as counts (SolverCan::COUNT_LINES).
+    bool countsLines() const { return can(solver, SolverCan::COUNT_LINES); }
+    // Whether the sides gather the light of the sources, rather than being met by rays from them.
+    bool gathersFirstShot() const { return rowOf(firstShot).isGathered; }
     // Whether lines may be denser where patches are small.
     bool hasLineWindows() const {
-        return solver == "LINE_REUSE" && isProjectionExact() && linesPerBundle == 0 &&
+        return countsLines() && isProjectionExact() && linesPerBundle == 0 &&
                maxBundles <= kMostWindowBundles;
     }
     // Whether each bundle's direction is independent of those before.
-    bool hasIndependentDirections() const;
+    bool hasIndependentDirections() const { return rowOf(directions).isIndependent; }
     // Whether the projector sees all surfaces along a line.
     bool isProjectionExact() const {
-        return (projector == "AUTO" || projector == "FRAGMENT_LISTS") &&
-               smallPatches == "CENTRE_SAMPLING" && linesPerBundle != 1;
+        return rowOf(projector).isExact && smallPatches == SmallPatches::CENTRE_SAMPLING &&
+               linesPerBundle != 1;
     }
 };
 

@@ -47,15 +47,15 @@ void shareErrors(std::vector<CornerReceiver>& corners, size_t first, const Smoot
 }  // namespace
 
 bool gathersSparseResults(const Settings& settings) {
-    return settings.reconstruction != "AREA_AVERAGE" && settings.finalGather &&
-           settings.solver == "LINE_REUSE" && settings.firstShot == "GATHER";
+    return settings.reconstruction != Reconstruction::AREA_AVERAGE && settings.finalGather &&
+           settings.countsLines() && settings.gathersFirstShot();
 }
 
 std::vector<bool> gatheringInstances(const Scene& scene, const Settings& settings) {
     std::vector<bool> gathers;
     for (const Instance& instance : scene.instances)
         gathers.push_back(instance.role == RB_ROLE_BAKE &&
-                          (settings.reconstruction == "POINT" ||
+                          (settings.reconstruction == Reconstruction::POINT ||
                            (instance.hasSparseResults && gathersSparseResults(settings))));
     return gathers;
 }

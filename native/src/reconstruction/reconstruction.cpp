@@ -136,7 +136,7 @@ LeastSquaresFit byAreaAverage(const Patches& patches, const InstanceSide& surfac
 
 // A reconstruction. What POINT's corners gather is put in the place of what it fits.
 struct Kind {
-    const char* name;
+    Reconstruction value;
     // From fields per side to fields per node.
     LeastSquaresFit (*fit)(const Patches& patches, const InstanceSide& surface,
                            const std::vector<float>& exposed, const Settings& settings,
@@ -145,24 +145,19 @@ struct Kind {
 };
 
 constexpr Kind kKinds[] = {
-    {"LEAST_SQUARES", byLeastSquares, true},
-    {"AREA_AVERAGE", byAreaAverage, false},
-    {"POINT", byLeastSquares, false},
+    {Reconstruction::LEAST_SQUARES, byLeastSquares, true},
+    {Reconstruction::AREA_AVERAGE, byAreaAverage, false},
+    {Reconstruction::POINT, byLeastSquares, false},
 };
 
-const Kind& kindOf(const std::string& name) {
-    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
-                                  [&](const Kind& kind) { return name == kind.name; });
-    assert(row != std::end(kKinds) && "settings know the names");
-    return *row;
-}
+static_assert(hasEveryValue(kKinds));
 
 // Reconstructs the instances, each by itself.
-class Reconstruction {
+class InstanceReconstruction {
   public:
-    Reconstruction(const ReconstructionInput& input, const Progress& progress)
+    InstanceReconstruction(const ReconstructionInput& input, const Progress& progress)
         : input(input),
-          kind(kindOf(input.settings.reconstruction)),
+          kind(kKinds[size_t(input.settings.reconstruction)]),
           ranges(instanceRanges(input.scene, input.patches)),
           outside(exposedOutside(input.patches, input.visibility, input.exposed)),
           gathers(gatheringInstances(input.scene, input.settings)),
@@ -343,7 +338,7 @@ std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& pat
 
 std::vector<InstanceLight> reconstruct(const ReconstructionInput& input, const Progress& progress,
                                        Report& report) {
-    Reconstruction reconstruction(input, progress);
+    InstanceReconstruction reconstruction(input, progress);
     const size_t count = input.scene.instances.size();
     std::vector<InstanceLight> result(count);
     report.objects.resize(count);

@@ -88,9 +88,8 @@ class Multipath : public Transport {
         : input(input),
           first(handOver(input.patches, input.shot, input.exposed)),
           halves{Estimate(input.patches.sideCount()), Estimate(input.patches.sideCount())} {
-        const std::string& projector = input.settings.projector;
-        const bool isWeighted = input.settings.directions == "ADAPTIVE" || projector == "PLANE" ||
-                                projector == "PLANES";
+        const bool isWeighted = rowOf(input.settings.directions).isWeighted ||
+                                rowOf(input.settings.projector).isByChance;
         const float share = isWeighted ? kWeightedShare : 1;
         const double s2 = input.tracer.pixelArea;
         const size_t n = input.patches.sideCount();

@@ -34,19 +34,11 @@ uint64_t linesPerBundle(const TransportInput& input) {
     return std::max<uint64_t>(1, uint64_t(std::llround(across / input.tracer.pixelArea)));
 }
 
-enum class Estimator { COLLISION, SURVIVAL, ABSORPTION };
-
-Estimator estimatorOf(const Settings& settings) {
-    if (settings.estimator == "SURVIVAL") return Estimator::SURVIVAL;
-    if (settings.estimator == "ABSORPTION") return Estimator::ABSORPTION;
-    return Estimator::COLLISION;
-}
-
 class RandomWalk : public LocalRayTransport {
   public:
     explicit RandomWalk(const TransportInput& input)
         : LocalRayTransport(input, linesPerBundle(input), kWalksPerBatch),
-          estimator(estimatorOf(input.settings)) {}
+          estimator(input.settings.estimator) {}
 
   private:
     void sample(uint32_t count, std::mt19937_64& random, RayLog& log) const override {

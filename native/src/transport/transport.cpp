@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/transport.h"
 
-#include <algorithm>
 #include <cassert>
 
 #include "patches/clusters.h"
@@ -10,16 +9,17 @@ namespace raybundle {
 namespace {
 
 struct Kind {
-    const char* name;
+    Solver value;
     std::unique_ptr<Transport> (*make)(const TransportInput& input);
 };
 
 constexpr Kind kKinds[] = {
-    {"LINE_REUSE", lineReuse},
-    {"MULTIPATH", multipath},
-    {"STOCHASTIC_ITERATION", stochasticIteration},
-    {"RANDOM_WALK", randomWalk},
+    {Solver::LINE_REUSE, lineReuse},
+    {Solver::MULTIPATH, multipath},
+    {Solver::STOCHASTIC_ITERATION, stochasticIteration},
+    {Solver::RANDOM_WALK, randomWalk},
 };
+static_assert(hasEveryValue(kKinds));
 
 }  // namespace
 
@@ -40,24 +40,21 @@ HandOver handOver(const Patches& patches, const FirstShot& shot,
     return light;
 }
 
-std::unique_ptr<Transport> makeTransport(const std::string& kind, const TransportInput& input) {
-    const auto row = std::find_if(std::begin(kKinds), std::end(kKinds),
-                                  [&](const Kind& k) { return kind == k.name; });
-    assert(row != std::end(kKinds) && "settings know the names");
-    return row->make(input);
+std::unique_ptr<Transport> makeTransport(Solver solver, const TransportInput& input) {
+    return kKinds[size_t(solver)].make(input);
 }
 
-Transports makeTransports(const std::string& kind, const std::vector<TransportInput>& inputs) {
+Transports makeTransports(Solver solver, const std::vector<TransportInput>& inputs) {
     if (inputs.front().clusters && !inputs.front().clusters->isNone()) {
-        assert(kind == "LINE_REUSE" && "the settings have clusters for no other");
+        assert(solver == Solver::LINE_REUSE && "the settings have clusters for no other");
         return lineReuseOfClusters(inputs);
     }
     if (inputs.size() > 1) {
-        assert(kind == "LINE_REUSE" && "checkCombination refuses light sets for others");
+        assert(solver == Solver::LINE_REUSE && "checkCombination refuses light sets for others");
         return lineReuseOfMany(inputs);
     }
     Transports transports;
-    transports.push_back(makeTransport(kind, inputs.front()));
+    transports.push_back(makeTransport(solver, inputs.front()));
     return transports;
 }
 

@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "bundles/bundle_tracer.h"
@@ -163,12 +162,11 @@ std::unique_ptr<Transport> multipath(const TransportInput& input);
 std::unique_ptr<Transport> stochasticIteration(const TransportInput& input);
 std::unique_ptr<Transport> randomWalk(const TransportInput& input);
 
-// A transport by the name of its row. Throws Error(INVALID_ARGUMENT) if it would not converge on
-// this scene.
-std::unique_ptr<Transport> makeTransport(const std::string& kind, const TransportInput& input);
+// The transport of a solver. Throws Error(INVALID_ARGUMENT) if it would not converge on this scene.
+std::unique_ptr<Transport> makeTransport(Solver solver, const TransportInput& input);
 
 // The same for several lights on the same lines; the first advances all. More than one is for
 // LINE_REUSE alone: no other transport sends two lights along the lines of one trace.
-Transports makeTransports(const std::string& kind, const std::vector<TransportInput>& inputs);
+Transports makeTransports(Solver solver, const std::vector<TransportInput>& inputs);
 
 }  // namespace raybundle

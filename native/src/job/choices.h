@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// What the settings of a bake choose from. Each choice is an enum and one table, whose row for each
+// value has its name in the C interface, a line of help, and what the value can do. Other code asks
+// the enum or the table; names are for callers, messages and reports alone.
+//
+// The rows stand in the order of the enum, and the first value is the default. Blender files store
+// the place of a value in the add-on's list, which has the same order: new values go to the end.
+#pragma once
+
+#include <cstddef>
+#include <iterator>
+
+namespace raybundle {
+
+// --------------------------------------------------------------------------------------------
+// Solver: how light is passed on between surfaces
+// --------------------------------------------------------------------------------------------
+
+enum class Solver { LINE_REUSE, MULTIPATH, STOCHASTIC_ITERATION, RANDOM_WALK };
+
+// The bits of SolverRow::abilities.
+struct SolverCan {
+    enum Ability : unsigned {
+        // It sends light along bundles of lines; without this it follows local rays, which have no
+        // directions to choose, no projector and no pixels.
+        TRACE_BUNDLES = 1 << 0,
+        // Each direction may depend on those before, as in a low-discrepancy sequence.
+        USE_DEPENDENT_DIRECTIONS = 1 << 1,
+        // Directions may have weights other than 1.
+        USE_WEIGHTED_DIRECTIONS = 1 << 2,
+        // Exchanges may be found by chance only and then stand for several lines.
+        USE_CHANCE_EXCHANGES = 1 << 3,
+        // It keeps the lines of all bundles as counts and solves on these. Lines may then be denser
+        // where patches are small, patches may be cut or clustered as their light asks for, and the
+        // next bake of the same geometry has new light without new lines.
+        COUNT_LINES = 1 << 4,
+        // It keeps the light of several light sets apart.
+        CARRY_LIGHT_SETS = 1 << 5,
+        // It knows at which angles light arrives and leaves, as needed for gloss and for all other
+        // surfaces whose reflectance depends on the angle.
+        CARRY_ANGLES = 1 << 6,
+        // It carries on the light that passes through translucent surfaces.
+        CARRY_TRANSLUCENCE = 1 << 7,
+        // It finds the light of the world and of other surfaces on objects that take no part in the
+        // exchange of light.
+        LIGHT_WITHOUT_EXCHANGE = 1 << 8,
+        // It has a variant that follows the pseudo-code of the thesis (thesis_literal).
+        FOLLOW_THE_THESIS = 1 << 9,
+    };
+};
+
+struct SolverRow {
+    Solver value;
+    const char* name;
+    const char* help;
+    const char* whyDirections;  // why it refuses the directions that it cannot use
+    const char* whyProjectors;  // why it refuses the projectors that it cannot use
+    unsigned abilities;         // bits of SolverCan
+};
+
+inline constexpr SolverRow kSolvers[] = {
+    {Solver::LINE_REUSE, "LINE_REUSE",
+     "Keep all lines as a sparse matrix and solve on it to convergence",
+     "it moves no power while it traces, which directions could follow", "",
+     SolverCan::TRACE_BUNDLES | SolverCan::USE_DEPENDENT_DIRECTIONS |
+         SolverCan::USE_CHANCE_EXCHANGES | SolverCan::COUNT_LINES | SolverCan::CARRY_LIGHT_SETS |
+         SolverCan::CARRY_ANGLES | SolverCan::CARRY_TRANSLUCENCE |
+         SolverCan::LIGHT_WITHOUT_EXCHANGE},
+    {Solver::MULTIPATH, "MULTIPATH",
+     "Each bundle passes on a part of the light that is still to be distributed. Two chains, each "
+     "of half of the bundles, tell the noise",
+     "light goes on from one bundle to the next, so that their directions must be independent", "",
+     SolverCan::TRACE_BUNDLES | SolverCan::USE_WEIGHTED_DIRECTIONS |
+         SolverCan::USE_CHANCE_EXCHANGES | SolverCan::FOLLOW_THE_THESIS},
+    {Solver::STOCHASTIC_ITERATION, "STOCHASTIC_ITERATION",
+     "Each bundle reflects all the light that the one before brought; the result is the mean. Two "
+     "chains, each of half of the bundles, tell the noise",
+     "light goes on from one bundle to the next whole, so that their directions must be "
+     "independent and of equal weight",
+     "exchanges found with a small probability have a weight without bound, with which the "
+     "iteration does not converge",
+     SolverCan::TRACE_BUNDLES},
+    {Solver::RANDOM_WALK, "RANDOM_WALK",
+     "Light walks along local rays from surface to surface; there are no bundles",
+     "it walks along random local rays and has no bundles",
+     "it walks along local rays and has no bundles to project", 0},
+};
+
+// --------------------------------------------------------------------------------------------
+// First shot: how the light of the sources is distributed before any bundle
+// --------------------------------------------------------------------------------------------
+
+enum class FirstShotKind { GATHER, SHOOT, EXTENDED };
+
+struct FirstShotRow {
+    FirstShotKind value;
+    const char* name;
+    const char* help;
+    // Each side gathers its light by itself, at the angles at which it arrives, and the light of
+    // each source can be told apart; if not, rays from the sources bring it.
+    bool isGathered;
+};
+
+inline constexpr FirstShotRow kFirstShots[] = {
+    // value, name, help, gathered
+    {FirstShotKind::GATHER, "GATHER", "Shadow rays from the receivers to the lights", true},
+    {FirstShotKind::SHOOT, "SHOOT", "Rays from the lights to the surfaces that they meet first",
+     false},
+    {FirstShotKind::EXTENDED, "EXTENDED",
+     "Shoot, and go on from the surfaces that became bright until light is everywhere", false},
+};
+
+// --------------------------------------------------------------------------------------------
+// Directions: how the directions of the bundles are chosen (bundles/directions.h)
+// --------------------------------------------------------------------------------------------
+
+enum class DirectionKind { LOW_DISCREPANCY, RANDOM, ADAPTIVE };
+
+struct DirectionRow {
+    DirectionKind value;
+    const char* name;
+    const char* help;
+    bool isIndependent;  // each direction is independent of those before
+    bool isWeighted;     // directions have weights other than 1
+};
+
+inline constexpr DirectionRow kDirectionKinds[] = {
+    // value, name, help, independent, weighted
+    {DirectionKind::LOW_DISCREPANCY, "LOW_DISCREPANCY", "Directions spread evenly: the least noise",
+     false, false},
+    {DirectionKind::RANDOM, "RANDOM", "Independent uniform directions", true, false},
+    {DirectionKind::ADAPTIVE, "ADAPTIVE",
+     "Independent directions, more of them where more light passes", true, true},
+};
+
+// --------------------------------------------------------------------------------------------
+// Projector: how the lines of a bundle find the surfaces that they meet (bundles/projector.h)
+// --------------------------------------------------------------------------------------------
+
+enum class ProjectorKind { AUTO, FRAGMENT_LISTS, PAINTER, PAINTER_NEWELL, PLANE, PLANES };
+
+struct ProjectorRow {
+    ProjectorKind value;
+    const char* name;
+    const char* help;
+    bool isAutomatic;  // leaves the choice to the bake, which may need no projector
+    bool isExact;      // sees all surfaces along a line in their order
+    bool isByChance;   // finds an exchange with some probability, and has it stand for several
+};
+
+inline constexpr ProjectorRow kProjectorKinds[] = {
+    // value, name, help, automatic, exact, by chance
+    {ProjectorKind::AUTO, "AUTO", "The fastest exact projector", true, true, false},
+    {ProjectorKind::FRAGMENT_LISTS, "FRAGMENT_LISTS",
+     "Exact lists of fragments per pixel, ordered by depth", false, true, false},
+    {ProjectorKind::PAINTER, "PAINTER",
+     "Faces in the order of their centres: wrong where they overlap in depth", false, false, false},
+    {ProjectorKind::PAINTER_NEWELL, "PAINTER_NEWELL",
+     "Faces in an order that Newell's tests have proved; cycles are broken and counted", false,
+     false, false},
+    {ProjectorKind::PLANE, "PLANE",
+     "Two depth buffers, one on each side of a random plane per direction", false, false, true},
+    {ProjectorKind::PLANES, "PLANES",
+     "Two depth buffers on the sides of each of several planes per direction", false, false, true},
+};
+
+// --------------------------------------------------------------------------------------------
+// Small patches: how patches smaller than a pixel are met
+// --------------------------------------------------------------------------------------------
+
+enum class SmallPatches { CENTRE_SAMPLING, ROULETTE };
+
+struct SmallPatchesRow {
+    SmallPatches value;
+    const char* name;
+    const char* help;
+    bool needsPixels;  // is no rule for single lines and local rays
+};
+
+inline constexpr SmallPatchesRow kSmallPatches[] = {
+    // value, name, help, needs pixels
+    {SmallPatches::CENTRE_SAMPLING, "CENTRE_SAMPLING",
+     "A line meets what covers the pixel's centre: unbiased for patches of any size", false},
+    {SmallPatches::ROULETTE, "ROULETTE",
+     "A patch fills whole pixels; if it is smaller than a pixel, with a probability of its area",
+     true},
+};
+
+// --------------------------------------------------------------------------------------------
+// Choices of which only the name and the help are asked for
+// --------------------------------------------------------------------------------------------
+
+template <class Choice>
+struct NameRow {
+    Choice value;
+    const char* name;
+    const char* help;
+};
+
+// How light on patches becomes light at vertices (reconstruction/reconstruction.h).
+enum class Reconstruction { LEAST_SQUARES, AREA_AVERAGE, POINT };
+
+inline constexpr NameRow<Reconstruction> kReconstructions[] = {
+    {Reconstruction::LEAST_SQUARES, "LEAST_SQUARES",
+     "Vertex values whose interpolation over the faces is nearest to the light on the surface"},
+    {Reconstruction::AREA_AVERAGE, "AREA_AVERAGE",
+     "The mean of the light on the faces around each vertex: never too bright or too dark, but "
+     "blurred"},
+    {Reconstruction::POINT, "POINT", "The light at the vertices themselves, as Cycles bakes it"},
+};
+
+// Where the projector PLANES puts its planes (bundles/planes.h).
+enum class PlanePlacement { SYSTEMATIC, STRATIFIED, CLOSE_DISTANCE };
+
+inline constexpr NameRow<PlanePlacement> kPlanePlacements[] = {
+    {PlanePlacement::SYSTEMATIC, "SYSTEMATIC", "At equal distances, all moved by one random shift"},
+    {PlanePlacement::STRATIFIED, "STRATIFIED", "One at a random place of each of equal intervals"},
+    {PlanePlacement::CLOSE_DISTANCE, "CLOSE_DISTANCE",
+     "Some of the planes near surfaces, so that they part what lies close together"},
+};
+
+// What a walk of the solver RANDOM_WALK counts as light (transport/random_walk.cpp).
+enum class Estimator { COLLISION, SURVIVAL, ABSORPTION };
+
+inline constexpr NameRow<Estimator> kEstimators[] = {
+    {Estimator::COLLISION, "COLLISION",
+     "A walk counts at every surface that it meets: the least noise"},
+    {Estimator::SURVIVAL, "SURVIVAL", "A walk counts where it goes on"},
+    {Estimator::ABSORPTION, "ABSORPTION", "A walk counts where it ends"},
+};
+
+// --------------------------------------------------------------------------------------------
+// Looking a value up
+// --------------------------------------------------------------------------------------------
+
+// The table of a choice; the argument only says which.
+constexpr const auto& rowsOf(Solver) { return kSolvers; }
+constexpr const auto& rowsOf(FirstShotKind) { return kFirstShots; }
+constexpr const auto& rowsOf(DirectionKind) { return kDirectionKinds; }
+constexpr const auto& rowsOf(ProjectorKind) { return kProjectorKinds; }
+constexpr const auto& rowsOf(SmallPatches) { return kSmallPatches; }
+constexpr const auto& rowsOf(Reconstruction) { return kReconstructions; }
+constexpr const auto& rowsOf(PlanePlacement) { return kPlanePlacements; }
+constexpr const auto& rowsOf(Estimator) { return kEstimators; }
+
+template <class Choice>
+constexpr const auto& rowOf(Choice value) {
+    return rowsOf(value)[size_t(value)];
+}
+
+template <class Choice>
+constexpr const char* choiceName(Choice value) {
+    return rowOf(value).name;
+}
+
+constexpr bool can(Solver solver, SolverCan::Ability ability) {
+    return (rowOf(solver).abilities & ability) != 0;
+}
+
+// Whether a table, here or elsewhere, has one row for each value of a choice, in its order.
+template <class Row, size_t count>
+constexpr bool hasEveryValue(const Row (&rows)[count]) {
+    for (size_t k = 0; k < count; ++k)
+        if (size_t(rows[k].value) != k) return false;
+    return count == std::size(rowsOf(rows[0].value));
+}
+
+static_assert(hasEveryValue(kSolvers) && hasEveryValue(kFirstShots) &&
+              hasEveryValue(kDirectionKinds) && hasEveryValue(kProjectorKinds) &&
+              hasEveryValue(kSmallPatches) && hasEveryValue(kReconstructions) &&
+              hasEveryValue(kPlanePlacements) && hasEveryValue(kEstimators));
+
+}  // namespace raybundle
