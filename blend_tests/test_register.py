@@ -21,6 +21,13 @@ SCENE_PROPERTIES = """scope target_error output attribute domain data_type topol
     lines_per_bundle memory_limit seed threads report""".split()
 OPERATORS = ("bake", "relight", "clear", "preview")
 
+# Settings of the library that Blender does not show: they are for studies from C.
+NOT_IN_BLENDER = ["min_bundles", "thesis_literal", "plane_coherence", "regularization"]
+# Properties with a narrower range than the library's, which serves studies too.
+NARROWER = {'target_error': (0.0005, 1.0)}
+RNA_TYPES = {int: 'INT', float: 'FLOAT', str: 'ENUM'}
+RNA_UNITS = {"": 'NONE', "m": 'LENGTH'}  # Blender has none for megabytes
+
 
 def test_register_unregister_register():
     raybundle.unregister()
@@ -55,34 +62,86 @@ def test_every_property_has_a_description(group):
                 assert all(item.description for item in definition.enum_items)
 
 
-@pytest.mark.needs_library
-def test_defaults_are_those_of_the_native_library():
-    # Floats cross the interface in single precision, hence 1e-6.
-    with native.Bake() as bake:
-        for name in native.SETTINGS:
-            if name in properties.RaybundleSceneSettings.bl_rna.properties:
-                default = getattr(bpy.context.scene.raybundle, name)
-                assert bake.get(name) == (
-                    pytest.approx(default, rel=1e-6) if isinstance(default, float) else default
-                ), name
+def rna_properties() -> bpy.types.bpy_prop_collection:
+    return properties.RaybundleSceneSettings.bl_rna.properties
+
+
+def library_settings(kind: type) -> list[native.Setting]:
+    """Those of a type that are properties of the scene too."""
+    return [setting for setting in native.settings().values()
+            if setting.type is kind and setting.name in rna_properties()]
 
 
 @pytest.mark.needs_library
-def test_every_choice_is_known_to_the_native_library():
+def test_every_setting_of_the_library_is_a_property_or_left_out_on_purpose():
+    skips = {item[0] for item in properties.enum_skip}
+    missing = [name for name in native.settings()
+               if name not in rna_properties() and name.partition("skip.")[2] not in skips]
+    assert missing == NOT_IN_BLENDER
+
+
+@pytest.mark.needs_library
+def test_types_descriptions_and_units_are_those_of_the_library():
+    for kind in (int, float, str):
+        for setting in library_settings(kind):
+            definition = rna_properties()[setting.name]
+            is_switch = kind is int and (setting.least, setting.most) == (0, 1)
+            assert definition.type == ('BOOLEAN' if is_switch else RNA_TYPES[kind]), setting.name
+            assert definition.description == setting.help
+            if setting.unit in RNA_UNITS:
+                assert definition.unit == RNA_UNITS[setting.unit], setting.name
+
+
+@pytest.mark.needs_library
+@pytest.mark.parametrize("kind", (int, float))
+def test_numbers_have_the_default_and_the_range_of_the_library(kind):
+    for setting in library_settings(kind):
+        definition = rna_properties()[setting.name]
+        # Floats cross the interface in single precision, hence 1e-6.
+        assert definition.default == pytest.approx(setting.default, rel=1e-6), setting.name
+        if definition.type == 'BOOLEAN':
+            continue
+        least, most = NARROWER.get(setting.name, (setting.least, setting.most))
+        assert setting.least <= least <= most <= setting.most, setting.name
+        assert definition.hard_min == pytest.approx(least, rel=1e-6), setting.name
+        assert definition.hard_max == pytest.approx(most, rel=1e-6), setting.name
+
+
+@pytest.mark.needs_library
+def test_choices_are_those_of_the_library_in_its_order():
+    for setting in library_settings(str):
+        definition = rna_properties()[setting.name]
+        assert definition.default == setting.default
+        assert {item.identifier: item.description for item in definition.enum_items} == \
+            setting.choices
+        # Files store the place of a choice.
+        assert definition.enum_items.keys() == list(setting.choices), setting.name
+
+
+@pytest.mark.needs_library
+def test_skips_are_those_of_the_library_in_its_order():
+    skips = [(name.partition(".")[2], setting) for name, setting in native.settings().items()
+             if name.startswith("skip.")]
+    assert [(item[0], item[2]) for item in properties.enum_skip] == \
+        [(name, setting.help) for name, setting in skips]
+    # The add-on has a set of those that are off, which is empty at first.
+    assert all((setting.type, setting.least, setting.most, setting.default) == (int, 0, 1, 1)
+               for _, setting in skips)
+    assert rna_properties()['skips_off'].default_flag == set()
+
+
+@pytest.mark.needs_library
+def test_settings_are_set_and_read_by_name():
     with native.Bake() as bake:
-        for name, kind in native.SETTINGS.items():
-            definition = properties.RaybundleSceneSettings.bl_rna.properties.get(name)
-            if definition is None:
-                continue
-            if kind is str:
-                for item in definition.enum_items:
-                    bake.set(name, item.identifier)
-            elif definition.type == 'BOOLEAN':
-                bake.set(name, False)
-                bake.set(name, True)
-            else:
-                bake.set(name, definition.hard_min)
-                bake.set(name, definition.hard_max)
+        for setting in native.settings().values():
+            assert bake.get(setting.name) == setting.default
+            for value in setting.choices or (setting.type(setting.least),
+                                             setting.type(setting.most)):
+                bake.set(setting.name, value)
+                assert bake.get(setting.name) == value
+        for call in (lambda: bake.get("colour"), lambda: bake.set("colour", 1)):
+            with pytest.raises(raybundle.RaybundleError, match="colour"):
+                call()
 
 
 def test_every_native_function_is_declared():
@@ -91,14 +150,6 @@ def test_every_native_function_is_declared():
     declared = set(re.findall(r"RB_API [^;(]*?(rb_\w+)\(", text))
     assert declared == set(native._FALLIBLE) | set(native._INFALLIBLE)
     assert int(re.search(r"#define RB_ABI_VERSION (\d+)", text)[1]) == native.ABI_VERSION
-
-
-def test_every_skip_is_a_choice():
-    header = Path(__file__).parent.parent / "native/include/raybundle/raybundle.h"
-    names = re.search(r"skip\.NAME .*?NAME: ([^(]*)", header.read_text(), re.DOTALL)[1]
-    names = re.findall(r"[a-z_]+", names)
-    assert sorted(names) == sorted(native.SKIPS)
-    assert [item[0] for item in properties.enum_skip] == list(native.SKIPS)
 
 
 def test_only_one_module_knows_ctypes():

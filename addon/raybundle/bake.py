@@ -211,11 +211,12 @@ def _want_written_corners(export: SceneExport) -> None:
 
 
 def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
-    for name in native.SETTINGS:
-        if hasattr(settings, name):
+    for name in native.settings():
+        section, _, skip = name.partition(".")
+        if section == "skip":
+            native_bake.set(name, skip not in settings.skips_off)
+        elif hasattr(settings, name):
             native_bake.set(name, getattr(settings, name))
-    for name in native.SKIPS:
-        native_bake.set(f'skip.{name}', name not in settings.skips_off)
 
 
 def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: native.Bake) -> None:

@@ -12,14 +12,16 @@ from __future__ import annotations
 
 import ctypes
 import enum
+import functools
 import json
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 
 
 class ErrorCode(enum.IntEnum):
@@ -52,38 +54,8 @@ POINT_SHAPES = {'DISK': 0, 'SPHERE': 1}
 AREA_SHAPES = {'RECTANGLE': 0, 'ELLIPSE': 1}
 OUTPUTS = {'COMBINED': 0, 'LIGHTING': 1, 'DIRECT': 2, 'INDIRECT': 3}
 
-# Settings of a bake and their types.
-SETTINGS: dict[str, type] = {
-    'target_error': float,
-    'patch_size': float,
-    'max_patches': int,
-    'refine': int,
-    'contacts': int,
-    'min_bundles': int,
-    'max_bundles': int,
-    'lines_per_bundle': int,
-    'memory_limit': float,
-    'seed': int,
-    'threads': int,
-    'regularization': float,
-    'solver': str,
-    'first_shot': str,
-    'directions': str,
-    'projector': str,
-    'small_patches': str,
-    'reconstruction': str,
-    'final_gather': int,
-    'plane_count': int,
-    'plane_placement': str,
-    'local_rays': int,
-    'estimator': str,
-}
-
-# Skips of a bake: settings "skip.NAME" that are 0 or 1.
-SKIPS = ('darkness', 'reflection', 'geometry', 'lights', 'facing', 'occluders', 'lit', 'weak',
-         'inside', 'gather', 'bundles', 'warm_start', 'sheets', 'lamp_insides',
-         'clusters')
-SETTINGS.update({f'skip.{name}': int for name in SKIPS})
+# Types of settings in the order of rb_setting_type.
+SETTING_TYPES = (int, float, str)
 
 # A function that is called with the name of the stage and the share of it that is done, 0 to 1;
 # it cancels the bake by returning False.
@@ -99,7 +71,28 @@ _enum = ctypes.c_int
 _text = ctypes.c_char_p
 _floats = ctypes.POINTER(ctypes.c_float)
 _ints = ctypes.POINTER(ctypes.c_int32)
+_texts = ctypes.POINTER(ctypes.c_char_p)
 _out = ctypes.POINTER
+
+
+class _SettingInfo(ctypes.Structure):
+    """rb_setting_info."""
+
+    _fields_ = (
+        ('size', _size),
+        ('name', _text),
+        ('help', _text),
+        ('unit', _text),
+        ('type', _enum),
+        ('least', ctypes.c_double),
+        ('most', ctypes.c_double),
+        ('default_number', ctypes.c_double),
+        ('default_choice', _text),
+        ('choice_count', _size),
+        ('choices', _texts),
+        ('choice_help', _texts),
+    )
+
 
 # Argument types of every function that returns an rb_error.
 _FALLIBLE: dict[str, Sequence[object]] = {
@@ -140,6 +133,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_instance_light_set': (_handle, _int, _int),
     'rb_set_world_light_set': (_handle, _int),
     'rb_new_bake': (_out(_handle),),
+    'rb_get_setting_info': (_size, _out(_SettingInfo)),
     'rb_set_bake_int': (_handle, _text, _int),
     'rb_set_bake_float': (_handle, _text, _float),
     'rb_set_bake_string': (_handle, _text, _text),
@@ -166,6 +160,7 @@ _INFALLIBLE: dict[str, tuple[object, Sequence[object]]] = {
     'rb_get_error_message': (_text, ()),
     'rb_release_scene': (None, (_handle,)),
     'rb_release_bake': (None, (_handle,)),
+    'rb_get_setting_count': (_size, ()),
     'rb_release_subdivision': (None, (_handle,)),
 }
 
@@ -592,6 +587,43 @@ class Scene(_Handle):
 # --------------------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class Setting:
+    """What the library says of a setting of a bake."""
+
+    name: str
+    type: type  # int, float, or str: a choice
+    help: str
+    unit: str  # "m", "MB", or "" for a number without one
+    least: float  # the range of a number, both ends allowed; 0 for a choice
+    most: float
+    default: int | float | str
+    choices: dict[str, str]  # of a choice: help by name, in their lasting order; else empty
+
+
+@functools.cache
+def settings() -> dict[str, Setting]:
+    """All settings of a bake by name. Raises RaybundleError without a library."""
+    library = load()
+    result = {}
+    for index in range(library.rb_get_setting_count()):
+        info = _SettingInfo(size=ctypes.sizeof(_SettingInfo))
+        library.rb_get_setting_info(index, ctypes.byref(info))
+        kind = SETTING_TYPES[info.type]
+        default = info.default_choice.decode() if kind is str else kind(info.default_number)
+        choices = {info.choices[k].decode(): info.choice_help[k].decode()
+                   for k in range(info.choice_count)}
+        name = info.name.decode()
+        result[name] = Setting(name, kind, info.help.decode(), info.unit.decode(), info.least,
+                               info.most, default, choices)
+    return result
+
+
+def _setting_type(name: str) -> type:
+    """float for an unknown name, which the library itself refuses."""
+    return settings()[name].type if name in settings() else float
+
+
 class Bake(_Handle):
     """A bake: its settings, execution and results. Patches and lines are kept for the next
     execution."""
@@ -603,17 +635,16 @@ class Bake(_Handle):
         self._library.rb_new_bake(ctypes.byref(self._pointer))
 
     def set(self, name: str, value: int | float | str) -> None:
-        kind = SETTINGS.get(name)
+        kind = _setting_type(name)
         if kind is str:
             self._library.rb_set_bake_string(self._pointer, name.encode(), str(value).encode())
         elif kind is int:
             self._library.rb_set_bake_int(self._pointer, name.encode(), int(value))
         else:
-            # The library refuses names that it does not know.
             self._library.rb_set_bake_float(self._pointer, name.encode(), float(value))
 
     def get(self, name: str) -> int | float | str:
-        kind = SETTINGS.get(name)
+        kind = _setting_type(name)
         if kind is str:
             text = _text()
             self._library.rb_get_bake_string(self._pointer, name.encode(), ctypes.byref(text))

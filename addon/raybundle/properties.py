@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The settings of a scene (scene.raybundle) and of an object (object.raybundle).
 
-Settings that the native library has too have its defaults, which a test compares.
+Those that are settings of the native library too are defined here a second time, since properties
+must be registered where the library is missing. A test compares names, types, defaults, ranges,
+choices and descriptions with what the library says of them (native.settings()), so that both agree.
+Files store the place of a choice in its list: new ones go to the end.
 """
 
 from __future__ import annotations
@@ -52,25 +55,28 @@ enum_shared_meshes = (
     ('AVERAGE', "Average", "Objects that share a mesh keep sharing it and show their mean light"),
 )
 
-# What each skip leaves out, by the names of the native library's settings "skip.NAME". Add new ones
-# at the end: .blend files store the positions in this list.
+# The native library's settings "skip.NAME".
 enum_skip = (
-    ('darkness', "Darkness", "Bundles and solve, if no light reaches any surface"),
-    ('reflection', "Reflection", "The same, if no surface reflects light"),
-    ('geometry', "Geometry", "Patches and lines, if the geometry is as in the last bake"),
-    ('lights', "Lights", "The first shot, if lights too are as in the last bake"),
-    ('facing', "Facing", "Shadow rays to a light that the surface cannot face"),
-    ('occluders', "Occluders", "Reconstruction of objects that are not baked"),
-    ('lit', "Lit", "Noise of a light that is wholly visible: its light is known exactly"),
-    ('weak', "Weak", "Most shadow rays to a light that gives little of all"),
-    ('inside', "Inside", "Most shadow rays from the inside of solids"),
-    ('gather', "Gather", "Final gather where interpolation follows the light"),
-    ('bundles', "Bundles", "Bundles once the noise is at its target"),
-    ('warm_start', "Warm Start", "Iterations that a solve from zero takes more"),
-    ('sheets', "Sheets", "Projection of faces that lie in a plane with others of their kind"),
+    ('darkness', "Darkness", "Leave out bundles and solve if no light reaches any surface"),
+    ('reflection', "Reflection",
+     "Leave out bundles and solve if no surface reflects light and lines carry no other light"),
+    ('geometry', "Geometry", "Keep patches and lines if the geometry is as in the last bake"),
+    ('lights', "Lights", "Keep the first shot if geometry and lights are as in the last bake"),
+    ('facing', "Facing", "Leave out shadow rays to a light that the surface cannot face"),
+    ('occluders', "Occluders", "Leave out the reconstruction of objects that are not baked"),
+    ('lit', "Lit",
+     "Leave out the noise of a light that is wholly visible: its light is known exactly"),
+    ('weak', "Weak", "Leave out most shadow rays to a light that gives little of all"),
+    ('inside', "Inside", "Leave out most shadow rays from the inside of solids"),
+    ('gather', "Gather", "Leave out the final gather where interpolation follows the light"),
+    ('bundles', "Bundles", "Leave out further bundles once the noise is at its target"),
+    ('warm_start', "Warm Start",
+     "Begin the solve with the solution of the last bake, which takes fewer iterations"),
+    ('sheets', "Sheets", "Project faces that lie in a plane with others of their kind as one"),
     ('lamp_insides', "Lamp Insides",
-     "Emission inside of closed surfaces that hold nothing else"),
-    ('clusters', "Clusters", "Light of each patch where it is not shown and finer than needed"),
+     "Leave out the emission inside of closed surfaces that hold nothing else"),
+    ('clusters', "Clusters",
+     "Leave out the light of each patch where it is not shown and finer than needed"),
 )
 
 enum_solver = (
@@ -287,8 +293,8 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         soft_max=64, max=1024)
     skips_off: EnumProperty(
         name="Skips Off",
-        description="Work that is done although the scene does not need it, to test that the result "
-                    "stays the same",
+        description="Skips that are switched off: their work is done although the scene does not "
+                    "need it, to test that the result stays the same",
         items=enum_skip, options={'ENUM_FLAG'}, default=set())
     light_sets: CollectionProperty(
         name="Light Sets",

@@ -49,7 +49,7 @@ extern "C" {
 
 /* Raised by one whenever a signature or a meaning below changes; a caller built for another one
  * must not go on. */
-#define RB_ABI_VERSION 1
+#define RB_ABI_VERSION 2
 
 /* RB_ABI_VERSION of the library that was loaded. */
 RB_API int32_t rb_get_abi_version(void);
@@ -337,46 +337,45 @@ RB_API rb_error rb_new_bake(rb_bake* bake);
 /* Frees the bake, or lets the call that is at work with it do so. NULL is allowed. */
 RB_API void rb_release_bake(rb_bake bake);
 
-/* Settings by name; an unknown name, a wrong type or a value out of range is
- * RB_ERROR_INVALID_ARGUMENT.
- *   float  target_error    relative noise at which bundles stop (0.02)
- *   float  patch_size      edge of a patch in metres, 0 = automatic (0)
- *   int    max_patches     most patches that subdivision may make (100000); a face is one at
- *                          least, but for small ones whose light is not shown, which exchange it
- *                          in clusters; where faces take most of them those that are cut may have
- *                          an eighth as many beside
- *   int    refine          1: smaller patches at shadow edges where that pays (0)
- *   int    contacts        1: smaller patches beside gaps much narrower than a patch (1)
- *   int    min_bundles, max_bundles   bounds of the number of bundles (64, 65536)
- *   int    lines_per_bundle   0 = automatic: two lines per mean patch (0)
- *   float  memory_limit    for the exchanges, in MB (4096)
- *   int    seed, threads   threads 0 = all (0, 0)
- *   int    final_gather    of POINT and sparse results: 0 leaves the light of other surfaces to
- *                          interpolation (1)
- *   float  regularization  of the reconstruction: weight of slope changes across edges (0.005)
- *   string reconstruction  LEAST_SQUARES | AREA_AVERAGE | POINT
- *   string solver          LINE_REUSE | MULTIPATH | STOCHASTIC_ITERATION | RANDOM_WALK
- *   string first_shot      GATHER | SHOOT | EXTENDED
- *   string directions      LOW_DISCREPANCY | RANDOM | ADAPTIVE
- *   string projector       AUTO | FRAGMENT_LISTS | PAINTER | PAINTER_NEWELL | PLANE | PLANES
- *   string small_patches   CENTRE_SAMPLING | ROULETTE
- *   int    plane_count, plane_coherence   of PLANES (4, 1)
- *   string plane_placement   of PLANES: SYSTEMATIC | STRATIFIED | CLOSE_DISTANCE
- *   int    local_rays      of SHOOT and EXTENDED, 0 = to target_error (0)
- *   string estimator       of RANDOM_WALK: COLLISION | SURVIVAL | ABSORPTION
- *   int    thesis_literal  1: MULTIPATH as the thesis' pseudo-code has it, for comparison (0)
- *   int    skip.NAME       0 does work that the scene does not need, for tests (1). NAME: darkness,
- *                          reflection, geometry, lights, facing, sheets, occluders, lit, weak,
- *                          inside, lamp_insides, clusters, gather, bundles,
- *                          warm_start (job/skips.h)
- * The first of each choice is the default; docs/method.md says what they do and which work
- * together. rb_execute_bake refuses others with the reason.
- */
+typedef enum rb_setting_type RB_INT {
+    RB_SETTING_INT = 0,   /* rb_set_bake_int; with a range of 0 to 1 it is a switch */
+    RB_SETTING_FLOAT = 1, /* rb_set_bake_float */
+    RB_SETTING_CHOICE = 2 /* rb_set_bake_string, one of a list of names */
+} rb_setting_type;
+
+/* What there is to know of a setting. All text is UTF-8 in static memory. */
+typedef struct rb_setting_info {
+    size_t size; /* of this struct in the caller's header, in bytes, set before the call. The struct
+                  * grows at its end: no more than size bytes are written, and a size of 0 or larger
+                  * than that of the library's own is refused. */
+    const char* name; /* as rb_set_bake_* takes it */
+    const char* help; /* what it does, a line without a full stop at its end */
+    const char* unit; /* "m", "MB", or "" for a number without one */
+    rb_setting_type type;
+    double least, most;         /* of a number: its range, both ends allowed; else 0 */
+    double default_number;      /* of a number; else 0 */
+    const char* default_choice; /* of a choice, one of choices; else NULL */
+    size_t choice_count;        /* of a choice; else 0 */
+    const char* const* choices; /* of a choice: choice_count names, whose order stays; else NULL */
+    const char* const* choice_help; /* what each of them does, a line; else NULL */
+} rb_setting_info;
+
+/* Number of settings that a bake has. */
+RB_API size_t rb_get_setting_count(void);
+
+/* Describes setting number index, 0 to rb_get_setting_count() - 1, in *info, whose size the caller
+ * has set. docs/c_api.md has all of them in a table. */
+RB_API rb_error rb_get_setting_info(size_t index, rb_setting_info* info);
+
+/* Give a setting a value, by the name of the setting. An unknown name, a function of another type,
+ * and a value out of range are RB_ERROR_INVALID_ARGUMENT. docs/method.md says which methods work
+ * together; rb_execute_bake refuses others with the reason. */
 RB_API rb_error rb_set_bake_int(rb_bake bake, const char* name, int32_t value);
 RB_API rb_error rb_set_bake_float(rb_bake bake, const char* name, float value);
 RB_API rb_error rb_set_bake_string(rb_bake bake, const char* name, const char* value);
 
-/* The present value of a setting, which before any rb_set_bake_* is the default. */
+/* The present value of a setting, which before any rb_set_bake_* is the default. *value of a choice
+ * is static memory. */
 RB_API rb_error rb_get_bake_int(rb_bake bake, const char* name, int32_t* value);
 RB_API rb_error rb_get_bake_float(rb_bake bake, const char* name, float* value);
 RB_API rb_error rb_get_bake_string(rb_bake bake, const char* name, const char** value);

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <iterator>
+
+#include "api/border.h"
+#include "job/setting_table.h"
+
+using namespace raybundle;
+
+namespace {
+
+// Names and help of the values of a choice, as arrays of C.
+template <class Choice>
+struct ChoiceTexts {
+    static constexpr size_t count = std::size(rowsOf(Choice{}));
+    const char* names[count]{};
+    const char* help[count]{};
+
+    constexpr ChoiceTexts() {
+        for (size_t k = 0; k < count; ++k) {
+            names[k] = rowsOf(Choice{})[k].name;
+            help[k] = rowsOf(Choice{})[k].help;
+        }
+    }
+};
+
+template <class Choice>
+constexpr ChoiceTexts<Choice> kTexts;
+
+rb_setting_info describe(const Setting& setting) {
+    rb_setting_info info{};
+    info.name = setting.name;
+    info.help = setting.help;
+    info.unit = setting.unit;
+    std::visit(
+        [&](auto member) {
+            using Value = ValueOf<decltype(member)>;
+            const Value value = Settings().*member;
+            if constexpr (std::is_enum_v<Value>) {
+                info.type = RB_SETTING_CHOICE;
+                info.default_choice = choiceName(value);
+                info.choice_count = kTexts<Value>.count;
+                info.choices = kTexts<Value>.names;
+                info.choice_help = kTexts<Value>.help;
+            } else {
+                info.type = std::is_same_v<Value, int> ? RB_SETTING_INT : RB_SETTING_FLOAT;
+                info.least = setting.least;
+                info.most = setting.most;
+                info.default_number = double(value);
+            }
+        },
+        setting.member);
+    return info;
+}
+
+}  // namespace
+
+size_t rb_get_setting_count(void) { return std::size(kSettings); }
+
+rb_error rb_get_setting_info(size_t index, rb_setting_info* info) {
+    return guarded([&] {
+        need(info, "info");
+        if (index >= std::size(kSettings))
+            throw invalidArgument("index: there are " + std::to_string(std::size(kSettings)) +
+                                  " settings");
+        if (info->size == 0 || info->size > sizeof(rb_setting_info))
+            throw invalidArgument("info: its size must be that of rb_setting_info");
+        rb_setting_info described = describe(kSettings[index]);
+        described.size = info->size;
+        std::memcpy(info, &described, described.size);
+    });
+}
