@@ -277,16 +277,38 @@ rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices, si
     });
 }
 
-rb_error rb_set_mesh_corner_normals(rb_scene scene, int32_t mesh, const float* normals,
-                                    size_t corner_count) {
+namespace {
+
+// Copies a value per corner to a mesh. argument, what: the array and a number of it in messages.
+template <class V>
+rb_error setCornerValues(rb_scene scene, int32_t mesh, const float* values, size_t count,
+                         const char* argument, const char* what, std::vector<V> Mesh::*target) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
-        Mesh& target = held->mesh(mesh);
-        needCount(corner_count, target.cornerCount(), "corner_count");
-        needArray(normals, corner_count, "normals");
-        needFinite(normals, 3 * corner_count, "normal component");
-        target.cornerNormals = vectors<glm::vec3>(normals, corner_count);
+        Mesh& owner = held->mesh(mesh);
+        needCount(count, owner.cornerCount(), "corner_count");
+        needArray(values, count, argument);
+        needFinite(values, size_t(V::length()) * count, what);
+        owner.*target = vectors<V>(values, count);
     });
+}
+
+}  // namespace
+
+rb_error rb_set_mesh_corner_normals(rb_scene scene, int32_t mesh, const float* normals,
+                                    size_t corner_count) {
+    return setCornerValues(scene, mesh, normals, corner_count, "normals", "normal component",
+                           &Mesh::cornerNormals);
+}
+
+rb_error rb_set_mesh_uvs(rb_scene scene, int32_t mesh, const float* uvs, size_t corner_count) {
+    return setCornerValues(scene, mesh, uvs, corner_count, "uvs", "UV component", &Mesh::uvs);
+}
+
+rb_error rb_set_mesh_corner_colors(rb_scene scene, int32_t mesh, const float* rgb,
+                                   size_t corner_count) {
+    return setCornerValues(scene, mesh, rgb, corner_count, "rgb", "colour component",
+                           &Mesh::cornerColors);
 }
 
 rb_error rb_set_mesh_sharp_edges(rb_scene scene, int32_t mesh, const int32_t* vertices,
@@ -306,29 +328,6 @@ rb_error rb_set_mesh_sharp_edges(rb_scene scene, int32_t mesh, const int32_t* ve
         }
         std::sort(edges.begin(), edges.end());
         target.sharpEdges = std::move(edges);
-    });
-}
-
-rb_error rb_set_mesh_uvs(rb_scene scene, int32_t mesh, const float* uvs, size_t corner_count) {
-    return guarded([&] {
-        const HeldScene held(scene, "scene");
-        Mesh& target = held->mesh(mesh);
-        needCount(corner_count, target.cornerCount(), "corner_count");
-        needArray(uvs, corner_count, "uvs");
-        needFinite(uvs, 2 * corner_count, "UV component");
-        target.uvs = vectors<glm::vec2>(uvs, corner_count);
-    });
-}
-
-rb_error rb_set_mesh_corner_colors(rb_scene scene, int32_t mesh, const float* rgb,
-                                   size_t corner_count) {
-    return guarded([&] {
-        const HeldScene held(scene, "scene");
-        Mesh& target = held->mesh(mesh);
-        needCount(corner_count, target.cornerCount(), "corner_count");
-        needArray(rgb, corner_count, "rgb");
-        needFinite(rgb, 3 * corner_count, "colour component");
-        target.cornerColors = vectors<glm::vec3>(rgb, corner_count);
     });
 }
 
