@@ -76,7 +76,8 @@ def _emission_colors(objects: Collection[bpy.types.Object]
     colors = {}
     for material in materials - {None}:
         index = exporter.export(SlotMaterial(material)).index
-        emission = exporter.scene.materials[index].emission.max(axis=0)
+        emission = np.max([side.emission.constant
+                           for side in exporter.scene.materials[index].sides], axis=0)
         if emission.max() > 0.0:
             colors[material] = tuple(emission / emission.max())
     return colors if len(colors) < len(materials) else {}

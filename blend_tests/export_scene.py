@@ -7,8 +7,8 @@
 The scene is exported by the add-on itself. --show and --hide include and exclude collections of the
 view layer first: scenes/office.blend has its lamps in lamps_up and lamps_down. --room exports one of
 lamp_rooms.py instead of a file. The .blend file is never saved. The format, read by
-native/bench/scene_file.cpp, is that of SceneData: one list per kind, arrays flat, indices are
-positions in the lists; fields that are None are left out.
+native/bench/scene_file.cpp, is that of SceneData: one list per kind, arrays flat, a surface and its
+parts as objects, indices are positions in the lists; fields that are None are left out.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import bpy
@@ -53,6 +53,8 @@ def record(item: object) -> dict:
 
 
 def flat(value: object) -> object:
+    if is_dataclass(value):
+        return record(value)
     return value.ravel().tolist() if isinstance(value, np.ndarray) else value
 
 

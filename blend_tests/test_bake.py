@@ -510,9 +510,10 @@ def test_missing_or_broken_library(closed_box, tmp_path, monkeypatch, content, m
 
 
 def test_library_of_another_version(closed_box, monkeypatch):
+    found = f"interface version {native.ABI_VERSION}, .* needs 999"
     monkeypatch.setattr(native, "_library", None)
     monkeypatch.setattr(native, "ABI_VERSION", 999)
-    with pytest.raises(raybundle.RaybundleError, match="interface version 2, .* needs 999"):
+    with pytest.raises(raybundle.RaybundleError, match=found):
         bake()
 
 

@@ -222,8 +222,9 @@ def test_materials_of_objects_split_a_shared_mesh(new_object, new_material):
     second.material_slots[0].material = new_material("Blue", (0, 0, 1))
     bpy.context.view_layer.update()
     scene = export().scene
-    reflectances = [scene.materials[scene.meshes[item.mesh].face_materials[0]].reflectance[0]
-                    for item in scene.instances]
+    materials = [scene.materials[scene.meshes[item.mesh].face_materials[0]]
+                 for item in scene.instances]
+    reflectances = [material.front.reflectance.constant for material in materials]
     assert reflectances[0].tolist() == [1, 0, 0] and reflectances[1].tolist() == [0, 0, 1]
 
 
@@ -400,8 +401,12 @@ def set_specular(material, value):
     (inputs.get('Specular IOR Level') or inputs['Specular']).default_value = value
 
 
-def diffuse_of(material, side=0):
-    return (material.diffuse_scale * material.reflectance + material.diffuse_offset)[side]
+def part_of(part, reflectance):
+    return part.scale * reflectance + part.offset
+
+
+def diffuse_of(side):
+    return part_of(side.shown.color, side.reflectance.constant)
 
 
 def shader_of(material):
@@ -415,7 +420,8 @@ def sockets_of(shader, specular, base):
 
 
 def test_no_material_is_grey():
-    assert exported_material(None)[0].reflectance == pytest.approx(np.full((2, 3), 0.8))
+    for side in exported_material(None)[0].sides:
+        assert side.reflectance.constant == pytest.approx(np.full(3, 0.8))
 
 
 def test_material_without_nodes():
@@ -424,7 +430,8 @@ def test_material_without_nodes():
         pytest.skip("every material has nodes")
     material.use_nodes = False
     material.diffuse_color = (0.1, 0.2, 0.3, 1.0)
-    assert exported_material(material)[0].reflectance[0] == pytest.approx([0.1, 0.2, 0.3])
+    front = exported_material(material)[0].front
+    assert front.reflectance.constant == pytest.approx([0.1, 0.2, 0.3])
 
 
 def test_principled(principled):
@@ -439,11 +446,11 @@ def test_principled(principled):
     base = np.array([0.8, 0.4, 0.2])
     albedo = principled_albedo(sockets_of(shader, 0.0, base), 1.0)
     assert any('"Principled"' in text and "mirrors" in text for text in result.warnings)
-    for side in range(2):
-        assert material.reflectance[side] == pytest.approx(
+    for side in material.sides:
+        assert side.reflectance.constant == pytest.approx(
             0.25 * ALBEDO * base + 0.5 * (albedo.metal * base + albedo.metal_edge))
-        assert diffuse_of(material, side) == pytest.approx(0.25 * albedo.shown * base)
-        assert material.emission[side] == pytest.approx([3 * math.pi, 1.5 * math.pi, 0.0])
+        assert diffuse_of(side) == pytest.approx(0.25 * albedo.shown * base)
+        assert side.emission.constant == pytest.approx([3 * math.pi, 1.5 * math.pi, 0.0])
 
 
 def test_light_under_the_surface_has_a_colour_of_its_own(principled):
@@ -454,8 +461,8 @@ def test_light_under_the_surface_has_a_colour_of_its_own(principled):
     shader.inputs['Subsurface Color'].default_value = (0.2, 0.4, 0.6, 1.0)
     shader.inputs['Subsurface'].default_value = 0.25
     material, _ = exported_material(principled)
-    assert diffuse_of(material) == pytest.approx([0.65, 0.4, 0.3])
-    assert material.reflectance[0] == pytest.approx(ALBEDO * np.array([0.65, 0.4, 0.3]))
+    assert diffuse_of(material.front) == pytest.approx([0.65, 0.4, 0.3])
+    assert material.front.reflectance.constant == pytest.approx(ALBEDO * np.array([0.65, 0.4, 0.3]))
 
 
 def test_backfacing_separates_the_sides(new_material):
@@ -472,7 +479,7 @@ def test_backfacing_separates_the_sides(new_material):
     tree.links.new(blue.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs['Surface'])
     exported, result = exported_material(material)
-    assert exported.reflectance.tolist() == [[1, 0, 0], [0, 0, 1]]
+    assert [side.reflectance.constant.tolist() for side in exported.sides] == [[1, 0, 0], [0, 0, 1]]
     assert result.warnings == []
 
 
@@ -507,7 +514,7 @@ def test_mixed_shaders_and_colours_through_a_group(new_material):
     tree.links.new(color.outputs[0], node.inputs[0])
     tree.links.new(node.outputs[0], diffuse.inputs['Color'])
     exported, result = exported_material(material)
-    assert exported.reflectance[0] == pytest.approx([0.3, 0.2, 0.0])
+    assert exported.front.reflectance.constant == pytest.approx([0.3, 0.2, 0.0])
     assert result.warnings == []
 
 
@@ -539,9 +546,10 @@ def test_image_as_base_colour(principled, is_float):
     tree.links.new(texture.outputs['Color'], shader_of(principled).inputs['Base Color'])
     material, result = exported_material(principled)
     assert result.warnings == []
-    assert material.image == 0 and material.image_weight == pytest.approx(
-        np.full(3, ALBEDO))
-    assert material.reflectance == pytest.approx(np.zeros((2, 3)))
+    for side in material.sides:
+        assert side.reflectance.image == 0
+        assert side.reflectance.image_weight == pytest.approx(np.full(3, ALBEDO))
+        assert side.reflectance.constant == pytest.approx(np.zeros(3))
     data = result.scene.images[0]
     assert data.extension == 'EXTEND'
     # 8 bits of 0.5 are 128/255 (127.5 is rounded up), in sRGB; floats are linear already.
@@ -566,7 +574,8 @@ def test_corner_colours_as_base_colour(principled):
     bpy.context.scene.collection.objects.link(item)
     bpy.context.view_layer.update()
     scene = export().scene
-    assert scene.materials[0].color_weight == pytest.approx(np.full(3, ALBEDO))
+    for side in scene.materials[0].sides:
+        assert side.reflectance.corner_color_weight == pytest.approx(np.full(3, ALBEDO))
     assert scene.meshes[0].corner_colors == pytest.approx(
         (np.arange(16).reshape(4, 4) / 16)[:, :3])
 
@@ -582,7 +591,7 @@ def add_noise(material):
 def test_what_cannot_be_read_is_baked_and_named(principled):
     add_noise(principled)
     material, result = exported_material(principled)
-    pixels = result.scene.images[material.image].pixels
+    pixels = result.scene.images[material.front.reflectance.image].pixels
     # Noise lies about 0.5; the image has room beside the face.
     assert 0.3 < pixels[pixels > 0].mean() < 0.7
     assert len(result.warnings) == 1
@@ -598,7 +607,7 @@ def test_what_cannot_be_baked_either_is_named(principled, monkeypatch):
     monkeypatch.setattr(cycles_bake._Stage, '_run', fail_to_bake)
     add_noise(principled)
     material, result = exported_material(principled)
-    assert material.reflectance[0] == pytest.approx(ALBEDO * np.array([0.1, 0.2, 0.3]))
+    assert material.front.reflectance.constant == pytest.approx(ALBEDO * np.array([0.1, 0.2, 0.3]))
     assert len(result.warnings) == 2
     assert '"Square"' in result.warnings[0] and "no bake today" in result.warnings[0]
     assert '"Principled"' in result.warnings[1] and '"Noise Texture"' in result.warnings[1]
@@ -682,10 +691,12 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
     assert result.warnings == []
     # Of F0 = 0.04 or a little less.
     assert 0.04 < albedo.specular[0] < 0.07
-    assert material.reflectance[0] == pytest.approx(albedo.diffuse * base + albedo.specular)
-    assert diffuse_of(material) == pytest.approx(albedo.shown * base)
+    assert material.front.reflectance.constant == pytest.approx(
+        albedo.diffuse * base + albedo.specular)
+    assert diffuse_of(material.front) == pytest.approx(albedo.shown * base)
     bpy.context.scene.cycles.caustics_reflective = False
-    assert exported_material(principled)[0].reflectance[0] == pytest.approx(alone.diffuse * base)
+    front = exported_material(principled)[0].front
+    assert front.reflectance.constant == pytest.approx(alone.diffuse * base)
 
 
 def test_gloss_beside_an_image(principled):
@@ -697,11 +708,11 @@ def test_gloss_beside_an_image(principled):
     texture.image = new_image(values, True)
     tree.links.new(texture.outputs['Color'], shader_of(principled).inputs['Base Color'])
     material, _ = exported_material(principled)
-    dark, bright = (material.reflectance[0] + material.image_weight * value for value in (0, 0.5))
+    reflectance, color = material.front.reflectance, material.front.shown.color
+    dark, bright = (reflectance.constant + reflectance.image_weight * value for value in (0, 0.5))
     assert (dark > 0.03).all()
-    scale, offset = material.diffuse_scale[0], material.diffuse_offset[0]
-    assert scale * dark + offset == pytest.approx(np.zeros(3))
-    assert (scale * bright + offset > 0.45).all() and (scale * bright + offset < 0.51).all()
+    assert part_of(color, dark) == pytest.approx(np.zeros(3))
+    assert (part_of(color, bright) > 0.45).all() and (part_of(color, bright) < 0.51).all()
 
 
 def test_all_of_a_matt_material_is_diffuse(principled):
@@ -719,21 +730,24 @@ def test_all_of_a_matt_material_is_diffuse(principled):
     output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
     tree.links.new(shader.outputs[0], output.inputs['Surface'])
     material, _ = exported_material(principled)
-    assert (material.image_weight < 0.0).all()
-    assert material.diffuse_scale == pytest.approx(np.ones((2, 3)))
-    assert material.diffuse_offset == pytest.approx(np.zeros((2, 3)))
+    for side in material.sides:
+        assert (side.reflectance.image_weight < 0.0).all()
+        assert side.shown.color.scale == pytest.approx(np.ones(3))
+        assert side.shown.color.offset == pytest.approx(np.zeros(3))
 
 
 def test_gloss_of_what_cycles_bakes(principled):
     add_noise(principled)
     matt = exported_material(principled)[0]
-    assert matt.diffuse_scale == pytest.approx(np.full((2, 3), matt.diffuse_scale[0, 0]))
+    for side in matt.sides:
+        assert side.shown.color.scale == pytest.approx(
+            np.full(3, matt.front.shown.color.scale[0]))
     set_specular(principled, 0.5)
     shader_of(principled).inputs['Metallic'].default_value = 0.2
     material, result = exported_material(principled)
-    pixels = result.scene.images[material.image].pixels
+    pixels = result.scene.images[material.front.reflectance.image].pixels
     whole = pixels[pixels > 0.02].mean()
-    diffuse = material.diffuse_scale.mean() * whole + material.diffuse_offset.mean()
+    diffuse = part_of(material.front.shown.color, whole).mean()
     # Noise lies about 0.5; of the base colour 80 % are diffuse.
     assert 0.3 < diffuse / 0.8 < 0.7 and diffuse < 0.85 * whole
 
@@ -747,14 +761,14 @@ def test_gloss_alone(principled):
     tree.links.new(node.outputs[0], output.inputs['Surface'])
     # By default diffuse light sees it rougher than it is.
     material, _ = exported_material(principled)
-    assert 0.6 < material.gloss_roughness[0] < 0.7
-    assert (material.reflectance[0] < [0.7, 0.35, 0.18]).all()
+    assert 0.6 < material.front.gloss.roughness < 0.7
+    assert (material.front.reflectance.constant < [0.7, 0.35, 0.18]).all()
     bpy.context.scene.cycles.blur_glossy = 0.0
     material, result = exported_material(principled)
-    assert material.gloss_roughness[0] == 0.0
-    assert material.gloss_scale[0] == pytest.approx(np.ones(3))
-    assert material.reflectance[0] == pytest.approx([0.8, 0.4, 0.2], rel=1e-3)
-    assert (diffuse_of(material) == 0.0).all()
+    assert material.front.gloss.roughness == 0.0
+    assert material.front.gloss.part.scale == pytest.approx(np.ones(3))
+    assert material.front.reflectance.constant == pytest.approx([0.8, 0.4, 0.2], rel=1e-3)
+    assert (diffuse_of(material.front) == 0.0).all()
     assert any("mirrors" in text for text in result.warnings)
 
 
@@ -764,7 +778,7 @@ def test_alpha_is_opacity(principled):
     material, result = exported_material(principled)
     assert material.opacity == pytest.approx(0.25)
     # Of the whole: what passes through is not reflected.
-    assert material.reflectance[0] == pytest.approx(ALBEDO * np.array([0.2, 0.1, 0.0]))
+    assert material.front.reflectance.constant == pytest.approx(ALBEDO * np.array([0.2, 0.1, 0.0]))
     assert result.warnings == []
 
 
@@ -780,9 +794,10 @@ def test_emission_by_image(principled):
     shader.inputs['Emission Strength'].default_value = 2.0
     material, result = exported_material(principled)
     assert result.warnings == []
-    assert material.image is None and material.emission_image == 0
-    assert material.emission_image_weight == pytest.approx(np.full((2, 3), 2 * math.pi))
-    assert material.emission == pytest.approx(np.zeros((2, 3)))
+    for side in material.sides:
+        assert side.reflectance.image is None and side.emission.image == 0
+        assert side.emission.image_weight == pytest.approx(np.full(3, 2 * math.pi))
+        assert side.emission.constant == pytest.approx(np.zeros(3))
 
 
 def test_glass_lets_light_through_and_is_named(new_material):
@@ -792,7 +807,7 @@ def test_glass_lets_light_through_and_is_named(new_material):
     output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
     tree.links.new(glass.outputs[0], output.inputs['Surface'])
     exported, result = exported_material(material)
-    assert not exported.reflectance.any()
+    assert not any(side.reflectance.constant.any() for side in exported.sides)
     assert exported.opacity == pytest.approx(0.0)
     assert '"Window"' in result.warnings[0] and "Glass" in result.warnings[0]
 
@@ -813,10 +828,12 @@ def test_translucence_is_laid_out_like_the_reflectance(new_material):
     tree.links.new(mix.outputs[0], output.inputs['Surface'])
     exported, result = exported_material(material)
     assert result.warnings == []
-    assert exported.image == exported.translucence_image == 0
-    assert exported.image_weight == pytest.approx([0.75] * 3)
-    assert exported.translucence_image_weight == pytest.approx(np.full((2, 3), 0.25))
-    assert not exported.translucence.any() and exported.opacity == 1.0
+    for side in exported.sides:
+        assert side.reflectance.image == side.translucence.image == 0
+        assert side.reflectance.image_weight == pytest.approx([0.75] * 3)
+        assert side.translucence.image_weight == pytest.approx([0.25] * 3)
+        assert not side.translucence.constant.any()
+    assert exported.opacity == 1.0
 
 
 def test_two_materials_by_face(new_object, new_material):

@@ -359,8 +359,10 @@ def test_a_result_alone_before_the_first_bake_is_a_guess_that_is_said(corner):
     as_emission(wall.data.materials[0], "Radiosity", 'VERTEX_COLOR')
     scene = export_scene(bpy.context).scene
     by_name = {material.name: material for material in scene.materials}
-    assert by_name["Grey"].reflectance == pytest.approx(np.tile(GREY, (2, 1)))
-    assert by_name["Dark"].reflectance == pytest.approx(np.full((2, 3), 0.8))
+    for side in by_name["Grey"].sides:
+        assert side.reflectance.constant == pytest.approx(GREY)
+    for side in by_name["Dark"].sides:
+        assert side.reflectance.constant == pytest.approx(np.full(3, 0.8))
     report = bake()
     before = [read_colors(item) for item in corner]
     for name in ("Grey", "Dark"):
@@ -392,7 +394,7 @@ def test_paint_of_another_name_is_a_colour_as_before(corner):
     as_base_color(floor.data.materials[0], "Painted", 'ATTRIBUTE')
     scene = export_scene(bpy.context).scene
     material = next(item for item in scene.materials if item.name == "Grey")
-    assert material.color_weight == pytest.approx(np.ones(3))
+    assert material.front.reflectance.corner_color_weight == pytest.approx(np.ones(3))
     assert naming(bake()) == ""
 
 

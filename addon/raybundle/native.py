@@ -16,10 +16,12 @@ import functools
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+
+from .surface_data import SurfaceData
 
 ABI_VERSION = 2
 
@@ -73,6 +75,49 @@ _floats = ctypes.POINTER(ctypes.c_float)
 _ints = ctypes.POINTER(ctypes.c_int32)
 _texts = ctypes.POINTER(ctypes.c_char_p)
 _out = ctypes.POINTER
+_rgb = 3 * ctypes.c_float
+
+NO_IMAGE = -1  # RB_NO_IMAGE
+
+
+class _AngleFactors(ctypes.Structure):
+    _fields_ = [('linear', _rgb), ('square', _rgb), ('fifth', _rgb), ('cosine_fifth', _rgb)]
+
+
+class _Color(ctypes.Structure):
+    _fields_ = [('constant', _rgb), ('image', _int), ('image_weight', _rgb),
+                ('corner_color_weight', _rgb)]
+
+
+class _Part(ctypes.Structure):
+    _fields_ = [('scale', _rgb), ('offset', _rgb)]
+
+
+class _Shown(ctypes.Structure):
+    _fields_ = [('color', _Part), ('from_above', _rgb), ('by_angle', _AngleFactors)]
+
+
+class _Gloss(ctypes.Structure):
+    _fields_ = [('part', _Part), ('by_angle', _AngleFactors), ('roughness', _float),
+                ('masking', _enum)]
+
+
+class _Lobe(ctypes.Structure):
+    _fields_ = [('reflectance', _rgb), ('by_angle', _AngleFactors), ('roughness', _float)]
+
+
+class _Diffuse(ctypes.Structure):
+    _fields_ = [('model', _enum), ('roughness', _float), ('leaving', _AngleFactors)]
+
+
+class _Surface(ctypes.Structure):
+    """rb_surface; its members but for the size are named as those of SurfaceData."""
+
+    _fields_ = [('size', _size), ('reflectance', _Color), ('emission', _Color),
+                ('translucence', _Color), ('reflectance_by_angle', _AngleFactors),
+                ('shown', _Shown), ('gloss', _Gloss), ('microfibers', _Lobe), ('velvet', _Lobe),
+                ('burley_sheen', _Lobe), ('several_facets', _Lobe), ('diffuse', _Diffuse)]
+
 
 
 class _SettingInfo(ctypes.Structure):
@@ -98,20 +143,8 @@ class _SettingInfo(ctypes.Structure):
 _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_new_scene': (_out(_handle),),
     'rb_add_image': (_handle, _text, _int, _int, _floats, _enum, _out(_int)),
-    'rb_add_material': (_handle, _text, _floats, _floats, _out(_int)),
-    'rb_set_material_image': (_handle, _int, _int, _floats),
-    'rb_set_material_corner_colors': (_handle, _int, _floats),
-    'rb_set_material_emission_image': (_handle, _int, _int, _floats),
-    'rb_set_material_emission_corner_colors': (_handle, _int, _floats),
-    'rb_set_material_diffuse': (_handle, _int, _floats, _floats),
-    'rb_set_material_angles': (_handle, _int, _floats, _floats),
-    'rb_set_material_gloss': (_handle, _int, _floats, _floats, _floats, _int, _floats),
-    'rb_set_material_lobe': (_handle, _int, _int, _floats, _floats, _floats),
-    'rb_set_material_diffuse_model': (_handle, _int, _int, _floats),
-    'rb_set_material_leaving': (_handle, _int, _floats),
-    'rb_set_material_translucence': (_handle, _int, _floats, _int, _floats),
-    'rb_set_material_opacity': (_handle, _int, _float),
-    'rb_set_material_opacity_image': (_handle, _int, _int),
+    'rb_init_surface': (_out(_Surface), _size),
+    'rb_add_material': (_handle, _text, _out(_Surface), _out(_Surface), _float, _int, _out(_int)),
     'rb_add_mesh': (_handle, _text, _floats, _size, _ints, _size, _ints, _size, _ints, _out(_int)),
     'rb_set_mesh_corner_normals': (_handle, _int, _floats, _size),
     'rb_set_mesh_sharp_edges': (_handle, _int, _ints, _size),
@@ -277,6 +310,25 @@ def _as_ints(array: np.ndarray) -> object:
     return array.ctypes.data_as(_ints)
 
 
+def _fill(target: ctypes.Structure, data: object, name: str) -> None:
+    """Sets the members of a struct that data, a dataclass of surface_data.py, has by their names.
+    Factors by angle are rows of an array."""
+    if isinstance(target, _AngleFactors):
+        rows = _float_array(data, (len(target._fields_), 3), name)
+        for (member, _), row in zip(target._fields_, rows):
+            getattr(target, member)[:] = row
+        return
+    for item in fields(data):
+        member, value = getattr(target, item.name), getattr(data, item.name)
+        path = f"{name}.{item.name}"
+        if isinstance(member, ctypes.Structure):
+            _fill(member, value, path)
+        elif isinstance(member, _rgb):
+            member[:] = _float_array(value, (3,), path)
+        else:
+            setattr(target, item.name, NO_IMAGE if value is None else value)
+
+
 class _Handle:
     """Owns a native object, which close() or the end of a with block releases."""
 
@@ -334,110 +386,22 @@ class Scene(_Handle):
             IMAGE_EXTENSIONS[extension], ctypes.byref(identifier))
         return identifier.value
 
-    def add_material(self, name: str, reflectance: np.ndarray, emission: np.ndarray) -> int:
-        """reflectance, emission (W/m^2): (2, 3), RGB of the front side and of the back side."""
-        reflectance = _float_array(reflectance, (2, 3), "reflectance")
-        emission = _float_array(emission, (2, 3), "emission")
+    def add_material(self, name: str, front: SurfaceData, back: SurfaceData,
+                     opacity: float = 1.0, opacity_image: int | None = None) -> int:
+        """opacity: 0 to 1, share of the light that does not pass straight through, which the mean
+        of the image's channels multiplies."""
+        sides = [self._surface(data, side) for data, side in ((front, "front"), (back, "back"))]
         identifier = _int()
         self._library.rb_add_material(
-            self._pointer, name.encode(), _as_floats(reflectance), _as_floats(emission),
-            ctypes.byref(identifier))
+            self._pointer, name.encode(), *map(ctypes.byref, sides), opacity,
+            NO_IMAGE if opacity_image is None else opacity_image, ctypes.byref(identifier))
         return identifier.value
 
-    def set_material_image(self, material: int, image: int, weight: np.ndarray) -> None:
-        """weight: (3,), what the image is multiplied with before it joins the reflectance."""
-        weight = _float_array(weight, (3,), "weight")
-        self._library.rb_set_material_image(self._pointer, material, image, _as_floats(weight))
-
-    def set_material_corner_colors(self, material: int, weight: np.ndarray) -> None:
-        """weight: (3,), likewise for the mesh's corner colours."""
-        weight = _float_array(weight, (3,), "weight")
-        self._library.rb_set_material_corner_colors(self._pointer, material, _as_floats(weight))
-
-    def set_material_emission_image(self, material: int, image: int, weight: np.ndarray) -> None:
-        """weight: (2, 3), W/m^2, of the front side and of the back side."""
-        weight = _float_array(weight, (2, 3), "weight")
-        self._library.rb_set_material_emission_image(
-            self._pointer, material, image, _as_floats(weight))
-
-    def set_material_emission_corner_colors(self, material: int, weight: np.ndarray) -> None:
-        """weight: (2, 3), likewise for the mesh's corner colours."""
-        weight = _float_array(weight, (2, 3), "weight")
-        self._library.rb_set_material_emission_corner_colors(
-            self._pointer, material, _as_floats(weight))
-
-    def set_material_diffuse(self, material: int, scale: np.ndarray, offset: np.ndarray) -> None:
-        """(2, 3) each: of the reflectance, scale times it plus offset is diffuse, the rest gloss."""
-        scale = _float_array(scale, (2, 3), "scale")
-        offset = _float_array(offset, (2, 3), "offset")
-        self._library.rb_set_material_diffuse(
-            self._pointer, material, _as_floats(scale), _as_floats(offset))
-
-    def set_material_gloss(self, material: int, scale: np.ndarray, offset: np.ndarray,
-                           by_angle: np.ndarray, separate_masking: bool, roughness: np.ndarray
-                           ) -> None:
-        """(2, 3): of the reflectance, scale times it plus offset is mirrored; by_angle: (4, 2, 3),
-        how that depends on the light's angle; separate_masking: rb_masking; roughness: (2,), of
-        GGX."""
-        scale = _float_array(scale, (2, 3), "scale")
-        offset = _float_array(offset, (2, 3), "offset")
-        by_angle = _float_array(by_angle, (4, 2, 3), "by_angle")
-        roughness = _float_array(roughness, (2,), "roughness")
-        self._library.rb_set_material_gloss(
-            self._pointer, material, _as_floats(scale), _as_floats(offset), _as_floats(by_angle),
-            int(separate_masking), _as_floats(roughness))
-
-    def set_material_lobe(self, material: int, lobe: int, reflectance: np.ndarray,
-                          by_angle: np.ndarray, roughness: np.ndarray) -> None:
-        """lobe: rb_lobe, as in materials/layers.py; (2, 3): what of the reflectance it sends;
-        (4, 2, 3): how that depends on the light's angle; roughness: (2,)."""
-        arrays = [_float_array(values, shape, name) for values, shape, name in
-                  ((reflectance, (2, 3), "reflectance"), (by_angle, (4, 2, 3), "by_angle"),
-                   (roughness, (2,), "roughness"))]
-        self._library.rb_set_material_lobe(
-            self._pointer, material, lobe, *map(_as_floats, arrays))
-
-    def set_material_diffuse_model(self, material: int, model: int, roughness: np.ndarray) -> None:
-        """model: rb_diffuse_model, as in materials/scattering.py; roughness: (2,)."""
-        roughness = _float_array(roughness, (2,), "roughness")
-        self._library.rb_set_material_diffuse_model(
-            self._pointer, material, model, _as_floats(roughness))
-
-    def set_material_leaving(self, material: int, factors: np.ndarray) -> None:
-        """(4, 2, 3): how diffuse light leaves by its angle."""
-        factors = _float_array(factors, (4, 2, 3), "factors")
-        self._library.rb_set_material_leaving(self._pointer, material, _as_floats(factors))
-
-    def set_material_angles(self, material: int, reflected: np.ndarray, shown: np.ndarray) -> None:
-        """(4, 2, 3): by the terms of materials/diffuse_angles.py, how the reflectance depends on
-        the light's angle; (5, 2, 3): what outputs show of light from straight above, then by the
-        terms."""
-        reflected = _float_array(reflected, (4, 2, 3), "reflected")
-        shown = _float_array(shown, (5, 2, 3), "shown")
-        self._library.rb_set_material_angles(
-            self._pointer, material, _as_floats(reflected), _as_floats(shown))
-
-    def set_material_translucence(self, material: int, translucence: np.ndarray,
-                                  image: int | None = None,
-                                  image_weight: np.ndarray | None = None) -> None:
-        """(2, 3) each: what leaves the front, and the back, of the light on the other side; the
-        image, times its weight, is added."""
-        translucence = _float_array(translucence, (2, 3), "translucence")
-        weight = None
-        if image is not None:
-            image_weight = _float_array(image_weight, (2, 3), "image_weight")
-            weight = _as_floats(image_weight)
-        self._library.rb_set_material_translucence(
-            self._pointer, material, _as_floats(translucence), -1 if image is None else image,
-            weight)
-
-    def set_material_opacity(self, material: int, opacity: float) -> None:
-        """opacity: 0 to 1, share of the light that does not pass straight through."""
-        self._library.rb_set_material_opacity(self._pointer, material, opacity)
-
-    def set_material_opacity_image(self, material: int, image: int) -> None:
-        """The mean of the image's channels multiplies the opacity."""
-        self._library.rb_set_material_opacity_image(self._pointer, material, image)
+    def _surface(self, data: SurfaceData, name: str) -> _Surface:
+        surface = _Surface()
+        self._library.rb_init_surface(ctypes.byref(surface), ctypes.sizeof(surface))
+        _fill(surface, data, name)
+        return surface
 
     def add_mesh(self, name: str, vertices: np.ndarray, corner_vertices: np.ndarray,
                  face_offsets: np.ndarray, face_materials: np.ndarray | None) -> int:

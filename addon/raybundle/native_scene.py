@@ -12,41 +12,15 @@ def build_native_scene(data: SceneData) -> native.Scene:
     """The native scene, which the caller closes. Its ids of instances and of lights are positions
     in the lists of data. Raises RaybundleError if the native library refuses any of it."""
     scene = native.Scene()
-    images = [scene.add_image(image.name, image.pixels, image.extension) for image in data.images]
-    materials = []
+    for image in data.images:
+        scene.add_image(image.name, image.pixels, image.extension)
     for material in data.materials:
-        identifier = scene.add_material(material.name, material.reflectance, material.emission)
-        if material.image is not None:
-            scene.set_material_image(identifier, images[material.image], material.image_weight)
-        if material.color_weight is not None:
-            scene.set_material_corner_colors(identifier, material.color_weight)
-        if material.emission_image is not None:
-            scene.set_material_emission_image(identifier, images[material.emission_image],
-                                              material.emission_image_weight)
-        if material.emission_color_weight is not None:
-            scene.set_material_emission_corner_colors(identifier, material.emission_color_weight)
-        scene.set_material_diffuse(identifier, material.diffuse_scale, material.diffuse_offset)
-        scene.set_material_angles(identifier, material.reflected_by_angle, material.shown_by_angle)
-        scene.set_material_gloss(identifier, material.gloss_scale, material.gloss_offset,
-                                 material.gloss_by_angle, material.separate_masking,
-                                 material.gloss_roughness)
-        for lobe, parts in enumerate(zip(material.lobes, material.lobes_by_angle,
-                                         material.lobe_roughness)):
-            scene.set_material_lobe(identifier, lobe, *parts)
-        scene.set_material_diffuse_model(identifier, material.diffuse_model,
-                                         material.diffuse_roughness)
-        scene.set_material_leaving(identifier, material.leaving)
-        scene.set_material_translucence(
-            identifier, material.translucence,
-            None if material.translucence_image is None else images[material.translucence_image],
-            material.translucence_image_weight)
-        scene.set_material_opacity(identifier, material.opacity)
-        if material.opacity_image is not None:
-            scene.set_material_opacity_image(identifier, images[material.opacity_image])
-        materials.append(identifier)
-    meshes = [_add_mesh(scene, mesh) for mesh in data.meshes]
+        scene.add_material(material.name, material.front, material.back, material.opacity,
+                           material.opacity_image)
+    for mesh in data.meshes:
+        _add_mesh(scene, mesh)
     for instance in data.instances:
-        identifier = scene.add_instance(meshes[instance.mesh], instance.name, instance.transform,
+        identifier = scene.add_instance(instance.mesh, instance.name, instance.transform,
                                         instance.role, instance.side)
         scene.set_instance_visibility(identifier, instance.stops_direct, instance.exchanges)
         if instance.result_corners is not None:
@@ -61,7 +35,7 @@ def build_native_scene(data: SceneData) -> native.Scene:
     return scene
 
 
-def _add_mesh(scene: native.Scene, mesh: MeshData) -> int:
+def _add_mesh(scene: native.Scene, mesh: MeshData) -> None:
     identifier = scene.add_mesh(mesh.name, mesh.vertices, mesh.corner_vertices, mesh.face_offsets,
                                 mesh.face_materials)
     scene.set_mesh_corner_normals(identifier, mesh.corner_normals)
@@ -70,7 +44,6 @@ def _add_mesh(scene: native.Scene, mesh: MeshData) -> int:
         scene.set_mesh_uvs(identifier, mesh.uvs)
     if mesh.corner_colors is not None:
         scene.set_mesh_corner_colors(identifier, mesh.corner_colors)
-    return identifier
 
 
 def _add_light(scene: native.Scene, light: LightData) -> None:

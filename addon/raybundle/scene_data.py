@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .surface_data import SurfaceData
+
 
 @dataclass(frozen=True)
 class ImageData:
@@ -24,46 +26,15 @@ class ImageData:
 
 @dataclass(frozen=True)
 class MaterialData:
-    """Reflectance and emission of the front side (row 0) and the back side (row 1)."""
-
     name: str
-    reflectance: np.ndarray  # (2, 3)
-    emission: np.ndarray  # (2, 3), W/m^2
-    image: int | None = None
-    image_weight: np.ndarray | None = None  # (3,)
-    color_weight: np.ndarray | None = None  # (3,), of the mesh's corner colours
-    emission_image: int | None = None
-    emission_image_weight: np.ndarray | None = None  # (2, 3), W/m^2
-    emission_color_weight: np.ndarray | None = None  # (2, 3), W/m^2, of the corner colours
+    front: SurfaceData
+    back: SurfaceData
     opacity: float = 1.0  # share of the light that does not pass straight through
     opacity_image: int | None = None  # multiplies it, by the mean of its channels
-    # (2, 3) each: scale * reflectance + offset is diffuse, the rest gloss.
-    diffuse_scale: np.ndarray = field(default_factory=lambda: np.ones((2, 3)))
-    diffuse_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    # By the terms of materials/diffuse_angles.py: (4, 2, 3) of the reflectance; (5, 2, 3) what
-    # outputs show of light from straight above, then by the terms.
-    reflected_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
-    shown_by_angle: np.ndarray = field(
-        default_factory=lambda: np.concatenate([np.ones((1, 2, 3)), np.zeros((4, 2, 3))]))
-    # (2, 3) each: scale * reflectance + offset is mirrored; (4, 2, 3): that by angle; (2,): the
-    # roughness of it.
-    gloss_scale: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    gloss_offset: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    gloss_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))
-    gloss_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    separate_masking: bool = False  # rb_masking
-    # What of the reflectance each lobe of materials/layers.py sends (rb_set_material_lobe):
-    # (n, 2, 3), that by angle: (n, 4, 2, 3), and how rough: (n, 2).
-    lobes: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
-    lobes_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((0, 4, 2, 3)))
-    lobe_roughness: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    diffuse_model: int = 0  # of materials/scattering.py
-    diffuse_roughness: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    leaving: np.ndarray = field(default_factory=lambda: np.zeros((4, 2, 3)))  # likewise by angle
-    # (2, 3): what leaves a side, diffusely, of the light that arrives at the other.
-    translucence: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    translucence_image: int | None = None
-    translucence_image_weight: np.ndarray | None = None  # (2, 3)
+
+    @property
+    def sides(self) -> tuple[SurfaceData, SurfaceData]:
+        return self.front, self.back
 
 
 @dataclass(frozen=True)
@@ -195,7 +166,8 @@ class SceneData:
     def emits(self, instance: int) -> bool:
         """Whether an instance has a material that emits light."""
         used = np.unique(self.meshes[self.instances[instance].mesh].face_materials)
-        return any(np.any(self.materials[index].emission > 0.0) for index in used)
+        return any(np.any(side.emission.constant > 0.0) for index in used
+                   for side in self.materials[index].sides)
 
     def diagonal(self) -> float:
         """The diagonal of the bounding box of all instances in the world, m; 0 without any."""

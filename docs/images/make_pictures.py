@@ -30,7 +30,7 @@ def show_own_colors(objects: list[bpy.types.Object]) -> None:
     exporter = MaterialExporter(SceneData(), Warnings())
     for item in objects:
         index = exporter.export(SlotMaterial(item.material_slots[0].material)).index
-        color = np.append(exporter.scene.materials[index].reflectance[0], 1.0)
+        color = np.append(exporter.scene.materials[index].front.reflectance.constant, 1.0)
         data = item.data.color_attributes[ATTRIBUTE].data
         data.foreach_set('color', np.tile(color, len(data)).astype(np.float32))
 

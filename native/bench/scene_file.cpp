@@ -42,28 +42,22 @@ Image image(const Json& item) {
             vectors<glm::vec3>(item.at("pixels"))};
 }
 
-Material material(const Json& item) {
-    Material made;
-    made.name = name(item);
-    for (size_t side = 0; side < 2; ++side) {
-        made.reflectance[side] = vectorAt<glm::vec3>(item.at("reflectance"), 3 * side);
-        made.emission[side] = vectorAt<glm::vec3>(item.at("emission"), 3 * side);
-    }
-    if (item.contains("image")) {
-        made.image = item.at("image");
-        made.imageWeight = vectorAt<glm::vec3>(item.at("image_weight"));
-    }
-    if (item.contains("emission_image")) {
-        made.emissionImage = item.at("emission_image");
-        for (size_t side = 0; side < 2; ++side)
-            made.emissionImageWeight[side] =
-                vectorAt<glm::vec3>(item.at("emission_image_weight"), 3 * side);
-    }
-    if (item.contains("color_weight")) {
-        made.usesCornerColors = true;
-        made.cornerColorWeight = vectorAt<glm::vec3>(item.at("color_weight"));
-    }
+SurfaceColor color(const Json& item) {
+    return {vectorAt<glm::vec3>(item.at("constant")), item.value("image", RB_NO_IMAGE),
+            vectorAt<glm::vec3>(item.at("image_weight")),
+            vectorAt<glm::vec3>(item.at("corner_color_weight"))};
+}
+
+// Matt: what else a side has is not read.
+MaterialSide side(const Json& item) {
+    MaterialSide made;
+    made.reflectance = color(item.at("reflectance"));
+    made.emission = color(item.at("emission"));
     return made;
+}
+
+Material material(const Json& item) {
+    return {name(item), {side(item.at("front")), side(item.at("back"))}};
 }
 
 Mesh mesh(const Json& item) {

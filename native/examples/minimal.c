@@ -32,15 +32,20 @@ int main(void) {
                                         1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 4, 0};
     static const int32_t faces[7] = {0, 4, 8, 12, 16, 20, 24};
     static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    static const float reflectance[6] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
-    static const float emission[6] = {1, 1, 1, 0, 0, 0}; /* W/m^2, inside only */
+
+    /* The walls: of reflectance 0.5 on both sides, and inside of emission 1 W/m^2. */
+    rb_surface inside, outside;
+    check(rb_init_surface(&outside, sizeof outside));
+    for (int c = 0; c < 3; ++c) outside.reflectance.constant[c] = 0.5f;
+    inside = outside;
+    for (int c = 0; c < 3; ++c) inside.emission.constant[c] = 1;
 
     /* Describe the scene. */
     rb_scene scene;
     int32_t material, mesh, instance;
     int32_t materials[6];
     check(rb_new_scene(&scene));
-    check(rb_add_material(scene, "furnace", reflectance, emission, &material));
+    check(rb_add_material(scene, "furnace", &inside, &outside, 1, RB_NO_IMAGE, &material));
     for (int i = 0; i < 6; ++i) materials[i] = material;
     check(rb_add_mesh(scene, "box", vertices, 8, corners, 24, faces, 6, materials, &mesh));
     check(rb_add_instance(scene, mesh, "box", identity, RB_ROLE_BAKE, RB_SIDE_FRONT, &instance));

@@ -150,61 +150,113 @@ void addImage(Bytes& in, rb_scene scene) {
         expectMessage(rb_set_world_image(scene, width, height, pixels.data()));
 }
 
-void addMaterial(Bytes& in, rb_scene scene) {
-    int32_t id = -1;
-    const auto a = in.numbers<6>(), b = in.numbers<6>();
-    expectMessage(rb_add_material(scene, in.text().c_str(), a.data(), b.data(), &id));
-    const int32_t target = in.flag() ? id : in.small();
+template <size_t N>
+void copy(const std::array<float, N>& from, size_t first, float (&to)[3]) {
+    for (size_t c = 0; c < 3; ++c) to[c] = from[first + c];
+}
+
+rb_angle_factors angleFactors(Bytes& in) {
+    const auto values = in.numbers<12>();
+    rb_angle_factors factors;
+    copy(values, 0, factors.linear);
+    copy(values, 3, factors.square);
+    copy(values, 6, factors.fifth);
+    copy(values, 9, factors.cosine_fifth);
+    return factors;
+}
+
+struct Opacity {
+    float share = 1;
+    int32_t image = RB_NO_IMAGE;
+};
+
+// Sets a member of a surface, or a few that belong together, or the opacity. a, b: numbers for it.
+void spoil(Bytes& in, rb_surface& surface, Opacity& opacity, const std::array<float, 6>& a,
+           const std::array<float, 6>& b) {
     switch (in.below(11)) {
         case 0:
-            expectMessage(rb_set_material_image(scene, target, in.small(), a.data()));
+            surface.reflectance.image = in.small();
+            copy(a, 0, surface.reflectance.image_weight);
             break;
         case 1:
-            expectMessage(rb_set_material_corner_colors(scene, target, b.data()));
+            copy(b, 0, surface.reflectance.corner_color_weight);
             break;
         case 2:
-            expectMessage(rb_set_material_emission_image(scene, target, in.small(), a.data()));
+            surface.emission.image = in.small();
+            copy(a, 3, surface.emission.image_weight);
             break;
         case 3:
-            expectMessage(rb_set_material_emission_corner_colors(scene, target, b.data()));
+            copy(b, 3, surface.emission.corner_color_weight);
             break;
         case 4:
-            expectMessage(rb_set_material_diffuse(scene, target, a.data(), b.data()));
+            copy(a, 0, surface.shown.color.scale);
+            copy(b, 0, surface.shown.color.offset);
             break;
         case 5:
-            expectMessage(rb_set_material_opacity(scene, target, in.number()));
-            expectMessage(rb_set_material_opacity_image(scene, target, in.small()));
+            opacity = {in.number(), in.small()};
             break;
         case 6:
-            expectMessage(
-                rb_set_material_translucence(scene, target, a.data(), in.small(), b.data()));
+            copy(a, 0, surface.translucence.constant);
+            surface.translucence.image = in.small();
+            copy(b, 0, surface.translucence.image_weight);
+            copy(b, 3, surface.translucence.corner_color_weight);
             break;
-        case 7: {
-            const auto byAngle = in.numbers<24>();
-            const auto roughness = in.numbers<2>();
-            expectMessage(rb_set_material_gloss(scene, target, a.data(), b.data(), byAngle.data(),
-                                                rb_masking(in.small()), roughness.data()));
+        case 7:
+            copy(a, 0, surface.gloss.part.scale);
+            copy(b, 0, surface.gloss.part.offset);
+            surface.gloss.by_angle = angleFactors(in);
+            surface.gloss.roughness = in.number();
+            surface.gloss.masking = rb_masking(in.small());
             break;
-        }
         case 8:
-            expectMessage(rb_set_material_diffuse_model(scene, target, rb_diffuse_model(in.small()),
-                                                        a.data()));
-            expectMessage(rb_set_material_leaving(scene, target, in.numbers<24>().data()));
+            surface.diffuse.model = rb_diffuse_model(in.small());
+            surface.diffuse.roughness = a[0];
+            surface.diffuse.leaving = angleFactors(in);
             break;
         case 9: {
-            const auto byAngle = in.numbers<24>();
-            const auto roughness = in.numbers<2>();
-            expectMessage(rb_set_material_lobe(scene, target, rb_lobe(in.small()), a.data(),
-                                               byAngle.data(), roughness.data()));
+            rb_lobe* const lobes[] = {&surface.microfibers, &surface.velvet, &surface.burley_sheen,
+                                      &surface.several_facets};
+            rb_lobe& lobe = *lobes[in.below(4)];
+            copy(a, 0, lobe.reflectance);
+            lobe.by_angle = angleFactors(in);
+            lobe.roughness = in.number();
             break;
         }
-        default: {
-            const auto reflected = in.numbers<24>();
-            const auto shown = in.numbers<30>();
-            expectMessage(rb_set_material_angles(scene, target, reflected.data(), shown.data()));
-            break;
-        }
+        default:
+            surface.reflectance_by_angle = angleFactors(in);
+            copy(a, 0, surface.shown.from_above);
+            surface.shown.by_angle = angleFactors(in);
     }
+}
+
+void addMaterial(Bytes& in, rb_scene scene) {
+    int32_t id = -1;
+    rb_surface front, back;
+    expectMessage(rb_init_surface(&front, sizeof front));
+    expectMessage(rb_init_surface(&back, sizeof back));
+    const auto a = in.numbers<6>(), b = in.numbers<6>();
+    const std::string name = in.text();
+    copy(a, 0, front.reflectance.constant);
+    copy(a, 3, back.reflectance.constant);
+    copy(b, 0, front.emission.constant);
+    copy(b, 3, back.emission.constant);
+    Opacity opacity;
+    const rb_surface* other = &back;
+    rb_surface* unusual = &front;
+    uint32_t times = 1;
+    if (!in.flag()) {
+        const int32_t choice = in.small();
+        if (choice != 1) unusual = &back;
+        if (choice == 0)
+            times += in.below(4);
+        else if (choice == 1)
+            other = nullptr;
+        else
+            back.size = size_t(choice);
+    }
+    for (; times > 0; --times) spoil(in, *unusual, opacity, a, b);
+    expectMessage(
+        rb_add_material(scene, name.c_str(), &front, other, opacity.share, opacity.image, &id));
 }
 
 void addInstance(Bytes& in, rb_scene scene) {

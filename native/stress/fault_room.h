@@ -14,8 +14,6 @@ namespace raybundle::test {
 
 // A closed room with a box and a lamp; `brightness` of the lamp.
 inline rb_scene roomOf(float brightness) {
-    static const float kGrey[6] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
-    static const float kBlack[6] = {0, 0, 0, 0, 0, 0};
     static const float kRoom[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 3, 0};
     static const float kBox[12] = {-1, 0, 0, 2, 0, 1, 0, 1, 0, 0, 1, 0};
     const float intensity[3] = {brightness, brightness, brightness};
@@ -23,7 +21,10 @@ inline rb_scene roomOf(float brightness) {
     rb_scene scene = nullptr;
     int32_t id = -1, mesh = -1;
     rb_new_scene(&scene);
-    rb_add_material(scene, "grey", kGrey, kBlack, &id);
+    rb_surface grey;
+    rb_init_surface(&grey, sizeof grey);
+    std::fill_n(grey.reflectance.constant, 3, 0.5f);
+    rb_add_material(scene, "grey", &grey, nullptr, 1, RB_NO_IMAGE, &id);
     const std::vector<int32_t> materials(6, id);
     rb_add_mesh(scene, "cube", kVertices, 8, kCorners, 24, kFaces, 6, materials.data(), &mesh);
     rb_add_instance(scene, mesh, "room", kRoom, RB_ROLE_BAKE, RB_SIDE_FRONT, &id);

@@ -43,7 +43,8 @@ std::vector<Case> materialCases() {
     for (Scene* scene : {&mixed.scene, bright.get()})
         place(*scene, rectangle("lamp", {1.5f, 1.2f, 2.7f}, {0, 0.6f, 0}, {0.6f, 0, 0}),
               grey("lamp", 0, 1e12f));
-    mixed.scene.materials[1].emission = {glm::vec3(1e-12f), glm::vec3(0.0f)};
+    mixed.scene.materials[1].sides[0].emission.constant = glm::vec3(1e-12f);
+    mixed.scene.materials[1].sides[1].emission.constant = glm::vec3(0.0f);
     mixed.like = bright;
     mixed.likeSettings = mixed.settings;
     mixed.hasNoise = true;

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 #include <string>
 #include <vector>
@@ -24,12 +26,12 @@ TEST(ApiNull, HandlesAreRefusedEverywhere) {
     const char* text = nullptr;
     rb_subdivision subdivision = nullptr;
     const float matrix[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const rb_surface grey = surface();
     expectInvalid(rb_new_scene(nullptr), "scene");
     expectInvalid(rb_new_bake(nullptr), "bake");
     expectInvalid(rb_add_image(nullptr, "", 1, 1, kOne, RB_IMAGE_REPEAT, &id), "scene");
-    expectInvalid(rb_add_material(nullptr, "", kGrey, kBlack, &id), "scene");
-    expectInvalid(rb_set_material_image(nullptr, 0, 0, kOne), "scene");
-    expectInvalid(rb_set_material_corner_colors(nullptr, 0, kOne), "scene");
+    expectInvalid(rb_init_surface(nullptr, sizeof grey), "surface");
+    expectInvalid(rb_add_material(nullptr, "", &grey, &grey, 1, RB_NO_IMAGE, &id), "scene");
     expectInvalid(rb_add_mesh(nullptr, "", kVertices, 8, kCorners, 24, kFaces, 6, nullptr, &id),
                   "scene");
     expectInvalid(rb_set_mesh_corner_normals(nullptr, 0, kVertices, 8), "scene");
@@ -74,25 +76,11 @@ TEST(ApiNull, HandlesAreRefusedEverywhere) {
 
 TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     int32_t id = 77;
+    const rb_surface grey = surface();
     expectInvalid(rb_add_image(scene, "", 1, 1, nullptr, RB_IMAGE_REPEAT, &id), "rgb");
     expectInvalid(rb_add_image(scene, "", 1, 1, kOne, RB_IMAGE_REPEAT, nullptr), "image");
-    expectInvalid(rb_add_material(scene, "", nullptr, kBlack, &id), "reflectance");
-    expectInvalid(rb_add_material(scene, "", kGrey, nullptr, &id), "emission");
-    expectInvalid(rb_add_material(scene, "", kGrey, kBlack, nullptr), "material");
-    expectInvalid(rb_set_material_diffuse(scene, 0, nullptr, kBlack), "scale");
-    expectInvalid(rb_set_material_angles(scene, 0, nullptr, kAngles), "reflected");
-    expectInvalid(rb_set_material_angles(scene, 0, kAngles, nullptr), "shown");
-    expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, nullptr), "offset");
-    expectInvalid(
-        rb_set_material_gloss(scene, 0, nullptr, kGrey, kAngles, RB_MASKING_SEPARATE, kGrey),
-        "scale");
-    expectInvalid(
-        rb_set_material_gloss(scene, 0, kGrey, nullptr, kAngles, RB_MASKING_SEPARATE, kGrey),
-        "offset");
-    expectInvalid(
-        rb_set_material_gloss(scene, 0, kGrey, kGrey, nullptr, RB_MASKING_SEPARATE, kGrey),
-        "by_angle");
-    expectInvalid(rb_set_material_translucence(scene, 0, nullptr, -1, nullptr), "translucence");
+    expectInvalid(rb_add_material(scene, "", nullptr, &grey, 1, RB_NO_IMAGE, &id), "front");
+    expectInvalid(rb_add_material(scene, "", &grey, &grey, 1, RB_NO_IMAGE, nullptr), "material");
     expectInvalid(rb_add_mesh(scene, "", nullptr, 8, kCorners, 24, kFaces, 6, nullptr, &id),
                   "vertices");
     expectInvalid(rb_add_mesh(scene, "", kVertices, 8, nullptr, 24, kFaces, 6, nullptr, &id),
@@ -112,16 +100,17 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_set_bake_int(bake, nullptr, 1), "setting");
     expectInvalid(rb_set_bake_string(bake, "solver", nullptr), "solver");
     EXPECT_EQ(id, 77);
-    // A missing name is an empty one.
-    EXPECT_EQ(rb_add_material(scene, nullptr, kGrey, kBlack, &id), RB_ERROR_NONE);
+    // A missing name is an empty one, a missing back is as the front.
+    EXPECT_EQ(rb_add_material(scene, nullptr, &grey, nullptr, 1, RB_NO_IMAGE, &id), RB_ERROR_NONE);
     EXPECT_EQ(id, 0);
 }
 
 TEST_F(Api, LightThatIsTooBrightIsRefusedByName) {
-    const float bright[6] = {0, 2e15f, 0, 0, 0, 0};
+    const float bright[3] = {0, 2e15f, 0};
     const float x[3] = {1, 0, 0}, y[3] = {0, 1, 0}, small[3] = {1e-4f, 0, 0};
     int32_t id = 77;
-    expectInvalid(rb_add_material(scene, "glow", kGrey, bright, &id), "glow");
+    const rb_surface glow = surface(0.5f, bright[1]);
+    expectInvalid(rb_add_material(scene, "glow", &glow, nullptr, 1, RB_NO_IMAGE, &id), "glow");
     expectInvalid(rb_add_point_light(scene, "bulb", kOne, bright, 0, RB_POINT_DISK, &id), "bulb");
     expectInvalid(rb_add_sun_light(scene, "sun", kOne, bright, 0, &id), "sun");
     expectInvalid(rb_add_area_light(scene, "panel", kOne, x, y, bright, RB_AREA_RECTANGLE, &id),
@@ -135,12 +124,12 @@ TEST_F(Api, LightThatIsTooBrightIsRefusedByName) {
 }
 
 TEST_F(Api, LightThatMultipliesToTooMuchIsAnErrorWithoutAResult) {
-    const float pixel[3] = {1e25f, 1e25f, 1e25f}, weight[6] = {1e25f, 1e25f, 1e25f, 0, 0, 0};
-    int32_t image = -1;
-    ASSERT_EQ(rb_add_image(scene, "sun", 1, 1, pixel, RB_IMAGE_REPEAT, &image), RB_ERROR_NONE);
-    const int32_t material = addMaterial(kGrey, kBlack);
-    ASSERT_EQ(rb_set_material_emission_image(scene, material, image, weight), RB_ERROR_NONE);
-    const int32_t mesh = addCube(material);
+    const float pixel[3] = {1e25f, 1e25f, 1e25f};
+    rb_surface sun = surface();
+    setAll(sun.emission.image_weight, 1e25f);
+    ASSERT_EQ(rb_add_image(scene, "sun", 1, 1, pixel, RB_IMAGE_REPEAT, &sun.emission.image),
+              RB_ERROR_NONE);
+    const int32_t mesh = addCube(addMaterial(sun));
     const std::vector<float> uvs(48, 0.5f);
     ASSERT_EQ(rb_set_mesh_uvs(scene, mesh, uvs.data(), 24), RB_ERROR_NONE);
     addInstance(mesh);
@@ -161,38 +150,10 @@ TEST_F(Api, ALongMessageEndsWithAWholeCharacter) {
 }
 
 TEST_F(Api, IdsThatWereNotGivenOutAreRefused) {
-    const int32_t material = addMaterial(), mesh = addCube(material);
+    const int32_t mesh = addCube(addMaterial());
     int32_t id = 77;
     const float matrix[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     for (int32_t bad : {-1, 1, 1000, std::numeric_limits<int32_t>::min()}) {
-        expectInvalid(rb_set_material_image(scene, bad, 0, kOne),
-                      "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_image(scene, material, bad, kOne),
-                      "image " + std::to_string(bad));
-        expectInvalid(rb_set_material_emission_image(scene, material, bad, kGlow),
-                      "image " + std::to_string(bad));
-        expectInvalid(rb_set_material_opacity_image(scene, material, bad),
-                      "image " + std::to_string(bad));
-        expectInvalid(rb_set_material_opacity(scene, bad, 0.5f), "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_angles(scene, bad, kAngles, kAngles),
-                      "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_diffuse(scene, bad, kGrey, kBlack),
-                      "material " + std::to_string(bad));
-        expectInvalid(
-            rb_set_material_gloss(scene, bad, kGrey, kBlack, kAngles, RB_MASKING_SEPARATE, kBlack),
-            "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_lobe(scene, bad, RB_LOBE_VELVET, kGrey, kAngles, kBlack),
-                      "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_diffuse_model(scene, bad, RB_DIFFUSE_BURLEY, kBlack),
-                      "material " + std::to_string(bad));
-        expectInvalid(rb_set_material_translucence(scene, bad, kGrey, -1, nullptr),
-                      "material " + std::to_string(bad));
-        // -1 is none.
-        if (bad != -1)
-            expectInvalid(rb_set_material_translucence(scene, material, kGrey, bad, kGlow),
-                          "image " + std::to_string(bad));
-        expectInvalid(rb_set_material_corner_colors(scene, bad, kOne),
-                      "material " + std::to_string(bad));
         expectInvalid(rb_set_mesh_uvs(scene, bad, kVertices, 24), "mesh " + std::to_string(bad));
         expectInvalid(rb_set_light_cone(scene, bad, matrix, 1, 0, false),
                       "light " + std::to_string(bad));
@@ -271,58 +232,10 @@ TEST_F(Api, WrongCountsAreRefused) {
 
 TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     int32_t id = 77;
-    const float bad[6] = {0.5f, NAN, 0.5f, 0.5f, 0.5f, 0.5f}, negative[6] = {0, 0, -1, 0, 0, 0};
-    expectInvalid(rb_add_material(scene, "fog", bad, kBlack, &id), "fog");
-    expectInvalid(rb_add_material(scene, "fog", kGrey, bad, &id), "fog");
-    expectInvalid(rb_add_material(scene, "fog", negative, kBlack, &id), "fog");
-    expectInvalid(rb_add_material(scene, "fog", kGrey, negative, &id), "fog");
-    expectInvalid(rb_set_material_diffuse(scene, 0, bad, kBlack), "scale");
-    float badAngles[30] = {};
-    badAngles[17] = INFINITY;
-    expectInvalid(rb_set_material_angles(scene, 0, badAngles, kAngles), "reflected");
-    badAngles[17] = 0;
-    badAngles[29] = NAN;
-    expectInvalid(rb_set_material_angles(scene, 0, kAngles, badAngles), "shown");
-    expectInvalid(rb_set_material_diffuse(scene, 0, kGrey, bad), "offset");
-    expectInvalid(rb_set_material_gloss(scene, 0, bad, kGrey, kAngles, RB_MASKING_SEPARATE, kGrey),
-                  "scale");
-    expectInvalid(rb_set_material_gloss(scene, 0, kGrey, bad, kAngles, RB_MASKING_SEPARATE, kGrey),
-                  "offset");
-    badAngles[23] = NAN;
-    expectInvalid(
-        rb_set_material_gloss(scene, 0, kGrey, kGrey, badAngles, RB_MASKING_SEPARATE, kGrey),
-        "by_angle");
-    const int32_t paint = addMaterial();
-    expectInvalid(rb_set_material_lobe(scene, paint, RB_LOBE_VELVET, bad, kAngles, kGrey),
-                  "reflectance");
-    expectInvalid(rb_set_material_lobe(scene, paint, RB_LOBE_VELVET, kGrey, badAngles, kGrey),
-                  "by_angle");
-    expectInvalid(rb_set_material_lobe(scene, paint, rb_lobe(4), kGrey, kAngles, kGrey), "lobe 4");
-    expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, rb_masking(2), kGrey),
-                  "masking 2");
-    expectInvalid(rb_set_material_leaving(scene, paint, badAngles), "factors");
-    expectInvalid(rb_set_material_leaving(scene, paint, nullptr), "factors");
-    expectInvalid(rb_set_material_leaving(scene, paint + 1, kAngles), "material");
-    for (float rough : {-0.1f, 1.1f, NAN, INFINITY}) {
-        const float roughness[2] = {0.5f, rough};
-        expectInvalid(rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles,
-                                            RB_MASKING_SEPARATE, roughness),
-                      "roughness");
-        expectInvalid(rb_set_material_lobe(scene, paint, RB_LOBE_VELVET, kGrey, kAngles, roughness),
-                      "roughness");
-        expectInvalid(rb_set_material_diffuse_model(scene, paint, RB_DIFFUSE_BURLEY, roughness),
-                      "roughness");
-    }
-    expectInvalid(
-        rb_set_material_gloss(scene, paint, kGrey, kGrey, kAngles, RB_MASKING_SEPARATE, nullptr),
-        "roughness");
-    expectInvalid(rb_set_material_diffuse_model(scene, paint, rb_diffuse_model(3), kBlack),
-                  "diffuse model 3");
-    expectInvalid(rb_set_material_translucence(scene, 0, bad, -1, nullptr), "translucence");
+    const float negative[3] = {0, 0, -1};
     const float infinite[3] = {0, INFINITY, 0}, zero[3] = {0, 0, 0};
     expectInvalid(rb_add_point_light(scene, "bulb", infinite, kOne, 0, RB_POINT_DISK, &id), "bulb");
-    expectInvalid(rb_add_point_light(scene, "bulb", kOne, negative + 2, 0, RB_POINT_DISK, &id),
-                  "bulb");
+    expectInvalid(rb_add_point_light(scene, "bulb", kOne, negative, 0, RB_POINT_DISK, &id), "bulb");
     expectInvalid(rb_add_point_light(scene, "bulb", kOne, kOne, -1, RB_POINT_DISK, &id), "bulb");
     expectInvalid(rb_add_point_light(scene, "bulb", kOne, kOne, NAN, RB_POINT_DISK, &id), "bulb");
     expectInvalid(rb_add_sun_light(scene, "sol", zero, kOne, 0, &id), "sol");
@@ -362,6 +275,86 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     const int32_t box = addInstance(mesh);
     expectInvalid(rb_set_result_corners(scene, box, nullptr, 1), "corners");
     expectInvalid(rb_set_result_corners(scene, box, noCorners, 2), "77777");
+}
+
+// Adds "fog" with what is wrong on one side and in the opacity of it.
+class ApiMaterial : public Api {
+  protected:
+    rb_error add(const rb_surface& side, rb_side wrong = RB_SIDE_FRONT, float opacity = 1,
+                 int32_t opacityImage = RB_NO_IMAGE) {
+        const rb_surface right = surface();
+        const rb_surface* sides[] = {&right, &right};
+        sides[wrong] = &side;
+        return rb_add_material(scene, "fog", sides[0], sides[1], opacity, opacityImage, &id);
+    }
+    void TearDown() override {
+        EXPECT_EQ(id, 77) << "outputs are untouched on failure";
+        Api::TearDown();
+    }
+
+    int32_t id = 77;
+};
+
+TEST_F(ApiMaterial, SurfacesOfAnotherSizeAreRefusedByName) {
+    rb_surface made = surface();
+    EXPECT_EQ(made.size, sizeof made);
+    const size_t sizes[] = {0, sizeof(size_t), sizeof made + 1, std::numeric_limits<size_t>::max()};
+    for (const size_t size : sizes) {
+        const std::string named = "has a size of " + std::to_string(size) + " bytes";
+        expectInvalid(rb_init_surface(&made, size), "surface " + named);
+        EXPECT_EQ(made.size, sizeof made);
+        rb_surface wrong = surface();
+        wrong.size = size;
+        expectInvalid(add(wrong, RB_SIDE_FRONT), "material \"fog\": its front " + named);
+        expectInvalid(add(wrong, RB_SIDE_BACK), "material \"fog\": its back " + named);
+    }
+}
+
+// The bits of NAN are no number, no image and in no enumeration: wherever they are, that is refused.
+TEST_F(ApiMaterial, EveryMemberOfASurfaceIsCheckedByName) {
+    const float bad = NAN;
+    constexpr size_t kEnd = offsetof(rb_surface, diffuse) + sizeof(rb_diffuse);
+    for (const rb_side side : {RB_SIDE_FRONT, RB_SIDE_BACK})
+        for (size_t at = sizeof(size_t); at < kEnd; at += sizeof bad) {
+            rb_surface wrong = surface();
+            std::memcpy(reinterpret_cast<char*>(&wrong) + at, &bad, sizeof bad);
+            SCOPED_TRACE(at);
+            expectInvalid(add(wrong, side), "fog");
+        }
+}
+
+TEST_F(ApiMaterial, TheMemberThatIsWrongIsNamed) {
+    auto expect = [&](const auto& spoil, const std::string& named) {
+        rb_surface made = surface();
+        spoil(made);
+        expectInvalid(add(made, RB_SIDE_BACK), "material \"fog\": " + named);
+    };
+    const std::string ofLight = "reflectance and emission must be finite and not negative";
+    expect([](rb_surface& s) { s.reflectance.constant[2] = -1; }, ofLight);
+    expect([](rb_surface& s) { s.emission.constant[0] = -1e-3f; }, ofLight);
+    expect([](rb_surface& s) { s.emission.corner_color_weight[1] = INFINITY; },
+           "back emission.corner_color_weight 1 is not a finite number");
+    expect([](rb_surface& s) { s.shown.by_angle.cosine_fifth[2] = NAN; },
+           "back shown.by_angle.cosine_fifth 2 is not a finite number");
+    for (const float rough : {-0.1f, 1.1f, NAN, INFINITY}) {
+        expect([&](rb_surface& s) { s.gloss.roughness = rough; },
+               "back gloss.roughness must be 0 to 1");
+        expect([&](rb_surface& s) { s.velvet.roughness = rough; },
+               "back velvet.roughness must be 0 to 1");
+        expect([&](rb_surface& s) { s.diffuse.roughness = rough; },
+               "back diffuse.roughness must be 0 to 1");
+    }
+    expect([](rb_surface& s) { s.gloss.masking = rb_masking(2); }, "unknown masking 2");
+    expect([](rb_surface& s) { s.diffuse.model = rb_diffuse_model(3); }, "unknown diffuse model 3");
+    for (const int32_t image : {-2, 0, 1000, std::numeric_limits<int32_t>::min()}) {
+        const std::string noImage = "there is no image " + std::to_string(image);
+        expect([&](rb_surface& s) { s.reflectance.image = image; }, noImage);
+        expect([&](rb_surface& s) { s.translucence.image = image; }, noImage);
+        expectInvalid(add(surface(), RB_SIDE_FRONT, 1, image), "material \"fog\": " + noImage);
+    }
+    for (const float opacity : {-0.1f, 1.1f, NAN})
+        expectInvalid(add(surface(), RB_SIDE_FRONT, opacity),
+                      "material \"fog\": opacity must be 0 to 1");
 }
 
 TEST_F(Api, UnknownSettingsAndOtherTypesAreRefused) {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -16,13 +17,20 @@
 namespace raybundle::test {
 
 inline constexpr float kIdentity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-inline constexpr float kGrey[6] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
-inline constexpr float kBlack[6] = {0, 0, 0, 0, 0, 0};
-inline constexpr float kGlow[6] = {1, 1, 1, 0, 0, 0};
-inline constexpr float kAngles[30] = {1, 1, 1, 1, 1, 1};
 inline constexpr float kOne[3] = {1, 1, 1};
 
 inline std::string message() { return rb_get_error_message(); }
+
+inline void setAll(float (&rgb)[3], float value) { std::fill_n(rgb, 3, value); }
+
+// A grey side, by its reflectance and its emission in W/m^2.
+inline rb_surface surface(float reflectance = 0.5f, float emission = 0) {
+    rb_surface made;
+    EXPECT_EQ(rb_init_surface(&made, sizeof made), RB_ERROR_NONE) << message();
+    setAll(made.reflectance.constant, reflectance);
+    setAll(made.emission.constant, emission);
+    return made;
+}
 
 // Checks the code, and that the message names what is concerned.
 inline void expectFailure(rb_error found, rb_error wanted, const std::string& named) {
@@ -47,9 +55,10 @@ class Api : public ::testing::Test {
         rb_release_bake(bake);
         rb_release_scene(scene);
     }
-    int32_t addMaterial(const float* reflectance = kGrey, const float* emission = kGlow) {
+    int32_t addMaterial(const rb_surface& front = surface(0.5f, 1),
+                        const rb_surface& back = surface()) {
         int32_t id = -1;
-        EXPECT_EQ(rb_add_material(scene, "glow", reflectance, emission, &id), RB_ERROR_NONE)
+        EXPECT_EQ(rb_add_material(scene, "glow", &front, &back, 1, RB_NO_IMAGE, &id), RB_ERROR_NONE)
             << message();
         return id;
     }

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <string>
 #include <thread>
 #include <vector>
@@ -105,8 +107,10 @@ TEST_F(Api, OneBakeServesSeveralScenes) {
 }
 
 TEST_F(Api, ReflectanceOfOneIsClampedAndTheMaterialNamed) {
-    const float mirror[6] = {1, 1.5f, 0.5f, 0, 0, 0};
-    addInstance(addCube(addMaterial(mirror, kGlow)));
+    rb_surface mirror = surface(0.5f, 1);
+    mirror.reflectance.constant[0] = 1;
+    mirror.reflectance.constant[1] = 1.5f;
+    addInstance(addCube(addMaterial(mirror)));
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
     const std::string warnings = report()["warnings"].dump();
     EXPECT_NE(warnings.find("glow"), std::string::npos) << warnings;
@@ -123,17 +127,56 @@ TEST_F(Api, ReflectanceOfOneIsClampedAndTheMaterialNamed) {
 TEST_F(Api, ImagesAndCornerColoursGiveReflectance) {
     // Black base, half from an image of constant 0.6 and half from corner colours of 0.4: rho =
     // 0.5.
-    const int32_t material = addMaterial(kBlack, kGlow), mesh = addCube(material);
     const std::vector<float> pixels(4 * 2 * 3, 0.6f), uvs(48, 0.3f), colors(72, 0.4f);
-    const float half[3] = {0.5f, 0.5f, 0.5f};
-    int32_t image = -1;
-    ASSERT_EQ(rb_add_image(scene, "paint", 4, 2, pixels.data(), RB_IMAGE_REPEAT, &image),
+    rb_surface painted = surface(0, 1);
+    ASSERT_EQ(rb_add_image(scene, "paint", 4, 2, pixels.data(), RB_IMAGE_REPEAT,
+                           &painted.reflectance.image),
               RB_ERROR_NONE);
-    ASSERT_EQ(rb_set_material_image(scene, material, image, half), RB_ERROR_NONE);
-    ASSERT_EQ(rb_set_material_corner_colors(scene, material, half), RB_ERROR_NONE);
+    setAll(painted.reflectance.image_weight, 0.5f);
+    setAll(painted.reflectance.corner_color_weight, 0.5f);
+    const int32_t mesh = addCube(addMaterial(painted));
     ASSERT_EQ(rb_set_mesh_uvs(scene, mesh, uvs.data(), 24), RB_ERROR_NONE);
     ASSERT_EQ(rb_set_mesh_corner_colors(scene, mesh, colors.data(), 24), RB_ERROR_NONE);
     const int32_t instance = addInstance(mesh);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    expectFurnace(instance);
+}
+
+TEST_F(Api, ASurfaceIsByDefaultThatOfFacesWithoutAMaterial) {
+    const float centre[3] = {0.5f, 0.5f, 0.5f};
+    auto lightWith = [&](const std::vector<int32_t>& materials) {
+        int32_t mesh = -1, lamp = -1;
+        EXPECT_EQ(rb_add_mesh(scene, "cube", kVertices, 8, kCorners, 24, kFaces, 6,
+                              materials.empty() ? nullptr : materials.data(), &mesh),
+                  RB_ERROR_NONE);
+        EXPECT_EQ(rb_add_point_light(scene, "bulb", centre, kOne, 0, RB_POINT_SPHERE, &lamp),
+                  RB_ERROR_NONE);
+        const int32_t instance = addInstance(mesh);
+        EXPECT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+        return cornerLight(instance);
+    };
+    const std::vector<float> without = lightWith({});
+    rb_release_scene(scene);
+    ASSERT_EQ(rb_new_scene(&scene), RB_ERROR_NONE);
+    rb_surface plain;
+    ASSERT_EQ(rb_init_surface(&plain, sizeof plain), RB_ERROR_NONE);
+    EXPECT_EQ(lightWith(std::vector<int32_t>(6, addMaterial(plain, plain))), without);
+}
+
+TEST_F(Api, OfAShorterSurfaceTheRestHasDefaults) {
+    constexpr size_t kShort = offsetof(rb_surface, translucence);
+    const float bad = NAN;
+    rb_surface older = surface(0.5f, 1);
+    for (size_t at = kShort; at < sizeof older; at += sizeof bad)
+        std::memcpy(reinterpret_cast<char*>(&older) + at, &bad, sizeof bad);
+    const rb_surface whole = older;
+    ASSERT_EQ(rb_init_surface(&older, kShort), RB_ERROR_NONE);
+    EXPECT_EQ(older.size, kShort);
+    EXPECT_EQ(std::memcmp(&older.translucence, &whole.translucence, sizeof older - kShort), 0)
+        << "what the caller does not know is not written";
+    setAll(older.reflectance.constant, 0.5f);
+    setAll(older.emission.constant, 1);
+    const int32_t instance = addInstance(addCube(addMaterial(older)));
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
     expectFurnace(instance);
 }

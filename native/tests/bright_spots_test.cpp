@@ -23,8 +23,8 @@ Scene roomWithLampAtWall(double distance, bool isRough = false) {
     Scene scene;
     Material paint = grey("", 0.6f);
     if (isRough) {
-        paint.scattering[0].diffuseModel = RB_DIFFUSE_BURLEY;
-        paint.scattering[0].diffuseRoughness = 1;
+        paint.sides[0].scattering.diffuseModel = RB_DIFFUSE_BURLEY;
+        paint.sides[0].scattering.diffuseRoughness = 1;
     }
     place(scene, box("room", glm::vec3(0), glm::vec3(2), true), paint);
     scene.addLight(pointLight({1.03, distance, 0.96}, glm::dvec3(5)));

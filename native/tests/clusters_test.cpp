@@ -19,8 +19,8 @@ Scene roomWithBall(int subdivisions, float reflectance, float emission = 0, floa
     Scene scene = roomWithBoxes(reflectance, emission);
     Material paint = grey("ball", reflectance, emission, emission);
     if (gloss > 0) {
-        paint.scattering[0].glossOffset = glm::vec3(gloss);
-        paint.scattering[0].glossRoughness = 0.3f;
+        paint.sides[0].scattering.glossOffset = glm::vec3(gloss);
+        paint.sides[0].scattering.glossRoughness = 0.3f;
     }
     place(scene, icosphere("ball", 0.4f, subdivisions, false), paint,
           glm::translate(glm::dmat4(1), {3.1, 2.3, 1.9}), RB_ROLE_OCCLUDE);

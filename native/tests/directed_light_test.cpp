@@ -32,11 +32,11 @@ Scene studio(bool isBurley = false) {
     Scene scene;
     Material paint = grey("paint", kReflected);
     if (isBurley) {
-        paint.scattering[0].diffuseModel = RB_DIFFUSE_BURLEY;
-        paint.scattering[0].diffuseRoughness = 1;
+        paint.sides[0].scattering.diffuseModel = RB_DIFFUSE_BURLEY;
+        paint.sides[0].scattering.diffuseRoughness = 1;
     } else {
-        paint.scattering[0].glossScale = glm::vec3(kMirrored / kReflected);
-        paint.scattering[0].glossRoughness = kRoughness;
+        paint.sides[0].scattering.glossScale = glm::vec3(kMirrored / kReflected);
+        paint.sides[0].scattering.glossRoughness = kRoughness;
     }
     const Material black = grey("black", 0);
     place(scene, rectangle("floor", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), paint);
@@ -322,7 +322,7 @@ TEST_P(Studio, SendsOnAnEvenSky) {
 TEST(DirectedLight, IsTheSameAfterLightsAndPaintWereChanged) {
     auto make = [](bool hasGloss, double red) {
         Scene scene = studio();
-        if (!hasGloss) scene.materials.front().scattering = {};
+        if (!hasGloss) scene.materials.front().sides[0].scattering = {};
         scene.lights.front().strength.x = red;
         Light other = sunLight({0.6, 0, 0.8}, glm::dvec3(1));
         other.castsShadows = false;
@@ -347,8 +347,8 @@ TEST(DirectedLight, IsTheSameAfterLightsAndPaintWereChanged) {
 TEST(GlossyBoards, GetNoMoreThanTheSky) {
     Scene scene;
     Material paint = grey("paint", 1);
-    paint.scattering[0].glossOffset = glm::vec3(0.2f);
-    paint.scattering[0].glossRoughness = 0.5f;
+    paint.sides[0].scattering.glossOffset = glm::vec3(0.2f);
+    paint.sides[0].scattering.glossRoughness = 0.5f;
     for (int k = 0; k < 5; ++k) {
         const float x = 0.072f * float(k);
         place(scene, box("board", {x, 0, 0}, {x + 0.07f, 0.22f, 0.3f}, false), paint);

@@ -25,13 +25,10 @@ TEST(Gloss, IsNoPartOfWhatLeaves) {
             // A furnace: the exitance of the room is 1.
             Scene scene = closedCube(0.6f, 0.4f);
             Material shell = grey("shell", 0.3f * opacity, 0.7f * opacity);
-            shell.reflectance[1] = shell.reflectance[0];
-            shell.emission[1] = shell.emission[0];
             shell.opacity = opacity;
-            for (int side : {0, 1}) {
-                shell.diffuseScale[side] = glm::vec3(0.8f);
-                shell.diffuseOffset[side] = glm::vec3(-0.04f);
-            }
+            shell.sides[0].colorScale = glm::vec3(0.8f);
+            shell.sides[0].colorOffset = glm::vec3(-0.04f);
+            shell.sides[1] = shell.sides[0];
             place(scene, box("shell", {0.25f, 0.25f, 0.25f}, {0.7f, 0.75f, 0.8f}, false), shell);
             Bake bake;
             setQuick(bake);
@@ -50,7 +47,7 @@ TEST(Gloss, IsNoPartOfWhatLeaves) {
 Scene boardOverFloor(double cosine, float grazing) {
     Scene scene;
     Material white = grey("white", 0.5f);
-    white.reflectanceByAngle[0][2] = glm::vec3(21 * grazing);
+    white.sides[0].reflectanceByAngle[2] = glm::vec3(21 * grazing);
     place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), white);
     place(scene, rectangle("board", {-1, -1, 0.8f}, {0, 2, 0}, {2, 0, 0}), grey("black", 0));
     Light sun = sunLight({std::sqrt(1 - cosine * cosine), 0, cosine}, glm::dvec3(3));
@@ -78,9 +75,10 @@ TEST(Gloss, MoreIsReflectedAtGrazingAngles) {
 
 // Of no shader; with terms that none has alone.
 Material shownByAngle(Material material) {
-    material.shownFromAbove[0] = {0.8f, 0.9f, 1.0f};
-    material.shownByAngle[0] = {glm::vec3(0.1f, 0.2f, -0.1f), glm::vec3(-0.3f, 0.1f, 0.2f),
-                                glm::vec3(0.5f, -0.4f, 0.3f), glm::vec3(-0.2f, 0.6f, 0.7f)};
+    MaterialSide& front = material.sides[0];
+    front.shownFromAbove = {0.8f, 0.9f, 1.0f};
+    front.shownByAngle = {glm::vec3(0.1f, 0.2f, -0.1f), glm::vec3(-0.3f, 0.1f, 0.2f),
+                          glm::vec3(0.5f, -0.4f, 0.3f), glm::vec3(-0.2f, 0.6f, 0.7f)};
     return material;
 }
 
@@ -98,10 +96,10 @@ TEST(ShownByAngle, OfTheSunIsExact) {
             bake.run(scene);
             const double rest = 1 - cosine, fifth = std::pow(rest, 5);
             for (int c = 0; c < 3; ++c) {
-                double share = double(white.shownFromAbove[0][c]);
+                double share = double(white.sides[0].shownFromAbove[c]);
                 const double terms[] = {rest, rest * rest, fifth, cosine * fifth};
                 for (size_t k = 0; k < 4; ++k)
-                    share += terms[k] * double(white.shownByAngle[0][k][c]);
+                    share += terms[k] * double(white.sides[0].shownByAngle[k][c]);
                 for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
                     EXPECT_NEAR(double(light[c]) * kPi / (3 * cosine), share, 1e-4);
                 for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_COMBINED))
@@ -120,15 +118,14 @@ TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
         setQuick(bake);
         bake.settings.reconstruction = reconstruction;
         bake.run(scene);
-        const Material& white = scene.materials.front();
+        const MaterialSide& white = scene.materials.front().sides[0];
         for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
             for (int c = 0; c < 3; ++c)
-                EXPECT_NEAR(
-                    double(light[c]) * kPi,
-                    double(white.shownFromAbove[0][c] + white.shownByAngle[0][0][c] / 3 +
-                           white.shownByAngle[0][1][c] / 6 + white.shownByAngle[0][2][c] / 21 +
-                           white.shownByAngle[0][3][c] / 84),
-                    1e-4)
+                EXPECT_NEAR(double(light[c]) * kPi,
+                            double(white.shownFromAbove[c] + white.shownByAngle[0][c] / 3 +
+                                   white.shownByAngle[1][c] / 6 + white.shownByAngle[2][c] / 21 +
+                                   white.shownByAngle[3][c] / 84),
+                            1e-4)
                     << choiceName(reconstruction);
         EXPECT_LT(reportOf(bake)["estimated_error"].get<double>(), 1e-3);
         EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 1e-4);
@@ -141,19 +138,20 @@ TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
 TEST(ShownByAngle, TheStatedErrorHasThatOfTheAngles) {
     Scene scene;
     Material white = grey("white", 0.5f);
-    white.shownByAngle[0][0] = glm::vec3(0.8f);
+    white.sides[0].shownByAngle[0] = glm::vec3(0.8f);
     place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), white);
     scene.addLight(pointLight({0.003, 0.004, 0.02}, glm::dvec3(1)));
     const ShotScene shots(scene, 0.2f);
     auto shown = [&](const FirstShot& shot, size_t side) {
-        return double((white.shown(0, shot.angles[side]) * shot.irradiance[side]).x);
+        return double((white.sides[0].shown(shot.angles[side]) * shot.irradiance[side]).x);
     };
     const FirstShot exact = shots.shoot(FirstShotKind::GATHER, 0, 0, 1e-5f);
     double found = 0, stated = 0, light = 0;
     for (int seed = 1; seed <= 64; ++seed) {
         const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0, seed);
         for (size_t side = 0; side < shots.patches.sideCount(); side += 2) {
-            const double error = double(white.shown(0, shot.angles[side]).x * shot.error[side]);
+            const double error =
+                double(white.sides[0].shown(shot.angles[side]).x * shot.error[side]);
             found += std::pow(shown(shot, side) - shown(exact, side), 2);
             stated += std::pow(error, 2);
             light += std::pow(shown(exact, side), 2);
@@ -169,7 +167,7 @@ TEST(ShownByAngle, TheStatedErrorHasThatOfTheAngles) {
 Scene paintedRoom(float grazing) {
     Scene scene = roomWithBoxes(0.6f);
     for (Material& material : scene.materials)
-        material.reflectanceByAngle[0][2] = glm::vec3(21 * grazing);
+        material.sides[0].reflectanceByAngle[2] = glm::vec3(21 * grazing);
     scene.addLight(pointLight({1, 1, 2}, {3, 5, 2}));
     return scene;
 }

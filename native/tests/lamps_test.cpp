@@ -168,7 +168,7 @@ TEST(AreaLight, ALargeOneNearByShinesFromWhereItIs) {
     scene.addLight(
         areaLight({0.2, 0.1, kHeight}, {kLamp / 2, 0, 0}, {0, -kLamp / 2, 0}, glm::dvec3(7)));
     Material rough = grey("", 0.5f);
-    rough.scattering[0].diffuseModel = RB_DIFFUSE_OREN_NAYAR;
+    rough.sides[0].scattering.diffuseModel = RB_DIFFUSE_OREN_NAYAR;
     place(scene,
           grid("floor", {-kWidth / 2, -kWidth / 2, 0}, {kWidth, 0, 0}, {0, kWidth, 0}, kCells,
                kCells),

@@ -38,7 +38,7 @@ Scene court(const Lit& lit = {}, bool isSplit = false) {
     place(scene, grid("floor", {0, 0, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("", 0.6f));
     place(scene, grid("wall", {0, 4, 0}, {4, 0, 0}, {0, 0, 3}, 4, 3), grey("", 0.5f));
     Material red = grey("red", 0.2f, lit.first ? 20.0f : 0.0f);
-    red.emission[0] *= glm::vec3(1, 0.2f, 0.1f);
+    red.sides[0].emission.constant *= glm::vec3(1, 0.2f, 0.1f);
     const int32_t panel =
         place(scene, rectangle("panel", {2.5f, 3.5f, 1}, {0.6f, 0, 0}, {0, 0, 0.6f}), red);
     if (isSplit) {

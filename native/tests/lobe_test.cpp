@@ -41,7 +41,7 @@ TEST(Lobe, IsTheModelOverItsMean) {
             for (rb_masking masking : {RB_MASKING_CORRELATED, RB_MASKING_SEPARATE})
                 expectModel(Lobe::gloss(normal, in, masking, rough, glm::vec3(0.04f)),
                             ggx(roughness, 0.04, masking), in, kTolerance);
-            expectModel(Lobe::of(RB_LOBE_SEVERAL_FACETS, normal, in, rough), several, in,
+            expectModel(Lobe::of(LobeKind::SEVERAL_FACETS, normal, in, rough), several, in,
                         kTolerance);
             expectModel(Lobe::diffuse(normal, in, RB_DIFFUSE_BURLEY, rough), burley(roughness), in,
                         kTolerance);
@@ -59,11 +59,11 @@ TEST(Lobe, OfClothIsTheModelOverItsMean) {
             SCOPED_TRACE(std::to_string(cosine) + " " + std::to_string(roughness));
             const glm::dvec3 in = inclined(cosine);
             const float rough = float(roughness);
-            expectModel(Lobe::of(RB_LOBE_MICROFIBERS, normal, in, rough),
+            expectModel(Lobe::of(LobeKind::MICROFIBERS, normal, in, rough),
                         transformedCosine(roughness), in, kTolerance);
-            expectModel(Lobe::of(RB_LOBE_VELVET, normal, in, rough), velvet(roughness), in,
+            expectModel(Lobe::of(LobeKind::VELVET, normal, in, rough), velvet(roughness), in,
                         kTolerance);
-            expectModel(Lobe::of(RB_LOBE_BURLEY_SHEEN, normal, in, rough), burleySheen(), in,
+            expectModel(Lobe::of(LobeKind::BURLEY_SHEEN, normal, in, rough), burleySheen(), in,
                         kTolerance);
         }
 }
@@ -91,10 +91,10 @@ TEST(Lobe, HasNothingBelowTheSurfaceAndIsFiniteAtItsEdge) {
             for (const Lobe& lobe :
                  {Lobe::gloss(normal, to, RB_MASKING_CORRELATED, roughness, glm::vec3(0)),
                   Lobe::gloss(normal, to, RB_MASKING_SEPARATE, roughness, glm::vec3(1)),
-                  Lobe::of(RB_LOBE_MICROFIBERS, normal, to, roughness),
-                  Lobe::of(RB_LOBE_VELVET, normal, to, roughness),
-                  Lobe::of(RB_LOBE_BURLEY_SHEEN, normal, to, roughness),
-                  Lobe::of(RB_LOBE_SEVERAL_FACETS, normal, to, roughness)}) {
+                  Lobe::of(LobeKind::MICROFIBERS, normal, to, roughness),
+                  Lobe::of(LobeKind::VELVET, normal, to, roughness),
+                  Lobe::of(LobeKind::BURLEY_SHEEN, normal, to, roughness),
+                  Lobe::of(LobeKind::SEVERAL_FACETS, normal, to, roughness)}) {
                 EXPECT_EQ(lobe.towards({0.6f, 0, -0.8f}), glm::vec3(0));
                 for (const glm::vec3& out : {glm::vec3(0, 0, 1), glm::vec3(-1, 0, 1e-6f),
                                              glm::vec3(1, 0, 1e-6f), glm::vec3(0, 1, 1)}) {

@@ -18,7 +18,7 @@ using namespace test;
 
 Material veil(float opacity, float reflectance = 0) {
     Material material = grey("veil", reflectance);
-    material.reflectance[1] = material.reflectance[0];
+    material.sides[1] = material.sides[0];
     material.opacity = opacity;
     return material;
 }
@@ -41,7 +41,7 @@ Scene floorUnderSun() {
 Scene furnaceWithShell(float opacity) {
     Scene scene = closedCube(0.6f, 0.4f);
     Material shell = veil(opacity, 0.3f * opacity);
-    for (glm::vec3& emission : shell.emission) emission = glm::vec3(0.7f * opacity);
+    for (MaterialSide& side : shell.sides) side.emission.constant = glm::vec3(0.7f * opacity);
     place(scene, box("shell", {0.25f, 0.25f, 0.25f}, {0.7f, 0.75f, 0.8f}, false), shell);
     return scene;
 }
@@ -186,8 +186,9 @@ Scene floorUnderChecker(int pixels, const glm::vec3& bright) {
         for (int x = 0; x < pixels; ++x)
             checker.push_back((x + y) % 2 ? glm::vec3(0.0f) : glm::vec3(1.0f));
     Material lamp = grey("lamp", 0);
-    lamp.emissionImage = scene.addImage({"checker", pixels, pixels, RB_IMAGE_REPEAT, checker});
-    lamp.emissionImageWeight = {bright, glm::vec3(0.0f)};
+    SurfaceColor& emission = lamp.sides[0].emission;
+    emission.image = scene.addImage({"checker", pixels, pixels, RB_IMAGE_REPEAT, checker});
+    emission.imageWeight = bright;
     place(scene, mesh, lamp, glm::dmat4(1), RB_ROLE_OCCLUDE);
     return scene;
 }
@@ -220,9 +221,9 @@ TEST(VaryingEmission, OfARegularCheckerHalfEscapesFromTwoSides) {
     for (int y = 0; y < kAcross; ++y)
         for (int x = 0; x < kAlong; ++x) checker.push_back(glm::vec3((x + y) % 2 ? 0.0f : 1.0f));
     Material lamp = grey("lamp", 0);
-    lamp.emissionImage =
+    const int32_t image =
         scene.addImage({"checker", kAlong, kAcross, RB_IMAGE_REPEAT, std::move(checker)});
-    lamp.emissionImageWeight = {glm::vec3(1.0f), glm::vec3(1.0f)};
+    for (MaterialSide& side : lamp.sides) side.emission = {glm::vec3(0.0f), image, glm::vec3(1.0f)};
     place(scene, mesh, lamp);
     const Patches patches = subdivide(scene, 20, kMany);
     ASSERT_GE(patches.count(), size_t(kAlong * kAcross));
@@ -275,8 +276,9 @@ TEST(VaryingEmission, ShotAndGatheredLightHaveTheSameColours) {
 TEST(VaryingEmission, SidesOfOtherColoursAreShotInTheirColours) {
     // A lamp of 1 m between two floors, red below and blue above.
     Scene scene = floorUnderChecker(2, {0, 0, 0});
-    scene.materials[scene.meshes.back().faceMaterials[0]].emission = {glm::vec3(50, 100, 0),
-                                                                      glm::vec3(0, 20, 900)};
+    Material& lamp = scene.materials[size_t(scene.meshes.back().faceMaterials[0])];
+    lamp.sides[0].emission.constant = glm::vec3(50, 100, 0);
+    lamp.sides[1].emission.constant = glm::vec3(0, 20, 900);
     place(scene, rectangle("below", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0));
     place(scene, rectangle("above", {-1, -1, 4}, {0, 2, 0}, {2, 0, 0}), grey("", 0));
     const ShotScene shot(scene, 0.5f);
@@ -294,8 +296,7 @@ TEST(VaryingEmission, CornerColoursShineInBundles) {
     for (int32_t v : mesh.cornerVertices)
         mesh.cornerColors.push_back(glm::vec3(2 * mesh.vertices[size_t(v)].x));
     Material glow = grey("glow", 0.5f);
-    glow.emissionUsesCornerColors = true;
-    glow.emissionColorWeight[0] = glm::vec3(0.5f);
+    glow.sides[0].emission.cornerColorWeight = glm::vec3(0.5f);
     place(scene, mesh, glow);
     Bake bake;
     setQuick(bake);

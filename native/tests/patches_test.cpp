@@ -286,9 +286,12 @@ TEST(Reflectance, AnImageOfACheckerAveragesExactly) {
     for (float size : {1.0f, 0.5f}) {
         Scene scene;
         Material material = grey("checker", 0.0f);
-        material.reflectance[1] = glm::vec3(0.1f);
-        material.image = scene.addImage(image);
-        material.imageWeight = {1, 0.5f, 0};
+        material.sides[1].reflectance.constant = glm::vec3(0.1f);
+        const int32_t checker = scene.addImage(image);
+        for (MaterialSide& side : material.sides) {
+            side.reflectance.image = checker;
+            side.reflectance.imageWeight = {1, 0.5f, 0};
+        }
         Mesh mesh = rectangle("plane", {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
         mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
         place(scene, mesh, material);
@@ -303,8 +306,7 @@ TEST(Reflectance, AnImageOfACheckerAveragesExactly) {
 TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnQuads) {
     Scene scene;
     Material material = grey("ramp", 0.0f);
-    material.usesCornerColors = true;
-    material.cornerColorWeight = glm::vec3(1);
+    material.sides[0].reflectance.cornerColorWeight = glm::vec3(1);
     Mesh mesh = rectangle("plane", {0, 0, 0}, {2, 0, 0}, {0, 1, 0});
     for (int32_t v : mesh.cornerVertices)
         mesh.cornerColors.push_back(0.1f + 0.3f * mesh.vertices[size_t(v)] + glm::vec3(0, 0, 0.2f));
@@ -321,8 +323,7 @@ TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnQuads) {
 TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnTriangles) {
     Scene scene;
     Material material = grey("ramp", 0.0f);
-    material.usesCornerColors = true;
-    material.cornerColorWeight = glm::vec3(1);
+    material.sides[0].reflectance.cornerColorWeight = glm::vec3(1);
     Mesh mesh = polygons("triangle", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
     mesh.cornerColors = {{0, 0, 0.9f}, {0.9f, 0, 0}, {0, 0.9f, 0}};
     place(scene, mesh, material);

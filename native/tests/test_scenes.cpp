@@ -114,8 +114,9 @@ Mesh icosphere(const std::string& name, float radius, int levels, bool inward) {
 Material grey(const std::string& name, float reflectance, float emission, float backEmission) {
     Material material;
     material.name = name;
-    material.reflectance = {glm::vec3(reflectance), glm::vec3(reflectance)};
-    material.emission = {glm::vec3(emission), glm::vec3(backEmission)};
+    for (MaterialSide& side : material.sides) side.reflectance.constant = glm::vec3(reflectance);
+    material.sides[0].emission.constant = glm::vec3(emission);
+    material.sides[1].emission.constant = glm::vec3(backEmission);
     return material;
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 Material translucent(float reflectance, float translucence, float emission = 0) {
     Material material = grey("paper", reflectance, emission, emission);
-    material.translucence = {glm::vec3(translucence), glm::vec3(translucence)};
+    for (MaterialSide& side : material.sides) side.translucence.constant = glm::vec3(translucence);
     return material;
 }
 
@@ -187,10 +187,8 @@ TEST(TranslucenceOfMaterials, AnImageVariesIt) {
     Scene scene = paperCube(0, 0.6f);
     scene.meshes[0].uvs.assign(24, glm::vec2(0.5f));
     scene.images.push_back({"half", 1, 1, RB_IMAGE_REPEAT, {glm::vec3(0.5f)}});
-    Material& paper = scene.materials[0];
-    paper.translucence = {glm::vec3(0.1f), glm::vec3(0.1f)};
-    paper.translucenceImage = 0;
-    paper.translucenceImageWeight = {glm::vec3(1.0f), glm::vec3(1.0f)};
+    for (MaterialSide& paper : scene.materials[0].sides)
+        paper.translucence = {glm::vec3(0.1f), 0, glm::vec3(1.0f)};
     Bake bake;
     bake.settings.patchSize = 0.2f;
     bake.run(scene);

@@ -11,12 +11,14 @@ import numpy as np
 
 from ..image_export import ImagePixels
 from ..scene_data import ImageData, MaterialData, SceneData, Warnings
+from ..surface_data import (CORRELATED, SEPARATE, ColorData, DiffuseData, GlossData, LobeData,
+                            PartData, ShownData, SurfaceData)
 from .color_expression import WHITE, ColorExpression, Texture
 from .color_reader import Reading
 from .cycles_bake import BakedMaterial
 from .diffuse_angles import lambert
 from .last_surfaces import LastSurface, LastSurfaces
-from .layers import LOBES
+from .layers import BURLEY_SHEEN, LOBES, MICROFIBERS, SEVERAL_FACETS, VELVET
 from .node_links import output_node
 from .node_reader import NodeReader
 from .shown_results import RENDERED, attributes_read
@@ -74,7 +76,7 @@ def _is_laid_out(translucence: ColorExpression, *others: ColorExpression) -> boo
     return translucence.attribute is None and _share_coordinates(translucence, *others)
 
 
-def _line_to(part: ColorExpression, whole: ColorExpression) -> tuple[np.ndarray, np.ndarray]:
+def _part_of(part: ColorExpression, whole: ColorExpression) -> PartData:
     """scale and offset, (3,) each, with which part = scale * whole + offset: exactly if the part
     varies by the same image or attribute as the whole, else for their means."""
     if part.texture and whole.texture and part.texture.same_as(whole.texture):
@@ -84,24 +86,33 @@ def _line_to(part: ColorExpression, whole: ColorExpression) -> tuple[np.ndarray,
     elif part.is_constant and not whole.is_constant:
         scale = np.zeros(3)
     else:
-        return _ratio(part.mean(), whole.mean()), np.zeros(3)
-    return scale, part.constant - scale * whole.constant
-
-
-def _shown_by_angle(surface: Surface) -> np.ndarray:
-    """(1 + TERMS, 3): what is shown of light by its angle, for a diffuse colour of 1."""
-    color = np.maximum(surface.diffuse.mean(), 0.0)
-    return np.where(color > 1e-6, surface.shown_by_angle / np.maximum(color, 1e-6),
-                    lambert().shown)
-
-
-def _by_side(values: list[np.ndarray]) -> np.ndarray:
-    """(n, 2, 3), of the arrays (n, 3) of the front and of the back."""
-    return np.stack(values, axis=1)
+        return PartData(_ratio(part.mean(), whole.mean()))
+    return PartData(scale, part.constant - scale * whole.constant)
 
 
 def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return np.divide(part, whole, out=np.zeros(3), where=whole != 0.0)
+
+
+def _surface_data(surface: Surface, model: int, diffuse: PartData, reflectance: ColorData,
+                  emission: ColorData, translucence: ColorData) -> SurfaceData:
+    """One side of a material. model: of diffuse reflection, as in scattering.py; diffuse: what of
+    the reflectance is a diffuse colour."""
+    color = np.maximum(surface.diffuse.mean(), 0.0)
+    shown = np.where(color > 1e-6, surface.shown_by_angle / np.maximum(color, 1e-6),
+                     lambert().shown)
+    scattering = surface.scattering
+    lobes = [LobeData(scattering.lobes[lobe, 0], scattering.lobes_by_angle[lobe],
+                      scattering.lobe_roughness(lobe)) for lobe in LOBES]
+    return SurfaceData(
+        reflectance, emission, translucence, surface.reflected_by_angle,
+        ShownData(diffuse, shown[0], shown[1:]),
+        GlossData(_part_of(scattering.gloss, surface.reflectance), scattering.by_angle,
+                  scattering.gloss_roughness(),
+                  SEPARATE if bpy.app.version < (4, 0, 0) else CORRELATED),
+        microfibers=lobes[MICROFIBERS], velvet=lobes[VELVET], burley_sheen=lobes[BURLEY_SHEEN],
+        several_facets=lobes[SEVERAL_FACETS],
+        diffuse=DiffuseData(model, scattering.diffuse_model()[1], scattering.leaving_factors()))
 
 
 class MaterialExporter:
@@ -196,18 +207,14 @@ class MaterialExporter:
             if pixels is not None:
                 index[name] = len(self.scene.images)
                 self.scene.images.append(ImageData(f"{material.name} ({name})", pixels, 'EXTEND'))
-        glows = baked.radiance is not None
-        self.scene.materials.append(MaterialData(
-            material.name, np.zeros((2, 3)), np.zeros((2, 3)), index['reflectance'], np.ones(3),
-            emission_image=index.get('radiance'),
-            emission_image_weight=np.full((2, 3), np.pi) if glows else None,
-            opacity_image=index.get('opacity'), diffuse_scale=np.tile(baked.diffuse_scale, (2, 1)),
-            diffuse_offset=np.tile(baked.diffuse_offset, (2, 1)),
-            reflected_by_angle=_by_side([surface.reflected_by_angle] * 2),
-            shown_by_angle=_by_side([_shown_by_angle(surface)] * 2),
-            **self._scattering([surface] * 2),
-            translucence_image=index.get('translucence'),
-            translucence_image_weight=None if baked.translucence is None else np.ones((2, 3))))
+        side = _surface_data(
+            surface, surface.scattering.diffuse_model()[0],
+            PartData(baked.diffuse_scale, baked.diffuse_offset),
+            *(ColorData(image=index.get(name), image_weight=np.full(3, weight))
+              for name, weight in (('reflectance', 1.0), ('radiance', np.pi),
+                                   ('translucence', 1.0))))
+        self.scene.materials.append(MaterialData(material.name, side, side,
+                                                 opacity_image=index.get('opacity')))
         self._baked[material.original] = len(self.scene.materials) - 1
         # For the next bake only the means of the images are kept.
         mean = replace(surface, radiance=ColorExpression(baked.radiance_color),
@@ -323,28 +330,19 @@ class MaterialExporter:
         if np.ptp(transmittance) > 1e-3:
             self.warnings.add(f'material "{name}": what it lets through differs between colours '
                               f'or sides: its mean is used')
-        scale, offset = (np.array(values) for values in zip(
-            *(_line_to(side.diffuse, side.reflectance) for side in sides)))
-        data = MaterialData(
-            name,
-            np.maximum([side.reflectance.constant for side in sides], 0.0),
+        images = [self._image_index(one) if one else None
+                  for one in (texture, glow_texture, passed_texture)]
+        model = sides[0].scattering.diffuse_model()[0]  # of both sides
+        data = MaterialData(name, *(_surface_data(
+            side, model, _part_of(side.diffuse, side.reflectance),
+            ColorData(np.maximum(side.reflectance.constant, 0.0), images[0],
+                      varying.texture_weight, varying.attribute_weight),
             # A surface of radiance L has the exitance pi L.
-            np.pi * np.maximum([glow.constant for glow in glows], 0.0),
-            self._image_index(texture) if texture else None,
-            varying.texture_weight if texture else None,
-            varying.attribute_weight if attribute is not None else None,
-            self._image_index(glow_texture) if glow_texture else None,
-            np.pi * np.array([glow.texture_weight for glow in glows]) if glow_texture else None,
-            (np.pi * np.array([glow.attribute_weight for glow in glows])
-             if glow_attribute is not None else None),
-            1.0 - float(transmittance.mean()), diffuse_scale=scale, diffuse_offset=offset,
-            reflected_by_angle=_by_side([side.reflected_by_angle for side in sides]),
-            shown_by_angle=_by_side([_shown_by_angle(side) for side in sides]),
-            **self._scattering(sides),
-            translucence=np.array([color.constant for color in passed]),
-            translucence_image=self._image_index(passed_texture) if passed_texture else None,
-            translucence_image_weight=(np.array([color.texture_weight for color in passed])
-                                       if passed_texture else None))
+            ColorData(np.pi * np.maximum(glow.constant, 0.0), images[1],
+                      np.pi * glow.texture_weight, np.pi * glow.attribute_weight),
+            ColorData(through.constant, images[2], through.texture_weight))
+            for side, glow, through in zip(sides, glows, passed)),
+            1.0 - float(transmittance.mean()))
         self.scene.materials.append(data)
         return MaterialExport(len(self.scene.materials) - 1,
                               texture or glow_texture or passed_texture,
@@ -378,26 +376,6 @@ class MaterialExporter:
             return None, Surface(transmittance=WHITE)
         reader = NodeReader(f'material "{material.name}"', self.images, warnings, reading, inexact)
         return reader, reader.surface(output.inputs['Surface'])
-
-    @staticmethod
-    def _scattering(sides: list[Surface]) -> dict[str, np.ndarray | int]:
-        """The fields of MaterialData that say in which directions light is reflected."""
-        lines = [_line_to(side.scattering.gloss, side.reflectance) for side in sides]
-        models = [side.scattering.diffuse_model() for side in sides]
-        return {
-            'gloss_scale': np.array([scale for scale, _ in lines]),
-            'gloss_offset': np.array([offset for _, offset in lines]),
-            'gloss_by_angle': _by_side([side.scattering.by_angle for side in sides]),
-            'gloss_roughness': np.array([side.scattering.gloss_roughness()
-                                         for side in sides]),
-            'separate_masking': bpy.app.version < (4, 0, 0),
-            'lobes': _by_side([side.scattering.lobes[:, 0] for side in sides]),
-            'lobes_by_angle': np.stack([side.scattering.lobes_by_angle for side in sides], axis=2),
-            'lobe_roughness': np.array([[side.scattering.lobe_roughness(lobe) for side in sides]
-                                        for lobe in LOBES]),
-            'diffuse_model': models[0][0],
-            'diffuse_roughness': np.array([roughness for _, roughness in models]),
-            'leaving': _by_side([side.scattering.leaving_factors() for side in sides])}
 
     def _image_index(self, texture: Texture) -> int:
         """Index of the texture's image in SceneData.images, where it is added once."""

@@ -90,7 +90,7 @@ _VELVET = _MICROFIBERS[0], np.array([
 # Burley's sheen has no roughness: Schlick's fifth power of the angle between light and half vector.
 _BURLEY_SHEEN = np.array([0.0004, 0.0037, 0.0452, 0.0375, 0.0550])
 
-MICROFIBERS, VELVET, BURLEY_SHEEN, SEVERAL_FACETS = LOBES = range(4)  # rb_lobe
+MICROFIBERS, VELVET, BURLEY_SHEEN, SEVERAL_FACETS = LOBES = range(4)  # the lobes of rb_surface
 
 
 @dataclass(frozen=True)

@@ -96,108 +96,149 @@ typedef enum rb_image_extension RB_INT {
 RB_API rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, int32_t height,
                              const float* rgb, rb_image_extension extension, int32_t* image);
 
-/* Adds a material. reflectance and emission hold six floats: RGB of the front side, then of the
- * back side. reflectance is the albedo. Values of 1 or more are clamped to 0.999 with a warning in
- * the report. emission is the exitance in W/m^2 (pi times the radiance). Id in *material. */
-RB_API rb_error rb_add_material(rb_scene scene, const char* name, const float reflectance[6],
-                                const float emission[6], int32_t* material);
+/* Stands for no image where a material may have one. */
+#define RB_NO_IMAGE (-1)
 
-/* Adds weight (RGB) times the image, averaged over each patch, to the reflectance of both sides.
- * The meshes that use the material need UVs (rb_set_mesh_uvs). */
-RB_API rb_error rb_set_material_image(rb_scene scene, int32_t material, int32_t image,
-                                      const float weight[3]);
+/* A colour that may vary over a mesh, RGB:
+ *   constant + image_weight * image + corner_color_weight * corner colours
+ * averaged over each patch, where a negative sum counts as 0. Weights are finite and may be
+ * negative.
+ *   image                of rb_add_image, or RB_NO_IMAGE. It is read at the UVs of the mesh
+ *                        (rb_set_mesh_uvs) and black on a mesh without UVs
+ *   image_weight         not used without an image
+ *   corner_color_weight  of the colours of rb_set_mesh_corner_colors, which are black on a mesh
+ *                        without them */
+typedef struct rb_color {
+    float constant[3];
+    int32_t image;
+    float image_weight[3];
+    float corner_color_weight[3];
+} rb_color;
 
-/* Adds weight (RGB) times the mesh's corner colours (rb_set_mesh_corner_colors), averaged over each
- * patch, to the reflectance of both sides. */
-RB_API rb_error rb_set_material_corner_colors(rb_scene scene, int32_t material,
-                                              const float weight[3]);
+/* How a share of light depends on the cosine c between the normal and the direction of the light:
+ * the sum of four terms, each times a factor (RGB, finite). The mean of a term is that over light
+ * from all directions. */
+typedef struct rb_angle_factors {
+    float linear[3];       /* of 1 - c; mean 1/3 */
+    float square[3];       /* of (1 - c)^2; mean 1/6 */
+    float fifth[3];        /* of (1 - c)^5; mean 1/21 */
+    float cosine_fifth[3]; /* of c (1 - c)^5; mean 1/84 */
+} rb_angle_factors;
 
-/* Likewise for the emission: adds weight (six floats, W/m^2: RGB of the front side, then of the back
- * side) times the image, or times the corner colours, averaged over each patch. */
-RB_API rb_error rb_set_material_emission_image(rb_scene scene, int32_t material, int32_t image,
-                                               const float weight[6]);
-RB_API rb_error rb_set_material_emission_corner_colors(rb_scene scene, int32_t material,
-                                                       const float weight[6]);
+/* A part of the reflectance of a side, which may vary with it: scale * reflectance + offset (RGB,
+ * finite). */
+typedef struct rb_part {
+    float scale[3];
+    float offset[3];
+} rb_part;
 
-/* How much of the reflectance is diffuse, which is what outputs with colour show: scale times it
- * plus offset (six floats each: RGB of the front side, then of the back side), but at least 0 and at
- * most 1. The rest is gloss. Without it all is diffuse. */
-RB_API rb_error rb_set_material_diffuse(rb_scene scene, int32_t material, const float scale[6],
-                                        const float offset[6]);
+/* What outputs show of a side.
+ *   color       the diffuse colour, which outputs with colour show; counts as 0 to 1
+ *   from_above  the share that is shown of light that comes along the normal (RGB, finite)
+ *   by_angle    what is added to from_above for light from other directions. The sum counts as 0 to
+ *               16. */
+typedef struct rb_shown {
+    rb_part color;
+    float from_above[3];
+    rb_angle_factors by_angle;
+} rb_shown;
 
-/* How reflection depends on the cosine c between the normal and the light, by the terms 1 - c,
- * (1 - c)^2, (1 - c)^5 and c (1 - c)^5, with first shot GATHER.
- *   reflected  six floats, likewise, for each term. The reflectance is for light from everywhere;
- *              light of the sources meets more by the sum of these factors times the term less its
- *              mean (1/3, 1/6, 1/21, 1/84)
- *   shown      six floats for light from straight above, then for each term: outputs show light
- *              times the first plus the sum of the others times the terms, 0 to 16 in all
- * Without it 0 and, for light from straight above, 1. */
-RB_API rb_error rb_set_material_angles(rb_scene scene, int32_t material, const float reflected[24],
-                                       const float shown[30]);
-
-/* What of the reflectance is mirrored: scale times it plus offset (six floats each, likewise), for
- * light from everywhere; by_angle: how that depends on the angle of the sources' light, as
- * `reflected` of rb_set_material_angles, of which it is a part. roughness: of the front and of the
- * back, 0 to 1, whose square is alpha of GGX; masking: whether the height of a facet decides both
- * whether light reaches it and whether it is seen, or each by itself. With first shot GATHER and
- * solver LINE_REUSE light goes where GGX mirrors it to, smoother than a roughness of 0.45 as by
- * that. Without it nothing is mirrored. */
+/* How the shadowing and the masking of facets go together: both by the height of the facet, as in
+ * Cycles from Blender 4.0 on, or each by itself. */
 typedef enum rb_masking RB_INT { RB_MASKING_CORRELATED = 0, RB_MASKING_SEPARATE = 1 } rb_masking;
 
-RB_API rb_error rb_set_material_gloss(rb_scene scene, int32_t material, const float scale[6],
-                                      const float offset[6], const float by_angle[24],
-                                      rb_masking masking, const float roughness[2]);
+/* The part of the reflectance that is mirrored by facets, as GGX has it. With first shot GATHER and
+ * solver LINE_REUSE its light goes where GGX sends it to, with others where diffuse light goes.
+ *   part       for light from all directions; counts as 0 to the reflectance
+ *   by_angle   what of rb_surface.reflectance_by_angle is mirrored
+ *   roughness  0 to 1, whose square is the alpha of GGX. For where light goes less than 0.45 counts
+ *              as 0.45. */
+typedef struct rb_gloss {
+    rb_part part;
+    rb_angle_factors by_angle;
+    float roughness;
+    rb_masking masking;
+} rb_gloss;
 
-/* What of the reflectance goes where a lobe of its own sends it (six floats, of the whole surface:
- * RGB of the front side, then of the back side), for light from everywhere, and how that depends on
- * the angle of the light, likewise a part of `reflected` of rb_set_material_angles. The lobes: sheen
- * as Cycles has it from Blender 4.0 on, its velvet, its sheen before; and light that gloss sends on
- * after several facets. roughness: of the front and of the back, 0 to 1 (of velvet sigma; of
- * Burley's sheen unused; of several facets as gloss). Of each lobe what was set last counts; without
- * it nothing. */
-typedef enum rb_lobe RB_INT {
-    RB_LOBE_MICROFIBERS = 0,
-    RB_LOBE_VELVET = 1,
-    RB_LOBE_BURLEY_SHEEN = 2,
-    RB_LOBE_SEVERAL_FACETS = 3
+/* A part of the reflectance that has a lobe of its own. With first shot GATHER and solver LINE_REUSE
+ * its light goes where the lobe sends it to, with others where diffuse light goes.
+ *   reflectance  for light from all directions (RGB, finite); less than 0 counts as 0
+ *   by_angle     what of rb_surface.reflectance_by_angle the lobe sends
+ *   roughness    0 to 1 */
+typedef struct rb_lobe {
+    float reflectance[3];
+    rb_angle_factors by_angle;
+    float roughness;
 } rb_lobe;
 
-RB_API rb_error rb_set_material_lobe(rb_scene scene, int32_t material, rb_lobe lobe,
-                                     const float reflectance[6], const float by_angle[24],
-                                     const float roughness[2]);
-
-/* Where the rest goes, likewise: as by Lambert's law, or as Burley's or Oren and Nayar's model has
- * it, with a roughness (of the front and of the back), 0 to 1. */
 typedef enum rb_diffuse_model RB_INT {
     RB_DIFFUSE_LAMBERT = 0,
     RB_DIFFUSE_BURLEY = 1,
     RB_DIFFUSE_OREN_NAYAR = 2
 } rb_diffuse_model;
 
-RB_API rb_error rb_set_material_diffuse_model(rb_scene scene, int32_t material,
-                                              rb_diffuse_model model, const float roughness[2]);
+/* Where the rest of the reflected light goes: what neither gloss nor a lobe sends.
+ *   model      where light goes with first shot GATHER and solver LINE_REUSE; with others as by
+ *              Lambert's law
+ *   roughness  0 to 1; not used by Lambert's law
+ *   leaving    how the rest leaves by angle, as from under a layer that lets less of it out at some
+ *              angles: 1 plus the sum of these factors times their terms less the means of the
+ *              terms, at the angle at which light leaves. Solver LINE_REUSE only. */
+typedef struct rb_diffuse {
+    rb_diffuse_model model;
+    float roughness;
+    rb_angle_factors leaving;
+} rb_diffuse;
 
-/* How that leaves, by angle, whatever light it is (LINE_REUSE): from under a layer that lets less
- * of it out at some angles. 1 plus the sum of these factors times the term of rb_set_material_angles
- * at the angle at which it leaves, less the term's mean (six floats for each term, likewise).
- * Without it 0. */
-RB_API rb_error rb_set_material_leaving(rb_scene scene, int32_t material, const float factors[24]);
+/* What one side of a material does with light. rb_init_surface sets all members to their defaults,
+ * which are 0 where nothing else is named, no image and the first value of an enum.
+ *   size          of this struct in the header of the caller, in bytes. Later versions have more
+ *                 members at the end: a library that knows more than the caller takes their
+ *                 defaults, one that knows less refuses the surface.
+ *   reflectance   albedo; its constant is not negative. 1 or more is clamped to 0.999, with a
+ *                 warning in the report. Default: 0.8
+ *   emission      exitance in W/m^2, pi times the radiance; its constant is 0 to 1e15
+ *   translucence  the share of the light that arrives at the other side of the material and leaves
+ *                 this side, as if this side reflected it. Outputs with colour show it. Together
+ *                 with the reflectance at most 0.999, else clamped. Solver LINE_REUSE only.
+ *   reflectance_by_angle  how the reflectance depends on the angle of the light of the sources, with
+ *                 first shot GATHER: light from one direction meets more than the reflectance, which
+ *                 is for light from all directions, by the sum of these factors times their terms
+ *                 less the means of the terms.
+ *   shown         default: all of the reflectance is diffuse colour, and all light is shown alike
+ *   microfibers   sheen as Cycles has it from Blender 4.0 on
+ *   velvet        Cycles' velvet; its roughness is sigma
+ *   burley_sheen  sheen as Cycles has it before Blender 4.0; its roughness is not used
+ *   several_facets  what gloss reflects after several facets; its roughness is as that of gloss
+ * Where the material lets light straight through (opacity of rb_add_material) all these are of the
+ * whole surface, so that the reflectance is at most the opacity. */
+typedef struct rb_surface {
+    size_t size;
+    rb_color reflectance;
+    rb_color emission;
+    rb_color translucence;
+    rb_angle_factors reflectance_by_angle;
+    rb_shown shown;
+    rb_gloss gloss;
+    rb_lobe microfibers;
+    rb_lobe velvet;
+    rb_lobe burley_sheen;
+    rb_lobe several_facets;
+    rb_diffuse diffuse;
+} rb_surface;
 
-/* The share of the light that does not pass straight through the surface, 0 to 1; without it 1.
- * Reflectance and emission remain those of the whole surface, so reflectance is at most the
- * opacity. An image multiplies it (the mean of its channels), averaged over each patch. */
-RB_API rb_error rb_set_material_opacity(rb_scene scene, int32_t material, float opacity);
-RB_API rb_error rb_set_material_opacity_image(rb_scene scene, int32_t material, int32_t image);
+/* Sets a surface to the defaults: matt grey that emits nothing. size is sizeof(rb_surface) of the
+ * caller; no byte of *surface beyond it is written. */
+RB_API rb_error rb_init_surface(rb_surface* surface, size_t size);
 
-/* The share of the light that passes through the surface and leaves it on the other side as if that
- * side reflected it (six floats: what leaves the front, RGB, then the back). Outputs with colour show
- * it too. An image, or -1, adds image_weight (likewise six floats; NULL without an image) times it,
- * averaged over each patch. Together with the reflectance at most 0.999, else clamped; without it 0.
- * Only the solver LINE_REUSE carries this light. */
-RB_API rb_error rb_set_material_translucence(rb_scene scene, int32_t material,
-                                             const float translucence[6], int32_t image,
-                                             const float image_weight[6]);
+/* Adds a material with a surface on each side. back may be NULL: then both sides are as front.
+ *   opacity        the share of the light that does not pass straight through, 0 to 1
+ *   opacity_image  an image whose mean channel, averaged over each patch, multiplies the opacity, or
+ *                  RB_NO_IMAGE
+ * Meshes that use a material with images need UVs (rb_set_mesh_uvs). Id in *material. */
+RB_API rb_error rb_add_material(rb_scene scene, const char* name, const rb_surface* front,
+                                const rb_surface* back, float opacity, int32_t opacity_image,
+                                int32_t* material);
 
 /* Adds a mesh of planar or nearly planar n-gons, which may be concave.
  *   vertices         3 * vertex_count floats, object space, metres

@@ -9,7 +9,8 @@ uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vecto
                   bool hasDirections) {
     Hasher hasher;
     for (const Material& material : scene.materials)
-        hasher.add(material.shownFromAbove, material.shownByAngle);
+        for (const MaterialSide& side : material.sides)
+            hasher.add(side.shownFromAbove, side.shownByAngle);
     hasher.add(hasDirections, settings.skipClusters);
     // Clusters are of one material where directions matter.
     for (const Mesh& mesh : scene.meshes)

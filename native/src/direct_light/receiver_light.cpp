@@ -236,10 +236,11 @@ AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) c
     if (!showsByAngle) return factors;
     constexpr float kLeastShown = 0.05f;  // less shows too little of the light to be clean
     const Parent& parent = patches.parentAt(side);
-    const Material& material = scene.materialOf(parent.instance, size_t(parent.face));
-    const glm::vec3 all = glm::max(material.shown(side % 2, angles), kLeastShown);
+    const MaterialSide& surface =
+        scene.materialOf(parent.instance, size_t(parent.face)).sides[side % 2];
+    const glm::vec3 all = glm::max(surface.shown(angles), kLeastShown);
     for (size_t term = 0; term < factors.size(); ++term)
-        factors[term] = material.shownByAngle[side % 2][term] / all;
+        factors[term] = surface.shownByAngle[term] / all;
     return factors;
 }
 

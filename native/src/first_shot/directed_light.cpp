@@ -129,7 +129,7 @@ void DirectedLight::addParts(uint32_t side, const FirstShot& shot, std::vector<P
             const glm::vec3 sent = surface.lobeAt(lobe, terms);
             if (brightest(sent) > kLeastShare)
                 parts.push_back(
-                    {Lobe::of(lobe.lobe, normal, direction, lobe.roughness), sent * part});
+                    {Lobe::of(lobe.kind, normal, direction, lobe.roughness), sent * part});
         }
         if (!scattering.isRough()) continue;
         const glm::vec3 diffuse = surface.diffuseAt(terms);

@@ -39,16 +39,41 @@ bool hasImage(const Mesh& mesh, int image) { return image >= 0 && !mesh.uvs.empt
 
 // Means over a patch of what a material's images and corner colours add or multiply.
 struct Varying {
-    glm::vec3 reflectance{0.0f};
-    std::array<glm::vec3, 2> translucence{glm::vec3(0.0f), glm::vec3(0.0f)};
-    std::array<glm::vec3, 2> emission{glm::vec3(0.0f), glm::vec3(0.0f)};
+    struct Side {
+        glm::vec3 reflectance{0.0f}, emission{0.0f}, translucence{0.0f};
+    };
+    std::array<Side, 2> sides;
     float opacity = 1;
 };
 
-bool varies(const Mesh& mesh, const Material& m) {
-    return hasImage(mesh, m.image) || hasImage(mesh, m.emissionImage) ||
-           hasImage(mesh, m.translucenceImage) ||
-           ((m.usesCornerColors || m.emissionUsesCornerColors) && !mesh.cornerColors.empty());
+bool varies(const Mesh& mesh, const Material& material) {
+    for (const MaterialSide& side : material.sides)
+        for (const SurfaceColor* color : side.colors())
+            if (hasImage(mesh, color->image) ||
+                (color->usesCornerColors() && !mesh.cornerColors.empty()))
+                return true;
+    return false;
+}
+
+// An image that a material reads, and the sum of what was read of it.
+struct ReadImage {
+    int index;
+    glm::vec3 sum{0.0f};
+};
+
+// Each once, though several colours may read it.
+std::vector<ReadImage> imagesOf(const Mesh& mesh, const Material& material) {
+    std::vector<ReadImage> images;
+    auto add = [&](int index) {
+        if (hasImage(mesh, index) &&
+            std::none_of(images.begin(), images.end(),
+                         [&](const ReadImage& image) { return image.index == index; }))
+            images.push_back({index});
+    };
+    for (const MaterialSide& side : material.sides)
+        for (const SurfaceColor* color : side.colors()) add(color->image);
+    add(material.opacityImage);
+    return images;
 }
 
 Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mesh,
@@ -62,12 +87,11 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
         return cell.isTriangle() ? sum : sum + w[3] * values[cell.corner[3]];
     };
     const bool hasColors = !mesh.cornerColors.empty();
+    std::vector<ReadImage> images = imagesOf(mesh, material);
 
     int samples = kMinSamples;
-    for (int index : {material.image, material.emissionImage, material.opacityImage,
-                      material.translucenceImage}) {
-        if (!hasImage(mesh, index)) continue;
-        const Image& image = scene.images[size_t(index)];
+    for (const ReadImage& read : images) {
+        const Image& image = scene.images[size_t(read.index)];
         glm::vec2 low(INFINITY), high(-INFINITY);
         for (glm::vec2 uv : {glm::vec2(0.01f), glm::vec2(0.98f, 0.01f), glm::vec2(0.01f, 0.98f)}) {
             const glm::vec2 at = interpolate(mesh.uvs, patches.point(patch, uv));
@@ -83,32 +107,32 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
     grid.isTriangle = parent.isTriangle;
     grid.countA = grid.countB = uint16_t(samples);
     const glm::vec2 centroid = parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
-    glm::vec3 image(0.0f), emissionImage(0.0f), translucenceImage(0.0f), color(0.0f);
+    glm::vec3 colors(0.0f);
     float opacity = 0;
     for (uint32_t k = 0; k < grid.patchCount(); ++k) {
         const glm::vec3 point = patches.point(patch, grid.pointOn(k, centroid));
-        auto at = [&](int index) {
-            return lookup(scene.images[size_t(index)], interpolate(mesh.uvs, point));
-        };
-        if (hasImage(mesh, material.image)) image += at(material.image);
-        if (hasImage(mesh, material.emissionImage)) emissionImage += at(material.emissionImage);
-        if (hasImage(mesh, material.translucenceImage))
-            translucenceImage += at(material.translucenceImage);
-        if (hasImage(mesh, material.opacityImage))
-            opacity += glm::dot(at(material.opacityImage), glm::vec3(1.0f / 3));
-        if (hasColors) color += interpolate(mesh.cornerColors, point);
+        for (ReadImage& read : images) {
+            const glm::vec3 value =
+                lookup(scene.images[size_t(read.index)], interpolate(mesh.uvs, point));
+            read.sum += value;
+            if (read.index == material.opacityImage)
+                opacity += glm::dot(value, glm::vec3(1.0f / 3));
+        }
+        if (hasColors) colors += interpolate(mesh.cornerColors, point);
     }
     const float perSample = 1 / float(grid.patchCount());
+    auto mean = [&](const SurfaceColor& color) {
+        glm::vec3 sum(0.0f);
+        for (const ReadImage& read : images)
+            if (read.index == color.image) sum = perSample * color.imageWeight * read.sum;
+        if (color.usesCornerColors()) sum += perSample * color.cornerColorWeight * colors;
+        return sum;
+    };
     Varying means;
-    means.reflectance = perSample * material.imageWeight * image;
-    if (material.usesCornerColors)
-        means.reflectance += perSample * material.cornerColorWeight * color;
     for (size_t side = 0; side < 2; ++side) {
-        means.emission[side] = perSample * material.emissionImageWeight[side] * emissionImage;
-        means.translucence[side] =
-            perSample * material.translucenceImageWeight[side] * translucenceImage;
-        if (material.emissionUsesCornerColors)
-            means.emission[side] += perSample * material.emissionColorWeight[side] * color;
+        const MaterialSide& surface = material.sides[side];
+        means.sides[side] = {mean(surface.reflectance), mean(surface.emission),
+                             mean(surface.translucence)};
     }
     if (hasImage(mesh, material.opacityImage)) means.opacity = perSample * opacity;
     return means;
@@ -116,11 +140,9 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
 
 }  // namespace
 
-bool isEmptySpace(const Material& m) {
-    constexpr glm::vec3 kBlack(0.0f);
-    return m.reflectance[0] == kBlack && m.reflectance[1] == kBlack && m.emission[0] == kBlack &&
-           m.emission[1] == kBlack && m.image < 0 && m.emissionImage < 0 && !m.usesCornerColors &&
-           !m.emissionUsesCornerColors && !m.isTranslucent();
+bool isEmptySpace(const Material& material) {
+    return material.sides[0].reflectance.isBlack() && material.sides[1].reflectance.isBlack() &&
+           !material.emits() && !material.isTranslucent();
 }
 
 void assignOpacity(const Scene& scene, Patches& patches) {
@@ -158,12 +180,13 @@ namespace {
 void assignScattering(const Scene& scene, Patches& patches) {
     patches.scattering.clear();
     if (std::all_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
-            return material.scattering[0].isLambert() && material.scattering[1].isLambert();
+            return material.sides[0].scattering.isLambert() &&
+                   material.sides[1].scattering.isLambert();
         }))
         return;
     for (const Material& material : scene.materials)
-        patches.scattering.insert(patches.scattering.end(), material.scattering.begin(),
-                                  material.scattering.end());
+        for (const MaterialSide& side : material.sides)
+            patches.scattering.push_back(side.scattering);
     const uint32_t ofDefault = uint32_t(scene.materials.size());
     patches.scattering.resize(patches.scattering.size() + 2);
     for (Parent& parent : patches.parents) {
@@ -178,10 +201,11 @@ void assignScattering(const Scene& scene, Patches& patches) {
 void assignMaterials(const Scene& scene, Patches& patches) {
     patches.reflectance.resize(patches.sideCount());
     patches.emission.resize(patches.sideCount());
-    const std::array<AngleFactors, 2> none{};
     const bool hasAngles =
-        std::any_of(scene.materials.begin(), scene.materials.end(),
-                    [&](const Material& material) { return material.reflectanceByAngle != none; });
+        std::any_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
+            return material.sides[0].reflectanceByAngle != AngleFactors{} ||
+                   material.sides[1].reflectanceByAngle != AngleFactors{};
+        });
     patches.byAngle.assign(hasAngles ? patches.sideCount() : 0, AngleFactors{});
     const bool hasTranslucence =
         std::any_of(scene.materials.begin(), scene.materials.end(),
@@ -200,20 +224,19 @@ void assignMaterials(const Scene& scene, Patches& patches) {
             const float opacity = patches.opacityOf(p);
             const float scale = opacity > 0 ? 1 / opacity : 0.0f;
             for (size_t side = 0; side < 2; ++side) {
+                const MaterialSide& surface = material.sides[side];
+                const Varying::Side& more = varying.sides[side];
                 patches.reflectance[2 * p + side] =
-                    glm::clamp(scale * (material.reflectance[side] + varying.reflectance), 0.0f,
+                    glm::clamp(scale * (surface.reflectance.constant + more.reflectance), 0.0f,
                                kMaxReflectance);
-                for (size_t term = 0; hasAngles && term < material.reflectanceByAngle[side].size();
-                     ++term)
-                    patches.byAngle[2 * p + side][term] =
-                        scale * material.reflectanceByAngle[side][term];
+                for (size_t term = 0; hasAngles && term < surface.reflectanceByAngle.size(); ++term)
+                    patches.byAngle[2 * p + side][term] = scale * surface.reflectanceByAngle[term];
                 if (hasTranslucence)
                     patches.translucence[2 * p + side] = glm::clamp(
-                        scale * (material.translucence[side] + varying.translucence[side]),
+                        scale * (surface.translucence.constant + more.translucence),
                         glm::vec3(0.0f), kMaxReflectance - patches.reflectance[2 * p + side]);
                 patches.emission[2 * p + side] =
-                    scale *
-                    glm::max(material.emission[side] + varying.emission[side], glm::vec3(0.0f));
+                    scale * glm::max(surface.emission.constant + more.emission, glm::vec3(0.0f));
             }
         }
     });
@@ -226,10 +249,9 @@ std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& pa
         const Material& material = scene.materialOf(parent.instance, size_t(parent.face));
         const uint32_t first = 2 * parent.firstPatch;
         for (uint32_t side = first; side < first + 2 * parent.patchCount(); ++side) {
+            const MaterialSide& surface = material.sides[side % 2];
             const glm::vec3 all = patches.opacityOf(side / 2) * patches.reflectance[side];
-            diffuse[side] =
-                glm::clamp(material.diffuseScale[side % 2] * all + material.diffuseOffset[side % 2],
-                           0.0f, 1.0f);
+            diffuse[side] = glm::clamp(surface.colorScale * all + surface.colorOffset, 0.0f, 1.0f);
         }
     });
     return diffuse;

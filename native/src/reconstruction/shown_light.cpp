@@ -45,7 +45,7 @@ ShownLight::ShownLight(const Scene& scene, const Patches& patches, bool gathersA
     if (std::any_of(scene.materials.begin(), scene.materials.end(),
                     [](const Material& material) { return material.showsByAngle(); }))
         for (size_t side = 0; side < shown.size(); ++side)
-            fromEverywhere.push_back(materialOf(side).shown(side % 2, kEverywhere));
+            fromEverywhere.push_back(materialOf(side).sides[side % 2].shown(kEverywhere));
     if (isOwnAlone()) return;
     othersShare.resize(colors.size());
     for (size_t side = 0; side < colors.size(); ++side) {
@@ -71,7 +71,7 @@ std::vector<float> ShownLight::resultArea() const {
 
 glm::vec3 ShownLight::byAngle(size_t side, const glm::vec4& angles) const {
     if (fromEverywhere.empty()) return glm::vec3(1.0f);
-    return materialOf(side).shown(side % 2, angles);
+    return materialOf(side).sides[side % 2].shown(angles);
 }
 
 glm::vec3 ShownLight::of(size_t side, const glm::vec3& own, const glm::vec3& others,

@@ -84,17 +84,24 @@ int32_t Scene::addMaterial(Material material) {
     // Reflectance of 1 or more makes light grow without end in a closed scene.
     constexpr float kMaxReflectance = 0.999f;
     const std::string object = quoted("material", material.name);
+    auto checkImage = [&](int id) {
+        if (id != RB_NO_IMAGE && (id < 0 || size_t(id) >= images.size()))
+            throw invalidArgument(object + ": there is no image " + std::to_string(id));
+    };
+    checkImage(material.opacityImage);
     bool clamped = false;
-    for (int side = 0; side < 2; ++side) {
-        if (!isFiniteAndPositive(material.reflectance[side]) ||
-            !isFiniteAndPositive(material.emission[side]))
+    for (MaterialSide& side : material.sides) {
+        for (const SurfaceColor* color : side.colors()) checkImage(color->image);
+        glm::vec3& reflectance = side.reflectance.constant;
+        const glm::vec3& emission = side.emission.constant;
+        if (!isFiniteAndPositive(reflectance) || !isFiniteAndPositive(emission))
             throw invalidArgument(object +
                                   ": reflectance and emission must be finite and not negative");
-        if (brightest(material.emission[side]) > kMostLight)
+        if (brightest(emission) > kMostLight)
             throw invalidArgument(object + ": its emission" + kTooBright);
-        const glm::vec3 limited = glm::min(material.reflectance[side], glm::vec3(kMaxReflectance));
-        clamped = clamped || limited != material.reflectance[side];
-        material.reflectance[side] = limited;
+        const glm::vec3 limited = glm::min(reflectance, glm::vec3(kMaxReflectance));
+        clamped = clamped || limited != reflectance;
+        reflectance = limited;
     }
     if (clamped)
         warnings.push_back({WarningId::CLAMPED_REFLECTANCE,
@@ -196,7 +203,6 @@ int32_t Scene::addLightSet(std::string name) {
     return int32_t(lightSets.size()) - 1;
 }
 
-Material& Scene::material(int32_t id) { return checked(materials, id, "material"); }
 Mesh& Scene::mesh(int32_t id) { return checked(meshes, id, "mesh"); }
 Light& Scene::light(int32_t id) { return checked(lights, id, "light"); }
 Instance& Scene::instance(int32_t id) { return checked(instances, id, "instance"); }
@@ -237,25 +243,9 @@ size_t Scene::cornersWithoutResult() const {
     return count;
 }
 
-void Scene::checkImage(int32_t id) const {
-    if (id < 0 || size_t(id) >= images.size())
-        throw invalidArgument("there is no image " + std::to_string(id));
-}
-
 void Scene::checkLightSet(int32_t id) const {
     if (id != kNoLightSet && (id < 0 || size_t(id) >= lightSets.size()))
         throw invalidArgument("there is no light set " + std::to_string(id));
-}
-
-bool Material::showsByAngle() const {
-    static const Material kPlain;
-    return shownFromAbove != kPlain.shownFromAbove || shownByAngle != kPlain.shownByAngle;
-}
-
-glm::vec3 Material::shown(size_t side, const glm::vec4& angles) const {
-    constexpr float kMostShown = 16;  // far above what any shader shows; keeps results finite
-    return glm::clamp(shownFromAbove[side] + sumOfTerms(shownByAngle[side], angles), 0.0f,
-                      kMostShown);
 }
 
 const Material& Scene::materialOf(const Mesh& mesh, size_t face) const {

@@ -10,7 +10,7 @@
 
 #include "job/warning.h"
 #include "raybundle/raybundle.h"
-#include "scene/angles.h"
+#include "scene/material.h"
 
 namespace raybundle {
 
@@ -23,86 +23,8 @@ struct Image {
     std::vector<glm::vec3> pixels;
 };
 
-// A part of what a side reflects that has a lobe of its own, see rb_set_material_lobe.
-struct LobeReflectance {
-    rb_lobe lobe = RB_LOBE_MICROFIBERS;
-    float roughness = 0;
-    glm::vec3 reflectance{0.0f};
-    AngleFactors byAngle{};
-};
-
-// Where a side of a surface that is not Lambert's sends light, see
-// rb_set_material_gloss, rb_set_material_lobe, rb_set_material_diffuse_model and
-// rb_set_material_leaving.
-struct Scattering {
-    glm::vec3 glossScale{0.0f}, glossOffset{0.0f};
-    AngleFactors glossByAngle{};
-    rb_masking glossMasking = RB_MASKING_CORRELATED;
-    float glossRoughness = 0;
-    std::vector<LobeReflectance> lobes;  // of different kinds, none black
-    rb_diffuse_model diffuseModel = RB_DIFFUSE_LAMBERT;
-    float diffuseRoughness = 0;
-    AngleFactors leaving{};  // by the angle at which diffuse light leaves
-
-    bool hasGloss() const {
-        return glossScale != glm::vec3(0.0f) || glossOffset != glm::vec3(0.0f) ||
-               glossByAngle != AngleFactors{};
-    }
-    bool isRough() const { return diffuseModel != RB_DIFFUSE_LAMBERT; }
-    bool hasLayer() const { return leaving != AngleFactors{}; }
-    bool isLambert() const { return !hasGloss() && lobes.empty() && !isRough() && !hasLayer(); }
-};
-
 // From the origin, metres: areas, and the squares of distances, stay far from the ends of float.
 constexpr double kFarthest = 1e12;
-
-// Reflectance (albedo) and emission (exitance, W/m^2) of the front [0] and the back [1] side. The
-// optional image and corner colours, each times its weight, are added to both reflectances.
-struct Material {
-    std::string name;
-    std::array<glm::vec3, 2> reflectance{glm::vec3(0.8f), glm::vec3(0.8f)};
-    std::array<glm::vec3, 2> emission{glm::vec3(0.0f), glm::vec3(0.0f)};
-    int image = -1;
-    glm::vec3 imageWeight{0.0f};
-    bool usesCornerColors = false;
-    glm::vec3 cornerColorWeight{0.0f};
-    // Likewise added to the emissions, with a weight for each side.
-    int emissionImage = -1;
-    std::array<glm::vec3, 2> emissionImageWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
-    bool emissionUsesCornerColors = false;
-    std::array<glm::vec3, 2> emissionColorWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
-    // What of the reflectance is diffuse and no gloss: scale times it plus offset.
-    std::array<glm::vec3, 2> diffuseScale{glm::vec3(1.0f), glm::vec3(1.0f)};
-    std::array<glm::vec3, 2> diffuseOffset{glm::vec3(0.0f), glm::vec3(0.0f)};
-    // See rb_set_material_angles: of the reflectance, and of what outputs show.
-    std::array<AngleFactors, 2> reflectanceByAngle{};
-    std::array<glm::vec3, 2> shownFromAbove{glm::vec3(1.0f), glm::vec3(1.0f)};
-    std::array<AngleFactors, 2> shownByAngle{};
-    bool showsByAngle() const;  // whether they do not show all light alike
-    // What outputs show of light at a side, by the means of its angleTerms.
-    glm::vec3 shown(size_t side, const glm::vec4& angles) const;
-    std::array<Scattering, 2> scattering{};
-    // Share of the light that does not pass straight through, and an image (its mean channel) that
-    // multiplies it. Reflectance and emission are those of the whole, what passes through included.
-    float opacity = 1;
-    int opacityImage = -1;
-
-    // What leaves each side of the light that arrives at the other, and an image that, times its
-    // weights, is added.
-    std::array<glm::vec3, 2> translucence{glm::vec3(0.0f), glm::vec3(0.0f)};
-    int translucenceImage = -1;
-    std::array<glm::vec3, 2> translucenceImageWeight{glm::vec3(0.0f), glm::vec3(0.0f)};
-
-    bool isOpaque() const { return opacity >= 1 && opacityImage < 0; }
-    bool emits() const {
-        return emissionImage >= 0 || emissionUsesCornerColors || emission[0] != glm::vec3(0.0f) ||
-               emission[1] != glm::vec3(0.0f);
-    }
-    bool isTranslucent() const {
-        return translucenceImage >= 0 || translucence[0] != glm::vec3(0.0f) ||
-               translucence[1] != glm::vec3(0.0f);
-    }
-};
 
 // N-gons over shared vertices, in object space. A corner is a position in cornerVertices; face f
 // has the corners faceOffsets[f] .. faceOffsets[f + 1] - 1.
@@ -217,10 +139,8 @@ class Scene {
     int32_t addLightSet(std::string name);
 
     // Checks that an id was given out; `what` names its kind in the message.
-    Material& material(int32_t id);
     Mesh& mesh(int32_t id);
     Light& light(int32_t id);
-    void checkImage(int32_t id) const;
     Instance& instance(int32_t id);
     void setResultCorners(int32_t instance, const int32_t* corners, size_t count);
     // Of instances whose other corners have one.

@@ -224,17 +224,17 @@ Lobe Lobe::diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffus
     return lobe;
 }
 
-Lobe Lobe::of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming, float roughness) {
-    if (lobe == RB_LOBE_SEVERAL_FACETS) {
+Lobe Lobe::of(LobeKind lobe, const glm::vec3& normal, const glm::vec3& incoming, float roughness) {
+    if (lobe == LobeKind::SEVERAL_FACETS) {
         const float rough = std::clamp(roughness, kLeastRoughness, 1.0f), alpha = rough * rough;
         Lobe several(Kind::SEVERAL_FACETS, normal, incoming, alpha * alpha);
         const Moments moments = GlossTable::of(several.kind).at(rough, several.cosine);
         several.normalise(moments.white, moments.white2);
         return several;
     }
-    const Kind kind = lobe == RB_LOBE_MICROFIBERS ? Kind::MICROFIBERS
-                      : lobe == RB_LOBE_VELVET    ? Kind::VELVET
-                                                  : Kind::BURLEY_SHEEN;
+    const Kind kind = lobe == LobeKind::MICROFIBERS ? Kind::MICROFIBERS
+                      : lobe == LobeKind::VELVET    ? Kind::VELVET
+                                                    : Kind::BURLEY_SHEEN;
     Lobe cloth(kind, normal, incoming, std::max(roughness, kLeastClothRoughness));
     cloth.normalise();
     return cloth;

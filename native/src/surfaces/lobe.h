@@ -20,7 +20,7 @@
 #include <glm/glm.hpp>
 #include <utility>
 
-#include "raybundle/raybundle.h"
+#include "scene/material.h"
 
 namespace raybundle {
 
@@ -37,7 +37,7 @@ class Lobe {
     static Lobe diffuse(const glm::vec3& normal, const glm::vec3& incoming, rb_diffuse_model model,
                         float roughness);
     // Several facets are as rough as gloss.
-    static Lobe of(rb_lobe lobe, const glm::vec3& normal, const glm::vec3& incoming,
+    static Lobe of(LobeKind lobe, const glm::vec3& normal, const glm::vec3& incoming,
                    float roughness);
 
     // f0 of gloss that reflects so many times as much of light at right angles as of light from

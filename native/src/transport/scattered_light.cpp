@@ -168,7 +168,7 @@ struct ScatteredLight::Transfer {
         }
         for (const LobeReflectance& lobe : surface.lobes)
             lobes.push_back(between(
-                [&](const glm::vec3& from) { return Lobe::of(lobe.lobe, z, from, lobe.roughness); },
+                [&](const glm::vec3& from) { return Lobe::of(lobe.kind, z, from, lobe.roughness); },
                 true));
         if (surface.isRough())
             rough = between(
@@ -237,16 +237,16 @@ void ScatteredLight::findTransfers() {
     // Alike to within a hundredth of the roughness.
     auto rounded = [](float roughness) { return float(std::lround(100 * roughness)) / 100; };
     // Gloss, lobes and the diffuse rest: whether there is, of which kind, how rough.
-    using Kind = std::tuple<bool, rb_masking, float, std::vector<std::pair<rb_lobe, float>>,
+    using Kind = std::tuple<bool, rb_masking, float, std::vector<std::pair<LobeKind, float>>,
                             rb_diffuse_model, float>;
     std::map<Kind, std::vector<size_t>> alike;
     transfers.resize(patches.scattering.size());
     for (size_t k = 0; k < transfers.size(); ++k) {
         const Scattering& surface = patches.scattering[k];
         const float gloss = std::clamp(surface.glossRoughness, Lobe::kLeastRoughness, 1.0f);
-        std::vector<std::pair<rb_lobe, float>> lobes;
+        std::vector<std::pair<LobeKind, float>> lobes;
         for (const LobeReflectance& lobe : surface.lobes)
-            lobes.emplace_back(lobe.lobe, rounded(lobe.roughness));
+            lobes.emplace_back(lobe.kind, rounded(lobe.roughness));
         alike[{surface.hasGloss(), surface.glossMasking, surface.hasGloss() ? rounded(gloss) : 0,
                lobes, surface.diffuseModel,
                surface.isRough() ? rounded(surface.diffuseRoughness) : 0}]

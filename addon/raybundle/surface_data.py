@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What one side of a material does with light, as the native library takes it, without bpy.
+
+The members, their units and ranges are those of rb_surface and its parts in
+native/include/raybundle/raybundle.h, by the same names: native.py copies them by name. Colours are
+(3,), linear RGB; factors by angle are (4, 3), of the terms of diffuse_angles.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+CORRELATED, SEPARATE = range(2)  # rb_masking
+
+
+def _black() -> np.ndarray:
+    return np.zeros(3)
+
+
+def _white() -> np.ndarray:
+    return np.ones(3)
+
+
+def _at_all_angles() -> np.ndarray:
+    return np.zeros((4, 3))
+
+
+@dataclass(frozen=True)
+class ColorData:
+    """rb_color: constant + image_weight * image + corner_color_weight * corner colours."""
+
+    constant: np.ndarray = field(default_factory=_black)
+    image: int | None = None  # position in SceneData.images
+    image_weight: np.ndarray = field(default_factory=_black)
+    corner_color_weight: np.ndarray = field(default_factory=_black)
+
+
+@dataclass(frozen=True)
+class PartData:
+    """rb_part: scale * reflectance + offset."""
+
+    scale: np.ndarray = field(default_factory=_black)
+    offset: np.ndarray = field(default_factory=_black)
+
+
+@dataclass(frozen=True)
+class ShownData:
+    """rb_shown: what outputs show."""
+
+    color: PartData = field(default_factory=lambda: PartData(_white()))
+    from_above: np.ndarray = field(default_factory=_white)
+    by_angle: np.ndarray = field(default_factory=_at_all_angles)
+
+
+@dataclass(frozen=True)
+class GlossData:
+    """rb_gloss: the part of the reflectance that is mirrored."""
+
+    part: PartData = field(default_factory=PartData)
+    by_angle: np.ndarray = field(default_factory=_at_all_angles)
+    roughness: float = 0.0
+    masking: int = CORRELATED
+
+
+@dataclass(frozen=True)
+class LobeData:
+    """rb_lobe: a part of the reflectance that has a lobe of its own."""
+
+    reflectance: np.ndarray = field(default_factory=_black)
+    by_angle: np.ndarray = field(default_factory=_at_all_angles)
+    roughness: float = 0.0
+
+
+@dataclass(frozen=True)
+class DiffuseData:
+    """rb_diffuse: where the rest of the reflected light goes."""
+
+    model: int = 0  # of scattering.py
+    roughness: float = 0.0
+    leaving: np.ndarray = field(default_factory=_at_all_angles)
+
+
+@dataclass(frozen=True)
+class SurfaceData:
+    """rb_surface: one side of a material."""
+
+    reflectance: ColorData
+    emission: ColorData = field(default_factory=ColorData)  # W/m^2
+    translucence: ColorData = field(default_factory=ColorData)
+    reflectance_by_angle: np.ndarray = field(default_factory=_at_all_angles)
+    shown: ShownData = field(default_factory=ShownData)
+    gloss: GlossData = field(default_factory=GlossData)
+    microfibers: LobeData = field(default_factory=LobeData)
+    velvet: LobeData = field(default_factory=LobeData)
+    burley_sheen: LobeData = field(default_factory=LobeData)
+    several_facets: LobeData = field(default_factory=LobeData)
+    diffuse: DiffuseData = field(default_factory=DiffuseData)
