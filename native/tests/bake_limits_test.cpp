@@ -41,7 +41,8 @@ TEST(BadScenes, WithoutFacesThereIsAWarning) {
     }
     Bake bake;
     bake.run(degenerate);
-    EXPECT_TRUE(warns(reportOf(bake), WarningId::FEWER_THREADS));
+    EXPECT_TRUE(warns(reportOf(bake), WarningId::DEGENERATE_FACES));
+    EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "thread"));
     for (const glm::vec3& v : cornerLight(bake, 0, RB_OUTPUT_COMBINED)) EXPECT_EQ(v, glm::vec3(0));
 }
 
