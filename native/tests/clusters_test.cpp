@@ -141,7 +141,7 @@ TEST(Clusters, LeaveAFurnaceExact) {
 TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
     for (const float gloss : {0.0f, 0.3f})
         for (const float megabytes : {4096.0f, 0.5f}) {
-            Scene scene = roomWithBall(5, 0.6f, 0, gloss);
+            Scene scene = roomWithBall(4, 0.6f, 0, gloss);
             scene.lightSets = {"lamp"};
             Light lamp = pointLight({2.2, 1.2, 2.2}, glm::dvec3(5));
             lamp.lightSet = 0;
@@ -157,6 +157,7 @@ TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
                 bake.settings.skipClusters = on;
                 bake.run(scene);
                 const Json report = reportOf(bake);
+                EXPECT_EQ(skips(report, SkippedWork::CLUSTERED_PATCHES), on == 1);
                 EXPECT_EQ(warns(report, WarningId::MEMORY_LIMIT), megabytes < 1);
                 light[on] = everything(bake);
                 stated[on] = report["estimated_error"];

@@ -136,8 +136,9 @@ TEST(Surplus, ShadowEdgesAreKnownWithinAFactorOfTwo) {
         // The place of the edge on the grid is chance: the mean over some.
         for (int k = 0; k < 8; ++k)
             for (double angle : {0.0, 0.3, 0.7}) {
+                const double cosine = std::cos(angle), sine = std::sin(angle);
                 const LitMesh lit(square(1), patchSize, [=](glm::dvec3 p) {
-                    const double across = std::cos(angle) * p.x + std::sin(angle) * p.y;
+                    const double across = cosine * p.x + sine * p.y;
                     return across < 0.1 + 0.031 * k ? 1.0 : 0.2;
                 });
                 truth += std::pow(lit.distanceFromLinear(), 2);

@@ -56,7 +56,9 @@ void setMethod(Bake& bake, const Method& method, float patchSize, int seed) {
     bake.settings.patchSize = patchSize;
     bake.settings.linesPerBundle = method.linesPerBundle;
     bake.settings.minBundles = bake.settings.maxBundles = method.bundles;
-    bake.settings.targetError = 1e-4f;
+    // Of the direct light. What GATHER leaves of it from seed to seed is far below the noise of the
+    // bundles; with 1e-4 it would take four fifths of the time.
+    bake.settings.targetError = 5e-3f;
     bake.settings.localRays = 4000;
     bake.settings.threads = 1;  // seeds run side by side
     bake.settings.seed = seed;
@@ -122,6 +124,7 @@ TEST_P(Unbiased, InARoomWithTwoBoxes) {
     static const std::vector<double> exact = [&] {
         Bake bake;
         setMethod(bake, {"", {{"directions", "LOW_DISCREPANCY"}}, 16384}, 0.8f, 999);
+        bake.settings.targetError = 1e-4f;
         bake.settings.contacts = 0;  // the same patches for all methods
         bake.run(scene);
         return groupMeans(bake, objects, objectOf);

@@ -49,8 +49,9 @@ const glm::vec3 kNormals[] = {{0, 0, 1},           {0, 0, -1},       {1, 0, 0},
                               {0.6f, 0, 0.8f},     {0, -0.8f, 0.6f}, {-0.48f, 0.6f, 0.64f},
                               {0.1f, 0.7f, -0.7f}, {0, 1, 0}};
 
-glm::vec3 unblocked(const WorldImage& image, const glm::vec3& normal) {
-    return *WorldSource(image).irradiance({0, 0, 0}, glm::normalize(normal));
+// Irradiance by the whole image on a surface with this normal.
+glm::vec3 unblocked(const WorldSource& world, const glm::vec3& normal) {
+    return *world.irradiance({0, 0, 0}, glm::normalize(normal));
 }
 
 TEST(WorldImage, HasTheMappingOfCycles) {
@@ -85,8 +86,9 @@ TEST(WorldImage, AConstantOneGivesPiTimesItsRadiance) {
         const WorldImage image =
             painted(width, (width + 1) / 2, [](auto&) { return glm::vec3(1, 2, 3); });
         EXPECT_NEAR(image.meanRadiance().y, 2, 1e-5);
+        const WorldSource world(image);
         for (const glm::vec3& normal : kNormals) {
-            const glm::vec3 found = unblocked(image, normal);
+            const glm::vec3 found = unblocked(world, normal);
             EXPECT_NEAR(found.x, kPi, 2e-4 * kPi) << width;
             EXPECT_NEAR(found.z, 3 * kPi, 6e-4 * kPi) << width;
         }
@@ -99,10 +101,11 @@ TEST(WorldImage, AHalfWhiteSphereHasAClosedForm) {
         const WorldImage image = painted(720, 360, [&](const glm::dvec3& w) {
             return glm::vec3(glm::dot(w, white) > 0 ? 1.0f : 0.0f);
         });
+        const WorldSource world(image);
         for (const glm::vec3& normal : kNormals) {
             const double c = glm::dot(glm::normalize(glm::dvec3(normal)), white);
             // The edge follows whole pixels of half a degree.
-            EXPECT_NEAR(unblocked(image, normal).x, 0.5 * kPi * (1 + c), 0.005);
+            EXPECT_NEAR(unblocked(world, normal).x, 0.5 * kPi * (1 + c), 0.005);
         }
     }
 }
