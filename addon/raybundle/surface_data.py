@@ -3,7 +3,8 @@
 
 The members, their units and ranges are those of rb_surface and its parts in
 native/include/raybundle/raybundle.h, by the same names: native.py copies them by name. Colours are
-(3,), linear RGB; factors by angle are (4, 3), of the terms of diffuse_angles.py.
+(3,), linear RGB; factors by angle are (4, 3), of the terms of
+materials/diffuse_angles.py.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ class LobeData:
 class DiffuseData:
     """rb_diffuse: where the rest of the reflected light goes."""
 
-    model: int = 0  # of scattering.py
+    model: int = 0  # of materials/scattering.py
     roughness: float = 0.0
     leaving: np.ndarray = field(default_factory=_at_all_angles)
 

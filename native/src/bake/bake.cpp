@@ -194,7 +194,8 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     progress.report(RB_STAGE_PATCHES, 1);
 }
 
-// Where lines are not traced yet: cuts the patches, and makes ready to trace. Returns as cutPatches.
+// Where lines are not traced yet: cuts the patches, and makes ready to trace. Returns as
+// cutPatches.
 std::vector<CoarseShot> Bake::startLines(const Scene& scene, Report& report) {
     if (trace->tracer) return {};
     std::vector<CoarseShot> coarse = cutPatches(scene, report);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bundles and solves in turns, until the difference of the two halves' estimates says that the noise
-// is at its target, in the light of all sources and in that of each light set.
+// Bundles and solves in turns, until the difference of the two halves' estimates says that the
+// noise is at its target, in the light of all sources and in that of each light set.
 //
 // Source: thesis section 4.3.3 (stop by a stated error). Differs: bake/stop_rule.h,
 // stated_error/noise.h, stated_error/noisy_parts.h.
@@ -24,7 +24,8 @@
 
 namespace raybundle {
 
-// What a solve works on besides; all references must outlive it.
+// What a solve works on: what every stage does, and the tiles and the shown light of its patches.
+// All references must outlive it.
 struct SolveInput : StageInput {
     const Tiles& tiles;
     const ShownLight& shown;

@@ -8,7 +8,8 @@
 // Sources: Szecsi, Sbert and Szirmay-Kalos, "Combined Correlated and Importance Sampling in Direct
 // Light Source Computation" (2004) for the closed form as a control.
 // Differs:
-// - Emission that bundles carry without much noise is no source here (direct_light/emission_split.h).
+// - Emission that bundles carry without much noise is no source here
+//   (direct_light/emission_split.h).
 // - Each light set has a DirectLight of its own, which knows nothing of the others: its light is
 //   what a scene with no other lights would have, sample for sample.
 #pragma once

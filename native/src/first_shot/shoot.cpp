@@ -11,7 +11,8 @@
 //   exactly, in each channel.
 // - The number of lines is doubled until the relative error, weighted by area, meets the target;
 //   the thesis tells the user to look.
-// - Light that surfaces do not stop is gathered (direct_light/direct_light.h): lines end at the first.
+// - Light that surfaces do not stop is gathered (direct_light/direct_light.h): lines end at the
+//   first.
 // - The thesis has emissive patches only. Suns shoot parallel lines from a disk that covers the
 //   scene: most of them may miss it. A lamp's disk that turns to each receiver shoots the lines
 //   that each receiver would see it along (lights/light_source.cpp).

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What a bake warns of: an identifier for programs and tests, and a sentence for the user that names
-// the object concerned and says what to do.
+// What a bake warns of: an identifier for programs and tests, and a sentence for the user that
+// names the object concerned and says what to do.
 #pragma once
 
 #include <string>

@@ -96,8 +96,8 @@ class LightSource {
     virtual LightSample sample(const glm::vec3& point, const glm::vec3& normal,
                                glm::vec2 uv) const = 0;
 
-    // The parts of the source, each of which may be visible or not (direct_light/outlook.h): of each
-    // those that it touches. Empty: none are told apart.
+    // The parts of the source, each of which may be visible or not (direct_light/outlook.h): of
+    // each those that it touches. Empty: none are told apart.
     virtual const PartNeighbours& parts() const {
         static const PartNeighbours kNone;
         return kNone;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Tiles: the patches as they were before some were cut (refinement/refinement.h), and the means over
-// them of what cut patches have. A cut tile has the lines that it had: its patches share them, so
-// that each has more noise and the mean over the tile no more. What is interpolated between the
+// Tiles: the patches as they were before some were cut (refinement/refinement.h), and the means
+// over them of what cut patches have. A cut tile has the lines that it had: its patches share them,
+// so that each has more noise and the mean over the tile no more. What is interpolated between the
 // corners of faces, none smaller than a tile, has that of the tiles; so noise is measured on them.
 #pragma once
 

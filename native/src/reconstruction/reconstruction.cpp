@@ -149,7 +149,6 @@ constexpr Kind kKinds[] = {
     {Reconstruction::AREA_AVERAGE, byAreaAverage, false},
     {Reconstruction::POINT, byLeastSquares, false},
 };
-
 static_assert(hasEveryValue(kKinds));
 
 // Reconstructs the instances, each by itself.

@@ -10,8 +10,8 @@
 // A cut pays where the squares that it removes, over those of the light, are more than those of
 // kWorth targets. One tile of N is 1 / N of the area, and its cut adds 3 / N to the patches. If a
 // share c of the run time goes with the patches, bundles for as much time would bring the squares
-// of the noise, which are those of the target, down by 2 * kNoiseSlope (bundles/directions.h) * 3 * c of
-// them: with c = 1/2 that is the square of 1.4 targets.
+// of the noise, which are those of the target, down by 2 * kNoiseSlope (bundles/directions.h) * 3 *
+// c of them: with c = 1/2 that is the square of 1.4 targets.
 //
 // Contacts are cut only where the sources' light shows them; narrow gaps are cut for themselves
 // (refinement/contacts.h).

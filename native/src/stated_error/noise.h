@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The noise: how far the light on the patch sides is from that of infinitely many bundles and shadow
-// rays on the same patches. Light is shown interpolated over the cells of the user's faces, so that
-// what differs from patch to patch within a cell is not seen: that of the cells' means foretells the
-// noise at corners (stated_error/object_noise.h).
+// The noise: how far the light on the patch sides is from that of infinitely many bundles and
+// shadow rays on the same patches. Light is shown interpolated over the cells of the user's faces,
+// so that what differs from patch to patch within a cell is not seen: that of the cells' means
+// foretells the noise at corners (stated_error/object_noise.h).
 //
 // Source: thesis section 4.3.3 (stated error).
 // Differs:

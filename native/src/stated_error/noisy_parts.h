@@ -31,7 +31,8 @@ struct NoisyPartsInput {
     const std::vector<float>& weight;  // per side of the tiles, positive where it has a result
     // Where corners gather instead of showing their side's light, rays do not help.
     const ShownLight& shown;
-    // Per instance, see stated_error/object_noise.h; the second as of the halves that are looked at.
+    // Per instance, see stated_error/object_noise.h; the second as of the halves that are looked
+    // at.
     const std::vector<double>& growth;
     const std::vector<double>& shownOverForetold;
     // Of sheets and single faces, of each bundle, where there are windows of finer lines; else 0.
@@ -59,9 +60,9 @@ class NoisyParts {
     std::vector<ExtraRays> rays(const std::vector<std::array<float, 2>>& samples,
                                 uint32_t most) const;
     // As of a look at the halves with these rays: parts that are not clean yet are to have more if
-    // that has made those of their object cleaner, and furtherPasses of twice as many each may clean
-    // them. Returns how many times too large is what is left, on the object where that is most: of
-    // nine parts of ten of it. It is the noise of the light that rays met, and their own.
+    // that has made those of their object cleaner, and furtherPasses of twice as many each may
+    // clean them. Returns how many times too large is what is left, on the object where that is
+    // most: of nine parts of ten of it. It is the noise of the light that rays met, and their own.
     double lookWithRays(const SetNoise& noise, uint32_t furtherPasses);
 
   private:

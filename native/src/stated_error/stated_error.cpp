@@ -229,7 +229,7 @@ class InstanceErrors {
     double corners = 0;  // about, of the cells with a result
 };
 
-// noise: what is shown of that of the patches, relative.
+// noise: at the corners, by that of the patches, relative.
 Report::Errors relative(const Squares& s, double noiseScale, double noise, double discretisation) {
     if (!(s.signal > 0)) return {};
     return {std::hypot(noise, s.shown > 0 ? std::sqrt(s.gathered / s.shown) : 0),
@@ -325,8 +325,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     // Also what the halves have in common.
     const double noiseScale =
         all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
-    // As the bake has measured what is shown of it, relative to what is shown.
-    const double shown = all.shown > 0 ? report.error.noise * std::sqrt(all.signal / all.shown) : 0;
+    const double shown = report.error.noise;  // as the bake has measured it at all corners
     const double limit = std::max(kCoarse, kCoarseTargets * targetError);
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The stated error of the result, in three parts, per object and in all:
-// - noise: of the light on the patches, from finitely many bundles and shadow rays (stated_error/noise.h);
+// - noise: of the light on the patches, from finitely many bundles and shadow rays
+//   (stated_error/noise.h);
 // - discretisation: what light has beyond the best linear function on each patch, which nothing
 //   that is made of the patches can show (stated_error/surplus.h);
 // - mesh: how far the interpolation between the corners is from the light of the patches, which is

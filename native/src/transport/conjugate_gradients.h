@@ -23,10 +23,10 @@ class ConjugateGradients {
   public:
     using Field = std::vector<glm::vec3>;  // per side
 
-    // scale: s_i, with the weights of the lines in it. guess: where z starts. brought: per side, sum_j
-    // c_ij s_j z_j of the guess. tolerance: of the residual, relative to the right-hand side, and to
-    // the solution on the sides that isShown holds for (null: to the right-hand side alone), in
-    // every channel. References must outlive the object.
+    // scale: s_i, with the weights of the lines in it. guess: where z starts. brought: per side,
+    // sum_j c_ij s_j z_j of the guess. tolerance: of the residual, relative to the right-hand side,
+    // and to the solution on the sides that isShown holds for (null: to the right-hand side alone),
+    // in every channel. References must outlive the object.
     ConjugateGradients(LineSystem& lines, const Field& scale, Field guess, Field rightSide,
                        const Field& brought, const std::vector<bool>* isShown, float tolerance);
 

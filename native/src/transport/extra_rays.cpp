@@ -47,9 +47,9 @@ struct Brought {
 constexpr double kTellingLines = 40000;
 
 // So much of all that is absorbed rays may lose or make. Lines keep the power of all sides; that of
-// a few sides they have only up to a noise of their own, for the lines of a bundle err in common. To
-// take it over in full is to lose what the rays are cast for: 5 of 14 objects of house_on_plain are
-// then above 4 % at the 95th percentile instead of 1.
+// a few sides they have only up to a noise of their own, for the lines of a bundle err in common.
+// To take it over in full is to lose what the rays are cast for: 5 of 14 objects of house_on_plain
+// are then above 4 % at the 95th percentile instead of 1.
 constexpr double kMostMade = 1e-4;
 
 // What lines and rays bring a side, W/m^2.
@@ -71,6 +71,7 @@ void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought
 
 using Samples = std::vector<std::array<float, 2>>;  // per side and half
 
+// The rays of the wanted sides, and what they bring to the light of each set.
 class ExtraGather {
   public:
     ExtraGather(const ExtraRaysInput& input, const Samples& samples, const SetLights& lights)

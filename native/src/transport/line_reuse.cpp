@@ -43,8 +43,8 @@ struct ScaledSystem {
 };
 
 // reflected: R where the solve starts; is set to 0 in channels that a side does not reflect, and
-// isKept to false if that changes anything. rightSide: exitance that does not depend on R, W/m^2; is
-// divided by the scale.
+// isKept to false if that changes anything. rightSide: exitance that does not depend on R, W/m^2;
+// is divided by the scale.
 ScaledSystem scaledSystem(const Patches& patches, const LineSystem& lines, Field& reflected,
                           bool& isKept, Field& rightSide) {
     ScaledSystem system(lines.sideCount());

@@ -26,9 +26,9 @@ constexpr uint32_t kAlong = 2 * kEdge, kDirections = kAlong * kAlong;
 constexpr float kMostSteps = 127;
 constexpr float kOpenSteps = 48;  // those of a cell that is open
 // What is sent by direction makes or loses power by its noise. Between sides that reflect nearly
-// all of it, as in a slit between white boards, that grows without bound: of a channel of which less
-// than this share is absorbed, in proportion less goes by direction. (Between books of pure blue
-// under an even sky there was 8 times the light of the sky. In Cycles it is 1.0 to 1.1 times.)
+// all of it, as in a slit between white boards, that grows without bound: of a channel of which
+// less than this share is absorbed, in proportion less goes by direction. (Between books of pure
+// blue under an even sky there was 8 times the light of the sky. In Cycles it is 1.0 to 1.1 times.)
 constexpr float kLeastAbsorbed = 0.02f;
 
 int8_t rounded(float steps) {

@@ -56,8 +56,8 @@ class StarvedSides {
     // that these rays meet. Adds the direct light that the rays bring.
     void castRays(const std::vector<bool>& wanted);
 
-    // Adds the reflected light that these rays bring. reflected: exitance by reflection per side, as
-    // the solve found it, W/m^2.
+    // Adds the reflected light that these rays bring. reflected: exitance by reflection per side,
+    // as the solve found it, W/m^2.
     void addReflected(const std::vector<glm::vec3>& reflected);
 
     // The sides that gather.

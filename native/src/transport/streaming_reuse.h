@@ -34,9 +34,9 @@ struct StreamingStart {
 
 class StreamingReuse {
   public:
-    // One half. source: per side, exitance that is there without lines; exposed: per side, the share
-    // of it that nothing covers; emission (per side) and worldExitance: what lines bring straight,
-    // W/m^2. patches and emission must outlive the object.
+    // One half. source: per side, exitance that is there without lines; exposed: per side, the
+    // share of it that nothing covers; emission (per side) and worldExitance: what lines bring
+    // straight, W/m^2. patches and emission must outlive the object.
     StreamingReuse(const Patches& patches, const StreamingStart& start,
                    const std::vector<glm::vec3>& source, const std::vector<float>& exposed,
                    const std::vector<glm::vec3>& emission, const glm::vec3& worldExitance);
