@@ -65,10 +65,6 @@ class MeshData:
     def face_count(self) -> int:
         return len(self.face_offsets) - 1
 
-    def corner_faces(self) -> np.ndarray:
-        """(c,): the face of each corner."""
-        return np.repeat(np.arange(self.face_count), np.diff(self.face_offsets))
-
     def digest(self) -> bytes:
         """A digest of the content, without the name."""
         content = hashlib.blake2b(digest_size=16)

@@ -47,8 +47,7 @@ class Noise {
 
     // On the sides, as of the last look, relative to the RMS of the light.
     double relative() const;
-    double ofBundles() const;  // without that of the first shot
-    // What the halves have in common, see Transport::bias; relative.
+    // What both halves are off alike, by Transport::bias; relative.
     double biasOfBoth() const { return bias; }
     // So many times too large is the noise of bundles for a relative target beside that of the
     // first shot, which they do not help: beside that of the cells' means, where the target is out
@@ -71,11 +70,13 @@ class Noise {
 
   private:
     void measure(const std::array<Irradiance, 2>& half);
+    // Of bundles alone, on the sides, relative.
+    double ofBundles() const;
+    double factor() const;
 
     const std::vector<float>& weight;
     const std::vector<float>& directError;
     const std::vector<uint32_t>& cellOf;
-    double factor() const;
 
     std::vector<glm::vec3> difference;  // per side: half that of the halves, W/m^2
     std::vector<OfCell> ofCells;
