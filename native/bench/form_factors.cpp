@@ -101,8 +101,7 @@ double formFactorByBundles(const FormFactor& f, uint32_t lines, uint32_t bundles
                            std::mt19937_64& random) {
     const double perBundle = double(lines) / bundles;
     const float pixelSize = f.patches.radius * float(std::sqrt(glm::pi<double>() / perBundle));
-    BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS,
-                        {f.patches, f.visibility, pixelSize, 1e-4f * f.patches.radius},
+    BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS, {f.patches, f.visibility, pixelSize},
                         DirectionKind::RANDOM, uint32_t(random()));
     uint64_t leaving = 0, between = 0;
     for (const TracedBundle& traced : tracer.trace(bundles)) {

@@ -42,7 +42,6 @@ namespace raybundle::bench {
 namespace {
 
 constexpr float kPixelsPerPatch = 2;  // as in bake.cpp
-constexpr float kTouchDistance = 1e-4f;
 constexpr uint32_t kTraced = 256, kMerged = 128;
 constexpr uint32_t kRays = 1024;  // from the table of Sobol points
 
@@ -54,9 +53,7 @@ struct Subject {
           visibility(patches),
           pixelSize(std::sqrt(patches.totalArea / double(patches.count()) / kPixelsPerPatch)) {}
 
-    ProjectorInput input(float pixels) const {
-        return {patches, visibility, pixels, kTouchDistance};
-    }
+    ProjectorInput input(float pixels) const { return {patches, visibility, pixels}; }
     std::vector<TracedBundle> trace(uint32_t count) const {
         BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS, input(float(pixelSize)),
                             DirectionKind::LOW_DISCREPANCY, 0);
@@ -73,7 +70,7 @@ struct Subject {
 std::unique_ptr<const Subject> subject;
 
 void project(benchmark::State& state, const Patches& patches, float pixelSize) {
-    FragmentLists lists(patches, pixelSize, kTouchDistance, SmallPatches::CENTRE_SAMPLING, {});
+    FragmentLists lists(patches, pixelSize, SmallPatches::CENTRE_SAMPLING, {});
     const std::vector<Bundle> bundles = Directions(DirectionKind::LOW_DISCREPANCY, 0).next(64);
     size_t lines = 0, fragments = 0, exchanges = 0, k = 0;
     for (auto _ : state) {
@@ -204,9 +201,9 @@ void LeastSquares(benchmark::State& state) {
             const SmoothRegions regions =
                 smoothRegions(scene.meshes[size_t(instance.mesh)], patches.cells,
                               ranges[i].firstCell, ranges[i].lastCell);
-            benchmark::DoNotOptimize(leastSquares(patches, {ranges[i], regions, instance.side},
-                                                  exposed, subject->settings.regularization,
-                                                  {&field}));
+            benchmark::DoNotOptimize(leastSquares({patches, exposed},
+                                                  {ranges[i], regions, instance.side},
+                                                  subject->settings.regularization, {&field}));
         }
 }
 BENCHMARK(LeastSquares)->Unit(benchmark::kMillisecond);

@@ -34,8 +34,7 @@ namespace raybundle::bench {
 namespace {
 
 constexpr float kPixelsPerPatch = 2;  // as in bake.cpp
-constexpr float kTouchDistance = 1e-4f;
-constexpr int kRepeats = 7;  // the least time counts
+constexpr int kRepeats = 7;           // the least time counts
 constexpr glm::vec3 kRoom{5, 4, 2.8f};
 constexpr float kWall = 0.2f;  // thickness between two rooms, metres
 
@@ -108,8 +107,7 @@ void addRoom(Scene& scene, int column, int row) {
 class Windows {
   public:
     Windows(const std::vector<Patches>& parts, float pixel) {
-        for (const Patches& patches : parts)
-            projectors.emplace_back(patches, pixel, kTouchDistance);
+        for (const Patches& patches : parts) projectors.emplace_back(patches, pixel);
     }
 
     void project(const std::vector<Bundle>& bundles) {

@@ -125,8 +125,7 @@ double surfaceDeviation(const Bake& bake, const Scene& scene, double light) {
 bool areCountsRight(const Patches& patches) {
     if (patches.count() > kMostPairs) return true;
     const float pixel = float(std::sqrt(patches.totalArea / double(patches.count()) / 2));
-    const LineCounts counts = test::traceLines(patches, pixel, 8, 1, DirectionKind::LOW_DISCREPANCY,
-                                               3e-5f * patches.radius);
+    const LineCounts counts = test::traceLines(patches, pixel, 8);
     std::vector<std::vector<LineCount>> rows;
     for (uint32_t i = 0; i < counts.sideCount(); ++i) rows.push_back(counts.row(i));
     for (uint32_t i = 0; i < counts.sideCount(); ++i)

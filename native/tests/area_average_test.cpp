@@ -38,7 +38,7 @@ std::vector<Corner> averages(const Mesh& given, float patchSize,
     const InstanceRange range{0, uint32_t(patches.cells.size()), 0,
                               uint32_t(patches.parents.size())};
     const SmoothRegions regions = smoothRegions(mesh, patches.cells, 0, range.lastCell);
-    const auto nodes = areaAverage(patches, {range, regions, RB_SIDE_FRONT}, exposed, {&field});
+    const auto nodes = areaAverage({patches, exposed}, {range, regions, RB_SIDE_FRONT}, {&field});
     std::vector<Corner> corners;
     for (size_t c = 0; c < mesh.cornerCount(); ++c)
         corners.push_back(

@@ -28,7 +28,7 @@ Scene groundUnderBoard(float gap) {
 
 Cuts cutsOf(const Scene& scene, size_t most = kMany) {
     const Patches patches = subdivide(scene, 0.1f, kMany);
-    return contactCuts(patches, Visibility(patches), kTouch, most);
+    return contactCuts(patches, Visibility(patches), most);
 }
 
 TEST(ContactCuts, AreWhereAGapIsCoveredInPart) {
@@ -49,7 +49,7 @@ TEST(ContactCuts, AreWhereAGapIsCoveredInPart) {
 
 TEST(ContactCuts, LeaveWideGapsAndTouchingSurfacesAlone) {
     EXPECT_EQ(cutsOf(groundUnderBoard(0.03f)).count(), 0u);
-    EXPECT_EQ(cutsOf(groundUnderBoard(0.5f * kTouch)).count(), 0u);
+    EXPECT_EQ(cutsOf(groundUnderBoard(5e-6f)).count(), 0u);
     EXPECT_EQ(cutsOf(closedCube(0.5f)).count(), 0u);
 }
 

@@ -166,7 +166,7 @@ TEST(Crossings, WhatAPatchCountsAtCornersIsWhole) {
     const Patches patches = subdivide(sceneOf({"turned", 5, 12, 0.37}), 0, kMany);
     const InstanceRange all{0, uint32_t(patches.cells.size()), 0, uint32_t(patches.parents.size())};
     const std::vector<float> exposed(patches.sideCount(), 1.0f);
-    const CornerWeights weights(patches, all, RB_SIDE_FRONT, exposed);
+    const CornerWeights weights({patches, exposed}, all, RB_SIDE_FRONT);
     size_t parted = 0;
     for (uint32_t p = 0; p < patches.parents.size(); ++p) {
         parted += weights.isParted(p);

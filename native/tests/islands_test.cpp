@@ -234,7 +234,7 @@ TEST(Islands, LinesAreThoseOfTheWholePlane) {
     one.islands.resize(1);
     one.islands[0].reach = one.islands[0].radius = one.radius;
     for (Parent& parent : one.parents) parent.island = 0;
-    FragmentLists apart(patches, 0.1f, kTouch), together(one, 0.1f, kTouch);
+    FragmentLists apart(patches, 0.1f), together(one, 0.1f);
     Directions directions(DirectionKind::LOW_DISCREPANCY, 1);
     std::vector<Bundle> bundles = directions.next(64);
     // Along the two boxes, where one is behind the other.

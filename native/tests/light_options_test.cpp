@@ -180,8 +180,8 @@ TEST(DirectLight, PassesWhatDoesNotStopIt) {
         Settings settings;
         settings.localRays = 1 << 16;
         for (FirstShotKind kind : kShots) {
-            const FirstShot shot = firstShot(
-                kind, {light, patches, direct, settings, Progress(), 1e-4f, 100, &exchange});
+            const FirstShot shot =
+                firstShot(kind, {light, patches, direct, settings, Progress(), 100, &exchange});
             const Mean onGround = meanLight(patches, shot, 0), onRoof = meanLight(patches, shot, 1);
             // At most 1 % of noise where shot, half of it where gathered.
             EXPECT_NEAR(onGround.value, ground, kSigmas * onGround.error + 0.005 * ground)

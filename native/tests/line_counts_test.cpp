@@ -90,7 +90,7 @@ TEST(LineCounts, CoplanarPatchesNeverMeet) {
 
 TEST(LineCounts, ManyAdditionsGiveTheSameAsOne) {
     const Patches patches = subdivide(roomWithBoxes(0.5f), 0.3f, kMany);
-    FragmentLists projector(patches, 0.1f, 1e-5f);
+    FragmentLists projector(patches, 0.1f);
     LineCounts once(patches.sideCount()), often(patches.sideCount());
     std::vector<TracedBundle> all;
     for (const Bundle& bundle : Directions(DirectionKind::LOW_DISCREPANCY, 1).next(32)) {
@@ -121,8 +121,7 @@ TEST(Touching, TheFloorUnderABoxIsCoveredAndNothingElseIs) {
         place(scene, box("box", {1, 1, 0}, {2, 3, 1}, false), grey("", 0.5f),
               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, height)));
         const Patches patches = subdivide(scene, 0.5f, kMany);
-        const LineCounts counts =
-            traceLines(patches, 0.05f, 64, 1, DirectionKind::LOW_DISCREPANCY, 3e-4f);
+        const LineCounts counts = traceLines(patches, 0.05f, 64);
         const std::vector<float> exposed = counts.exposedShare();
         size_t covered = 0;
         float worst = 0, worstBack = 0;

@@ -140,7 +140,7 @@ TEST(Furnace, StarvedSidesGatherTheSameLight) {
             starved += linesOf(system.counts, i) < 16;
         ASSERT_GT(starved, 100u);
         EXPECT_EQ(system.solver().gatherStarvedSides(
-                      {visibility, nullptr, kTouch, 16, 1},
+                      {visibility, nullptr, 16, 1},
                       std::vector<bool>(system.patches.sideCount(), true), system.reflected, h),
                   starved);
         double worst = 0;
@@ -156,7 +156,7 @@ TEST(Furnace, StarvedSidesKeepTheirFirstShot) {
     System system(closedCube(0), 0.25f, 0.5f, 2);
     for (glm::vec3& g : system.shot.irradiance) g = {1, 2, 3};
     Irradiance h = system.solve();
-    system.solver().gatherStarvedSides({Visibility(system.patches), nullptr, kTouch, 1000, 1},
+    system.solver().gatherStarvedSides({Visibility(system.patches), nullptr, 1000, 1},
                                        std::vector<bool>(system.patches.sideCount(), true),
                                        system.reflected, h);
     for (uint32_t i = 0; i < system.patches.sideCount(); i += 2)
@@ -167,7 +167,7 @@ TEST(Furnace, StarvedSidesThatAreCoveredStayDark) {
     // Boxes that stand on the floor of a glowing room, all of whose sides gather.
     System system(roomWithBoxes(0.7f, 0.3f, 0), 0.1f, 0.2f, 2);
     Irradiance h = system.solve();
-    system.solver().gatherStarvedSides({Visibility(system.patches), nullptr, kTouch, 1000, 1},
+    system.solver().gatherStarvedSides({Visibility(system.patches), nullptr, 1000, 1},
                                        std::vector<bool>(system.patches.sideCount(), true),
                                        system.reflected, h);
     size_t bottoms = 0;

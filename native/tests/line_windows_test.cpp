@@ -51,7 +51,7 @@ struct Traced {
 Traced trace(const Patches& patches, float pixelSize, const std::vector<LineWindow>& windows,
              uint32_t count, uint32_t seed = 1) {
     const Visibility visibility(patches);
-    ProjectorInput input{patches, visibility, pixelSize, 1e-5f};
+    ProjectorInput input{patches, visibility, pixelSize};
     input.windows = windows;
     BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS, input, DirectionKind::LOW_DISCREPANCY, seed);
     LineCounts counts(patches.sideCount());

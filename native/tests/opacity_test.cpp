@@ -231,7 +231,7 @@ TEST(VaryingEmission, OfARegularCheckerHalfEscapesFromTwoSides) {
     for (uint32_t seed = 0; seed < 8; ++seed) {
         const DirectLight light(scene, patches, visibility, seed);
         // Fronts and backs are sources of their own, of equal power.
-        const std::vector<PowerShares> shares = light.powerShares(kTouch);
+        const std::vector<PowerShares> shares = light.powerShares();
         ASSERT_EQ(shares.size(), 2u);
         EXPECT_NEAR(shares[0].escaped.x, 1, 1e-6) << seed;
         EXPECT_NEAR(shares[1].escaped.x, 0, 1e-6) << seed;

@@ -20,8 +20,6 @@ namespace {
 
 using namespace test;
 
-constexpr float kTouchInOrder = 1e-4f;  // metres
-
 // Lines without the order in which a projector found them.
 struct Merged {
     std::map<std::pair<uint32_t, uint32_t>, uint32_t> exchanges;
@@ -45,7 +43,7 @@ class PaintedScene {
     PaintedScene(const Scene& scene, float patchSize, float pixelSize)
         : patches(subdivide(scene, patchSize, kMany)),
           visibility(patches),
-          input{patches, visibility, pixelSize, kTouchInOrder} {}
+          input{patches, visibility, pixelSize} {}
 
     BundleLines along(ProjectorKind projector, const Bundle& bundle) const {
         BundleLines lines;

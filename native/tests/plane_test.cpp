@@ -38,14 +38,11 @@ std::string nameOf(const Kind& kind) {
 
 // Patches of a scene and projectors over them.
 struct Scenery {
-    Scenery(const Scene& scene, float patchSize, float pixelSize, float touchDistance = 1e-5f)
-        : patches(subdivide(scene, patchSize, kMany)),
-          visibility(patches),
-          pixelSize(pixelSize),
-          touchDistance(touchDistance) {}
+    Scenery(const Scene& scene, float patchSize, float pixelSize)
+        : patches(subdivide(scene, patchSize, kMany)), visibility(patches), pixelSize(pixelSize) {}
 
     std::unique_ptr<Projector> projector(const Kind& kind, bool coherence = true) const {
-        ProjectorInput input{patches, visibility, pixelSize, touchDistance};
+        ProjectorInput input{patches, visibility, pixelSize};
         input.planeCount = kind.planeCount;
         input.planePlacement = kind.placement;
         input.planeCoherence = coherence;
@@ -60,7 +57,7 @@ struct Scenery {
 
     const Patches patches;
     const Visibility visibility;
-    const float pixelSize, touchDistance;
+    const float pixelSize;
 };
 
 // The lines of a bundle, counted in a few groups.
@@ -217,7 +214,7 @@ TEST(Planes, LinesThatMeetTheSceneAreThoseOfTheLists) {
 TEST(Planes, NothingShinesBetweenSurfacesThatTouch) {
     // Boxes that stand on the floor: their undersides and what they cover exchange nothing, and the
     // room's light does not leak into them.
-    const Scenery scenery(roomWithBoxes(0.5f, 0, 0), 0.3f, 0.05f, 1e-3f);
+    const Scenery scenery(roomWithBoxes(0.5f, 0, 0), 0.3f, 0.05f);
     for (const Kind& kind :
          {kKinds[0], kKinds[2], Kind{ProjectorKind::PLANES, 40, PlanePlacement::SYSTEMATIC},
           Kind{ProjectorKind::PLANES, 40, PlanePlacement::CLOSE_DISTANCE}}) {

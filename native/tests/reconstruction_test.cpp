@@ -50,8 +50,8 @@ class Surface {
         const InstanceRange range{0, uint32_t(patches.cells.size()), 0,
                                   uint32_t(patches.parents.size())};
         const SmoothRegions regions = smoothRegions(mesh(), patches.cells, 0, range.lastCell);
-        const LeastSquaresFit fit = leastSquares(patches, {range, regions, RB_SIDE_FRONT}, exposed,
-                                                 regularization, {&field});
+        const LeastSquaresFit fit = leastSquares(
+            {patches, exposed}, {range, regions, RB_SIDE_FRONT}, regularization, {&field});
         std::vector<glm::vec3> corners;
         EXPECT_TRUE(fit.isSolved);
         for (uint32_t node : regions.nodeOf) corners.push_back(fit.fields[0][node]);

@@ -32,7 +32,7 @@ class RouletteScene {
 
     std::unique_ptr<Projector> projector(
         SmallPatches kind, ProjectorKind projector = ProjectorKind::FRAGMENT_LISTS) const {
-        return makeProjector(projector, {patches, visibility, pixelSize, 1e-5f, kind});
+        return makeProjector(projector, {patches, visibility, pixelSize, kind});
     }
     // Crofton: of the fragments of n bundles.
     double expectedFragments(uint32_t n) const {

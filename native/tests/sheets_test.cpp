@@ -227,7 +227,7 @@ TEST(Sheets, PartlyWeldedObjectsHaveClosedOutlines) {
 void expectSameBundles(const Patches& patches) {
     Patches single = patches;
     single.sheets = withoutSheets(single);
-    FragmentLists bySheet(patches, 0.02f, 1e-4f), byParent(single, 0.02f, 1e-4f);
+    FragmentLists bySheet(patches, 0.02f), byParent(single, 0.02f);
     uint64_t all = 0, different = 0;
     for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 7).next(100)) {
         BundleLines a, b;
@@ -283,7 +283,7 @@ TEST(Sheets, NothingThatExchangesMakesNoLines) {
     EXPECT_TRUE(patches.sheets.sheets.empty());
     EXPECT_TRUE(patches.sheets.loose.empty());
     BundleLines lines;
-    FragmentLists(patches, 0.1f, 1e-4f)
+    FragmentLists(patches, 0.1f)
         .project(Directions(DirectionKind::RANDOM, 3).next(2).front(), lines);
     EXPECT_EQ(lines.lines, 0u);
     EXPECT_TRUE(lines.sky.empty());

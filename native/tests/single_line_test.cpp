@@ -23,7 +23,7 @@ struct LineScenery {
         : patches(subdivide(scene, patchSize, kMany)), visibility(patches) {}
 
     std::unique_ptr<Projector> singleLines() const {
-        ProjectorInput input{patches, visibility, 0, 1e-5f};
+        ProjectorInput input{patches, visibility, 0};
         input.singleLine = true;
         return makeProjector(ProjectorKind::AUTO, input);
     }
@@ -148,7 +148,7 @@ TEST(SingleLines, ExchangeAsInTheLists) {
             for (const Exchange& e : found.exchanges)
                 if (const int g = groupOf(e.i, e.j); g >= 0) lines[size_t(g)] += e.lines;
         }
-        const auto lists = fragmentLists({scenery.patches, scenery.visibility, kPixel, 1e-5f});
+        const auto lists = fragmentLists({scenery.patches, scenery.visibility, kPixel});
         for (const Bundle& bundle : Directions(DirectionKind::LOW_DISCREPANCY, 2).next(kBundles)) {
             BundleLines found;
             lists->project(bundle, found);

@@ -69,8 +69,9 @@ class LitMesh {
     double surplus() const {
         const std::vector<float> exposed(patches.sideCount(), 1.0f);
         const std::vector<float> noError(patches.sideCount(), 0.0f);
-        const std::vector<Surplus> found = surplusOf(patches, 0, uint32_t(patches.parents.size()),
-                                                     RB_SIDE_FRONT, irradiance, exposed, noError);
+        const std::vector<Surplus> found =
+            surplusOf({patches, exposed}, 0, uint32_t(patches.parents.size()), RB_SIDE_FRONT,
+                      irradiance, noError);
         double squares = 0, known = 0;
         for (const Surplus& s : found) {
             if (!s.isKnown) continue;

@@ -284,10 +284,15 @@ TEST(StochasticIterationLimit, GrowthIsThatOfTheory) {
     place(scene, icosphere("ball", 1, 1, true), grey("", 0.6f, 1));
     TransportScene ball(scene, 10, 0.02f);
     LineCounts counts(ball.patches.sideCount());
-    const ProjectorInput projector{ball.patches, ball.visibility, 0.02f, 1e-5f};
+    const ProjectorInput projector{ball.patches, ball.visibility, 0.02f};
     BundleTracer tracer(ProjectorKind::AUTO, projector, DirectionKind::RANDOM, 1);
-    const TransportInput input{ball.patches, ball.visibility, ball.shot, ball.world, ball.exposed,
-                               1e-5f,        ball.settings,   tracer,    counts};
+    const TransportInput input{{ball.patches, ball.exposed},
+                               ball.visibility,
+                               ball.shot,
+                               ball.world,
+                               ball.settings,
+                               tracer,
+                               counts};
     const std::vector<TracedBundle> traced = tracer.trace(16);
     EXPECT_NEAR(meanSquareGrowth(input, traced), 4.0 / 3 * 0.36, 0.001);
     for (uint32_t i = 0; i < ball.patches.sideCount(); i += 4)

@@ -181,8 +181,8 @@ Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double
 }
 
 LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed,
-                      DirectionKind directions, float touchDistance) {
-    FragmentLists projector(patches, pixelSize, touchDistance);
+                      DirectionKind directions) {
+    FragmentLists projector(patches, pixelSize);
     Directions sequence(directions, seed);
     LineCounts counts(patches.sideCount());
     constexpr uint32_t kBatch = 256;

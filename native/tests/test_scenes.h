@@ -16,7 +16,6 @@
 namespace raybundle::test {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr float kTouch = 1e-5f;     // surfaces not further apart touch, metres
 constexpr size_t kMany = 10000000;  // a limit of patches that no test reaches
 // Of the standard error that is stated: passed by chance once in 16000 checks.
 constexpr double kSigmas = 4;
@@ -65,8 +64,7 @@ Light sunLight(const glm::dvec3& direction, const glm::dvec3& irradiance, double
 
 // Lines of the first `count` bundles of a sequence through the patches.
 LineCounts traceLines(const Patches& patches, float pixelSize, uint32_t count, uint32_t seed = 1,
-                      DirectionKind directions = DirectionKind::LOW_DISCREPANCY,
-                      float touchDistance = kTouch);
+                      DirectionKind directions = DirectionKind::LOW_DISCREPANCY);
 
 // Lines that the pairs of a bundle exchange.
 uint64_t exchangedLines(const BundleLines& lines);

@@ -18,8 +18,7 @@ FirstShot ShotScene::shoot(FirstShotKind kind, int lines, int seed, float target
     settings.targetError = targetError;
     if (bundles > 0) settings.minBundles = settings.maxBundles = bundles;
     const DirectLight light(scene, patches, visibility, uint32_t(seed));
-    return firstShot(kind, {light, patches, visibility, settings, Progress(),
-                            1e-4f * patches.radius, linesPerBundle});
+    return firstShot(kind, {light, patches, visibility, settings, Progress(), linesPerBundle});
 }
 
 float GatheredShot::at(uint32_t instance, uint32_t side) const {

@@ -12,7 +12,7 @@ TransportScene::TransportScene(const Scene& scene, float patchSize, float pixelS
     : patches(subdivide(scene, patchSize, kMany)),
       visibility(patches),
       exposed(patches.sideCount(), 1.0f),
-      projector{patches, visibility, pixelSize, 1e-5f},
+      projector{patches, visibility, pixelSize},
       counts(patches.sideCount()) {
     shot.irradiance.assign(patches.sideCount(), glm::vec3(0));
     shot.emission = patches.emission;
@@ -22,8 +22,8 @@ std::unique_ptr<Transport> TransportScene::make(Solver solver, int seed) {
     settings.seed = seed;
     tracer = std::make_unique<BundleTracer>(ProjectorKind::AUTO, projector, DirectionKind::RANDOM,
                                             uint32_t(seed));
-    return makeTransport(solver, {patches, visibility, shot, world, exposed, 1e-4f * patches.radius,
-                                  settings, *tracer, counts});
+    return makeTransport(solver,
+                         {{patches, exposed}, visibility, shot, world, settings, *tracer, counts});
 }
 
 int cubeFace(const Patches& patches, uint32_t patch) {

@@ -212,8 +212,7 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     Cuts cuts;
     if (settings.contacts) {
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
-        cuts = contactCuts(patches, trace->visibility, trace->touchDistance,
-                           size_t(settings.maxPatches));
+        cuts = contactCuts(patches, trace->visibility, size_t(settings.maxPatches));
     }
     // Other solvers follow the lines of single patches and other first shots meet them with rays:
     // smaller ones are noisier.
@@ -256,7 +255,8 @@ Bake::Exchanged Bake::exchange(const SolveInput& in, SetLights& lights, Report& 
         result.noise = BundleSolve(in, lights, transports).run(report);
         result.exposed = trace->exposedShare();
         for (const SetLight& light : lights)
-            balanceEnergy(patches, light, result.exposed, transports.front()->openShare(), report);
+            balanceEnergy({patches, result.exposed}, light, transports.front()->openShare(),
+                          report);
         warnOfImbalance(report);
         report.bundles = transports.front()->bundleCount();
         warnOfFewLines(in.scene, patches, trace->density.pixelSize, uint32_t(report.bundles),
@@ -268,11 +268,16 @@ Bake::Exchanged Bake::exchange(const SolveInput& in, SetLights& lights, Report& 
 Transports Bake::transportsOf(const SetLights& lights, const ShownLight& shown) const {
     std::vector<TransportInput> inputs;
     for (const SetLight& light : lights)
-        inputs.push_back({trace->patches, trace->visibility, light.shot, light.worldRadiance,
-                          trace->surrounding.exposed, trace->touchDistance, settings,
-                          *trace->tracer, trace->counts,
+        inputs.push_back({{trace->patches, trace->surrounding.exposed},
+                          trace->visibility,
+                          light.shot,
+                          light.worldRadiance,
+                          settings,
+                          *trace->tracer,
+                          trace->counts,
                           settings.countsLines() ? &trace->solutionsOf(light.set) : nullptr,
-                          &shown.sides(), &trace->clusters});
+                          &shown.sides(),
+                          &trace->clusters});
     return makeTransports(settings.solver, inputs);
 }
 
@@ -281,10 +286,9 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
                                       const Exchanged& exchanged, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
     const Patches& patches = trace->patches;
-    std::vector<InstanceLight> made =
-        reconstruct({in.scene, patches, trace->visibility, trace->touchDistance, lights, in.shown,
-                     exchanged.exposed, settings},
-                    progress, report);
+    std::vector<InstanceLight> made = reconstruct(
+        {{patches, exchanged.exposed}, in.scene, trace->visibility, lights, in.shown, settings},
+        progress, report);
     std::vector<float> weight = patches.sideAreas();
     const std::vector<float> exposedOfTiles = in.tiles.mean(exchanged.exposed, weight);
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exchanged.exposed[side];

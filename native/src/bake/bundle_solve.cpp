@@ -124,8 +124,10 @@ double BundleSolve::castRays() {
         const std::vector<ExtraRays> rays = noisyParts->rays(samples, kRaysOfFirstPass << pass);
         if (pass == 0) ofFinish.skip(SkippedWork::RAYED_SIDES, rays.size());
         if (rays.empty()) break;
-        addExtraRays({patches, in.trace.visibility, in.trace.touchDistance, in.trace.exposedShare(),
-                      rays, hash(uint32_t(in.settings.seed), pass)},
+        addExtraRays({{patches, in.trace.exposedShare()},
+                      in.trace.visibility,
+                      rays,
+                      hash(uint32_t(in.settings.seed), pass)},
                      samples, lights, halves);
         SetNoise withRays({}, errorOfSets, tileWeight, in.tiles.patches());
         const Halves withThese = seen();
@@ -151,10 +153,9 @@ BundleSolve::Halves BundleSolve::seen() const {
 // At each look: the same light is to have the same rays, whatever was baked before; and rays leave
 // noise of another kind than lines.
 void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen) {
-    overForetold =
-        shownOverForetold(in.scene, in.tiles.patches(), look.ofLights().front(), halvesSeen.front(),
-                          in.tiles.mean(in.trace.exposedShare(), patches.sideAreas()),
-                          in.settings.regularization, growth);
+    overForetold = shownOverForetold(
+        in.scene, {in.tiles.patches(), in.tiles.mean(in.trace.exposedShare(), patches.sideAreas())},
+        look.ofLights().front(), halvesSeen.front(), in.settings.regularization, growth);
 }
 
 // States the noise that is left, and says why no bundles were added.
@@ -220,7 +221,7 @@ SideNoise keepFirstShot(const SolveInput& in, SetLights& lights, std::vector<flo
     const GatheredNoise gathered(patches, in.shown);
     std::vector<std::array<Irradiance, 2>> halves;
     for (SetLight& light : lights) {
-        HandOver first = handOver(patches, light.shot, exposed);
+        HandOver first = handOver({patches, exposed}, light.shot);
         light.irradiance.gathered = first.gathered;
         light.irradiance.direct = std::move(first.gathered);
         light.irradiance.indirect = std::move(first.indirect);

@@ -68,8 +68,6 @@ Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Scene& scene,
         if (parent.stopsDirect != parent.exchanges && !directVisibility)
             directVisibility =
                 std::make_unique<const Visibility>(patches, Blockers::STOPPING_DIRECT);
-    for (const Island& island : patches.islands)
-        touchDistance = std::max(touchDistance, island.touchDistance);
     if (settings.hasLineWindows() && patches.count() > 0)
         density = densityOf(clusters.patches());
     else
@@ -91,8 +89,7 @@ void Trace::startLines(const Settings& settings) {
 void Trace::measureExposedShare(uint32_t seed) {
     if (!surrounding.exposed.empty()) return;
     const std::vector<uint32_t> sides = counts.coveredInPart();
-    const std::vector<float> share =
-        exposedShareOf(sides, visibility, clusters, touchDistance, seed);
+    const std::vector<float> share = exposedShareOf(sides, visibility, clusters, seed);
     for (size_t k = 0; k < sides.size(); ++k) counts.setExposedShare(sides[k], share[k]);
 }
 
@@ -102,8 +99,7 @@ Surroundings Trace::surroundingsOf(const Settings& settings) const {
     std::vector<uint32_t> sides;
     for (uint32_t side = 0; side < result.exposed.size(); ++side)
         if (result.exposed[side] > 0 && result.exposed[side] < 1) sides.push_back(side);
-    const std::vector<float> share =
-        exposedShareOf(sides, visibility, Clusters(patches), touchDistance, seed);
+    const std::vector<float> share = exposedShareOf(sides, visibility, Clusters(patches), seed);
     for (size_t k = 0; k < sides.size(); ++k) result.exposed[sides[k]] = share[k];
     return result;
 }
@@ -112,7 +108,6 @@ ProjectorInput Trace::projectorInput(const Settings& settings) const {
     return {patches,
             visibility,
             density.pixelSize,
-            touchDistance,
             settings.smallPatches,
             settings.planeCount,
             settings.planePlacement,

@@ -81,8 +81,7 @@ struct Trace {
     const uint64_t hash;      // geometryHash
     const uint64_t likeness;  // likenessHash
     Patches patches;
-    Clusters clusters;        // of the patches, between which light is exchanged
-    float touchDistance = 0;  // the largest of all islands, metres
+    Clusters clusters;  // of the patches, between which light is exchanged
     const Visibility visibility;
     std::unique_ptr<const Visibility> directVisibility;  // where other surfaces stop direct light
     Surroundings surrounding;                            // empty: as the counts have it

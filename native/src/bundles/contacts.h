@@ -20,10 +20,9 @@ namespace raybundle {
 
 class Contacts {
   public:
-    // touchDistance: two surfaces not further apart than this touch, metres; in each island no
-    // further than Island::touchDistance. `patches` must outlive it.
-    Contacts(const Patches& patches, float touchDistance)
-        : patches(patches), touchDistance(double(touchDistance)) {}
+    // `patches` must outlive the object.
+    explicit Contacts(const Patches& patches)
+        : patches(patches), touchDistance(double(patches.touchDistance)) {}
 
     // Turns to the bundle along a direction.
     void begin(const glm::dvec3& newDirection) { direction = newDirection; }
@@ -39,7 +38,7 @@ class Contacts {
         double most = 0;
         for (uint32_t island : islands)
             most = std::max(most, double(patches.islands[island].touchDistance));
-        return kZone * std::min(touchDistance, most);
+        return kZone * most;
     }
 
     // Distance between the two across the nearer surface, metres.
@@ -80,9 +79,7 @@ class Contacts {
     static constexpr double kCoincidence = 0.05;
     static constexpr double kZone = 100;
 
-    double touchAt(uint32_t side) const {
-        return std::min(touchDistance, double(patches.islandAt(side).touchDistance));
-    }
+    double touchAt(uint32_t side) const { return double(patches.islandAt(side).touchDistance); }
     double coincidenceAt(uint32_t side) const { return kCoincidence * touchAt(side); }
     bool areSidesParallel(uint32_t a, uint32_t b) const {
         return areParallel(patches.parents[patches.parentOf[a / 2]],

@@ -47,15 +47,15 @@ void sortFour(uint64_t* key) {
 
 }  // namespace
 
-FragmentLists::FragmentLists(const Patches& patches, float pixelSize, float touchDistance,
-                             SmallPatches smallPatches, std::vector<LineWindow> windows)
-    : contacts(patches, touchDistance),
+FragmentLists::FragmentLists(const Patches& patches, float pixelSize, SmallPatches smallPatches,
+                             std::vector<LineWindow> windows)
+    : contacts(patches),
       hasLeaks(smallPatches == SmallPatches::ROULETTE),
       rasteriser(patches, pixelSize, smallPatches, std::move(windows)) {}
 
 std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input) {
-    return std::make_unique<FragmentLists>(input.patches, input.pixelSize, input.touchDistance,
-                                           input.smallPatches, input.windows);
+    return std::make_unique<FragmentLists>(input.patches, input.pixelSize, input.smallPatches,
+                                           input.windows);
 }
 
 void FragmentLists::project(const Bundle& bundle, BundleLines& out) {

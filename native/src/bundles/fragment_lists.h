@@ -29,9 +29,9 @@ namespace raybundle {
 
 class FragmentLists : public Projector {
   public:
-    // pixelSize: edge of a pixel in metres, the same for every bundle. touchDistance: two surfaces
-    // not further apart than this touch, metres. `patches` must outlive it.
-    FragmentLists(const Patches& patches, float pixelSize, float touchDistance,
+    // pixelSize: edge of a pixel in metres, the same for every bundle. `patches` must outlive the
+    // object.
+    FragmentLists(const Patches& patches, float pixelSize,
                   SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING,
                   std::vector<LineWindow> windows = {});
 

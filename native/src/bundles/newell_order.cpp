@@ -27,9 +27,9 @@ Interval interval(double corner, double da, double db, bool isTriangle) {
 
 }  // namespace
 
-NewellOrder::NewellOrder(const Patches& patches, float touchDistance)
+NewellOrder::NewellOrder(const Patches& patches)
     : patches(patches),
-      coincidence(Contacts(patches, touchDistance).coincidence()),
+      coincidence(Contacts(patches).coincidence()),
       rounding(kRoundingOfRadius * double(patches.radius)),
       frames(patches.parents.size()) {}
 

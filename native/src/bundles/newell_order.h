@@ -36,8 +36,8 @@ namespace raybundle {
 
 class NewellOrder : public PatchOrder {
   public:
-    // touchDistance: surfaces not further apart touch, metres. `patches` must outlive it.
-    NewellOrder(const Patches& patches, float touchDistance);
+    // `patches` must outlive the object.
+    explicit NewellOrder(const Patches& patches);
 
     uint64_t sort(const Bundle& bundle, std::vector<uint32_t>& drawn) override;
 

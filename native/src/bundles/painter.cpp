@@ -45,13 +45,12 @@ std::unique_ptr<Projector> painter(const ProjectorInput& input) {
 }
 
 std::unique_ptr<Projector> painterNewell(const ProjectorInput& input) {
-    return std::make_unique<Painter>(
-        input, std::make_unique<NewellOrder>(input.patches, input.touchDistance));
+    return std::make_unique<Painter>(input, std::make_unique<NewellOrder>(input.patches));
 }
 
 Painter::Painter(const ProjectorInput& input, std::unique_ptr<PatchOrder> order)
     : order(std::move(order)),
-      contacts(input.patches, input.touchDistance),
+      contacts(input.patches),
       hasLeaks(input.smallPatches == SmallPatches::ROULETTE),
       rasteriser(input.patches, input.pixelSize, input.smallPatches),
       place(input.patches.count()) {}

@@ -76,7 +76,7 @@ class Planes::Runs {
 Planes::Planes(const ProjectorInput& input, int planeCount)
     : input(input),
       planeCount(uint32_t(planeCount)),
-      contacts(input.patches, input.touchDistance),
+      contacts(input.patches),
       rasteriser(input.patches, input.pixelSize, input.smallPatches),
       planes(size_t(planeCount)) {
     density.setUniform();

@@ -84,8 +84,7 @@ class Projector {
 struct ProjectorInput {
     const Patches& patches;
     const Visibility& visibility;
-    float pixelSize;      // edge of a pixel in metres, the same for every bundle
-    float touchDistance;  // surfaces not further apart touch, metres
+    float pixelSize;  // edge of a pixel in metres, the same for every bundle
     SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING;
     int planeCount = 4;  // of PLANES
     PlanePlacement planePlacement = PlanePlacement::SYSTEMATIC;

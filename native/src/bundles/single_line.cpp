@@ -20,8 +20,7 @@ namespace {
 
 class SingleLine : public Projector {
   public:
-    explicit SingleLine(const ProjectorInput& input)
-        : input(input), contacts(input.patches, input.touchDistance) {}
+    explicit SingleLine(const ProjectorInput& input) : input(input), contacts(input.patches) {}
 
     void project(const Bundle& bundle, BundleLines& out) override {
         // Uniform on a disc as large as the sphere around the scene.

@@ -262,7 +262,7 @@ bool DirectLight::isOutOfSight(const LightSource& source, const ReceiverPlace& p
     return skips.skipFacing && source.isOutOfSight(place);
 }
 
-std::vector<PowerShares> DirectLight::powerShares(float touchDistance) const {
+std::vector<PowerShares> DirectLight::powerShares() const {
     std::vector<PowerShares> shares(sources.size());
     if (sources.empty()) return shares;
     const uint32_t rays = std::max(kLeastPowerRays, kPowerRays / uint32_t(sources.size()));
@@ -286,8 +286,7 @@ std::vector<PowerShares> DirectLight::powerShares(float touchDistance) const {
                              : visibility.firstHit(ray.start(visibility.offset()), ray.direction);
                 if (!met)
                     sums.local().escaped += weight;
-                else if (ray.side && isCovered(patches, *ray.side, *met, ray.direction, distance,
-                                               touchDistance))
+                else if (ray.side && isCovered(patches, *ray.side, *met, ray.direction, distance))
                     sums.local().covered += weight;
             }
         });

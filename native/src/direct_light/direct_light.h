@@ -107,9 +107,8 @@ class DirectLight {
     // Whether lines that end at the first surface leave out some of the light of a side's sources.
     bool hasPassingLight(uint32_t side) const;
 
-    // Of each source; 0 where it has no power. touchDistance: surfaces not further apart touch,
-    // metres.
-    std::vector<PowerShares> powerShares(float touchDistance) const;
+    // Of each source; 0 where it has no power.
+    std::vector<PowerShares> powerShares() const;
 
   private:
     class SourceGather;

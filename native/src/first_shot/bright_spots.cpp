@@ -35,7 +35,7 @@ bool isUncovered(const FirstShotInput& input, const Visibility& exchange, uint32
     for (uint32_t k = 0; k < kLooks; ++k) {
         const glm::vec4 u = sobolPoint(k, side);
         if (exchange.isBlocked(side, input.patches.point(side / 2, {u.x, u.y}), normal,
-                               input.touchDistance))
+                               input.patches.touchDistance))
             return false;
     }
     return true;

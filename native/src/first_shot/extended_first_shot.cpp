@@ -74,8 +74,7 @@ LineEnd castFrom(uint32_t side, const FirstShotInput& input, std::mt19937_64& ra
         const auto met =
             visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}), direction, &distance);
         if (!met) return {LineEnd::kSky};
-        if (!isCovered(patches, side, *met, direction, distance, input.touchDistance))
-            return {*met};
+        if (!isCovered(patches, side, *met, direction, distance)) return {*met};
     }
     return {};
 }

@@ -52,7 +52,6 @@ struct FirstShotInput {
     const Visibility& visibility;
     const Settings& settings;  // targetError: relative standard error to reach
     const Progress& progress;
-    float touchDistance = 0;               // surfaces not further apart touch, metres
     double linesPerBundle = 0;             // lines of a bundle through the scene's bounding sphere
     const Visibility* exchange = nullptr;  // of reflected light, where it differs
     // The coarse shot of the sides of the tiles, perhaps before some were cut: what

@@ -147,7 +147,7 @@ FirstShot gather(const FirstShotInput& input) {
                                coarseOfPatches(input, gatherers, receiverAt, report),
                                neighbouringGatherers(patches, standIns),
                                bySource->isWhole ? bySource.get() : nullptr);
-        shares = bySource->powerShares = light.powerShares(input.touchDistance);
+        shares = bySource->powerShares = light.powerShares();
         shot.bySource = std::move(bySource);
     }
     for (const Gathered& result : results) {

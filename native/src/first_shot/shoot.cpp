@@ -39,9 +39,7 @@ LineEnd castFrom(const LightSource& source, const FirstShotInput& input, std::mt
                  : visibility.firstHit(ray.start(visibility.offset()), ray.direction, &distance);
     if (!met) return {LineEnd::kSky, ray.weight};
     if (distance < ray.from) return {};
-    if (ray.side &&
-        isCovered(input.patches, *ray.side, *met, ray.direction, distance, input.touchDistance))
-        return {};
+    if (ray.side && isCovered(input.patches, *ray.side, *met, ray.direction, distance)) return {};
     return {*met, ray.weight};
 }
 

@@ -103,6 +103,7 @@ Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&
     joined->totalArea = all.totalArea;
     joined->size = all.size;
     joined->finest = all.finest;
+    joined->touchDistance = all.touchDistance;
     joined->tileCount = all.tileCount - (all.count() - size.size());
     for (Parent& parent : joined->parents) parent.firstPatch = numbers[parent.firstPatch];
     for (uint32_t k = 0; k < size.size(); ++k) {

@@ -167,6 +167,8 @@ struct Patches {
     double totalArea = 0;  // of all patches, one side, m^2
     float size = 0;        // target edge of a tile, metres
     float finest = 0;      // the same where it is least (patch_size.h)
+    // Metres; the largest of all islands'. Nothing that lies further from a side touches it.
+    float touchDistance = 0;
     size_t tileCount = 0;
     Warnings warnings;
     size_t degenerateFaces = 0;  // left out

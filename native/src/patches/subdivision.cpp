@@ -84,10 +84,12 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
         throw invalidArgument("the scene has too many faces: they are " + std::to_string(count) +
                               " patches at least, and " + std::to_string(kMostPatches) +
                               " are possible");
-    for (Island& island : patches.islands)
+    for (Island& island : patches.islands) {
         island.touchDistance =
             std::max(std::min(kTouchOfRadius * island.radius, kTouchOfPatch * island.finest),
                      kTouchOfDistance * (island.reach - island.radius));
+        patches.touchDistance = std::max(patches.touchDistance, island.touchDistance);
+    }
     patches.tileCount = count;
     for (const Parent& parent : patches.parents) patches.totalArea += parent.area();
     fillPatches(scene, patches);

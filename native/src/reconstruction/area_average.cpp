@@ -8,13 +8,14 @@
 namespace raybundle {
 
 std::vector<std::vector<glm::vec3>> areaAverage(
-    const Patches& patches, const InstanceSide& surface, const std::vector<float>& exposed,
+    const LitSurfaces& surfaces, const InstanceSide& surface,
     const std::vector<const std::vector<glm::vec3>*>& fields) {
+    const auto& [patches, exposed] = surfaces;
     const auto& [range, regions, side] = surface;
     std::vector<std::vector<glm::dvec3>> sums(
         fields.size(), std::vector<glm::dvec3>(regions.nodeCount, glm::dvec3(0.0)));
     std::vector<double> weights(regions.nodeCount, 0.0);
-    const CornerWeights cornerWeights(patches, range, side, exposed);
+    const CornerWeights cornerWeights(surfaces, range, side);
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];

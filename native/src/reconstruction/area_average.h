@@ -19,7 +19,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "reconstruction/instance_side.h"
 #include "reconstruction/least_squares.h"
 
@@ -27,7 +27,7 @@ namespace raybundle {
 
 // Arguments and result as in leastSquares.
 std::vector<std::vector<glm::vec3>> areaAverage(
-    const Patches& patches, const InstanceSide& surface, const std::vector<float>& exposed,
+    const LitSurfaces& surfaces, const InstanceSide& surface,
     const std::vector<const std::vector<glm::vec3>*>& fields);
 
 }  // namespace raybundle

@@ -14,19 +14,18 @@ namespace {
 constexpr float kHalfCovered = 0.5f;
 
 // RMS over channels and the exposed area of what is baked, W/m^2.
-double meanLight(const Scene& scene, const Patches& patches,
-                 const std::vector<InstanceRange>& ranges, const std::vector<float>& exposed,
-                 const Irradiance& light) {
+double meanLight(const Scene& scene, const LitSurfaces& surfaces,
+                 const std::vector<InstanceRange>& ranges, const Irradiance& light) {
     double squares = 0, area = 0;
     for (size_t i = 0; i < ranges.size(); ++i) {
         if (scene.instances[i].role != RB_ROLE_BAKE) continue;
         for (uint32_t p = ranges[i].firstParent; p < ranges[i].lastParent; ++p) {
-            const Parent& parent = patches.parents[p];
+            const Parent& parent = surfaces.patches.parents[p];
             for (uint32_t k = 0; k < parent.patchCount(); ++k) {
-                const uint32_t patch = parent.firstPatch + k;
-                const uint32_t side = 2 * patch + uint32_t(scene.instances[i].side);
+                const uint32_t side =
+                    2 * (parent.firstPatch + k) + uint32_t(scene.instances[i].side);
                 const glm::dvec3 h(light.direct[side] + light.indirect[side]);
-                const double weight = double(patches.area[patch]) * double(exposed[side]);
+                const double weight = surfaces.exposedArea(side);
                 squares += weight * glm::dot(h, h) / 3;
                 area += weight;
             }
@@ -63,13 +62,13 @@ std::vector<bool> gatheringInstances(const Scene& scene, const Settings& setting
 CornerGather::CornerGather(const ReconstructionInput& input,
                            const std::vector<InstanceRange>& ranges,
                            const std::vector<bool>& gathers,
-                           const std::vector<SmoothRegions>& regions,
-                           const std::vector<float>& exposed, const Progress& progress)
+                           const std::vector<SmoothRegions>& regions, const LitSurfaces& surfaces,
+                           const Progress& progress)
     : scene(input.scene),
       shown(input.shown),
       ranges(ranges),
       regions(regions),
-      exposed(exposed),
+      surfaces(surfaces),
       skips(input.settings),
       gathersSparse(gathersSparseResults(input.settings)) {
     findCorners(input, gathers);
@@ -83,11 +82,9 @@ void CornerGather::findCorners(const ReconstructionInput& input, const std::vect
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
         float distance = 0;
-        const auto met = visibility.firstHit(
-            receiver.side, *receiver.point, normal, &distance,
-            2 * std::min(input.touchDistance, patches.islandAt(receiver.side).touchDistance));
-        return met &&
-               isCovered(patches, receiver.side, *met, normal, distance, input.touchDistance);
+        const auto met = visibility.firstHit(receiver.side, *receiver.point, normal, &distance,
+                                             2 * patches.islandAt(receiver.side).touchDistance);
+        return met && isCovered(patches, receiver.side, *met, normal, distance);
     };
     for (size_t i = 0; i < ranges.size(); ++i) {
         first.push_back(corners.size());
@@ -101,7 +98,7 @@ void CornerGather::findCorners(const ReconstructionInput& input, const std::vect
             if (!scene.instances[i].hasResultAtVertex(size_t(vertices[size_t(all[c].corner)])))
                 return;
             leaveGap(all[c], patches, visibility);
-            isFree[c] = exposed[receiver.side] > kHalfCovered && !isTouched(receiver);
+            isFree[c] = surfaces.exposed[receiver.side] > kHalfCovered && !isTouched(receiver);
         });
         for (size_t c = 0; c < all.size(); ++c)
             if (isFree[c]) corners.push_back(all[c]);
@@ -112,7 +109,6 @@ void CornerGather::findCorners(const ReconstructionInput& input, const std::vect
 }
 
 void CornerGather::gatherSources(const ReconstructionInput& input, const Progress& progress) {
-    const Patches& patches = input.patches;
     const SetLights& lights = input.lights;
     const Settings& settings = input.settings;
     // After the corners, the other sides of those that show their light.
@@ -140,13 +136,13 @@ void CornerGather::gatherSources(const ReconstructionInput& input, const Progres
         for (size_t b = 0; b < behind.size(); ++b) {
             glm::vec3& own = light[behind[b]];
             own = shown.of(corners[behind[b]].receiver.side, own,
-                           gathered[corners.size() + b].irradiance, exposed);
+                           gathered[corners.size() + b].irradiance, surfaces.exposed);
         }
         for (const Gathered& one : gathered) rays += one.rays;
-        const double mean = meanLight(scene, patches, ranges, exposed, lights[k].irradiance);
+        const double mean = meanLight(scene, surfaces, ranges, lights[k].irradiance);
         others.push_back(settings.finalGather && mean > 0
-                             ? std::make_unique<const FinalGather>(patches, input.visibility,
-                                                                   lights[k], exposed, float(mean),
+                             ? std::make_unique<const FinalGather>(surfaces, input.visibility,
+                                                                   lights[k], float(mean),
                                                                    settings.targetError)
                              : nullptr);
     }
@@ -165,9 +161,8 @@ CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
         const FinalGather& gather = *others[k];
         std::vector<bool> wanted(nodeCount, true);
         if (skips.skipGather && !isSparse(instance)) {
-            wanted =
-                gather.isWanted(ranges[instance], regions[instance], scene.instances[instance].side,
-                                exposed, light.carried, light.indirect);
+            wanted = gather.isWanted(ranges[instance], regions[instance],
+                                     scene.instances[instance].side, light.carried, light.indirect);
             std::vector<uint8_t> isNear(end - begin);
             parallelFor(begin, end, [&](size_t c) {
                 isNear[c - begin] = showsOwnAlone(c) && !wanted[nodeOf[corners[c].corner]] &&

@@ -32,11 +32,10 @@ class CornerGather {
   public:
     // Gathers the light of the sources, of all light sets, on both sides where both show. gathers:
     // see gatheringInstances. ranges, regions: per instance, the latter of those that gather.
-    // exposed: per side, the share of it that counts (exposedOutside). References must outlive the
-    // object.
+    // surfaces: with what of each side counts (exposedOutside). References must outlive the object.
     CornerGather(const ReconstructionInput& input, const std::vector<InstanceRange>& ranges,
                  const std::vector<bool>& gathers, const std::vector<SmoothRegions>& regions,
-                 const std::vector<float>& exposed, const Progress& progress);
+                 const LitSurfaces& surfaces, const Progress& progress);
 
     // Whether an instance has sparse results that its corners gather, and the number of all such.
     bool isSparse(size_t instance) const {
@@ -78,7 +77,7 @@ class CornerGather {
     const ShownLight& shown;
     const std::vector<InstanceRange>& ranges;
     const std::vector<SmoothRegions>& regions;
-    const std::vector<float>& exposed;
+    const LitSurfaces surfaces;
     const Skips skips;
     const bool gathersSparse;
     std::vector<CornerReceiver> corners;

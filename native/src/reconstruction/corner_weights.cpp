@@ -24,9 +24,8 @@ glm::vec2 middleOf(const Parent& parent) {
 
 }  // namespace
 
-CornerWeights::CornerWeights(const Patches& patches, const InstanceRange& range, rb_side side,
-                             const std::vector<float>& exposed)
-    : patches(patches),
+CornerWeights::CornerWeights(const LitSurfaces& surfaces, const InstanceRange& range, rb_side side)
+    : patches(surfaces.patches),
       first(range.firstParent),
       counts(range.lastParent - range.firstParent, {1, 1, 1, 1}) {
     // Per cell that walls cut, and corner: what of its own side there is, and is exposed, m^2.
@@ -47,7 +46,7 @@ CornerWeights::CornerWeights(const Patches& patches, const InstanceRange& range,
                 if (!(parent.seenCorners >> a & 1)) continue;
                 const float own = patches.area[patch] * std::max(weights[a], 0.0f);
                 support.all[a] += own;
-                support.exposed[a] += own * exposed[2 * patch + uint32_t(side)];
+                support.exposed[a] += own * surfaces.exposed[2 * patch + uint32_t(side)];
             }
         }
     }
@@ -81,8 +80,9 @@ CornerWeights::OfPatch CornerWeights::of(uint32_t index, uint32_t patchInParent)
     return weights;
 }
 
-std::vector<float> exposedOutside(const Patches& patches, const Visibility& visibility,
-                                  std::vector<float> exposed) {
+std::vector<float> exposedOutside(const LitSurfaces& surfaces, const Visibility& visibility) {
+    const Patches& patches = surfaces.patches;
+    std::vector<float> exposed = surfaces.exposed;
     std::vector<uint8_t> isInside(patches.sideCount(), false);
     parallelFor(size_t(0), patches.parents.size(), [&](size_t p) {
         const Parent& parent = patches.parents[p];

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "scene/scene.h"
 #include "visibility/visibility.h"
 
@@ -24,10 +24,8 @@ struct InstanceRange {
 
 class CornerWeights {
   public:
-    // For one side of an instance; exposed: per side, the share of it that counts. `patches` must
-    // outlive the object.
-    CornerWeights(const Patches& patches, const InstanceRange& range, rb_side side,
-                  const std::vector<float>& exposed);
+    // For one side of an instance, by what is exposed of it. The patches must outlive the object.
+    CornerWeights(const LitSurfaces& surfaces, const InstanceRange& range, rb_side side);
 
     // Of a patch by its number in the parent, by its middle. The sum of the corners' is 1, or 0 if
     // it counts at none; all: what the patch counts by, the less the nearer it is to corners that a
@@ -52,7 +50,6 @@ class CornerWeights {
 
 // exposed, but 0 for what lies inside of a solid of the sides of faces that walls cut, if that is
 // the smaller part of a face.
-std::vector<float> exposedOutside(const Patches& patches, const Visibility& visibility,
-                                  std::vector<float> exposed);
+std::vector<float> exposedOutside(const LitSurfaces& surfaces, const Visibility& visibility);
 
 }  // namespace raybundle

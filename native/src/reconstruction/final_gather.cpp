@@ -38,14 +38,14 @@ double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 
 }  // namespace
 
-FinalGather::FinalGather(const Patches& patches, const Visibility& visibility,
-                         const SetLight& light, const std::vector<float>& exposed, float meanLight,
-                         float targetError)
-    : patches(patches),
+FinalGather::FinalGather(const LitSurfaces& surfaces, const Visibility& visibility,
+                         const SetLight& light, float meanLight, float targetError)
+    : surfaces(surfaces),
+      patches(surfaces.patches),
       visibility(visibility),
       light(light),
       emission(light.direct.bundledEmission()),
-      sent(patches, light.shot, light.irradiance, exposed, SentLight::Of::ALL),
+      sent(surfaces, light.shot, light.irradiance, SentLight::Of::ALL),
       world(glm::pi<float>() * light.worldRadiance),
       targetError(targetError),
       error(targetError * meanLight) {}
@@ -138,11 +138,10 @@ bool FinalGather::isNear(const Receiver& receiver) const {
 float FinalGather::width(uint32_t side) const { return std::sqrt(patches.area[side / 2]); }
 
 std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const SmoothRegions& regions,
-                                        rb_side side, const std::vector<float>& exposed,
-                                        const std::vector<glm::vec3>& carriedAt,
+                                        rb_side side, const std::vector<glm::vec3>& carriedAt,
                                         const std::vector<glm::vec3>& reflectedAt) const {
     std::vector<double> squares(regions.nodeCount, 0.0), weights(regions.nodeCount, 0.0);
-    const CornerWeights cornerWeights(patches, range, side, exposed);
+    const CornerWeights cornerWeights(surfaces, range, side);
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
@@ -159,7 +158,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
                 const uint32_t node = regions.nodeOf[size_t(cell.corner[a])];
                 difference += shares[a] * (carriedAt[node] + reflectedAt[node]);
             }
-            const double area = double(patches.area[at / 2]) * double(exposed[at]);
+            const double area = surfaces.exposedArea(at);
             for (size_t a = 0; a < 4; ++a) {
                 if (cell.corner[a] < 0 || shares[a] <= 0) continue;
                 const uint32_t node = regions.nodeOf[size_t(cell.corner[a])];

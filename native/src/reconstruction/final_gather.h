@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "direct_light/direct_light.h"
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
 #include "sampling/sobol.h"
@@ -34,10 +34,9 @@ namespace raybundle {
 class FinalGather {
   public:
     // The light of one set, or what belongs to none. meanLight: of all that is baked, W/m^2;
-    // targetError: relative to it, or to the light of what is brighter; exposed: per side, the
-    // share of it that nothing covers. References must outlive the object.
-    FinalGather(const Patches& patches, const Visibility& visibility, const SetLight& light,
-                const std::vector<float>& exposed, float meanLight, float targetError);
+    // targetError: relative to it, or to the light of what is brighter. References must outlive the object.
+    FinalGather(const LitSurfaces& surfaces, const Visibility& visibility, const SetLight& light,
+                float meanLight, float targetError);
 
     // What arrives at a point, W/m^2.
     struct Light {
@@ -61,10 +60,9 @@ class FinalGather {
     bool isNear(const Receiver& receiver) const;
 
     // Per node of an instance: whether the light there is to be gathered. carried, reflected: per
-    // node, as reconstructed. exposed: per side, the share of it that counts.
+    // node, as reconstructed.
     std::vector<bool> isWanted(const InstanceRange& range, const SmoothRegions& regions,
-                               rb_side side, const std::vector<float>& exposed,
-                               const std::vector<glm::vec3>& carried,
+                               rb_side side, const std::vector<glm::vec3>& carried,
                                const std::vector<glm::vec3>& reflected) const;
 
   private:
@@ -72,6 +70,7 @@ class FinalGather {
                  uint32_t count, Light& sum) const;
     float width(uint32_t side) const;  // of a patch, metres
 
+    const LitSurfaces surfaces;
     const Patches& patches;
     const Visibility& visibility;
     const SetLight& light;

@@ -177,12 +177,11 @@ using Fields = std::vector<const std::vector<glm::vec3>*>;  // each per side
 // their solutions.
 class NormalEquations {
   public:
-    // exposed: see leastSquares.
-    NormalEquations(const Patches& patches, const InstanceSide& surface,
-                    const std::vector<float>& exposed, float regularization, const Fields& fields)
-        : patches(patches),
+    NormalEquations(const LitSurfaces& surfaces, const InstanceSide& surface, float regularization,
+                    const Fields& fields)
+        : patches(surfaces.patches),
           surface(surface),
-          exposed(exposed),
+          exposed(surfaces.exposed),
           fields(fields),
           terms(surface.regions.nodeCount),
           rhs(Eigen::MatrixXd::Zero(nodes(), Eigen::Index(columns()))),
@@ -190,7 +189,7 @@ class NormalEquations {
         const InstanceRange& range = surface.range;
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
             openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);  // nothing covers slivers
-        const CornerWeights weights(patches, range, surface.side, exposed);
+        const CornerWeights weights(surfaces, range, surface.side);
         for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
             throwIfCancelledAt(p);
             addParent(p, weights);
@@ -309,12 +308,12 @@ class NormalEquations {
 
 }  // namespace
 
-LeastSquaresFit leastSquares(const Patches& patches, const InstanceSide& surface,
-                             const std::vector<float>& exposed, float regularization,
+LeastSquaresFit leastSquares(const LitSurfaces& surfaces, const InstanceSide& surface,
+                             float regularization,
                              const std::vector<const std::vector<glm::vec3>*>& fields) {
     const size_t nodes = surface.regions.nodeCount;
     if (nodes == 0) return {std::vector<std::vector<glm::vec3>>(fields.size())};
-    const NormalEquations equations(patches, surface, exposed, regularization, fields);
+    const NormalEquations equations(surfaces, surface, regularization, fields);
     std::vector<std::vector<glm::vec3>> result(fields.size(), std::vector<glm::vec3>(nodes));
     std::atomic<bool> areSolved = true;
     parallelFor(size_t(0), equations.columns(), [&](size_t c) {

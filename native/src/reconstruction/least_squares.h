@@ -22,7 +22,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "reconstruction/corner_weights.h"
 #include "reconstruction/instance_side.h"
 #include "scene/scene.h"
@@ -40,8 +40,8 @@ struct LeastSquaresFit {
 
 // exposed: per side, the share of it that counts. Reconstructs several fields (each per side) on
 // one side of an instance.
-LeastSquaresFit leastSquares(const Patches& patches, const InstanceSide& surface,
-                             const std::vector<float>& exposed, float regularization,
+LeastSquaresFit leastSquares(const LitSurfaces& surfaces, const InstanceSide& surface,
+                             float regularization,
                              const std::vector<const std::vector<glm::vec3>*>& fields);
 
 }  // namespace raybundle

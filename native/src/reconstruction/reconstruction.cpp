@@ -54,11 +54,11 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
     return lit[side] < kInsideOut * lit[1 - side];
 }
 
-std::vector<SideLight> sideLights(const Patches& patches, const ShownLight& shown,
-                                  const std::vector<float>& exposed, const SetLights& lights,
-                                  bool gathersCorners) {
+std::vector<SideLight> sideLights(const ReconstructionInput& input, bool gathersCorners) {
+    const auto& [patches, exposed] = static_cast<const LitSurfaces&>(input);
     std::vector<SideLight> result;
-    for (const SetLight& light : lights) {
+    const ShownLight& shown = input.shown;
+    for (const SetLight& light : input.lights) {
         SideLight out{
             shown.of(light, exposed), light.direct.emission(), Field(patches.sideCount()), {}, {}};
         for (size_t side = 0; side < out.exitance.size(); ++side) {
@@ -122,25 +122,22 @@ class NodeFields {
 
 using FieldList = std::vector<const Field*>;
 
-LeastSquaresFit byLeastSquares(const Patches& patches, const InstanceSide& surface,
-                               const std::vector<float>& exposed, const Settings& settings,
-                               const FieldList& fields) {
-    return leastSquares(patches, surface, exposed, settings.regularization, fields);
+LeastSquaresFit byLeastSquares(const LitSurfaces& surfaces, const InstanceSide& surface,
+                               const Settings& settings, const FieldList& fields) {
+    return leastSquares(surfaces, surface, settings.regularization, fields);
 }
 
-LeastSquaresFit byAreaAverage(const Patches& patches, const InstanceSide& surface,
-                              const std::vector<float>& exposed, const Settings& /*settings*/,
-                              const FieldList& fields) {
-    return {areaAverage(patches, surface, exposed, fields)};
+LeastSquaresFit byAreaAverage(const LitSurfaces& surfaces, const InstanceSide& surface,
+                              const Settings& /*settings*/, const FieldList& fields) {
+    return {areaAverage(surfaces, surface, fields)};
 }
 
 // A reconstruction. What POINT's corners gather is put in the place of what it fits.
 struct Kind {
     Reconstruction value;
     // From fields per side to fields per node.
-    LeastSquaresFit (*fit)(const Patches& patches, const InstanceSide& surface,
-                           const std::vector<float>& exposed, const Settings& settings,
-                           const FieldList& fields);
+    LeastSquaresFit (*fit)(const LitSurfaces& surfaces, const InstanceSide& surface,
+                           const Settings& settings, const FieldList& fields);
     bool addsSlopes;  // where nothing is gathered, see reconstruction/face_slopes.h
 };
 
@@ -158,17 +155,17 @@ class InstanceReconstruction {
         : input(input),
           kind(kKinds[size_t(input.settings.reconstruction)]),
           ranges(instanceRanges(input.scene, input.patches)),
-          outside(exposedOutside(input.patches, input.visibility, input.exposed)),
+          outside(exposedOutside(input, input.visibility)),
           gathers(gatheringInstances(input.scene, input.settings)),
-          onSides(
-              sideLights(input.patches, input.shown, input.exposed, input.lights, anyGathers())),
+          onSides(sideLights(input, anyGathers())),
           regionsOf(input.scene.instances.size()),
           warnings(input.scene.instances.size()) {
         parallelFor(size_t(0), regionsOf.size(), [&](size_t i) {
             if (gathers[i]) regionsOf[i] = findRegions(i);
         });
         if (anyGathers())
-            atCorners.emplace(input, ranges, gathers, regionsOf, outside, progress.part(0, 2));
+            atCorners.emplace(input, ranges, gathers, regionsOf,
+                              LitSurfaces{input.patches, outside}, progress.part(0, 2));
     }
 
     bool anyGathers() const {
@@ -278,7 +275,7 @@ class InstanceReconstruction {
         // Of sparse results only corners that cannot gather have the light of patches.
         const auto fit = isSparse(i) ? byAreaAverage : kind.fit;
         LeastSquaresFit result =
-            fit(input.patches, surface, outside, input.settings, fields.ofSides());
+            fit({input.patches, outside}, surface, input.settings, fields.ofSides());
         fields.put(std::move(result.fields));
         if (!result.isSolved)
             warnings[i] = {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "job/settings.h"
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "reconstruction/shown_light.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
@@ -13,14 +13,11 @@
 namespace raybundle {
 
 // What reconstructions are made of. References must outlive them.
-struct ReconstructionInput {
+struct ReconstructionInput : LitSurfaces {
     const Scene& scene;
-    const Patches& patches;
     const Visibility& visibility;
-    const float touchDistance;  // surfaces not further apart touch, metres
     const SetLights& lights;
     const ShownLight& shown;
-    const std::vector<float>& exposed;  // per side: the share of it that nothing covers
     const Settings& settings;
 };
 

@@ -29,11 +29,8 @@ constexpr size_t kMostMore = 40000;
 
 class Gaps {
   public:
-    Gaps(const Patches& patches, const Visibility& visibility, float touchDistance)
-        : patches(patches),
-          visibility(visibility),
-          touchDistance(touchDistance),
-          narrow(patches.sideCount()) {
+    Gaps(const Patches& patches, const Visibility& visibility)
+        : patches(patches), visibility(visibility), narrow(patches.sideCount()) {
         for (const float area : patches.area) widest = std::max(widest, kNarrow * std::sqrt(area));
     }
 
@@ -87,26 +84,23 @@ class Gaps {
                                float farthest, uint32_t* met = nullptr) const {
         float distance = 0;
         const auto hit = visibility.firstHit(side, point, direction, &distance, farthest);
-        if (!hit || distance <= std::min(touchDistance, patches.islandAt(side).touchDistance))
-            return std::nullopt;
+        if (!hit || distance <= patches.islandAt(side).touchDistance) return std::nullopt;
         if (met) *met = *hit;
         return distance;
     }
 
     const Patches& patches;
     const Visibility& visibility;
-    const float touchDistance;
     float widest = 0;                       // no gap is narrow anywhere that is wider, metres
     std::vector<std::atomic<bool>> narrow;  // per side
 };
 
 }  // namespace
 
-Cuts contactCuts(const Patches& patches, const Visibility& visibility, float touchDistance,
-                 size_t maxPatches) {
+Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t maxPatches) {
     const size_t tiles = patches.count();
     if (maxPatches <= tiles) return {};
-    Gaps gaps(patches, visibility, touchDistance);
+    Gaps gaps(patches, visibility);
     gaps.find();
     Cuts cuts;
     cuts.levels.assign(tiles, 0);

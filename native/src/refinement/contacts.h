@@ -22,10 +22,8 @@
 
 namespace raybundle {
 
-// The cuts of an uncut subdivision at contacts. Surfaces not further apart than touchDistance
-// (metres) touch. At most maxPatches patches come out; where that is not enough, all cuts are
-// coarser.
-Cuts contactCuts(const Patches& patches, const Visibility& visibility, float touchDistance,
-                 size_t maxPatches);
+// The cuts of an uncut subdivision at contacts. At most maxPatches patches come out; where that is
+// not enough, all cuts are coarser.
+Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t maxPatches);
 
 }  // namespace raybundle

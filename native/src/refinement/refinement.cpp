@@ -86,8 +86,9 @@ void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, do
         for (uint32_t tile = first; tile < end && !hasEdge; ++tile)
             hasEdge = shot.gathered[2 * tile + back].contrast > 0;
         if (!hasEdge) return;
-        const std::vector<Surplus> surplus = surplusOf(patches, range.firstParent, range.lastParent,
-                                                       rb_side(back), irradiance, exposed, error);
+        const std::vector<Surplus> surplus =
+            surplusOf({patches, exposed}, range.firstParent, range.lastParent, rb_side(back),
+                      irradiance, error);
         for (uint32_t tile = first; tile < end; ++tile) {
             const uint32_t side = 2 * tile + back;
             const Surplus& found = surplus[tile - first];

@@ -33,15 +33,15 @@ size_t objectSide(const Patches& patches, size_t side) {
 }
 
 // Per instance, its fronts and its backs.
-std::vector<BroughtByLines> broughtByLines(const Patches& patches, const Irradiance& irradiance,
-                                           const std::vector<float>& exposedShare,
+std::vector<BroughtByLines> broughtByLines(const LitSurfaces& surfaces,
+                                           const Irradiance& irradiance,
                                            const std::vector<float>& openShare) {
     std::vector<BroughtByLines> brought;  // for as many instances as have patches
-    for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const size_t of = objectSide(patches, side);
+    for (size_t side = 0; side < surfaces.exposed.size(); ++side) {
+        const size_t of = objectSide(surfaces.patches, side);
         brought.resize(std::max(brought.size(), of + 1));
         if (openShare[side] < 0) continue;
-        const double area = double(exposedShare[side]) * double(patches.area[side / 2]);
+        const double area = surfaces.exposedArea(side);
         brought[of].area += area;
         brought[of].power += area * glm::dvec3(byLines(irradiance, side));
         brought[of].open += area * double(openShare[side]);
@@ -51,19 +51,18 @@ std::vector<BroughtByLines> broughtByLines(const Patches& patches, const Irradia
 
 }  // namespace
 
-void balanceEnergy(const Patches& patches, const SetLight& light,
-                   const std::vector<float>& exposedShare, const std::vector<float>& openShare,
-                   Report& report) {
+void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
+                   const std::vector<float>& openShare, Report& report) {
+    const Patches& patches = surfaces.patches;
     const FirstShot& shot = light.shot;
     const Irradiance& irradiance = light.irradiance;
     const glm::vec3 worldExitance = glm::pi<float>() * light.worldRadiance;
-    const std::vector<BroughtByLines> brought =
-        broughtByLines(patches, irradiance, exposedShare, openShare);
+    const std::vector<BroughtByLines> brought = broughtByLines(surfaces, irradiance, openShare);
     // What the insides of lamps emit they absorb.
     glm::dvec3 emitted = shot.emitted + light.direct.unseenPower();
     glm::dvec3 absorbed = light.direct.unseenPower(), escaped = shot.escaped;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const double exposed = double(exposedShare[side]);
+        const double exposed = double(surfaces.exposed[side]);
         if (!patches.parentAt(uint32_t(side)).exchanges) {
             absorbed += exposed * power(patches, side, irradiance.gathered[side]);
             continue;
@@ -79,7 +78,7 @@ void balanceEnergy(const Patches& patches, const SetLight& light,
         open = std::max(0.0f, open);
         glm::vec3 reflected = patches.reflectance[side] * ofLines +
                               shotReflectance(patches, shot, side) * irradiance.gathered[side] +
-                              passedOn(patches, exposedShare, side, irradiance.all(side ^ 1));
+                              passedOn(surfaces, side, irradiance.all(side ^ 1));
         if (!irradiance.byAngle.empty()) reflected += irradiance.byAngle[side];
         emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
         absorbed += exposed * power(patches, side, irradiance.gathered[side] + ofLines - reflected);

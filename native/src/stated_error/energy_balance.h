@@ -6,19 +6,17 @@
 #include <vector>
 
 #include "job/report.h"
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
 
 namespace raybundle {
 
 // Compares the power that the lights emit with what surfaces absorb and what leaves the scene: adds
-// those of one light set. exposedShare, openShare: per side, what nothing covers and the share of
-// its lines that leave the scene, as Transport::openShare has it: sides of which nothing is known
+// those of one light set. openShare: per side, the share of its lines that leave the scene, as Transport::openShare has it: sides of which nothing is known
 // get what others of their object do by lines, in the mean.
-void balanceEnergy(const Patches& patches, const SetLight& light,
-                   const std::vector<float>& exposedShare, const std::vector<float>& openShare,
-                   Report& report);
+void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
+                   const std::vector<float>& openShare, Report& report);
 
 // The share of the lines of the weighted sides that leave the scene, or stay in it, only because
 // the projector lets lines through surfaces (ROULETTE): the difference to exact projection, object

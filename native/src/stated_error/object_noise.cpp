@@ -39,10 +39,10 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches) {
     return growth;
 }
 
-std::vector<double> shownOverForetold(const Scene& scene, const Patches& tiles, const Noise& noise,
-                                      const std::array<Irradiance, 2>& halves,
-                                      const std::vector<float>& exposed, float regularization,
-                                      const std::vector<double>& growth) {
+std::vector<double> shownOverForetold(const Scene& scene, const LitSurfaces& surfaces,
+                                      const Noise& noise, const std::array<Irradiance, 2>& halves,
+                                      float regularization, const std::vector<double>& growth) {
+    const Patches& tiles = surfaces.patches;
     const std::vector<InstanceRange> ranges = instanceRanges(scene, tiles);
     const std::vector<Noise::OfCell>& cells = noise.cells();
     std::array<std::vector<glm::vec3>, 2> light = {halves[0].direct, halves[1].direct};
@@ -56,7 +56,7 @@ std::vector<double> shownOverForetold(const Scene& scene, const Patches& tiles, 
         if (instance.role != RB_ROLE_BAKE || range.firstCell == range.lastCell) return;
         const SmoothRegions regions = smoothRegions(scene.meshes[instance.mesh], tiles.cells,
                                                     range.firstCell, range.lastCell);
-        const LeastSquaresFit fit = leastSquares(tiles, {range, regions, instance.side}, exposed,
+        const LeastSquaresFit fit = leastSquares(surfaces, {range, regions, instance.side},
                                                  regularization, {&light[0], &light[1]});
         double shown = 0, foretold = 0, count = 0;
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c)

@@ -17,7 +17,7 @@
 #include <array>
 #include <vector>
 
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "scene/scene.h"
 #include "stated_error/noise.h"
 
@@ -38,12 +38,11 @@ double bundlesAtCorners(const Noise::OfCell& cell, double growth);
 constexpr double kUsuallyOverForetold = 2;
 
 // Per instance: squares of the noise of bundles that its corners show, over what bundlesAtCorners
-// foretells of them. halves: per side of the tiles, of the noise's last look, W/m^2; exposed,
+// foretells of them. halves: per side of the tiles, of the noise's last look, W/m^2;
 // regularization: see leastSquares. Of few cells it is near what is usual.
-std::vector<double> shownOverForetold(const Scene& scene, const Patches& tiles, const Noise& noise,
-                                      const std::array<Irradiance, 2>& halves,
-                                      const std::vector<float>& exposed, float regularization,
-                                      const std::vector<double>& growth);
+std::vector<double> shownOverForetold(const Scene& scene, const LitSurfaces& tiles,
+                                      const Noise& noise, const std::array<Irradiance, 2>& halves,
+                                      float regularization, const std::vector<double>& growth);
 
 // Relative to the RMS of the light, that of the first shot included.
 struct CornerNoise {

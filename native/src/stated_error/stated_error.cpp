@@ -82,8 +82,8 @@ class InstanceErrors {
           sides(sides),
           isGathered(light.gatheredNoise.has_value()),
           light(light),
-          surplus(surplusOf(patches, range.firstParent, range.lastParent, instance.side,
-                            sides.irradiance, sides.exposed, sides.directError)) {
+          surplus(surplusOf({patches, sides.exposed}, range.firstParent, range.lastParent,
+                            instance.side, sides.irradiance, sides.directError)) {
         std::vector<double> exposed(range.lastCell - range.firstCell, 0.0);  // per cell, m^2
         forEachPatch([&](uint32_t at, double weight, const Cell& cell, const auto&, double residual,
                          const Surplus& s) {

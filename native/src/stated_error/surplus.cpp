@@ -219,13 +219,12 @@ class Sites {
 
 }  // namespace
 
-std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uint32_t lastParent,
-                               rb_side side, const Irradiance& irradiance,
-                               const std::vector<float>& exposed,
+std::vector<Surplus> surplusOf(const LitSurfaces& surfaces, uint32_t firstParent,
+                               uint32_t lastParent, rb_side side, const Irradiance& irradiance,
                                const std::vector<float>& directError) {
     if (firstParent >= lastParent) return {};
-    Sites sites(patches, firstParent, lastParent, side, irradiance);
-    sites.place(firstParent, lastParent, exposed);
+    Sites sites(surfaces.patches, firstParent, lastParent, side, irradiance);
+    sites.place(firstParent, lastParent, surfaces.exposed);
     sites.findGradients();
     sites.comparePairs(directError);
     return sites.surplus();

@@ -26,7 +26,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "scene/scene.h"
 #include "transport/transport.h"
 
@@ -40,11 +40,9 @@ struct Surplus {
 };
 
 // Of the patches of parents [firstParent, lastParent), in their order, for one of their sides.
-// exposed: per side, the share that nothing covers; directError: per side, standard error of the
-// light of the sources, W/m^2.
-std::vector<Surplus> surplusOf(const Patches& patches, uint32_t firstParent, uint32_t lastParent,
-                               rb_side side, const Irradiance& irradiance,
-                               const std::vector<float>& exposed,
+// directError: per side, standard error of the light of the sources, W/m^2.
+std::vector<Surplus> surplusOf(const LitSurfaces& surfaces, uint32_t firstParent,
+                               uint32_t lastParent, rb_side side, const Irradiance& irradiance,
                                const std::vector<float>& directError);
 
 }  // namespace raybundle

@@ -9,16 +9,15 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 
 namespace raybundle {
 
-// What leaves the exposed part of a side, exitance, W/m^2. arriving: the irradiance of the exposed
-// part of the patch's other side; exposed: per side, the share of it that nothing covers.
-inline glm::vec3 passedOn(const Patches& patches, const std::vector<float>& exposed, size_t side,
-                          const glm::vec3& arriving) {
-    if (!patches.parentAt(uint32_t(side)).exchanges) return glm::vec3(0.0f);
-    return exposed[side ^ 1] * patches.translucenceOf(side) * arriving;
+// The exitance of the exposed part of a side by light that passes through its patch, W/m^2.
+// arriving: the irradiance of the exposed part of the patch's other side, W/m^2.
+inline glm::vec3 passedOn(const LitSurfaces& surfaces, size_t side, const glm::vec3& arriving) {
+    if (!surfaces.patches.parentAt(uint32_t(side)).exchanges) return glm::vec3(0.0f);
+    return surfaces.exposed[side ^ 1] * surfaces.patches.translucenceOf(side) * arriving;
 }
 
 }  // namespace raybundle

@@ -43,12 +43,10 @@ class ClusteredReuse : public Transport {
 
     // What the transport between the clusters is made of.
     TransportInput inner(const TransportInput& input) const {
-        return {clusters.patches(),
+        return {{clusters.patches(), exposed},
                 input.visibility,
                 shot,
                 input.worldRadiance,
-                exposed,
-                input.touchDistance,
                 input.settings,
                 input.tracer,
                 input.counts,

@@ -16,11 +16,11 @@ namespace {
 
 // The light of one set: what sides send of it by the estimates of both halves together and of each.
 struct Sent {
-    Sent(const Patches& patches, const std::vector<float>& exposed, const SetLight& light,
+    Sent(const LitSurfaces& surfaces, const SetLight& light,
          const std::array<Irradiance, 2>& halves)
         : emission(light.shot.emission), world(glm::pi<float>() * light.worldRadiance) {
         auto of = [&](const Irradiance& irradiance) {
-            return std::make_unique<SentLight>(patches, light.shot, irradiance, exposed,
+            return std::make_unique<SentLight>(surfaces, light.shot, irradiance,
                                                SentLight::Of::BEYOND_FIRST_SHOT);
         };
         by[0] = of(light.irradiance);
@@ -125,8 +125,7 @@ class ExtraGather {
             float distance = 0;
             const auto hit = input.visibility.firstHit(
                 own.side, patches.point(own.side / 2, {u.x, u.y}), direction, &distance);
-            if (hit && isCovered(patches, own.side, *hit, direction, distance, input.touchDistance))
-                continue;
+            if (hit && isCovered(patches, own.side, *hit, direction, distance)) continue;
             if (hit && !(std::min(samples[*hit][0], samples[*hit][1]) > 0)) continue;
             // The first points and the last are each stratified by themselves.
             const size_t half = 2 * i < own.rays ? 0 : 1;
@@ -197,8 +196,7 @@ void addExtraRays(const ExtraRaysInput& input, std::vector<std::array<float, 2>>
     {
         // All that is met is read before anything is changed.
         std::vector<Sent> sent;
-        for (size_t k = 0; k < lights.size(); ++k)
-            sent.emplace_back(input.patches, input.exposed, lights[k], halves[k]);
+        for (size_t k = 0; k < lights.size(); ++k) sent.emplace_back(input, lights[k], halves[k]);
         gather.cast(input, sent);
     }
     for (size_t k = 0; k < lights.size(); ++k) {

@@ -36,13 +36,8 @@ struct ExtraRays {
 };
 
 // What rays are cast, and where. References must outlive it.
-struct ExtraRaysInput {
-    const Patches& patches;
+struct ExtraRaysInput : LitSurfaces {
     const Visibility& visibility;
-    // Rays that start where the side is covered, by a surface not further than this, do not count;
-    // metres.
-    const float touchDistance;
-    const std::vector<float>& exposed;  // per side: the share of it that nothing covers
     const std::vector<ExtraRays>& wanted;
     const uint32_t seed;
 };

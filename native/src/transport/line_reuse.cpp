@@ -155,11 +155,11 @@ Irradiance LineReuse::solvePassed(Half half, float tolerance, LineSolution& gues
     Field next(n), change(n);
     auto passOn = [&](const Field& direct, const Field& indirect) {
         forEachSide(n, [&](size_t i) {
-            next[i] = passedOn(patches, exposed, i, direct[i ^ 1] + indirect[i ^ 1]);
+            next[i] = passedOn({patches, exposed}, i, direct[i ^ 1] + indirect[i ^ 1]);
         });
     };
     if (passed.empty()) {
-        const HandOver first = handOver(patches, shot, exposed);
+        const HandOver first = handOver({patches, exposed}, shot);
         passOn(first.gathered, first.indirect);
         passed = next;
     }
@@ -182,7 +182,7 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, LineSolution& g
     const size_t n = counts.sideCount();
     Field &reflected = guess.reflected, &brought = guess.brought;
     const std::vector<float> exposed = exposedShare();
-    const HandOver first = handOver(patches, shot, exposed);
+    const HandOver first = handOver({patches, exposed}, shot);
     LineSystem lines(counts, half, weights);
     Irradiance result(n);
     addDirect(lines, first, result);
@@ -268,7 +268,8 @@ void LineReuse::addPower(const Field& light, const std::vector<float>& exposed,
 
 size_t LineReuse::gatherStarvedSides(const StarvedRays& rays, const std::vector<bool>& wanted,
                                      const Field& reflected, Irradiance& irradiance) const {
-    const StarvedInput input{patches, counts, shot, worldRadiance, exposedShare(), directedLight};
+    const std::vector<float> exposed = exposedShare();
+    const StarvedInput input{{patches, exposed}, counts, shot, worldRadiance, directedLight};
     StarvedSides sides(input, rays, irradiance);
     sides.castRays(wanted);
     sides.addReflected(reflected);

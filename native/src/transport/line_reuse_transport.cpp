@@ -111,10 +111,9 @@ class LineReuseTransport : public Transport {
         // The first of each half starts from nothing.
         if (input.settings.skipWarmStart && solves > 2)
             report.skip(SkippedWork::WARM_STARTS, solves - 2);
-        const size_t starved =
-            solver.gatherStarvedSides({input.visibility, input.clusters, input.touchDistance,
-                                       kStarvedLines, uint32_t(input.settings.seed)},
-                                      wanted, last.of[size_t(Half::BOTH)].reflected, result);
+        const size_t starved = solver.gatherStarvedSides(
+            {input.visibility, input.clusters, kStarvedLines, uint32_t(input.settings.seed)},
+            wanted, last.of[size_t(Half::BOTH)].reflected, result);
         if (starved) report.skip(SkippedWork::STARVED_SIDES, starved);
         if (!result.isSettled)
             report.warn(
@@ -143,8 +142,9 @@ class LineReuseTransport : public Transport {
 
   private:
     void startStreaming() {
-        const std::vector<float> exposed = solver.exposedShare();
-        first = handOver(input.patches, input.shot, exposed);
+        exposed = solver.exposedShare();
+        const LitSurfaces surfaces{input.patches, exposed};
+        first = handOver(surfaces, input.shot);
         // Light by direction as the lines so far have it: those that follow are not kept.
         const std::vector<glm::vec3> byDirection =
             solver.directed(Half::BOTH, solver.lineWeights(Half::BOTH));
@@ -154,8 +154,7 @@ class LineReuseTransport : public Transport {
             source[i] += input.patches.reflectance[i] * byDirection[i];
         }
         for (size_t i = 0; i < source.size(); ++i)
-            source[i] +=
-                passedOn(input.patches, exposed, i, first.gathered[i ^ 1] + first.indirect[i ^ 1]);
+            source[i] += passedOn(surfaces, i, first.gathered[i ^ 1] + first.indirect[i ^ 1]);
         for (uint32_t half = 0; half < 2; ++half) {
             const Irradiance start =
                 solver.solve(Half(half), kStartTolerance, last.of[half].reflected);
@@ -167,7 +166,7 @@ class LineReuseTransport : public Transport {
                 byLines.direct[i] = start.direct[i] - start.gathered[i];
                 byLines.indirect[i] = start.indirect[i] - first.indirect[i];
             }
-            streaming[half].emplace(input.patches, byLines, source, exposed, input.shot.emission,
+            streaming[half].emplace(surfaces, byLines, source, input.shot.emission,
                                     glm::pi<float>() * input.worldRadiance);
         }
     }
@@ -206,8 +205,10 @@ class LineReuseTransport : public Transport {
     LineSolutions& last;
     uint64_t solves = 0;
     std::array<std::optional<StreamingReuse>, 2> streaming;  // per half, once the limit is reached
-    HandOver first;                                          // while streaming
-    std::vector<LineReuseTransport*> carriers{this};         // all that the traced lines serve
+    // While streaming.
+    HandOver first;
+    std::vector<float> exposed;                       // per side: the share that nothing covers
+    std::vector<LineReuseTransport*> carriers{this};  // all that the traced lines serve
 };
 
 }  // namespace

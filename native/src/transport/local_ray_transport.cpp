@@ -79,7 +79,7 @@ void LocalRayTransport::add(const RayLog& log, Sums& to) const {
 
 Irradiance LocalRayTransport::irradiance(Half half, float) {
     const size_t n = input.patches.sideCount();
-    const HandOver first = handOver(input.patches, input.shot, input.exposed);
+    const HandOver first = handOver(input, input.shot);
     Irradiance result(n);
     for (uint32_t side = 0; side < n; ++side) {
         glm::dvec3 direct(0.0), indirect(0.0);

@@ -23,12 +23,10 @@ glm::vec2 uniform2(std::mt19937_64& random) {
 }  // namespace
 
 LocalRays::LocalRays(const TransportInput& input)
-    : patches(input.patches),
-      visibility(input.visibility),
-      exposed(input.exposed),
-      touchDistance(input.touchDistance) {
-    assert(exposed.size() == patches.sideCount() && "bake knows what is covered before it traces");
-    const HandOver first = handOver(patches, input.shot, exposed);
+    : surfaces(input), patches(input.patches), visibility(input.visibility) {
+    assert(surfaces.exposed.size() == patches.sideCount() &&
+           "bake knows what is covered before it traces");
+    const HandOver first = handOver(input, input.shot);
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
         addSource(side, RayLight::EMITTED, area(side) * input.shot.emission[side]);
         addSource(side, RayLight::REFLECTED, area(side) * first.unshot[side]);
@@ -66,13 +64,13 @@ std::optional<uint32_t> LocalRays::fromWorld(std::mt19937_64& random) const {
 // Whether another surface lies against a side at a point.
 bool LocalRays::isCovered(uint32_t side, const glm::vec3& point) const {
     return visibility.isBlocked(side, point, patches.normal(side),
-                                std::min(touchDistance, patches.islandAt(side).touchDistance));
+                                patches.islandAt(side).touchDistance);
 }
 
 std::optional<uint32_t> LocalRays::fromSide(uint32_t side, std::mt19937_64& random,
                                             RayLog& log) const {
     glm::vec3 point = patches.point(side / 2, uniform2(random));
-    if (exposed[side] < 1)
+    if (surfaces.exposed[side] < 1)
         for (int k = 1; k < kMostPoints && isCovered(side, point); ++k)
             point = patches.point(side / 2, uniform2(random));
     const auto hit =

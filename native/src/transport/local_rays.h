@@ -65,7 +65,7 @@ class LocalRays {
     std::optional<uint32_t> fromSide(uint32_t side, std::mt19937_64& random, RayLog& log) const;
 
     // The area of a side that gets light, m^2.
-    float area(uint32_t side) const { return patches.area[side / 2] * exposed[side]; }
+    float area(uint32_t side) const { return float(surfaces.exposedArea(side)); }
 
     // Largest reflectance of a side.
     static float reflectance(const Patches& patches, uint32_t side) {
@@ -82,10 +82,9 @@ class LocalRays {
     bool isCovered(uint32_t side, const glm::vec3& point) const;
     std::optional<uint32_t> fromWorld(std::mt19937_64& random) const;
 
+    const LitSurfaces surfaces;
     const Patches& patches;
     const Visibility& visibility;
-    const std::vector<float>& exposed;
-    const float touchDistance;  // metres
     std::vector<Source> sources;
     std::vector<double> cumulative;  // per source: power up to it, W
 };

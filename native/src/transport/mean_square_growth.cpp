@@ -38,8 +38,7 @@ constexpr int kPowerSteps = 256;
 // rho^2 g of a side.
 double gain(const TransportInput& input, uint32_t side) {
     const double rho = double(LocalRays::reflectance(input.patches, side));
-    const double area =
-        double(input.patches.area[side / 2]) * double(input.exposed[side]) / input.tracer.pixelArea;
+    const double area = input.exposedArea(side) / input.tracer.pixelArea;
     return area > 0 ? rho * rho * std::hypot(4.0 / 3, 2 / area) : 0;
 }
 
@@ -51,7 +50,7 @@ int classOf(double gain) {
 // Sides that light can reach by the given lines: what is dark does not count.
 std::vector<bool> litSides(const TransportInput& input, const std::vector<TracedBundle>& traced) {
     const Patches& patches = input.patches;
-    const HandOver first = handOver(patches, input.shot, input.exposed);
+    const HandOver first = handOver(input, input.shot);
     const glm::vec3 black(0.0f);
     std::vector<bool> shines(patches.sideCount()), lit(patches.sideCount());
     for (size_t i = 0; i < lit.size(); ++i)

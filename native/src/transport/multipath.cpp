@@ -86,7 +86,7 @@ class Multipath : public Transport {
   public:
     explicit Multipath(const TransportInput& input)
         : input(input),
-          first(handOver(input.patches, input.shot, input.exposed)),
+          first(handOver(input, input.shot)),
           halves{Estimate(input.patches.sideCount()), Estimate(input.patches.sideCount())} {
         const bool isWeighted = rowOf(input.settings.directions).isWeighted ||
                                 rowOf(input.settings.projector).isByChance;
@@ -139,7 +139,7 @@ class Multipath : public Transport {
             const float share = half == Half::BOTH ? 0.5f : 1.0f;
             const Later ambient = later(estimate);
             for (size_t i = 0; i < n; ++i) {
-                const float area = input.patches.area[i / 2] * input.exposed[i];
+                const float area = float(input.exposedArea(i));
                 if (area <= 0) continue;
                 const float scale = share / (float(estimate.bundles) * area);
                 // thesis_literal counts no lines.

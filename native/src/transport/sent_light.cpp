@@ -6,12 +6,13 @@
 
 namespace raybundle {
 
-SentLight::SentLight(const Patches& patches, const FirstShot& shot, const Irradiance& irradiance,
-                     const std::vector<float>& exposed, Of of)
+SentLight::SentLight(const LitSurfaces& surfaces, const FirstShot& shot,
+                     const Irradiance& irradiance, Of of)
     : irradiance(irradiance),
-      exposed(exposed),
-      mean(patches.sideCount()),
-      directed(patches, shot, of) {
+      exposed(surfaces.exposed),
+      mean(surfaces.patches.sideCount()),
+      directed(surfaces.patches, shot, of) {
+    const Patches& patches = surfaces.patches;
     const bool isBeyond = of == Of::BEYOND_FIRST_SHOT && !shot.unshot.empty();
     for (size_t side = 0; side < mean.size(); ++side) {
         glm::vec3 arriving =
@@ -23,7 +24,7 @@ SentLight::SentLight(const Patches& patches, const FirstShot& shot, const Irradi
             sent = concentrated * shot.unshot[side];
         }
         mean[side] = sent + patches.reflectance[side] * arriving +
-                     passedOn(patches, exposed, side, irradiance.all(side ^ 1));
+                     passedOn(surfaces, side, irradiance.all(side ^ 1));
     }
     for (size_t side = 0; side < irradiance.byAngle.size(); ++side)
         mean[side] += irradiance.byAngle[side];

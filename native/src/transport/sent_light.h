@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "first_shot/directed_light.h"
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "transport/transport.h"
 
 namespace raybundle {
@@ -16,10 +16,9 @@ namespace raybundle {
 class SentLight {
   public:
     using Of = DirectedLight::Of;
-    // irradiance: solved with that shot; exposed: per side, the share of it that nothing covers.
-    // All must outlive the object.
-    SentLight(const Patches& patches, const FirstShot& shot, const Irradiance& irradiance,
-              const std::vector<float>& exposed, Of of);
+    // irradiance: solved with that shot. All must outlive the object.
+    SentLight(const LitSurfaces& surfaces, const FirstShot& shot, const Irradiance& irradiance,
+              Of of);
 
     // Exitance towards a direction (unit) away from the side, W/m^2.
     glm::vec3 towards(uint32_t side, const glm::vec3& direction) const;

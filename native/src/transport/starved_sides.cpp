@@ -27,7 +27,7 @@ StarvedSides::StarvedSides(const StarvedInput& input, const StarvedRays& rays,
     : input(input),
       how(rays),
       surface(rays.clusters ? rays.clusters->members() : input.patches),
-      shotLight(handOver(input.patches, input.shot, input.exposed)),
+      shotLight(handOver(input, input.shot)),
       irradiance(irradiance) {}
 
 void StarvedSides::find(const std::vector<bool>& wanted) {
@@ -77,7 +77,7 @@ void StarvedSides::castRaysOf(size_t k) {
         float distance = 0;
         auto hit = how.visibility.firstHit(from, surface.point(from / 2, {u.x, u.y}), direction,
                                            &distance);
-        if (hit && isCovered(surface, from, *hit, direction, distance, how.touchDistance)) continue;
+        if (hit && isCovered(surface, from, *hit, direction, distance)) continue;
         if (hit && how.clusters) hit = how.clusters->sideOf(*hit);
         if (hit) {
             hits[k * raysPerSide + i] = *hit;
@@ -101,7 +101,7 @@ void StarvedSides::addReflected(const std::vector<glm::vec3>& reflected) {
     std::vector<glm::vec3> sent = reflected, next(starved.size());
     if (!input.patches.translucence.empty())
         for (size_t i = 0; i < sent.size(); ++i)
-            sent[i] += passedOn(input.patches, input.exposed, i, irradiance.all(i ^ 1));
+            sent[i] += passedOn(input, i, irradiance.all(i ^ 1));
     // Starved sides may see each other: sweep until what they send has settled.
     for (int k = 0; k < kMaxSweeps; ++k)
         if (sweep(sent, next)) return;
@@ -124,7 +124,7 @@ bool StarvedSides::sweep(std::vector<glm::vec3>& sent, std::vector<glm::vec3>& n
     });
     glm::vec3 change(0.0f), most(0.0f);
     for (size_t k = 0; k < starved.size(); ++k) {
-        next[k] += passedOn(patches, input.exposed, starved[k], irradiance.all(starved[k] ^ 1));
+        next[k] += passedOn(input, starved[k], irradiance.all(starved[k] ^ 1));
         change = glm::max(change, glm::abs(next[k] - sent[starved[k]]));
         most = glm::max(most, next[k]);
         sent[starved[k]] = next[k];

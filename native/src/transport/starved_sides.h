@@ -29,20 +29,15 @@ struct StarvedRays {
     // If the patches are those of clusters, `visibility` is of the patches that these are made of;
     // null: it is of the patches themselves.
     const Clusters* clusters;
-    // A ray does not count if it starts where another surface, not further away than this (metres),
-    // covers the side.
-    float touchDistance;
     uint32_t minLines;  // a side that fewer lines met is starved
     uint32_t seed;
 };
 
 // The patches, and what is known of the light on them before the rays. References must outlive it.
-struct StarvedInput {
-    const Patches& patches;
+struct StarvedInput : LitSurfaces {
     const LineCounts& counts;
     const FirstShot& shot;
-    const glm::vec3 worldRadiance;     // W/(m^2 sr)
-    const std::vector<float> exposed;  // per side: the share of it that nothing covers
+    const glm::vec3 worldRadiance;  // W/(m^2 sr)
     const DirectedLight& directedLight;
 };
 

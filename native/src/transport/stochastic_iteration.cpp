@@ -160,7 +160,7 @@ class BundleIteration : public Transport {
     uint32_t bundleCount() const override { return 2 * done; }
 
     Irradiance irradiance(Half half, float) override {
-        const HandOver first = handOver(input.patches, input.shot, input.exposed);
+        const HandOver first = handOver(input, input.shot);
         Irradiance result(sides.unshot.size());
         for (size_t i = 0; i < sides.unshot.size(); ++i) {
             const auto [direct, indirect] = mean(half, i);
@@ -180,7 +180,7 @@ class BundleIteration : public Transport {
         for (size_t i = 0; i < open.size(); ++i) {
             const auto [direct, indirect] = mean(Half::BOTH, i);
             const glm::dvec3 light = direct + indirect;
-            const double area = double(input.patches.area[i / 2]) * double(input.exposed[i]);
+            const double area = input.exposedArea(i);
             arriving += area * sumOfChannels(light);
             goingOn += area * std::max(0.0, 1 - double(open[i])) *
                        sumOfChannels(glm::dvec3(sides.reflectance[i]) * light);
@@ -206,13 +206,13 @@ class BundleIteration : public Transport {
   private:
     static Sides makeSides(const TransportInput& input) {
         const Patches& patches = input.patches;
-        Sides sides{patches.reflectance, handOver(patches, input.shot, input.exposed).unshot,
+        Sides sides{patches.reflectance, handOver(input, input.shot).unshot,
                     std::vector<float>(patches.sideCount()), glm::pi<float>() * input.worldRadiance,
                     false};
         const glm::vec3 black(0.0f);
         sides.hasDirect = input.worldRadiance != black;
         for (size_t i = 0; i < patches.sideCount(); ++i) {
-            const double area = double(patches.area[i / 2]) * double(input.exposed[i]);
+            const double area = input.exposedArea(i);
             sides.perLine[i] = area > 0 ? float(2 * input.tracer.pixelArea / area) : 0;
             sides.hasDirect |= input.shot.emission[i] != black;
         }

@@ -13,16 +13,14 @@ constexpr float kMostReflectance = 0.95f;
 
 }  // namespace
 
-StreamingReuse::StreamingReuse(const Patches& patches, const StreamingStart& start,
+StreamingReuse::StreamingReuse(const LitSurfaces& surfaces, const StreamingStart& start,
                                const std::vector<glm::vec3>& source,
-                               const std::vector<float>& exposed,
                                const std::vector<glm::vec3>& emission,
                                const glm::vec3& worldExitance)
-    : patches(patches),
+    : surfaces(surfaces),
       emission(emission),
       worldExitance(worldExitance),
       source(source),
-      exposed(exposed),
       bundles(start.bundles),
       totalWeight(start.bundles),
       directSum(start.lines.size()),
@@ -35,12 +33,12 @@ StreamingReuse::StreamingReuse(const Patches& patches, const StreamingStart& sta
     const std::vector<glm::vec3>&direct = start.direct, &indirect = start.indirect;
     float reflectance = 0;
     for (size_t i = 0; i < lines.size(); ++i) {
-        const glm::vec3& rho = patches.reflectance[i];
+        const glm::vec3& rho = surfaces.patches.reflectance[i];
         reflectance = std::max({reflectance, rho.x, rho.y, rho.z});
         directSum[i] = lines[i] * glm::dvec3(direct[i]);
         indirectSum[i] = lines[i] * glm::dvec3(indirect[i]);
         exitance[i] = source[i] + rho * (direct[i] + indirect[i]) +
-                      passedOn(patches, exposed, i, direct[i ^ 1] + indirect[i ^ 1]);
+                      passedOn(surfaces, i, direct[i ^ 1] + indirect[i ^ 1]);
     }
     steps = 1 / (1 - double(std::min(reflectance, kMostReflectance)));
 }
@@ -55,8 +53,9 @@ void StreamingReuse::meet(uint32_t side, double lineCount) {
 
 void StreamingReuse::updateExitance(size_t side) {
     const size_t other = side ^ 1;
-    exitance[side] = source[side] + patches.reflectance[side] * (direct(side) + indirect(side)) +
-                     passedOn(patches, exposed, side, direct(other) + indirect(other));
+    exitance[side] = source[side] +
+                     surfaces.patches.reflectance[side] * (direct(side) + indirect(side)) +
+                     passedOn(surfaces, side, direct(other) + indirect(other));
 }
 
 void StreamingReuse::add(const BundleLines& bundle) {
@@ -81,7 +80,7 @@ void StreamingReuse::add(const BundleLines& bundle) {
     for (uint32_t side : met) {
         indirectSum[side] += newest * arriving[side];
         updateExitance(side);
-        if (!patches.translucence.empty()) updateExitance(side ^ 1);
+        if (!surfaces.patches.translucence.empty()) updateExitance(side ^ 1);
         arriving[side] = glm::dvec3(0.0);
         isMet[side] = false;
     }

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "bundles/bundle_tracer.h"
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 
 namespace raybundle {
 
@@ -34,12 +34,12 @@ struct StreamingStart {
 
 class StreamingReuse {
   public:
-    // One half. source: per side, exitance that is there without lines; exposed: per side, the
-    // share of it that nothing covers; emission (per side) and worldExitance: what lines bring
-    // straight, W/m^2. patches and emission must outlive the object.
-    StreamingReuse(const Patches& patches, const StreamingStart& start,
-                   const std::vector<glm::vec3>& source, const std::vector<float>& exposed,
-                   const std::vector<glm::vec3>& emission, const glm::vec3& worldExitance);
+    // One half. source: per side, exitance that is there without lines; emission (per side) and
+    // worldExitance: what lines bring straight, W/m^2. surfaces and emission must outlive the
+    // object.
+    StreamingReuse(const LitSurfaces& surfaces, const StreamingStart& start,
+                   const std::vector<glm::vec3>& source, const std::vector<glm::vec3>& emission,
+                   const glm::vec3& worldExitance);
 
     void add(const BundleLines& bundle);
 
@@ -55,11 +55,10 @@ class StreamingReuse {
     void meet(uint32_t side, double lineCount);
     void updateExitance(size_t side);
 
-    const Patches& patches;
+    const LitSurfaces surfaces;
     const std::vector<glm::vec3>& emission;
     const glm::dvec3 worldExitance;
     std::vector<glm::vec3> source;
-    const std::vector<float> exposed;
     double steps;        // a
     double bundles;      // n
     double totalWeight;  // of all bundles so far

@@ -23,8 +23,8 @@ static_assert(hasEveryValue(kKinds));
 
 }  // namespace
 
-HandOver handOver(const Patches& patches, const FirstShot& shot,
-                  const std::vector<float>& exposed) {
+HandOver handOver(const LitSurfaces& surfaces, const FirstShot& shot) {
+    const auto& [patches, exposed] = surfaces;
     const size_t n = patches.sideCount();
     HandOver light{std::vector<glm::vec3>(n), std::vector<glm::vec3>(n), std::vector<glm::vec3>(n)};
     for (size_t i = 0; i < n; ++i) {

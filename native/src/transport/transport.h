@@ -18,7 +18,7 @@
 #include "job/progress.h"
 #include "job/report.h"
 #include "job/settings.h"
-#include "patches/patches.h"
+#include "patches/lit_surfaces.h"
 #include "visibility/visibility.h"
 
 namespace raybundle {
@@ -84,13 +84,10 @@ struct LineSolutions {
 };
 
 // What transports are made of. References must outlive them.
-struct TransportInput {
-    const Patches& patches;
+struct TransportInput : LitSurfaces {
     const Visibility& visibility;
     const FirstShot& shot;
-    const glm::vec3 worldRadiance;      // W/(m^2 sr)
-    const std::vector<float>& exposed;  // per side: the share of it that nothing covers
-    const float touchDistance;          // surfaces not further apart touch, metres
+    const glm::vec3 worldRadiance;  // W/(m^2 sr)
     const Settings& settings;
     BundleTracer& tracer;
     LineCounts& counts;  // of the bundles traced so far; LINE_REUSE alone adds to it
@@ -147,7 +144,7 @@ struct HandOver {
     std::vector<glm::vec3> indirect;  // irradiance from reflected light, already distributed
     std::vector<glm::vec3> unshot;    // reflected exitance that is still to be distributed
 };
-HandOver handOver(const Patches& patches, const FirstShot& shot, const std::vector<float>& exposed);
+HandOver handOver(const LitSurfaces& surfaces, const FirstShot& shot);
 
 // The transports, one a row of the table.
 std::unique_ptr<Transport> lineReuse(const TransportInput& input);

@@ -12,7 +12,7 @@ namespace {
 constexpr uint32_t kPoints = 256;
 
 float shareExposed(uint32_t side, const Visibility& visibility, const Clusters& clusters,
-                   float touchDistance, uint32_t seed) {
+                   uint32_t seed) {
     const Patches& surface = clusters.members();
     const SobolPoints points(hash(seed, side));
     uint32_t covered = 0;
@@ -22,8 +22,8 @@ float shareExposed(uint32_t side, const Visibility& visibility, const Clusters& 
         float distance = 0;
         const auto met =
             visibility.firstHit(from, surface.point(from / 2, {points[k].x, points[k].y}), normal,
-                                &distance, touchDistance);
-        covered += met && isCovered(surface, from, *met, normal, distance, touchDistance);
+                                &distance, surface.touchDistance);
+        covered += met && isCovered(surface, from, *met, normal, distance);
     }
     return float(kPoints - covered) / float(kPoints);
 }
@@ -31,11 +31,11 @@ float shareExposed(uint32_t side, const Visibility& visibility, const Clusters& 
 }  // namespace
 
 std::vector<float> exposedShareOf(const std::vector<uint32_t>& sides, const Visibility& visibility,
-                                  const Clusters& clusters, float touchDistance, uint32_t seed) {
+                                  const Clusters& clusters, uint32_t seed) {
     std::vector<float> share(sides.size());
     parallelFor(size_t(0), sides.size(), [&](size_t k) {
         throwIfCancelledAt(k);
-        share[k] = shareExposed(sides[k], visibility, clusters, touchDistance, seed);
+        share[k] = shareExposed(sides[k], visibility, clusters, seed);
     });
     return share;
 }

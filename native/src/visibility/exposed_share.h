@@ -16,9 +16,9 @@
 
 namespace raybundle {
 
-// Of each of some sides of the clusters, the share that does not lie against another surface, no
-// further than touchDistance (m). visibility: of the patches that the clusters are made of.
+// Of each of some sides of the clusters, the share that touches no other surface, 0 to 1.
+// visibility: of the patches that the clusters are made of.
 std::vector<float> exposedShareOf(const std::vector<uint32_t>& sides, const Visibility& visibility,
-                                  const Clusters& clusters, float touchDistance, uint32_t seed);
+                                  const Clusters& clusters, uint32_t seed);
 
 }  // namespace raybundle

@@ -63,11 +63,10 @@ std::vector<uint64_t> allotLines(const std::vector<double>& expected, double xi)
 }
 
 bool isCovered(const Patches& patches, uint32_t side, uint32_t met, const glm::vec3& direction,
-               float distance, float touchDistance) {
+               float distance) {
     constexpr float kOpposite = -0.99f;  // cosine below which normals point against each other
     const glm::vec3 normal = patches.normal(side);
-    return distance * glm::dot(direction, normal) <=
-               std::min(touchDistance, patches.islandAt(side).touchDistance) &&
+    return distance * glm::dot(direction, normal) <= patches.islandAt(side).touchDistance &&
            glm::dot(normal, patches.normal(met)) < kOpposite;
 }
 

@@ -37,7 +37,7 @@ struct LineEnd {
 
 // Whether a line that left a side met at once what covers the side there: it is dark in between.
 bool isCovered(const Patches& patches, uint32_t side, uint32_t met, const glm::vec3& direction,
-               float distance, float touchDistance);
+               float distance);
 
 // Four random numbers, uniform in [0, 1).
 glm::vec4 uniformPoint(std::mt19937_64& random);

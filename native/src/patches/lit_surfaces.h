@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "patches/patches.h"
+
+namespace raybundle {
+
+// The patches, and how much of each side light can reach. Refers to both, which must outlive it.
+struct LitSurfaces {
+    const Patches& patches;
+    const std::vector<float>& exposed;  // per side: the share that no other surface covers, 0 to 1
+
+    // The area of a side that receives and sends light, m^2.
+    double exposedArea(size_t side) const {
+        return double(patches.area[side / 2]) * double(exposed[side]);
+    }
+};
+
+}  // namespace raybundle
