@@ -9,8 +9,8 @@
 namespace raybundle {
 namespace {
 
-// Vertices coincide if their distance is at most kOfObject times the extent of their object, which
-// is a rounding error, and at most kOfFace times the extent of their face.
+// Vertices coincide if rounding separates them: by at most kOfObject times the extent of their
+// object and the rounding of their coordinates, and at most kOfFace times the extent of their face.
 constexpr double kOfObject = 2e-6, kOfFace = 1e-3;
 // Faces are sorted along this unit vector. It is oblique to the axes, because many faces of a
 // regular mesh would have the same position along a row.

@@ -56,8 +56,8 @@ class FaceCutting {
   private:
     // Returns per face whether it belongs to a solid.
     std::vector<Shell> findShells() const {
-        std::vector<double> reachOf(patches.vertices.size(),
-                                    0);  // per vertex: reach of its island, m
+        // Per vertex: reach of its island, m.
+        std::vector<double> reachOf(patches.vertices.size(), 0);
         for (size_t f = 0; f < faces.count(); ++f)
             reachOf[faces.vertices[faces.offsets[f]]] =
                 double(patches.islands[sizes.island[faces.piece[f]]].reach);
@@ -149,8 +149,8 @@ class FaceCutting {
         if (!(patches.finest < INFINITY)) patches.size = patches.finest = 1;
     }
 
-    // Sets Parent::surfaceSize: 16 bits for the area of the object, then 16 for that of the
-    // surface.
+    // Sets Parent::surfaceSize. Its upper 16 bits are the area of the object, its lower 16 bits the
+    // area of the surface, both on a logarithmic scale.
     void measureSurfaces() {
         std::vector<double> ofSurface(faces.surfaceCount, 0.0),
             ofInstance(scene.instances.size(), 0.0);
