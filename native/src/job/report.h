@@ -38,11 +38,12 @@ struct Report {
         SkippedWork work;
         uint64_t count;
     };
-    // Tiles that were cut into smaller patches, and the setting that caused it.
+    // Number of tiles that were cut into smaller patches for one reason, such as "narrow gap".
     struct Cut {
         std::string why;
         uint64_t tiles = 0;
     };
+    // The result of one light set.
     struct LightSet {
         std::string name;
         double estimatedError = 0;  // relative noise

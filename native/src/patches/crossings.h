@@ -22,8 +22,8 @@
 
 namespace raybundle {
 
-// Per cell and corner: its index in Patches::vertices after welding. The fourth corner of a triangle
-// is undefined.
+// Per cell and corner: its index in Patches::vertices after welding. The fourth corner of a
+// triangle is undefined.
 using CellVertices = std::vector<std::array<uint32_t, 4>>;
 
 // The result of findCrossings().

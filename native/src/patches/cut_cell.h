@@ -36,7 +36,7 @@ constexpr double kLeastTurn = 0.05;
 // Collects the walls that meet a cell, and divides the cell along them.
 class CutCell {
   public:
-    // Constructs a cell without walls. `size` is the edge length of the largest patch of the cell, m.
+    // Constructs a cell without walls. `size` is the edge length of the cell's largest patch, m.
     CutCell(const Cell& cell, double size);
 
     // Adds the segment along which another cell passes through the plane of this one or stands on

@@ -205,7 +205,7 @@ struct Patches {
     double totalArea = 0;  // area of all parents, one side, whatever their opacity, m^2
     float size = 0;        // largest target length of the edges of tiles, m
     float finest = 0;      // smallest target length of the edges of tiles, m (patch_size.h)
-    size_t tileCount = 0;
+    size_t tileCount = 0;  // over all parents
     Warnings warnings;
     size_t degenerateFaces = 0;  // faces that were left out because they have no area
     // Corners of faces that were left out because another face in the same place stands for them.
@@ -213,6 +213,7 @@ struct Patches {
     // Whether any faces coincide, also those that could not be left out.
     bool anyCoincide = false;
 
+    // Returns the number of patches.
     size_t count() const { return area.size(); }
     // Returns the share of the light that a patch stops, 0 to 1.
     float opacityOf(uint32_t patch) const { return opacity.empty() ? 1.0f : opacity[patch]; }
@@ -232,9 +233,11 @@ struct Patches {
         const glm::vec3& front = parents[parentOf[side / 2]].normal;
         return side % 2 ? -front : front;
     }
+    // Returns the island of a side.
     const Island& islandAt(uint32_t side) const {
         return islands[parents[parentOf[side / 2]].island];
     }
+    // Returns the parent of a side.
     const Parent& parentAt(uint32_t side) const { return parents[parentOf[side / 2]]; }
     // Maps (u, v) in [0, 1]^2 to a point on a patch, uniform by area. In m, relative to `centre`.
     glm::vec3 point(uint32_t patch, glm::vec2 uv) const;

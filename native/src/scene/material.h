@@ -65,8 +65,11 @@ struct Scattering {
         return glossScale != glm::vec3(0.0f) || glossOffset != glm::vec3(0.0f) ||
                glossByAngle != AngleFactors{};
     }
+    // Returns whether the diffuse part follows another model than Lambert's.
     bool isRough() const { return diffuseModel != RB_DIFFUSE_LAMBERT; }
+    // Returns whether a layer above the diffuse part keeps some of its light back.
     bool hasLayer() const { return leaving != AngleFactors{}; }
+    // Returns whether the side reflects all light by Lambert's law.
     bool isLambert() const { return !hasGloss() && lobes.empty() && !isRough() && !hasLayer(); }
 };
 
@@ -90,6 +93,7 @@ struct MaterialSide {
     std::array<const SurfaceColor*, 3> colors() const {
         return {&reflectance, &emission, &translucence};
     }
+    // Returns whether outputs show light from some directions more than from others.
     bool showsByAngle() const {
         return shownFromAbove != glm::vec3(1.0f) || shownByAngle != AngleFactors{};
     }
@@ -112,8 +116,11 @@ struct Material {
     // Index in Scene::images, or RB_NO_IMAGE.
     int opacityImage = RB_NO_IMAGE;
 
+    // Returns whether no light passes straight through.
     bool isOpaque() const { return opacity >= 1 && opacityImage == RB_NO_IMAGE; }
+    // Returns whether either side may emit light.
     bool emits() const { return !sides[0].emission.isBlack() || !sides[1].emission.isBlack(); }
+    // Returns whether light may pass diffusely to either side.
     bool isTranslucent() const {
         return !sides[0].translucence.isBlack() || !sides[1].translucence.isBlack();
     }

@@ -146,14 +146,18 @@ class Scene {
     // Functions that add an object and return its id. Each throws Error(INVALID_ARGUMENT), with a
     // message that names the object, if the object cannot be used.
     //
-    // Pixels that are negative or not finite become black.
+    // Adds an image. Pixels that are negative or not finite become black.
     int32_t addImage(Image image);
-    // Clamps reflectances to 0.999 and adds a warning if that changes one. Images must be added
-    // before.
+    // Adds a material. Clamps reflectances to 0.999, with a warning if that changes one. Its images
+    // must be added before.
     int32_t addMaterial(Material material);
-    // Materials must be added before the meshes that use them.
+    // Adds a mesh. Its materials must be added before.
     int32_t addMesh(Mesh mesh);
+    // Adds an instance. Its mesh must be added before, and its transform must be finite.
     int32_t addInstance(Instance instance);
+    // Adds a light, and normalises the direction of a SUN. Throws if the light reaches further than
+    // kFarthest from the origin, or if its strength is above 1e15 (for an AREA: its strength times
+    // the area of the parallelogram of axisU and axisV).
     int32_t addLight(Light light);
     // Sets the constant radiance of the world, W/(m^2 sr). Negative channels count as 0. Throws
     // Error(INVALID_ARGUMENT) if it is not finite or above 1e15.
