@@ -13,8 +13,8 @@ namespace raybundle {
 // Largest number of patches. A side is stored in 24 bits (bundles/line_rows.h), and a patch has
 // two.
 constexpr size_t kMostPatches = size_t(1) << 23;
-// Number of bundles that the line counts are certain to hold, approximately, where windows have
-// finer lines for small patches (bundles/line_windows.h). With more bundles, lines have no windows.
+// Windows of finer lines for small patches (bundles/line_windows.h) are limited such that the line
+// counts can hold about this many bundles. If maxBundles is larger, there are no windows.
 constexpr int kMostWindowBundles = 1 << 16;
 
 // The settings of a bake. This struct is the only place that holds their default values. The

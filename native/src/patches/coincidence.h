@@ -22,16 +22,16 @@ enum class Shell : uint8_t { OPEN, OUTWARD, INWARD };
 std::vector<bool> closedSurfaces(const WeldedFaces& faces);
 
 // Returns per face whether it belongs to a closed surface that encloses a volume. `places` holds
-// the positions of the vertices, m. Surfaces no thicker than `thinnest` (of a vertex, m) count as
-// OPEN. So do two surfaces of one instance that coincide within rounding with opposite
-// orientations, because such a shell receives light on both sides.
+// the positions of the vertices, m. A surface counts as OPEN if it is no thicker than `thinnest`
+// returns for one of its vertices, m. Two surfaces of one instance that coincide within rounding
+// with opposite orientations also count as OPEN, because such a shell receives light on both sides.
 std::vector<Shell> shellsOfFaces(const WeldedFaces& faces, const std::vector<bool>& closed,
                                  const std::vector<glm::vec3>& places,
                                  const std::function<double(uint32_t)>& thinnest);
 
 // Returns whether parent a comes before parent b along a direction, for two parallel surfaces in
 // the same place, whose order depth cannot tell. `aEnters` is whether the direction arrives at the
-// front of parent a; `bEnters` is that of parent b.
+// front of parent a, `bEnters` whether it arrives at the front of parent b.
 //
 // The order follows from solids. A surface through which the direction leaves a solid comes first,
 // then sheets, then a surface through which the direction enters the next solid. No light then

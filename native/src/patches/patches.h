@@ -39,8 +39,8 @@ struct CutTiles {
     std::vector<uint32_t> first;
 };
 
-// A triangle or parallelogram that is projected as a unit and carries a regular grid of tiles. A
-// front is the side from which a, b turn counter-clockwise.
+// A triangle or parallelogram that is projected as a unit and carries a regular grid of tiles. Its
+// front is the side to which cross(a, b) points.
 struct Parent {
     glm::vec3 origin, a, b;  // metres, relative to Patches::centre
     glm::vec3 normal;        // of the front, unit, along cross(a, b)
