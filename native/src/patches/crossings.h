@@ -35,8 +35,8 @@ struct Crossings {
 
 // Finds the cells that walls pass through or stand on. `sizes` holds, per cell, the edge length of
 // its patches, m (cells may be smaller). Large cells are examined first, relative to their patches.
-// Once the tests exceed some per cell, or the pieces a quarter of the number of cells, the rest of
-// the cells stays whole.
+// Once the tests exceed their limit for all cells, or the pieces a quarter of the number of cells,
+// the rest of the cells stays whole.
 Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double>& sizes,
                         const CellVertices& vertices);
 

@@ -91,6 +91,7 @@ class CutCell {
     // Returns the line along edge k of the outline, without walls.
     Line edge(size_t k) const;
     double lengthOf(size_t edge) const;
+    // Adds a wall: to the edge of the outline on which the segment lies, or to the walls inside.
     void add(const Segment& segment);
     // Returns the lines along which to cut, those with the longest walls first. Segments along one
     // line are joined; lines with short walls are left out.

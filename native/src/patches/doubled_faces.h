@@ -33,9 +33,9 @@ struct DoubledFaces {
 };
 
 // Finds doubled faces. Vertices coincide if only rounding separates them. A face is doubled only if
-// both faces act alike on light: they are opaque, block and exchange light alike, have one side
-// baked, and have one material if they emit. `places` holds the positions of all vertices, m;
-// `firstVertex` is the first vertex of each instance.
+// both faces act alike on light: both are opaque, and block and exchange light alike. If both are
+// baked, they show the same side; if they emit, they have one material and one light set. `places`
+// holds the positions of all vertices, m; `firstVertex` is the first vertex of each instance.
 DoubledFaces findDoubledFaces(const Scene& scene, const WeldedFaces& faces,
                               const std::vector<size_t>& firstVertex,
                               const std::vector<glm::vec3>& places);
