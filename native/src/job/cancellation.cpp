@@ -11,14 +11,17 @@
 namespace raybundle {
 namespace {
 
+// The interval at which the calling thread repeats the last progress report, so that the caller can
+// cancel between two reports.
 constexpr std::chrono::milliseconds kEvery(20);
 
-// What the thread that works and the one that asked for it tell each other.
+// State shared by the thread that works and the calling thread, which passes reports to the caller.
 class Watch {
   public:
     explicit Watch(const Progress& progress) : progress(progress) {}
 
-    // From the working thread: a rb_progress_function, which waits for the answer.
+    // Progress function of the working thread: stores the report and waits until the calling thread
+    // has passed it on. Returns false if the bake was cancelled. `user` is the Watch.
     static bool ask(void* user, rb_stage stage, double fraction) {
         Watch& watch = *static_cast<Watch*>(user);
         std::unique_lock lock(watch.mutex);
@@ -29,6 +32,7 @@ class Watch {
         return watch.cancelled == Cancelled::NO;
     }
 
+    // Runs `body` in the working thread and stores the exception that it throws, if any.
     void work(const Work& body) {
         try {
             body(Progress(&Watch::ask, this), context);
@@ -40,7 +44,8 @@ class Watch {
         changed.notify_all();
     }
 
-    // Until the work is done.
+    // Passes reports to the caller until the work is done. Returns whether and where the caller
+    // cancelled it. Rethrows the exception of the work unless the caller cancelled.
     Cancelled answer() {
         std::unique_lock lock(mutex);
         while (!isDone) {
@@ -77,6 +82,7 @@ class Watch {
     std::exception_ptr thrown;
 };
 
+// Joins the thread when the scope ends, also by an exception.
 struct Joined {
     std::thread& thread;
     ~Joined() { thread.join(); }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Stopping a bake wherever it is. All that a bake does runs under one context of oneTBB; the thread
-// that asked for the bake tells the caller how far it is, and cancels that context where the caller
-// wants to stop. Loops look whether it is: the parallel ones do by themselves, between two pieces
-// of work, and those that take long in one thread by throwIfCancelled().
+// Cancellation of a bake at any point. All work of a bake runs under one oneTBB task group context.
+// The thread that started the bake reports its progress to the caller, and cancels the context when
+// the caller asks for it. Loops check the context: parallel loops do so by themselves between two
+// pieces of work, and long serial loops call throwIfCancelled().
 #pragma once
 
 #include <tbb/parallel_for.h>
@@ -18,38 +18,44 @@
 
 namespace raybundle {
 
-// Throws Error(CANCELLED) if what the calling thread does is part of a bake that is to stop. Takes
-// some nanoseconds.
+// Throws Error(CANCELLED) if the calling thread works for a bake that has been cancelled. Takes a
+// few nanoseconds.
 inline void throwIfCancelled() {
     if (tbb::is_current_task_group_canceling())
         throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
 }
 
-// The same at every 1024th step of a loop.
+// Calls throwIfCancelled() if `step` is a multiple of 1024. For each step of a long serial loop.
 inline void throwIfCancelledAt(size_t step) {
     if (step % 1024 == 0) throwIfCancelled();
 }
 
-// As in oneTBB. Where the bake is to stop they leave out what is not begun, and throw.
+// Calls tbb::parallel_for. If the bake is cancelled, pieces of work that have not begun are left
+// out and Error(CANCELLED) is thrown.
 template <class... Arguments>
 void parallelFor(Arguments&&... arguments) {
     tbb::parallel_for(std::forward<Arguments>(arguments)...);
     throwIfCancelled();
 }
+// Calls tbb::parallel_invoke. If the bake is cancelled, bodies that have not begun are left out and
+// Error(CANCELLED) is thrown.
 template <class... Bodies>
 void parallelInvoke(const Bodies&... bodies) {
     tbb::parallel_invoke(bodies...);
     throwIfCancelled();
 }
 
+// Whether the caller cancelled the work, and where: BETWEEN_STEPS in answer to a progress report of
+// the work, which leaves its data complete, or ANYWHERE, which may leave its data half-made.
 enum class Cancelled { NO, BETWEEN_STEPS, ANYWHERE };
 
-// Runs `work` in a thread of its own, with a progress to report to and a context that is cancelled,
-// while the calling thread passes the reports on to `progress`, and repeats what came last every 20
-// ms. Where the caller stops the work at a report it ends between two steps, else anywhere: what it
-// works on may then be half-made. Throws what the work throws. Where no thread can be started, or
-// nobody wants to know, the work runs in the calling one.
+// Work that can be cancelled. It reports to `progress` and must run its parallel loops under
+// `context`.
 using Work = std::function<void(const Progress& progress, tbb::task_group_context& context)>;
+// Runs `work` in a thread of its own. Meanwhile the calling thread passes the reports of the work
+// on to `progress`, and repeats the last one every 20 ms, so that the caller can cancel at any
+// time. Returns whether and where the caller cancelled. Throws what `work` throws. Without a
+// listener for the progress, or if no thread can be started, `work` runs in the calling thread.
 Cancelled runCancellable(const Progress& progress, const Work& work);
 
 }  // namespace raybundle

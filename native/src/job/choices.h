@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What the settings of a bake choose from. Each choice is an enum and one table, whose row for each
-// value has its name in the C interface, a line of help, and what the value can do. Other code asks
-// the enum or the table; names are for callers, messages and reports alone.
+// The values that the choices among the settings of a bake can take. Each choice is an enum and a
+// table with a row for each value: its name in the C interface, a line of help, and the abilities
+// of the value. Other code uses the enum or the table; the names are only for callers, messages and
+// reports.
 //
-// The rows stand in the order of the enum, and the first value is the default. Blender files store
-// the place of a value in the add-on's list, which has the same order: new values go to the end.
+// The rows are in the order of the enum, and the first value is the default. Blender files store a
+// value as its index in the add-on's list, which has the same order: add new values at the end.
 #pragma once
 
 #include <cstddef>
@@ -19,43 +20,45 @@ namespace raybundle {
 
 enum class Solver { LINE_REUSE, MULTIPATH, STOCHASTIC_ITERATION, RANDOM_WALK };
 
-// The bits of SolverRow::abilities.
+// Abilities of a solver: the bits of SolverRow::abilities.
 struct SolverCan {
     enum Ability : unsigned {
-        // It sends light along bundles of lines; without this it follows local rays, which have no
-        // directions to choose, no projector and no pixels.
+        // Sends light along bundles of lines. A solver without this ability follows local rays, and
+        // uses no directions, projector or pixels.
         TRACE_BUNDLES = 1 << 0,
-        // Each direction may depend on those before, as in a low-discrepancy sequence.
+        // Accepts directions that depend on the previous ones, as in a low-discrepancy sequence.
         USE_DEPENDENT_DIRECTIONS = 1 << 1,
-        // Directions may have weights other than 1.
+        // Accepts directions with weights other than 1.
         USE_WEIGHTED_DIRECTIONS = 1 << 2,
-        // Exchanges may be found by chance only and then stand for several lines.
+        // Accepts exchanges that are found only with some probability and then stand for several
+        // lines.
         USE_CHANCE_EXCHANGES = 1 << 3,
-        // It keeps the lines of all bundles as counts and solves on these. Lines may then be denser
-        // where patches are small, patches may be cut or clustered as their light asks for, and the
-        // next bake of the same geometry has new light without new lines.
+        // Keeps the lines of all bundles as counts and solves on these. Lines may then be denser
+        // where patches are small, patches may be cut or clustered according to their light, and
+        // the next bake of an unchanged geometry needs no new lines.
         COUNT_LINES = 1 << 4,
-        // It keeps the light of several light sets apart.
+        // Keeps the light of each light set separately.
         CARRY_LIGHT_SETS = 1 << 5,
-        // It knows at which angles light arrives and leaves, as needed for gloss and for all other
+        // Accounts for the angles at which light arrives and leaves, as needed for gloss and other
         // surfaces whose reflectance depends on the angle.
         CARRY_ANGLES = 1 << 6,
-        // It carries on the light that passes through translucent surfaces.
+        // Carries on the light that passes through translucent surfaces.
         CARRY_TRANSLUCENCE = 1 << 7,
-        // It finds the light of the world and of other surfaces on objects that take no part in the
+        // Computes the light of the world and of other surfaces on objects that take no part in the
         // exchange of light.
         LIGHT_WITHOUT_EXCHANGE = 1 << 8,
-        // It has a variant that follows the pseudo-code of the thesis (thesis_literal).
+        // Has a variant that follows the pseudo-code of the thesis (setting thesis_literal).
         FOLLOW_THE_THESIS = 1 << 9,
     };
 };
 
+// A row of the table of solvers. All strings are static.
 struct SolverRow {
     Solver value;
     const char* name;
     const char* help;
-    const char* whyDirections;  // why it refuses the directions that it cannot use
-    const char* whyProjectors;  // why it refuses the projectors that it cannot use
+    const char* whyDirections;  // reason in the error message for directions it cannot use
+    const char* whyProjectors;  // reason in the error message for projectors it cannot use
     unsigned abilities;         // bits of SolverCan
 };
 
@@ -93,12 +96,13 @@ inline constexpr SolverRow kSolvers[] = {
 
 enum class FirstShotKind { GATHER, SHOOT, EXTENDED };
 
+// A row of the table of first shots. All strings are static.
 struct FirstShotRow {
     FirstShotKind value;
     const char* name;
     const char* help;
-    // Each side gathers its light by itself, at the angles at which it arrives, and the light of
-    // each source can be told apart; if not, rays from the sources bring it.
+    // Whether each side gathers its light by rays of its own. Its angles of arrival and the light
+    // of each source are then known. Otherwise rays from the sources bring the light.
     bool isGathered;
 };
 
@@ -117,11 +121,12 @@ inline constexpr FirstShotRow kFirstShots[] = {
 
 enum class DirectionKind { LOW_DISCREPANCY, RANDOM, ADAPTIVE };
 
+// A row of the table of direction sequences. All strings are static.
 struct DirectionRow {
     DirectionKind value;
     const char* name;
     const char* help;
-    bool isIndependent;  // each direction is independent of those before
+    bool isIndependent;  // each direction is independent of the previous ones
     bool isWeighted;     // directions have weights other than 1
 };
 
@@ -140,13 +145,14 @@ inline constexpr DirectionRow kDirectionKinds[] = {
 
 enum class ProjectorKind { AUTO, FRAGMENT_LISTS, PAINTER, PAINTER_NEWELL, PLANE, PLANES };
 
+// A row of the table of projectors. All strings are static.
 struct ProjectorRow {
     ProjectorKind value;
     const char* name;
     const char* help;
-    bool isAutomatic;  // leaves the choice to the bake, which may need no projector
-    bool isExact;      // sees all surfaces along a line in their order
-    bool isByChance;   // finds an exchange with some probability, and has it stand for several
+    bool isAutomatic;  // leaves the choice to the bake, which may use no projector
+    bool isExact;      // finds all surfaces along a line, in order
+    bool isByChance;   // finds an exchange with some probability and gives it a larger weight
 };
 
 inline constexpr ProjectorRow kProjectorKinds[] = {
@@ -171,11 +177,12 @@ inline constexpr ProjectorRow kProjectorKinds[] = {
 
 enum class SmallPatches { CENTRE_SAMPLING, ROULETTE };
 
+// A row of the table of rules for small patches. All strings are static.
 struct SmallPatchesRow {
     SmallPatches value;
     const char* name;
     const char* help;
-    bool needsPixels;  // is no rule for single lines and local rays
+    bool needsPixels;  // works with pixels only, not with single lines or local rays
 };
 
 inline constexpr SmallPatchesRow kSmallPatches[] = {
@@ -188,9 +195,10 @@ inline constexpr SmallPatchesRow kSmallPatches[] = {
 };
 
 // --------------------------------------------------------------------------------------------
-// Choices of which only the name and the help are asked for
+// Choices whose values have only a name and a help text
 // --------------------------------------------------------------------------------------------
 
+// A row of the table of a choice without abilities. All strings are static.
 template <class Choice>
 struct NameRow {
     Choice value;
@@ -198,7 +206,7 @@ struct NameRow {
     const char* help;
 };
 
-// How light on patches becomes light at vertices (reconstruction/reconstruction.h).
+// How the light on patches becomes light at vertices (reconstruction/reconstruction.h).
 enum class Reconstruction { LEAST_SQUARES, AREA_AVERAGE, POINT };
 
 inline constexpr NameRow<Reconstruction> kReconstructions[] = {
@@ -210,7 +218,7 @@ inline constexpr NameRow<Reconstruction> kReconstructions[] = {
     {Reconstruction::POINT, "POINT", "The light at the vertices themselves, as Cycles bakes it"},
 };
 
-// Where the projector PLANES puts its planes (bundles/planes.h).
+// Where the projector PLANES places its planes (bundles/planes.h).
 enum class PlanePlacement { SYSTEMATIC, STRATIFIED, CLOSE_DISTANCE };
 
 inline constexpr NameRow<PlanePlacement> kPlanePlacements[] = {
@@ -220,7 +228,7 @@ inline constexpr NameRow<PlanePlacement> kPlanePlacements[] = {
      "Some of the planes near surfaces, so that they part what lies close together"},
 };
 
-// What a walk of the solver RANDOM_WALK counts as light (transport/random_walk.cpp).
+// Which events of a walk of the solver RANDOM_WALK contribute light (transport/random_walk.cpp).
 enum class Estimator { COLLISION, SURVIVAL, ABSORPTION };
 
 inline constexpr NameRow<Estimator> kEstimators[] = {
@@ -231,10 +239,10 @@ inline constexpr NameRow<Estimator> kEstimators[] = {
 };
 
 // --------------------------------------------------------------------------------------------
-// Looking a value up
+// Lookup of values
 // --------------------------------------------------------------------------------------------
 
-// The table of a choice; the argument only says which.
+// Returns the table of a choice. The argument only selects the overload; its value is ignored.
 constexpr const auto& rowsOf(Solver) { return kSolvers; }
 constexpr const auto& rowsOf(FirstShotKind) { return kFirstShots; }
 constexpr const auto& rowsOf(DirectionKind) { return kDirectionKinds; }
@@ -244,21 +252,25 @@ constexpr const auto& rowsOf(Reconstruction) { return kReconstructions; }
 constexpr const auto& rowsOf(PlanePlacement) { return kPlanePlacements; }
 constexpr const auto& rowsOf(Estimator) { return kEstimators; }
 
+// Returns the row of a value in the table of its choice.
 template <class Choice>
 constexpr const auto& rowOf(Choice value) {
     return rowsOf(value)[size_t(value)];
 }
 
+// Returns the name of a value in the C interface. The string is static.
 template <class Choice>
 constexpr const char* choiceName(Choice value) {
     return rowOf(value).name;
 }
 
+// Returns whether the solver has the ability.
 constexpr bool can(Solver solver, SolverCan::Ability ability) {
     return (rowOf(solver).abilities & ability) != 0;
 }
 
-// Whether a table, here or elsewhere, has one row for each value of a choice, in its order.
+// Returns whether a table has exactly one row for each value of a choice, in the order of the enum.
+// Used in static assertions, also for tables in other files.
 template <class Row, size_t count>
 constexpr bool hasEveryValue(const Row (&rows)[count]) {
     for (size_t k = 0; k < count; ++k)

@@ -8,17 +8,20 @@
 namespace raybundle {
 namespace {
 
+// Returns whether the solver works with the directions.
 bool accepts(const SolverRow& solver, const DirectionRow& directions) {
     return (directions.isIndependent || can(solver.value, SolverCan::USE_DEPENDENT_DIRECTIONS)) &&
            (!directions.isWeighted || can(solver.value, SolverCan::USE_WEIGHTED_DIRECTIONS));
 }
 
+// Returns whether the solver works with the projector.
 bool accepts(const SolverRow& solver, const ProjectorRow& projector) {
     if (!can(solver.value, SolverCan::TRACE_BUNDLES)) return projector.isAutomatic;
     return !projector.isByChance || can(solver.value, SolverCan::USE_CHANCE_EXCHANGES);
 }
 
-// What is to be chosen instead: the setting and the names of the rows that will do.
+// Returns the advice for an error message: the setting and the names of the rows for which `willDo`
+// returns true.
 template <class Row, size_t count, class WillDo>
 std::string remedy(const char* setting, const Row (&rows)[count], const WillDo& willDo) {
     std::string text;
@@ -27,16 +30,20 @@ std::string remedy(const char* setting, const Row (&rows)[count], const WillDo& 
     return std::string(setting) + " " + text;
 }
 
+// Returns the advice to choose a solver with an ability.
 std::string solversThatCan(SolverCan::Ability ability) {
     return remedy("solver", kSolvers,
                   [&](const SolverRow& row) { return can(row.value, ability); });
 }
 
+// Returns the advice to choose a rule for small patches that works without pixels.
 std::string smallPatchesWithoutPixels() {
     return remedy("small_patches", kSmallPatches,
                   [](const SmallPatchesRow& row) { return !row.needsPixels; });
 }
 
+// Throws Error(INVALID_ARGUMENT) with a message of what does not work, why, and what to choose
+// instead.
 [[noreturn]] void refuse(const std::string& what, const std::string& why,
                          const std::string& instead) {
     throw invalidArgument(what + ": " + why + "; choose " + instead);

@@ -7,8 +7,9 @@
 
 namespace raybundle {
 
-// Throws Error(INVALID_ARGUMENT) with the reason where the methods that the settings name do not
-// work together, or do not carry several light sets. Table: docs/method.md.
+// Throws Error(INVALID_ARGUMENT) with the reason if the methods chosen in `settings` do not work
+// together, or if the solver cannot keep light sets apart although `lightSetCount` > 0. The table
+// of combinations is in docs/method.md.
 void checkCombination(const Settings& settings, size_t lightSetCount);
 
 }  // namespace raybundle

@@ -8,8 +8,9 @@
 
 namespace raybundle {
 
-// The one exception type that crosses modules: a code for the caller's program and a message for
-// the user, which names the object concerned. Our own mistakes are assertions, not Errors.
+// The only exception type that crosses module borders: an error code for the calling program, and a
+// message for the user that names the object concerned. Faults of the library itself are
+// assertions, not Errors.
 class Error : public std::runtime_error {
   public:
     Error(rb_error code, const std::string& message) : std::runtime_error(message), code(code) {}
@@ -17,7 +18,7 @@ class Error : public std::runtime_error {
     const rb_error code;
 };
 
-// What the user gave cannot be used as it is.
+// Returns an Error(INVALID_ARGUMENT), for input that cannot be used. The caller throws it.
 inline Error invalidArgument(const std::string& message) {
     return Error(RB_ERROR_INVALID_ARGUMENT, message);
 }

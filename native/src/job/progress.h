@@ -8,26 +8,29 @@
 
 namespace raybundle {
 
-// Tells the caller which stage of a bake runs and how far it is, and lets the caller cancel. Used
-// from the thread that runs the bake alone.
+// Reports the progress of a bake to the caller and lets the caller cancel. A Progress made by the
+// default constructor reports to nobody. Call its functions only from the thread that runs the
+// bake. Copies report to the same function.
 class Progress {
   public:
     Progress() = default;
+    // Reports to `function` with its argument `user`. Both must outlive the Progress and its
+    // copies.
     Progress(rb_progress_function function, void* user) : function(function), user(user) {}
 
-    // Reports the share (0 to 1) of a stage that is done. Throws Error(CANCELLED) if the caller
-    // wants to stop.
+    // Reports the completed share (0 to 1) of a stage. Throws Error(CANCELLED) if the caller
+    // cancels.
     void report(rb_stage stage, double fraction) const {
         if (!tell(stage, fraction)) throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
     }
-    // The same; returns whether the caller wants to go on.
+    // Reports the completed share (0 to 1) of a stage. Returns false if the caller cancels.
     bool tell(rb_stage stage, double fraction) const {
         return !function || function(user, stage, begin + share * fraction);
     }
-    // Whether there is anyone to report to.
+    // Returns whether there is a progress function to report to.
     bool isHeard() const { return function != nullptr; }
 
-    // For the k-th of n equal parts of what a stage does.
+    // Returns a Progress whose range 0 to 1 is the part k (from 0) of n equal parts of this one.
     Progress part(size_t k, size_t n) const {
         Progress progress = *this;
         progress.share = share / double(n);
@@ -38,6 +41,7 @@ class Progress {
   private:
     rb_progress_function function = nullptr;
     void* user = nullptr;
+    // The part of the stage that this Progress covers: where it begins, and its length.
     double begin = 0, share = 1;
 };
 

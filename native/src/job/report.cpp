@@ -12,34 +12,39 @@
 namespace raybundle {
 namespace {
 
-// Of the whole process so far.
+// Returns the peak resident memory of the whole process so far, in bytes.
 int64_t peakMemoryBytes() {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     return int64_t(usage.ru_maxrss) * 1024;
 }
 
-// Text of strings and numbers by nlohmann; objects and arrays are put together here, since its own
-// allocate when they are destroyed: without memory the process would end.
+// Functions that build JSON text. Only strings and numbers go through nlohmann::json. Its objects
+// and arrays allocate in their destructors, which would end the process when memory runs out, so
+// that this file joins them as text.
+//
+// Returns a string or number as JSON.
 template <class T>
 std::string text(const T& value) {
-    // Names that are not UTF-8 must not lose the report.
+    // Replace invalid bytes, so that names that are not UTF-8 do not make the report fail.
     return nlohmann::json(value).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+// Returns the items separated by commas, between the brackets `first` and `last`.
 std::string listed(const std::vector<std::string>& items, char first, char last) {
     std::string joined(1, first);
     for (const std::string& item : items) joined += (joined.size() > 1 ? ",\n" : "") + item;
     return joined + last;
 }
 
-// Keys with the text of their values.
+// Returns a JSON object of keys and the JSON text of their values.
 std::string object(const std::vector<std::pair<const char*, std::string>>& members) {
     std::vector<std::string> items;
     for (const auto& [key, value] : members) items.push_back(text(key) + ": " + value);
     return listed(items, '{', '}');
 }
 
+// Returns a JSON array of the texts that `textOf` returns for the items. Empty texts are left out.
 template <class Items, class TextOf>
 std::string array(const Items& items, const TextOf& textOf) {
     std::vector<std::string> texts;

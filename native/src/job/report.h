@@ -15,27 +15,35 @@
 
 namespace raybundle {
 
+// What a bake reports: times, counts, errors, warnings and skipped work. json() is its text.
 struct Report {
-    // Relative RMS by exposed area; what each covers: stated_error/stated_error.h.
+    // Parts of the stated error: relative RMS, weighted by exposed area.
+    // stated_error/stated_error.h defines what each part covers.
     struct Errors {
         double noise = 0, discretisation = 0, mesh = 0;
-        double ofPatches = 0;  // the noise of the patches, of which `noise` is shown
-        double total() const;  // with that: on the safe side
+        double ofPatches = 0;  // noise of the light on patches; `noise` is that at corners
+        // Returns the root of the sum of the squares of the parts. Noise counts with the larger of
+        // `noise` and `ofPatches`, to be on the safe side.
+        double total() const;
     };
+    // The result of one object.
     struct Object {
         std::string name;
         size_t corners = 0;
         std::string status;
         Errors error{};  // relative to the object's own light
     };
+    // Work that was left out, and how many times.
     struct Skip {
         SkippedWork work;
         uint64_t count;
     };
+    // Number of tiles that were cut into smaller patches for one reason, such as "narrow gap".
     struct Cut {
         std::string why;
         uint64_t tiles = 0;
     };
+    // The result of one light set.
     struct LightSet {
         std::string name;
         double estimatedError = 0;  // relative noise
@@ -43,28 +51,30 @@ struct Report {
     std::array<double, 5> seconds{};  // per rb_stage
     double totalSeconds = 0;
     size_t patches = 0;
-    std::vector<Cut> cuts;  // of tiles into patches
+    std::vector<Cut> cuts;  // tiles that were cut into patches
     uint32_t bundles = 0;
     uint64_t lines = 0;
-    size_t exchanges = 0;  // merged pairs of patch sides
+    size_t exchanges = 0;  // distinct pairs of patch sides that exchange light
     uint64_t shadowRays = 0;
-    double estimatedError = 0;                      // relative noise of the patch sides
-    Errors error;                                   // of what is shown
+    double estimatedError = 0;  // relative noise of the irradiance on patch sides
+    Errors error;               // of the shown light
     double emitted = 0, absorbed = 0, escaped = 0;  // W, sum of the channels
     std::vector<LightSet> lightSets;
     std::vector<Object> objects;
     Warnings warnings;
     std::vector<Skip> skipped;
 
+    // Adds a warning.
     void warn(WarningId id, std::string text) { warnings.push_back({id, std::move(text)}); }
-    // Notes that `count` times such work was left out; 0 leaves no line in the report.
+    // Notes that work was left out `count` times. The report leaves out entries whose count is 0.
     void skip(SkippedWork work, uint64_t count) { skipped.push_back({work, count}); }
     // Appends the warnings and the skipped work of another report.
     void addNotesOf(Report other);
 
-    // |emitted - absorbed - escaped| / emitted
+    // Returns |emitted - absorbed - escaped| / emitted, or 0 if nothing is emitted.
     double balanceError() const;
-    // The whole report; keys as in docs/c_api.md.
+    // Returns the report as UTF-8 JSON. docs/c_api.md lists its keys. Its peak memory is that of
+    // the process at the time of the call.
     std::string json() const;
 };
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The table of all settings of a bake: the name in the C interface, a line of help, the member of
-// Settings, the range and the unit. Defaults are those of Settings itself. rb_get_setting_info
-// gives the table to callers; tests compare the add-on's properties and docs/c_api.md with it.
+// Settings, the range and the unit. Default values are those of Settings itself.
+// rb_get_setting_info returns the rows to callers. Tests compare the add-on's properties and
+// docs/c_api.md with the table.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +15,7 @@
 
 namespace raybundle {
 
+// A row of the table of settings. All strings are static.
 struct Setting {
     const char* name;
     const char* help;
@@ -21,11 +23,11 @@ struct Setting {
                  DirectionKind Settings::*, ProjectorKind Settings::*, SmallPatches Settings::*,
                  Reconstruction Settings::*, PlanePlacement Settings::*, Estimator Settings::*>
         member;
-    double least = 0, most = 1;  // of numbers, both allowed; 0 and 1 are those of a switch
-    const char* unit = "";       // "": a number without one
+    double least = 0, most = 1;  // inclusive range of a number; a switch is an int from 0 to 1
+    const char* unit = "";       // "" for a number without a unit
 };
 
-// The type of a value, from that of a pointer to its member.
+// The type of a member of Settings, from the type of the pointer to it.
 template <class Member>
 using ValueOf = std::decay_t<decltype(std::declval<Settings&>().*std::declval<Member>())>;
 
@@ -85,7 +87,8 @@ inline constexpr Setting kSettings[] = {
      "other surfaces at the vertices too, where it changes between them",
      &Settings::finalGather},
 
-    // Skips (job/skips.h): 0 does the work although the scene does not need it.
+    // Skips (job/skips.h). A skip that is 0 makes the bake do the work although the scene does not
+    // need it.
     {"skip.darkness", "Leave out bundles and solve if no light reaches any surface",
      &Settings::skipDarkness},
     {"skip.reflection",

@@ -7,7 +7,8 @@
 namespace raybundle {
 namespace {
 
-// The setting of a name, if isOfType(its pointer to a member).
+// Returns the setting `name` if `isOfType` accepts its pointer to member. Throws
+// Error(INVALID_ARGUMENT) if there is none.
 template <class IsOfType>
 const Setting& find(const std::string& name, const IsOfType& isOfType) {
     for (const Setting& setting : kSettings)
@@ -15,12 +16,16 @@ const Setting& find(const std::string& name, const IsOfType& isOfType) {
     throw invalidArgument("there is no setting \"" + name + "\" of this type");
 }
 
+// Returns the setting `name` whose values are of the type Number (int or float). Throws
+// Error(INVALID_ARGUMENT) if there is none.
 template <class Number>
 const Setting& findNumber(const std::string& name) {
     return find(name,
                 [](auto member) { return std::is_same_v<ValueOf<decltype(member)>, Number>; });
 }
 
+// Returns the setting `name` whose values are a choice. Throws Error(INVALID_ARGUMENT) if there is
+// none.
 const Setting& findChoice(const std::string& name) {
     return find(name, [](auto member) { return std::is_enum_v<ValueOf<decltype(member)>>; });
 }
@@ -30,6 +35,8 @@ Number Settings::*memberOf(const Setting& setting) {
     return std::get<Number Settings::*>(setting.member);
 }
 
+// Sets a number. Throws Error(INVALID_ARGUMENT) if the setting does not exist or the value is out
+// of range or NaN.
 template <class Number>
 void setNumber(Settings& settings, const std::string& name, Number value) {
     const Setting& setting = findNumber<Number>(name);
@@ -40,7 +47,8 @@ void setNumber(Settings& settings, const std::string& name, Number value) {
     settings.*memberOf<Number>(setting) = value;
 }
 
-// Throws if the choice has no value of this name.
+// Returns the value of a choice by its name. Throws Error(INVALID_ARGUMENT) if the choice has no
+// value of this name.
 template <class Choice>
 Choice chosen(const std::string& name, const std::string& value) {
     std::string known;
@@ -81,7 +89,7 @@ const char* Settings::get(const std::string& name) const {
             if constexpr (std::is_enum_v<ValueOf<decltype(member)>>)
                 return choiceName(this->*member);
             else
-                return nullptr;  // no choice, which findChoice() has refused
+                return nullptr;  // unreachable: findChoice() accepts only choices
         },
         findChoice(name).member);
 }

@@ -10,14 +10,16 @@
 
 namespace raybundle {
 
-// The number of a side takes 24 bits (bundles/line_rows.h).
+// Largest number of patches. A side is stored in 24 bits (bundles/line_rows.h), and a patch has
+// two.
 constexpr size_t kMostPatches = size_t(1) << 23;
-// Where small patches have finer lines (bundles/line_windows.h), at least about so many bundles can
-// be counted.
+// Windows of finer lines for small patches (bundles/line_windows.h) are limited such that the line
+// counts can hold about this many bundles. If maxBundles is larger, there are no windows.
 constexpr int kMostWindowBundles = 1 << 16;
 
-// Settings of a bake and, in this one place, their defaults. What each one means, its name in the C
-// interface, its range and unit are in job/setting_table.h; an int of 0 or 1 is a switch.
+// The settings of a bake. This struct is the only place that holds their default values. The
+// meaning, the name in the C interface, the range and the unit of each are in job/setting_table.h.
+// An int with the range 0 to 1 is a switch.
 struct Settings : Skips {
     float targetError = 0.02f;
     float patchSize = 0;
@@ -45,9 +47,9 @@ struct Settings : Skips {
     Estimator estimator = Estimator::COLLISION;
     int thesisLiteral = 0;
 
-    // By the names of the table. Throw Error(INVALID_ARGUMENT) for unknown names, other types, and
-    // values out of range. Choices are set and read by the names of their values, which are in
-    // static memory.
+    // Set or get the setting `name` of job/setting_table.h. The value of a choice is passed as its
+    // name; the returned name is static. All throw Error(INVALID_ARGUMENT) if there is no setting
+    // of this name and type. The setters also throw if the value is out of range.
     void set(const std::string& name, int value);
     void set(const std::string& name, float value);
     void set(const std::string& name, const std::string& value);
@@ -55,18 +57,19 @@ struct Settings : Skips {
     void get(const std::string& name, float& value) const;
     const char* get(const std::string& name) const;
 
-    // Whether the solver keeps the lines of all bundles as counts (SolverCan::COUNT_LINES).
+    // Returns whether the solver keeps the lines of all bundles as counts (SolverCan::COUNT_LINES).
     bool countsLines() const { return can(solver, SolverCan::COUNT_LINES); }
-    // Whether the sides gather the light of the sources, rather than being met by rays from them.
+    // Returns whether sides gather the light of the sources. Otherwise the sources send rays to
+    // sides.
     bool gathersFirstShot() const { return rowOf(firstShot).isGathered; }
-    // Whether lines may be denser where patches are small.
+    // Returns whether lines may be denser where patches are small, in windows of finer pixels.
     bool hasLineWindows() const {
         return countsLines() && isProjectionExact() && linesPerBundle == 0 &&
                maxBundles <= kMostWindowBundles;
     }
-    // Whether each bundle's direction is independent of those before.
+    // Returns whether the direction of each bundle is independent of the previous ones.
     bool hasIndependentDirections() const { return rowOf(directions).isIndependent; }
-    // Whether the projector sees all surfaces along a line.
+    // Returns whether the projector finds all surfaces along a line, in order.
     bool isProjectionExact() const {
         return rowOf(projector).isExact && smallPatches == SmallPatches::CENTRE_SAMPLING &&
                linesPerBundle != 1;

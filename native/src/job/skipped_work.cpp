@@ -7,7 +7,7 @@
 namespace raybundle {
 namespace {
 
-// In the order of SkippedWork.
+// Texts of the report, in the order of SkippedWork.
 constexpr SkippedText kTexts[] = {
     {"EXCHANGE_WITHOUT_LIGHT", "bundles and solve", "there is no light to exchange"},
     {"EXCHANGE_WITHOUT_REFLECTION", "bundles and solve", "no surface reflects light"},

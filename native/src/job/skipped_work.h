@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Work that a bake has left out, as its report says it: an identifier for programs and tests, what
-// was left out, and the condition that made that safe.
+// Work that a bake has left out, as stated in its report: an identifier for programs and tests,
+// what was left out, and the condition that made leaving it out safe.
 #pragma once
 
 #include <cstdint>
 
 namespace raybundle {
 
-// The identifiers are part of the report (docs/c_api.md): once released, none changes its meaning.
+// Kinds of work that a bake can leave out. Their names are identifiers of the report
+// (docs/c_api.md): the meaning of a released name never changes.
 enum class SkippedWork {
     EXCHANGE_WITHOUT_LIGHT,
     EXCHANGE_WITHOUT_REFLECTION,
@@ -35,12 +36,13 @@ enum class SkippedWork {
     OCCLUDERS
 };
 
-// One line of the report's list of what was skipped. Static memory.
+// The texts of an entry in the report's list of skipped work. All strings are static.
 struct SkippedText {
-    const char* id;    // "EXCHANGE_WITHOUT_LIGHT" and so on
+    const char* id;    // identifier, such as "EXCHANGE_WITHOUT_LIGHT"
     const char* what;  // what was left out
-    const char* why;   // the condition that made that safe
+    const char* why;   // the condition that made leaving it out safe
 };
+// Returns the texts of a kind of skipped work. The reference is to static memory.
 const SkippedText& textOf(SkippedWork work);
 
 }  // namespace raybundle

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Work that a bake leaves out where the scene does not need it. Each skip can be switched off by
-// the setting "skip.NAME", to test that the result stays the same and to measure what it saves; all
-// are on by default. What each leaves out, and when, is said in job/setting_table.h.
+// Work that a bake leaves out if the scene does not need it. The setting "skip.NAME" switches each
+// skip off, to test that the result stays equal and to measure what the skip saves. All skips are
+// on by default. job/setting_table.h states what each leaves out, and when.
 #pragma once
 
 namespace raybundle {
 
+// Switches of the skips: 1 leaves the work out if possible, 0 always does it.
 struct Skips {
-    // Proofs: the result is the same to rounding.
+    // Skips that are proofs: they change the result only by rounding.
     int skipDarkness = 1;
     int skipReflection = 1;
     int skipGeometry = 1;
@@ -17,7 +18,7 @@ struct Skips {
     int skipSheets = 1;
     int skipOccluders = 1;
     int skipLampInsides = 1;
-    // Within the stated error.
+    // Skips that change the result by less than the stated error.
     int skipLit = 1;
     int skipWeak = 1;
     int skipInside = 1;

@@ -14,11 +14,12 @@
 namespace raybundle {
 namespace {
 
-// oneTBB counts the processors at its first use, and where memory runs out in that, every later use
-// waits forever (2021.8: atomic_do_once stays pending when what it runs throws); and it looks for
-// libraries of its own, in which glibc ends the process where there is no memory to say that there
-// is none. So both are done when the library is loaded, before there is a scene that could take the
-// memory.
+// Initialises oneTBB when the library is loaded, before there is a scene that could take the
+// memory. Returns false if there is not enough memory. Running out of memory at the first use would
+// be fatal for two reasons. oneTBB counts the processors at its first use, and if that throws,
+// every later use waits forever (2021.8: atomic_do_once stays pending when its function throws).
+// oneTBB also looks for its own libraries then, and glibc ends the process if there is no memory to
+// report a missing one.
 bool prepare() noexcept {
     try {
         tbb::task_arena().initialize();
@@ -29,8 +30,9 @@ bool prepare() noexcept {
 }
 const bool isPrepared = prepare();
 
-// Starts threads until there are as many at once, with the caller's, or no more can be. oneTBB
-// keeps those that it has, so that what went once is not tried again.
+// Returns how many of `wanted` threads can exist at once, the caller's included, by starting as
+// many. The largest number reached is remembered and not tried again, because oneTBB keeps the
+// threads that it has.
 int startable(int wanted) {
     static std::mutex mutex;
     static int known = 1;
@@ -42,7 +44,7 @@ int startable(int wanted) {
     try {
         while (int(threads.size()) + 1 < wanted) threads.emplace_back([ended] { ended.wait(); });
     } catch (const std::exception&) {
-        // No more threads, or no memory for them.
+        // The system allows no more threads, or there is no memory for them.
     }
     end.set_value();
     for (std::thread& thread : threads) thread.join();

@@ -7,15 +7,19 @@
 
 namespace raybundle {
 
-// The threads of a bake while it lives. oneTBB ends the process where one of its threads cannot
-// start another (2021.8: private_worker::run is noexcept and launches), and so whether as many can
-// be started is tried before; else it gets as many as could.
+// The number of threads of a bake. oneTBB ends the process if one of its threads cannot start
+// another one (2021.8: private_worker::run is noexcept and starts the thread). The constructor
+// therefore tries how many threads can be started, and limits oneTBB to that number for the
+// lifetime of the object.
 class Threads {
   public:
-    // asked: 0 is as many as oneTBB takes, which is also the most.
+    // Finds how many threads can be used. `asked` is the setting: at most that many, or as many as
+    // oneTBB allows if it is 0. Throws std::bad_alloc if oneTBB could not be initialised.
     explicit Threads(int asked);
 
-    int wanted = 1, count = 1;  // with the caller's
+    // Threads that the bake was to use, and threads that it can use. Both include the calling
+    // thread.
+    int wanted = 1, count = 1;
 
   private:
     std::optional<tbb::global_control> limit;

@@ -6,7 +6,7 @@
 namespace raybundle {
 namespace {
 
-// In the order of WarningId.
+// Names in the order of WarningId.
 constexpr const char* kNames[] = {
     "CLAMPED_REFLECTANCE", "DEGENERATE_FACES", "DOUBLED_FACES",   "UNCUT_CROSSINGS",
     "FEWER_THREADS",       "NO_FACES",         "NO_LIGHT",        "DARK_LIGHT_SET",

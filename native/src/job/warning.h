@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What a bake warns of: an identifier for programs and tests, and a sentence for the user that
-// names the object concerned and says what to do.
+// The warnings of a bake: an identifier for programs and tests, and a sentence for the user that
+// names the object concerned and states what to do.
 #pragma once
 
 #include <string>
@@ -9,7 +9,8 @@
 
 namespace raybundle {
 
-// The identifiers are part of the report (docs/c_api.md): once released, none changes its meaning.
+// Kinds of warnings. Their names are identifiers of the report (docs/c_api.md): the meaning of a
+// released name never changes.
 enum class WarningId {
     CLAMPED_REFLECTANCE,
     DEGENERATE_FACES,
@@ -39,9 +40,11 @@ enum class WarningId {
     COARSE_MESH
 };
 
-// The identifier as the report has it, "CLAMPED_REFLECTANCE" and so on. Static memory.
+// Returns the identifier as it is in the report, such as "CLAMPED_REFLECTANCE". The string is
+// static.
 const char* nameOf(WarningId id);
 
+// A warning of a bake.
 struct Warning {
     WarningId id;
     std::string text;  // UTF-8, for the user

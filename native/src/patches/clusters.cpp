@@ -13,13 +13,15 @@
 namespace raybundle {
 namespace {
 
-// Cells of the normals along each edge of the octahedron that they are mapped to: some 25 degrees.
+// Cells of normals along each edge of the square to which the octahedral map takes the sphere. A
+// cell is some 25 degrees wide.
 constexpr int kNormalCells = 8;
-// Width of a cell of places, of a tile.
+// Width of a cell of positions, relative to the target edge of a tile.
 constexpr float kWidth = 0.5f;
-// Patches of more than this share of a cell's area stand for themselves.
+// Patches larger than this share of a cell's area are in no cluster.
 constexpr float kSmall = 0.25f;
 
+// Returns the cell of a unit normal, by the octahedral map.
 int cellOf(const glm::vec3& normal) {
     const glm::vec3 a = glm::abs(normal);
     glm::vec2 p = glm::vec2(normal) / (a.x + a.y + a.z);
@@ -32,7 +34,7 @@ int cellOf(const glm::vec3& normal) {
     return cell(p.x) * kNormalCells + cell(p.y);
 }
 
-// Surface, object and material, cell of the normal, cell of the place.
+// Surface, object, material, cell of the normal, and cell of the position (3 numbers).
 using Key = std::array<uint32_t, 7>;
 struct HashOf {
     size_t operator()(const Key& key) const {
@@ -73,7 +75,7 @@ Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&
                       all.translucenceOf(2 * patch) == glm::vec3(0.0f) &&
                       all.translucenceOf(2 * patch + 1) == glm::vec3(0.0f);
     const std::vector<uint32_t> cluster = findClusters(all, isIn);
-    std::vector<uint32_t> numberOf;  // per cluster, once it has one
+    std::vector<uint32_t> numberOf;  // per cluster with patches so far, its patch of `joined`
     std::vector<uint32_t> number(all.count()), size;
     for (uint32_t patch = 0; patch < number.size(); ++patch) {
         uint32_t own = uint32_t(size.size());
@@ -108,7 +110,8 @@ Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&
     for (Parent& parent : joined->parents) parent.firstPatch = numbers[parent.firstPatch];
     for (uint32_t k = 0; k < size.size(); ++k) {
         throwIfCancelledAt(k);
-        // The largest one's place is that of all; of equal ones, the first one's.
+        // The first member gives the position of the cluster. It is the largest member, or the
+        // first of several that are equally large.
         const auto from = memberList.begin() + first[k], to = memberList.begin() + first[k + 1];
         std::iter_swap(from, std::max_element(from, to, [&](uint32_t a, uint32_t b) {
                            return all.area[a] < all.area[b];

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Clusters: patches of several faces. Where a mesh is finer than the tiles that light is exchanged
-// by, and its light is not shown, what surfaces around get from it is that of many patches
-// together: those of one surface that lie within a part of a tile's width and face alike exchange
-// light as one, so that the work follows the light and not the triangles.
+// Clusters of patches that exchange light as one patch. They are used where a mesh is finer than
+// the tiles between which light is exchanged and its light is not shown. Surfaces around then
+// receive only the sum of the light of many patches. A cluster consists of patches of one surface
+// that lie within part of a tile's width and face in similar directions. The cost of transport thus
+// follows the light and not the number of triangles.
 //
-// Sources: Willmott, Heckbert and Garland, "Face Cluster Radiosity" (1999). Lines count for a patch
-// of any shape: c_ij / m_i is its form factor however many faces it has, lines between two of them
-// included.
-// Differs: clusters are cells of a grid and not a hierarchy, and only what is not shown is in any:
-// its light is needed on others alone, which are lit by many clusters.
+// Sources: Willmott, Heckbert and Garland, "Face Cluster Radiosity" (1999). Lines can be counted
+// for a patch of any shape: c_ij / m_i is its form factor however many faces it consists of, lines
+// between two of its own faces included.
+// Differs: clusters are cells of a grid and not a hierarchy. Only patches whose light is not shown
+// are in clusters. Their light is needed only on other surfaces, each of which receives light of
+// many clusters.
 #pragma once
 
 #include <cstdint>
@@ -21,54 +23,63 @@
 
 namespace raybundle {
 
+// Stands for no cluster.
 constexpr uint32_t kNoCluster = UINT32_MAX;
 
-// Per patch, the number of the cluster that it would be in: of one surface, object and material,
-// near each other, facing alike; kNoCluster of those that are too large for any, and where `isIn`
-// (per patch) is false. The numbers are those from 0 on, in the order of the patches.
+// Returns for each patch the number of the cluster that it belongs to. The patches of a cluster
+// belong to one surface, object and material, are near each other and face in similar directions. A
+// patch is in no cluster (kNoCluster) if it is too large or `isIn` (per patch) is false. Numbers
+// begin at 0, in the order in which the patches first use them.
 std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn);
 
-// What light is exchanged between: the patches that are in no cluster, and clusters, each as one
-// patch.
+// The units between which light is exchanged: clusters, and the patches in no cluster. Each of them
+// is represented as one patch of patches().
 class Clusters {
   public:
-    // Without any cluster. `all` must outlive the object and stay where it is.
+    // Makes an object without clusters, where patches() is `all`. Keeps a reference to `all`.
     explicit Clusters(const Patches& all) : all(&all) {}
-    // Of patches that let no light through and neither of whose sides is shown (isShown: per side).
+    // Forms clusters of opaque patches that are not translucent and none of whose sides is shown.
+    // `isShown` is per side. Keeps a reference to `all`.
     Clusters(const Patches& all, const std::vector<bool>& isShown);
 
+    // Returns whether there are no clusters, so that patches() is members().
     bool isNone() const { return !joined; }
-    // Whether they are the same patches, whatever these reflect and emit.
+    // Returns whether both objects have equal clusters of equal patches, whatever the patches
+    // reflect and emit.
     bool areThoseOf(const Clusters& other) const { return numbers == other.numbers; }
-    // The patches that are in a cluster with others.
+    // Returns the number of patches that share their cluster with other patches.
     size_t memberCount() const;
 
-    // One a cluster, and one for each patch that is in none. Each has the place and the normal of
-    // the largest of its patches, the area of all and the mean of what they reflect and emit; all
-    // parents of a cluster have it as theirs. There are no cells and no sheets.
+    // Returns the patches between which light is exchanged: one for each cluster, and one for each
+    // patch in no cluster. A cluster has the position and the normal of its largest patch, the
+    // total area, and the means of reflectance and emission. All parents of a cluster refer to its
+    // patch. The result has no cells and no sheets.
     const Patches& patches() const { return joined ? *joined : *all; }
 
-    // The patches that these are made of.
+    // Returns the patches from which the clusters are formed.
     const Patches& members() const { return *all; }
 
-    // The side among those of patches() that a side of `all` is part of.
+    // Returns the side of patches() that contains a side of members().
     uint32_t sideOf(uint32_t side) const {
         return isNone() ? side : 2 * numbers[side / 2] + side % 2;
     }
-    // One of the sides of `all` that a side of patches() is made of, in turns by k.
+    // Returns a side of members() that is part of a side of patches(). Consecutive values of `k`
+    // run through all these sides in a cycle.
     uint32_t memberOf(uint32_t side, uint32_t k) const {
         if (isNone()) return side;
         const uint32_t begin = first[side / 2], count = first[side / 2 + 1] - begin;
         return 2 * memberList[begin + k % count] + side % 2;
     }
-    // Calls visit(patch, its share of the area) for the patches that one of patches() is made of.
+    // Calls visit(member, share) for each patch of members() that is part of `patch` of patches().
+    // `share` is the member's share of the area, and the shares add up to 1. Only if !isNone().
     template <class Visit>
     void forEachMember(uint32_t patch, const Visit& visit) const {
         for (uint32_t k = first[patch]; k < first[patch + 1]; ++k)
             visit(memberList[k], all->area[memberList[k]] / joined->area[patch]);
     }
 
-    // Means by area over each side of patches(), of values per side of `all`; stays empty.
+    // Returns the means by area over each side of patches() of values per side of members().
+    // Returns an empty vector if `values` is empty.
     template <class Value>
     std::vector<Value> mean(const std::vector<Value>& values) const {
         if (isNone() || values.empty()) return values;
@@ -79,7 +90,8 @@ class Clusters {
             });
         return means;
     }
-    // From values per side of patches() to values per side of `all`; stays empty.
+    // Returns for each side of members() the value of the side of patches() that contains it.
+    // Returns an empty vector if `values` is empty.
     template <class Value>
     std::vector<Value> spread(const std::vector<Value>& values) const {
         if (isNone() || values.empty()) return values;
@@ -89,12 +101,16 @@ class Clusters {
     }
 
   private:
+    // Sets the reflectance, emission, translucence and scattering of `joined`.
     void takeMaterials();
 
     const Patches* all;
     std::optional<Patches> joined;
-    std::vector<uint32_t> numbers;  // per patch of `all`; empty where there are no clusters
-    std::vector<uint32_t> first, memberList;  // per patch of `joined`
+    // Per patch of `all`, its patch of `joined`. Empty if there are no clusters.
+    std::vector<uint32_t> numbers;
+    // Patch k of `joined` consists of the patches of `all` in memberList, from position first[k] to
+    // first[k + 1] - 1.
+    std::vector<uint32_t> first, memberList;
 };
 
 }  // namespace raybundle

@@ -11,28 +11,29 @@
 namespace raybundle {
 namespace {
 
-// Of two parts in the same place, relative.
+// Relative difference of the volumes up to which two surfaces are taken for one.
 constexpr double kSameVolume = 1e-4;
 
-// Where a closed surface lies and what it encloses.
+// Bounds and measures of a closed surface.
 struct Part {
     glm::vec3 low{INFINITY}, high{-INFINITY};
-    double volume = 0;  // negative: turned inwards
-    double area = 0;
-    uint32_t instance = 0;         // of its first face
-    uint32_t vertex = UINT32_MAX;  // its first
+    double volume = 0;             // m^3; negative if the fronts look inwards
+    double area = 0;               // m^2
+    uint32_t instance = 0;         // instance of the first face
+    uint32_t vertex = UINT32_MAX;  // first vertex; UINT32_MAX if the surface is not closed
     bool isSolid = false;
 
-    // Whether another part lies in the same place, within what rounding does to it.
+    // Returns whether the bounding boxes coincide within `rounding`, m.
     bool isWhere(const Part& other, double rounding) const {
         const glm::vec3 off = glm::max(glm::abs(other.low - low), glm::abs(other.high - high));
         return double(std::max({off.x, off.y, off.z})) <= rounding;
     }
-    // Double: both sides of a slab.
+    // Returns the mean thickness, m. It is twice the volume over the area, because a slab has its
+    // area on both sides.
     double thickness() const { return area > 0 ? 2 * std::abs(volume) / area : 0; }
 };
 
-// Per surface; those that are not closed stay empty.
+// Returns the measures of each surface. Surfaces that are not closed keep the default values.
 std::vector<Part> measured(const WeldedFaces& faces, const std::vector<glm::vec3>& places,
                            const std::vector<bool>& closed) {
     std::vector<Part> parts(faces.surfaceCount);
@@ -46,7 +47,8 @@ std::vector<Part> measured(const WeldedFaces& faces, const std::vector<glm::vec3
             part.vertex = faces.vertices[begin];
             part.instance = faces.instance[f];
         }
-        // From a place of the part: far from the origin digits would be lost.
+        // Measure the volume from a vertex of the surface: from a far origin, differences would
+        // lose their digits.
         const glm::dvec3 origin(places[part.vertex]), first(place(begin));
         glm::dvec3 doubled(0.0);
         for (size_t c = begin; c < end; ++c) {

@@ -12,31 +12,34 @@
 
 namespace raybundle {
 
-// Whether a surface encloses a volume, and whether its faces wind about that outwards.
+// Whether a surface encloses a volume, and whether the fronts of its faces look out of that volume
+// (OUTWARD) or into it (INWARD).
 enum class Shell : uint8_t { OPEN, OUTWARD, INWARD };
 
-// Per surface: whether it is closed, that is, whether each edge of it has as many faces on one side
-// as on the other, which turn alike. (Where two boxes with split edges stand against each other,
-// welded edges have four faces.)
+// Returns per surface whether it is closed: along each edge, as many faces run in one direction as
+// in the other. An edge may have more than two faces. For example, welded edges have four faces
+// where two boxes with split edges stand against each other.
 std::vector<bool> closedSurfaces(const WeldedFaces& faces);
 
-// Per face: whether it belongs to a closed surface that encloses a volume. places: of the vertices,
-// metres. Surfaces that are no thicker than `thinnest` (per vertex, metres) do not, and neither do
-// two of one instance that lie in the same place, within rounding, and are turned each to another
-// side: such a shell has light on both sides.
+// Returns per face whether it belongs to a closed surface that encloses a volume. `places` holds
+// the positions of the vertices, m. A surface counts as OPEN if it is no thicker than `thinnest`
+// returns for one of its vertices, m. Two surfaces of one instance that coincide within rounding
+// with opposite orientations also count as OPEN, because such a shell receives light on both sides.
 std::vector<Shell> shellsOfFaces(const WeldedFaces& faces, const std::vector<bool>& closed,
                                  const std::vector<glm::vec3>& places,
                                  const std::function<double(uint32_t)>& thinnest);
 
-// Which of two parallel surfaces that lie in the same place comes first along a direction. Depth
-// cannot tell, but solids can: the surface by which the direction leaves a solid comes before any
-// sheet between, and that before the surface by which it enters the next solid; so nothing shines
-// between a cupboard and the wall it stands against. Of sheets, those whose fronts the direction
-// looks at come before those that it sees from behind. Of two of a kind the smaller one lies on the
-// front of the larger one, as a lamp or a picture on a wall does, whatever their order in the
-// scene; only where they are as large their indices decide, the same from both directions. (Of
-// surfaces that meet at an angle, depth knows the order.) aEnters: the direction looks at the front
-// of parent a.
+// Returns whether parent a comes before parent b along a direction, for two parallel surfaces in
+// the same place, whose order depth cannot tell. `aEnters` is whether the direction arrives at the
+// front of parent a, `bEnters` whether it arrives at the front of parent b.
+//
+// The order follows from solids. A surface through which the direction leaves a solid comes first,
+// then sheets, then a surface through which the direction enters the next solid. No light then
+// passes between a cupboard and the wall it stands against. Sheets whose fronts the direction
+// arrives at come before sheets whose backs it arrives at. Of two surfaces of equal kind, the
+// smaller one lies on the front of the larger one, as a lamp or a picture lies on a wall, whatever
+// their order in the scene. Surfaces of equal size are ordered by index, so that both directions
+// give one order. (Depth gives the order of surfaces that meet at an angle.)
 inline bool comesBefore(const Patches& patches, uint32_t a, bool aEnters, uint32_t b,
                         bool bEnters) {
     auto rank = [&](uint32_t index, bool enters) {
@@ -49,7 +52,7 @@ inline bool comesBefore(const Patches& patches, uint32_t a, bool aEnters, uint32
     return rank(a, aEnters) < rank(b, bEnters);
 }
 
-// Whether two parents are parallel, within what rounding does to coinciding faces.
+// Returns whether two parents are parallel, within the rounding errors of coinciding faces.
 inline bool areParallel(const Parent& a, const Parent& b) {
     const glm::dvec3 n = glm::cross(glm::dvec3(a.a), glm::dvec3(a.b));
     const glm::dvec3 m = glm::cross(glm::dvec3(b.a), glm::dvec3(b.b));

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Longest-edge bisection on OpenMesh's half-edges (the rule of its
-// Subdivider::Uniform::LongestEdgeT). Differs: faces keep their source triangle through the splits;
-// edges with more than two faces, which OpenMesh cannot hold, are cut open, and may then be
-// bisected differently on their sides. Slivers, triangles that are flat but for a rounding error,
-// as booleans leave them and as T-junctions are filled with, are taken out before: a short edge is
-// collapsed, else the longest edge is flipped, so that the triangle beyond it gets the sliver's
-// third vertex. Of faces with the same corners one is left.
+// Longest-edge bisection on OpenMesh's half-edges.
+//
+// Source: the rule of OpenMesh's Subdivider::Uniform::LongestEdgeT.
+// Differs:
+// - Faces keep their source triangle through the splits.
+// - Edges with more than two faces, which OpenMesh cannot store, are cut open. Their sides may then
+//   be bisected differently.
+// - Slivers are removed first. A sliver is a triangle that is flat except for a rounding error, as
+//   booleans leave it and as T-junctions are filled. Its shortest edge is collapsed if it is short
+//   enough. Otherwise its longest edge is flipped, so that the triangle beyond that edge gets the
+//   sliver's third vertex.
+// - Of several faces with the same corners, only one is kept.
 #include "patches/conforming_subdivision.h"
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
@@ -29,11 +34,12 @@ struct Traits : OpenMesh::DefaultTraits {
 };
 using TriMesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 
+// Largest number of triangles.
 constexpr size_t kMaxTriangles = size_t(1) << 26;
-// A triangle is a sliver where its height is less than this share of its longest edge, some times
-// the rounding of what lies ten edges from the origin.
+// A triangle is a sliver if its height is less than this share of its longest edge. The value is
+// several times the rounding error of a triangle that is ten times its edge length from the origin.
 constexpr double kFlat = 1e-5;
-// Flips and collapses, for each sliver: those that hang together may turn into each other.
+// Flips and collapses per sliver, at most: connected slivers may turn into each other without end.
 constexpr size_t kMostSteps = 16;
 
 // A triangle of the source mesh before any bisection.
@@ -47,7 +53,7 @@ OpenMesh::Vec3d point(const Mesh& mesh, int32_t corner) {
     return {p.x, p.y, p.z};
 }
 
-// Barycentric coordinates of a point in the plane of a triangle.
+// Returns the barycentric coordinates of a point in a triangle.
 std::array<float, 3> barycentric(const OpenMesh::Vec3d& p,
                                  const std::array<OpenMesh::Vec3d, 3>& t) {
     const OpenMesh::Vec3d normal = (t[1] - t[0]) % (t[2] - t[0]);
@@ -55,19 +61,21 @@ std::array<float, 3> barycentric(const OpenMesh::Vec3d& p,
     const double b = (normal | ((t[2] - p) % (t[0] - p))) / scale;
     const double c = (normal | ((t[0] - p) % (t[1] - p))) / scale;
     if (!std::isfinite(b) || !std::isfinite(c)) return {1, 0, 0};
-    // The point is in the triangle: what is not is rounding, without bound where edges are long.
+    // The point is in the triangle: coordinates outside are rounding errors, which are unbounded
+    // where edges are long.
     const double second = std::clamp(b, 0.0, 1.0), third = std::clamp(c, 0.0, 1.0);
     const double first = std::max(1 - second - third, 0.0), sum = first + second + third;
     return {float(first / sum), float(second / sum), float(third / sum)};
 }
 
-using SourceOf = OpenMesh::FProp<int>;  // index of a face's SourceTriangle
+using SourceOf = OpenMesh::FProp<int>;  // index of the face's SourceTriangle
 
-// Halfedges of a face: the one of its longest edge and the one of its shortest, and whether it is a
-// sliver.
+// The longest and the shortest edge of a face, and whether the face is a sliver.
 struct Shape {
     TriMesh::HalfedgeHandle longest, shortest;
-    bool isSliver, hasPoint;  // hasPoint: the shortest edge is no longer than a sliver is high
+    // `hasPoint`: the shortest edge is no longer than a sliver is high, so that it can be
+    // collapsed.
+    bool isSliver, hasPoint;
 
     Shape(const TriMesh& mesh, TriMesh::FaceHandle face) {
         double most = -1, least = INFINITY;
@@ -91,6 +99,7 @@ struct Shape {
     }
 };
 
+// Removes slivers by flips and collapses, and deletes those for which neither works.
 void takeOutSlivers(TriMesh& mesh, SourceOf& sourceTriangle) {
     std::vector<TriMesh::FaceHandle> pending;
     for (const auto face : mesh.faces())
@@ -124,8 +133,9 @@ void takeOutSlivers(TriMesh& mesh, SourceOf& sourceTriangle) {
     mesh.garbage_collection();
 }
 
-// Faces that have met others with the same corners, in the same order around, as copies of a face
-// and split edges do: they would be cut differently, and lie on each other in pieces.
+// Finds faces that repeat an earlier face: the same corners in the same order around, as in copies
+// of faces with split edges. They would be cut differently from each other, and their pieces would
+// overlap.
 class Doubles {
   public:
     explicit Doubles(const Mesh& mesh) : mesh(mesh) {
@@ -136,7 +146,7 @@ class Doubles {
                     .first->second);
     }
 
-    // Whether a face is the first of its kind.
+    // Returns whether no face with these corners has come before. Call it once for each face.
     bool isFirst(size_t face) {
         std::vector<int32_t> around;
         for (int32_t c = mesh.faceOffsets[face]; c < mesh.faceOffsets[face + 1]; ++c)
@@ -147,21 +157,22 @@ class Doubles {
 
   private:
     const Mesh& mesh;
-    std::vector<int32_t> place;  // per vertex: the first that lies there
+    std::vector<int32_t> place;  // per vertex: the first vertex at its position
     std::set<std::vector<int32_t>> met;
 };
 
-// The triangles of a mesh, and what they are cut from.
+// The triangles of a mesh, and the source triangle that each is cut from.
 struct Triangles {
     TriMesh mesh;
     SourceOf sourceTriangle{mesh};
     std::vector<SourceTriangle> sourceTriangles;
 
-    // An edge with more than two faces: the last gets vertices of its own.
+    // Adds a triangle. If OpenMesh refuses it because an edge would have more than two faces, the
+    // triangle gets vertices of its own.
     void add(const std::array<TriMesh::VertexHandle, 3>& v, const SourceTriangle& source) {
         TriMesh::FaceHandle face = mesh.add_face(v[0], v[1], v[2]);
         if (!face.is_valid()) {
-            // Copied first, since adding one moves the points.
+            // Copy the points first: adding a vertex moves them.
             const std::array<OpenMesh::Vec3d, 3> p{mesh.point(v[0]), mesh.point(v[1]),
                                                    mesh.point(v[2])};
             face =
@@ -172,6 +183,7 @@ struct Triangles {
     }
 };
 
+// Adds the triangles of all faces except doubles.
 void addFaces(const Mesh& source, Triangles& triangles) {
     std::vector<TriMesh::VertexHandle> handles;
     for (const glm::vec3& v : source.vertices)
@@ -196,7 +208,7 @@ void addFaces(const Mesh& source, Triangles& triangles) {
     }
 }
 
-// Bisects the longest edge until all are short enough.
+// Bisects the longest edge until none is longer than `maxEdge`.
 void bisectEdges(const Mesh& source, float maxEdge, TriMesh& mesh) {
     using Entry = std::pair<double, int>;  // squared length, edge index
     std::priority_queue<Entry> queue;
@@ -210,7 +222,8 @@ void bisectEdges(const Mesh& source, float maxEdge, TriMesh& mesh) {
         const auto [length2, index] = queue.top();
         queue.pop();
         const TriMesh::EdgeHandle edge(index);
-        if (mesh.calc_edge_sqr_length(edge) != length2) continue;  // was split meanwhile
+        // Edges that were split after they were queued have another length.
+        if (mesh.calc_edge_sqr_length(edge) != length2) continue;
         const TriMesh::VertexHandle middle = mesh.add_vertex(mesh.calc_edge_midpoint(edge));
         mesh.split_copy(edge, middle);
         for (auto spoke : mesh.voh_range(middle)) push(mesh.edge_handle(spoke));
@@ -223,7 +236,7 @@ void bisectEdges(const Mesh& source, float maxEdge, TriMesh& mesh) {
 }  // namespace
 
 ConformingSubdivision subdivideConforming(const Mesh& source, float maxEdge) {
-    omerr().disable();  // what it would print is handled here
+    omerr().disable();  // its messages are of no use to the caller
     Triangles triangles;
     addFaces(source, triangles);
     TriMesh& mesh = triangles.mesh;

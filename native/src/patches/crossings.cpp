@@ -18,18 +18,21 @@
 namespace raybundle {
 namespace {
 
-// Only what is so wide, in edges of a patch of what is cut, goes through something or is gone
-// through: leaves, the legs of chairs and handles let little light through.
+// Walls, and surfaces that walls cut, are at least this wide, in patch edges of the cell that is
+// cut. Narrower objects, such as leaves and the legs of chairs and handles, let little light
+// through.
 constexpr double kLeastWidth = 1;
-// What rises less over a face, in edges of a patch, stops little of the light across it.
+// A wall that rises less than this above a face, in patch edges of the face, blocks little of the
+// light across it.
 constexpr double kLeastHeight = 0.5;
-// Half the thickness of boxes, in edges of a patch.
+// Margin of the boxes, in patch edges.
 constexpr double kMargin = 0.02;
-// Tests whether something crosses a cell, of all cells together: so many a cell and these.
+// Limit of the tests for all cells together: kTestsPerCell for each cell, and kTests more.
 constexpr size_t kTestsPerCell = 32, kTests = 1 << 20;
-// Pieces that all cells may be cut into.
+// Least limit of the number of pieces of all cells.
 constexpr size_t kLeastPieces = 1 << 14;
-constexpr size_t kTogether = 1 << 12;  // cells
+// Cells that are tested in parallel between two checks of the limits.
+constexpr size_t kTogether = 1 << 12;
 
 using Box = Eigen::AlignedBox3d;
 using Tree = Eigen::KdBVH<double, 3, uint32_t>;  // of cells or walls
@@ -42,14 +45,14 @@ Box boxOf(const Cell& cell) {
     return box;
 }
 
-// Edge k of a cell.
+// Edge k of a cell, which joins corner k to the next.
 struct CellEdge {
-    uint32_t low = 0, high = 0;  // vertices
+    uint32_t low = 0, high = 0;  // vertices, low < high
     uint32_t cell = 0;
     int k = 0;
 };
 
-// Of the cells with patches; those of one edge side by side.
+// Returns the edges of all cells with patches, sorted so that equal edges are adjacent.
 std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const CellVertices& vertices) {
     std::vector<CellEdge> edges;
     edges.reserve(4 * cells.size());
@@ -68,13 +71,15 @@ std::vector<CellEdge> sortedEdges(const std::vector<Cell>& cells, const CellVert
     return edges;
 }
 
+// Returns whether two planes through a common edge are parallel within kLeastTurn. The arguments
+// are unit normals.
 bool areInOnePlane(const glm::dvec3& normal, const glm::dvec3& other) {
     return glm::length(glm::cross(normal, other)) <= kLeastTurn;
 }
 
-// Of the cells at an edge: which lie in one plane, by a number of the plane for each. In few
-// planes: of an edge at which many meet those that come late have one each. ofCells: the normals of
-// all cells.
+// Returns for each of `count` cells at an edge the number of its plane: cells in one plane have one
+// number. At most 64 planes are compared; at an edge with more planes, the later cells have one
+// number each. `ofCells` holds the normals of all cells.
 std::vector<size_t> planesOf(const std::vector<glm::dvec3>& ofCells, const CellEdge* edges,
                              size_t count) {
     constexpr size_t kMostCompared = 64;
@@ -94,18 +99,18 @@ std::vector<size_t> planesOf(const std::vector<glm::dvec3>& ofCells, const CellE
     return planes;
 }
 
-// Cells that go on into each other without a bend.
+// Walls: sets of cells that continue each other without a bend.
 struct Walls {
-    std::vector<uint32_t> of;  // per cell
+    std::vector<uint32_t> of;  // per cell: its wall
     std::vector<double> area;  // per wall, m^2
     std::vector<Box> box;      // per wall
 
-    // In the mean, metres.
+    // Returns the mean width of a wall, m: its area over the diagonal of its box.
     double width(uint32_t wall) const { return area[wall] / box[wall].diagonal().norm(); }
 };
 
-// The walls; boxes: per cell. And parts the edges at which cells of one plane meet others that
-// stand on them there, by common vertices.
+// Finds the walls. Also marks the edges at which cells of one plane meet cells of another plane
+// that stand on them, joined by vertices, as parted. `boxes` is per cell.
 Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
                 const CellVertices& vertices, std::map<uint32_t, Crossing>& crossings) {
     const std::vector<CellEdge> edges = sortedEdges(cells, vertices);
@@ -152,8 +157,8 @@ Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
     return walls;
 }
 
-// Visits what is in the parts of a tree whose boxes meet another box. Not by Eigen::BVIntersect,
-// which allocates for each query.
+// Visits the objects in all parts of a tree whose boxes meet `box`. Eigen::BVIntersect is not used
+// because it allocates for each query.
 template <class Visit>
 void forEachIn(const Tree& tree, Tree::Index part, const Box& box, const Visit& visit) {
     Tree::VolumeIterator inner = nullptr, innerEnd = nullptr;
@@ -164,10 +169,10 @@ void forEachIn(const Tree& tree, Tree::Index part, const Box& box, const Visit& 
         if (tree.getVolume(*--innerEnd).intersects(box)) forEachIn(tree, *innerEnd, box, visit);
 }
 
-// The cells of wide walls, by place.
+// Spatial index of the cells of wide walls.
 class CellsByPlace {
   public:
-    // cellsOf: per wall; boxes: per cell.
+    // `cellsOf` is per wall, and empty for narrow walls; `boxes` is per cell.
     CellsByPlace(const Walls& all, const std::vector<std::vector<uint32_t>>& cellsOf,
                  const std::vector<Box>& boxes)
         : trees(cellsOf.size()) {
@@ -186,7 +191,7 @@ class CellsByPlace {
         walls.init(wide.begin(), wide.end(), ofWide.begin(), ofWide.end());
     }
 
-    // The walls that may meet a box, and the cells of one that may.
+    // Visit the walls that may meet a box, or the cells of one wall that may.
     template <class Visit>
     void forEachWall(const Box& box, const Visit& visit) const {
         forEachIn(walls, walls.getRootIndex(), box, visit);
@@ -197,11 +202,12 @@ class CellsByPlace {
     }
 
   private:
-    std::vector<Tree> trees;  // per wall
+    std::vector<Tree> trees;  // per wall: its cells
     Tree walls;
 };
 
-// a, b: vertices of two cells with that many corners.
+// Returns whether two cells have a common edge. a and b are their vertices, nA and nB their numbers
+// of corners.
 bool haveCommonEdge(const std::array<uint32_t, 4>& a, int nA, const std::array<uint32_t, 4>& b,
                     int nB) {
     auto placeInB = [&](uint32_t vertex) {
@@ -218,7 +224,7 @@ bool haveCommonEdge(const std::array<uint32_t, 4>& a, int nA, const std::array<u
     return false;
 }
 
-// Whether what is within a box rises over a plane by at least so much, metres.
+// Returns whether a box reaches at least `least` metres from the plane.
 bool isHigh(const Box& box, const Plane& plane, double least) {
     const Eigen::Vector3d middle = box.center();
     const double height = std::abs(plane.height({middle.x(), middle.y(), middle.z()}));
@@ -238,7 +244,7 @@ Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double
         return walls.width(wall) >= kLeastWidth * size;
     };
     std::vector<std::vector<uint32_t>> cellsOf(walls.area.size());
-    std::vector<double> length(cells.size());  // of the longest edge over that of a patch
+    std::vector<double> length(cells.size());  // per cell: longest edge over the edge of a patch
     std::vector<uint32_t> order;
     for (uint32_t c = 0; c < cells.size(); ++c) {
         throwIfCancelledAt(c);

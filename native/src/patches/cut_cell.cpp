@@ -7,21 +7,22 @@
 namespace raybundle {
 namespace {
 
-// All as shares of the edge of the largest patch of the cell. What is nearer to a plane or a line
-// lies in it.
+// Tolerances, all relative to the edge length of the largest patch of the cell. A point closer to a
+// plane or line than kWithin lies in it.
 constexpr double kWithin = 0.02;
-// Walls are at least so long, and a line cuts a piece if they stand along so much of it in there,
-// or along most of the piece.
+// Walls on a line have at least the total length kLong. A line cuts a piece if walls stand along at
+// least kLeastCut of it within the piece, or along kMostOfPiece of its length within the piece.
 constexpr double kLong = 0.5, kLeastCut = 0.1;
 constexpr double kMostOfPiece = 0.9;
-// What is cut off is at least so wide.
+// Least width of a part that is cut off.
 constexpr double kNarrowest = 0.03;
-// What is shorter is a corner that touches the cell.
+// A shorter segment is only a corner that touches the cell.
 constexpr double kShortest = 1e-6;
-// Lengths that differ by less are the same, but where a multiple of it lies between.
+// Lengths are compared in steps of this size, so that rounding does not order equal lengths unless
+// the border between two steps lies between them.
 constexpr double kStep = 0.0937;
 constexpr size_t kMostPieces = 64;
-constexpr size_t kMostSegments = 1 << 12;  // that are looked at: the longest
+constexpr size_t kMostSegments = 1 << 12;  // number of segments used: the longest
 
 double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 
@@ -107,7 +108,8 @@ std::optional<Crossing> CutCell::crossing() const {
             out.seenCorners = cornersSeenFrom(piece, all);
             seen |= out.seenCorners;
         }
-        // A corner that a wall nearly stands on.
+        // A corner that no piece sees, because a wall almost stands on it, counts as seen by all
+        // pieces.
         for (CellPiece& piece : result.pieces) piece.seenCorners |= uint8_t(15 & ~seen);
     }
     if (result.pieces.empty() && result.parted == 0) return std::nullopt;
@@ -137,7 +139,7 @@ void CutCell::add(const Segment& segment) {
         onEdges[k].add(line.at(segment.from), line.at(segment.to));
         return;
     }
-    // What of it is inside.
+    // Find the part inside the cell. A segment that has one is kept whole.
     double from = 0, to = 1;
     for (size_t k = 0; k < outline.size(); ++k) {
         const Line line = edge(k);
@@ -171,8 +173,8 @@ std::vector<CutCell::Line> CutCell::lines() const {
     lines.erase(std::remove_if(lines.begin(), lines.end(),
                                [&](const Line& line) { return line.walls.total() < kLong * size; }),
                 lines.end());
-    // In steps, so that rounding does not order walls of one length; of those the one nearer to the
-    // first corner comes first.
+    // In steps, so that rounding does not order walls of equal length. Of these, the line closest
+    // to the first corner comes first.
     auto rank = [&](const Line& l) {
         return std::make_pair(-std::round(l.walls.total() / (kStep * size)),
                               std::round(std::abs(l.off(outline[0].at)) / (kStep * size)));

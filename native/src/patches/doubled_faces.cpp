@@ -9,10 +9,11 @@
 namespace raybundle {
 namespace {
 
-// Vertices in the same place: they are as far apart as rounding moves them, of the extent of their
-// object, and no further than this share of their face.
+// Vertices coincide if rounding separates them: by at most kOfObject times the extent of their
+// object and the rounding of their coordinates, and at most kOfFace times the extent of their face.
 constexpr double kOfObject = 2e-6, kOfFace = 1e-3;
-// Faces are sorted along this, unit: not along the rows of a mesh, of which many would be alike.
+// Faces are sorted along this unit vector. It is oblique to the axes, because many faces of a
+// regular mesh would have the same position along a row.
 constexpr glm::dvec3 kAcrossAll{0.534522483824849, 0.612372435695794, 0.582475449195318};
 
 class Search {
@@ -48,7 +49,7 @@ class Search {
             const double rounding = roundingOf(sorted[i].face);
             for (size_t k = i + 1;
                  k < sorted.size() && sorted[k].along - sorted[i].along <= rounding; ++k) {
-                // The one that is baked, or comes first, stands for both.
+                // The face with a result stands for both, or else the one with the smaller index.
                 size_t first = sorted[i].face, other = sorted[k].face;
                 if (result.isDouble[first]) break;
                 if (result.isDouble[other]) continue;
@@ -76,7 +77,7 @@ class Search {
     std::pair<bool, size_t> rankOf(size_t face) const {
         return {!scene.instances[faces.instance[face]].hasResultOnFace(faceOfMesh(face)), face};
     }
-    // Of the vertices of a face, metres.
+    // Returns the distance up to which rounding separates vertices of a face, m.
     double roundingOf(size_t face) const {
         double most = 0, extent = 0;
         for (size_t k = 0; k < size(face); ++k) {
@@ -87,7 +88,8 @@ class Search {
         return std::min(kOfObject * extents[faces.instance[face]] + Plane::kOfCoordinates * most,
                         kOfFace * extent);
     }
-    // The corner of a face's mesh that is its k-th here, where mirrored ones are reversed.
+    // Returns the corner of the mesh that is corner k of the face here. Mirrored instances have
+    // their corners in reverse order.
     uint32_t corner(size_t face, size_t k) const {
         const uint32_t instance = faces.instance[face];
         const size_t n = size(face);
@@ -100,6 +102,7 @@ class Search {
     const Material& materialOf(size_t face) const {
         return scene.materialOf(meshOf(faces.instance[face]), faceOfMesh(face));
     }
+    // Returns whether two faces act alike on light, so that one may stand for both.
     bool doAlike(size_t first, size_t other) const {
         const Instance& a = scene.instances[faces.instance[first]];
         const Instance& b = scene.instances[faces.instance[other]];
@@ -112,6 +115,7 @@ class Search {
         return materialIndex(first) == materialIndex(other) ? !m.emits() || a.lightSet == b.lightSet
                                                             : !m.emits() && !n.emits();
     }
+    // Adds `other` as a double of `first` if their vertices coincide, in the same order around.
     void addIfDouble(size_t first, size_t other, double rounding, DoubledFaces& result) const {
         const size_t n = size(first);
         if (n != size(other)) return;

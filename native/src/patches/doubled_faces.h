@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Doubled faces: two in the same place that look the same way, as a copy that was never moved
-// leaves them. Light sees one of them, and the other lay in its shadow. One stands for both here:
-// the other has no patches, and its corners get the light of the one's.
+// Doubled faces: two faces in the same place that are turned the same way, such as those of a copy
+// that was never moved. Light would reach only one of them, and the other would lie in its shadow.
+// Here one of the two stands for both: the other has no patches, and its corners get the light of
+// the first.
 #pragma once
 
 #include <cstdint>
@@ -14,23 +15,27 @@
 
 namespace raybundle {
 
-// A corner of a doubled face and the one whose light it gets; instances and corners of their
-// meshes.
+// A corner of a doubled face and the corner whose light it gets. Instances are indices in
+// Scene::instances; corners are those of the instances' meshes.
 struct DoubledCorner {
     uint32_t instance, corner;
     uint32_t ofInstance, ofCorner;
 };
 
+// The result of findDoubledFaces().
 struct DoubledFaces {
-    std::vector<bool> isDouble;  // per face: another stands for it
-    // Those that a corner's light comes from may be doubles themselves, which come later.
+    std::vector<bool> isDouble;  // per face: another face stands for it
+    // Corners of doubled faces. The corner that gives the light may belong to a doubled face
+    // itself, which then comes later in the list.
     std::vector<DoubledCorner> corners;
-    bool anyCoincide = false;  // also of those that do not do alike
+    // Whether any faces coincide, also if neither can stand for the other.
+    bool anyCoincide = false;
 };
 
-// places: of all vertices, metres. The same place is so but for a rounding error. Only faces that
-// do alike are doubles: opaque ones that block, exchange and are baked alike, and of one material
-// where they emit.
+// Finds doubled faces. Vertices coincide if only rounding separates them. A face is doubled only if
+// both faces act alike on light: both are opaque, and block and exchange light alike. If both are
+// baked, they show the same side; if they emit, they have one material and one light set. `places`
+// holds the positions of all vertices, m; `firstVertex` is the first vertex of each instance.
 DoubledFaces findDoubledFaces(const Scene& scene, const WeldedFaces& faces,
                               const std::vector<size_t>& firstVertex,
                               const std::vector<glm::vec3>& places);

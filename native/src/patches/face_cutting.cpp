@@ -14,14 +14,14 @@
 namespace raybundle {
 namespace {
 
-// Solids of less thickness are sheets, of how far they lie from the centre: about what depth tells
-// apart.
+// Closed surfaces that are thinner than this share of their distance from the centre are treated as
+// sheets. The resolution of depth is about as large.
 constexpr double kThinnest = 2e-6;
 
-// Walks over the faces of all instances and appends vertices, cells and parents.
+// Walks over the faces of all instances and adds vertices, cells and parents to the patches.
 class FaceCutting {
   public:
-    // placed: with its islands in the patches.
+    // `patches` must hold the islands of `placed`. Keeps references to all arguments.
     FaceCutting(const Scene& scene, const Placement& placed, Patches& patches)
         : scene(scene),
           placed(placed),
@@ -30,7 +30,7 @@ class FaceCutting {
           patches(patches),
           cutting(patches) {}
 
-    // patchSize: edge of a patch, metres; 0: the automatic ones.
+    // `patchSize` is the edge length of a patch, m; 0 takes the automatic sizes.
     void run(float patchSize) {
         const std::vector<Shell> shells = findShells();
         DoubledFaces doubled =
@@ -54,9 +54,10 @@ class FaceCutting {
     }
 
   private:
-    // Per face.
+    // Returns per face whether it belongs to a solid.
     std::vector<Shell> findShells() const {
-        std::vector<double> reachOf(patches.vertices.size(), 0);  // per vertex: of its island
+        // Per vertex: reach of its island, m.
+        std::vector<double> reachOf(patches.vertices.size(), 0);
         for (size_t f = 0; f < faces.count(); ++f)
             reachOf[faces.vertices[faces.offsets[f]]] =
                 double(patches.islands[sizes.island[faces.piece[f]]].reach);
@@ -64,7 +65,7 @@ class FaceCutting {
                              [&](uint32_t vertex) { return kThinnest * reachOf[vertex]; });
     }
 
-    // Adds the cells of an instance.
+    // Adds the cells of an instance, and warnings of faces that have none.
     void addInstance(size_t i, float patchSize, const DoubledFaces& doubled) {
         const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
         size_t degenerate = 0, doubles = 0;
@@ -97,6 +98,7 @@ class FaceCutting {
                      "such faces (Merge by Distance), or remove the object if it lies on another"});
     }
 
+    // Returns the vertices of each cell's corners.
     CellVertices cellVertices() const {
         CellVertices vertices(patches.cells.size());
         for (size_t c = 0; c < vertices.size(); ++c)
@@ -106,7 +108,7 @@ class FaceCutting {
         return vertices;
     }
 
-    // Cuts a cell into parents.
+    // Cuts a cell into parents and sets their properties.
     void addParents(uint32_t c, const Crossings& crossings, const std::vector<Shell>& shells) {
         const size_t firstParent = patches.parents.size();
         const auto crossing = crossings.ofCell.find(c);
@@ -137,7 +139,7 @@ class FaceCutting {
         }
     }
 
-    // Of all islands.
+    // Sets the largest and smallest target sizes over all islands.
     void measureSizes() {
         patches.finest = INFINITY;
         for (const Island& island : patches.islands) {
@@ -147,6 +149,8 @@ class FaceCutting {
         if (!(patches.finest < INFINITY)) patches.size = patches.finest = 1;
     }
 
+    // Sets Parent::surfaceSize. Its upper 16 bits are the area of the object, its lower 16 bits the
+    // area of the surface, both on a logarithmic scale.
     void measureSurfaces() {
         std::vector<double> ofSurface(faces.surfaceCount, 0.0),
             ofInstance(scene.instances.size(), 0.0);
@@ -154,7 +158,7 @@ class FaceCutting {
             ofSurface[parent.surface] += double(parent.area());
             ofInstance[parent.instance] += double(parent.area());
         }
-        // In steps of 0.7 %, so that rounding does not order what is as large.
+        // In steps of 0.7 %, so that rounding does not order surfaces of equal area.
         auto steps = [](double area) {
             return uint32_t(
                 std::clamp(100 * std::log2(std::max(area, 1e-80)) + 32768, 0.0, 65535.0));
@@ -164,8 +168,8 @@ class FaceCutting {
                 steps(ofInstance[parent.instance]) << 16 | steps(ofSurface[parent.surface]);
     }
 
-    // Adds the triangles of a face, or the parallelogram that it is; returns whether any has an
-    // area.
+    // Adds the cells of a face: one if it is a parallelogram, otherwise triangles. Returns whether
+    // any of them has an area.
     bool addCells(uint32_t instance, int32_t face) {
         const Mesh& mesh = scene.meshes[scene.instances[instance].mesh];
         const int32_t begin = mesh.faceOffsets[face], end = mesh.faceOffsets[face + 1];
@@ -191,6 +195,7 @@ class FaceCutting {
         return any;
     }
 
+    // Cuts a whole cell into parents. `size` is the edge length of a patch, m.
     void cutCell(uint32_t index, double size) {
         const Cell& cell = patches.cells[index];
         std::vector<uint32_t> vertices;
@@ -202,6 +207,8 @@ class FaceCutting {
             cutting.addParallelogram(index, vertices, size);
     }
 
+    // Cuts a piece of a cell into parents. Adds its corners as vertices unless they are those of
+    // the cell.
     void cutPiece(uint32_t index, const CellPiece& piece, double size) {
         const Cell& cell = patches.cells[index];
         std::vector<uint32_t> vertices;
@@ -222,6 +229,7 @@ class FaceCutting {
             patches.parents[p].seenCorners = piece.seenCorners;
     }
 
+    // Returns the index in Patches::vertices of a corner of an instance's mesh.
     uint32_t worldVertex(uint32_t instance, int32_t corner) const {
         return placed.vertex(instance,
                              scene.meshes[scene.instances[instance].mesh].cornerVertices[corner]);
@@ -244,7 +252,7 @@ class FaceCutting {
     const WeldedFaces& faces;
     const PatchSizes& sizes;
     Patches& patches;
-    std::vector<double> cellSizes;  // per cell: edge of its patches, metres
+    std::vector<double> cellSizes;  // per cell: edge length of its patches, m
     ParentCutting cutting;
 };
 

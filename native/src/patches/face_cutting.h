@@ -7,9 +7,10 @@
 
 namespace raybundle {
 
-// Cuts the faces of all instances into cells and these into parents, with grids of patches that are
-// not numbered yet; says what is left out. patches: with the vertices and islands of `placed`;
-// patchSize: edge of a patch, metres; 0: the automatic ones.
+// Cuts the faces of all instances into cells, and the cells into parents with grids of patches,
+// whose indices are not set yet. Adds warnings of faces that are left out or not cut. `patches`
+// must hold the vertices and islands of `placed`. `patchSize` is the edge length of a patch, m; 0
+// takes the automatic sizes of `placed`.
 void cutFaces(const Scene& scene, const Placement& placed, float patchSize, Patches& patches);
 
 }  // namespace raybundle

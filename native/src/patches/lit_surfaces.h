@@ -7,12 +7,12 @@
 
 namespace raybundle {
 
-// The patches, and how much of each side light can reach. Refers to both, which must outlive it.
+// The patches, and how much of each side light can reach. Both must outlive the object.
 struct LitSurfaces {
     const Patches& patches;
     const std::vector<float>& exposed;  // per side: the share that no other surface covers, 0 to 1
 
-    // The area of a side that receives and sends light, m^2.
+    // Returns the area of a side that receives and sends light, m^2.
     double exposedArea(size_t side) const {
         return double(patches.area[side / 2]) * double(exposed[side]);
     }

@@ -12,16 +12,19 @@ namespace {
 // Cosine of the largest angle between the planes of neighbours: about 25 degrees.
 constexpr float kSmoothCosine = 0.9f;
 
-// The edge of a tile on the edge of its parent.
+// An edge of a tile that lies on the edge of its parent.
 struct BorderEdge {
-    uint32_t low = 0, high = 0;      // ends of the parent's edge, into Patches::vertices
-    uint32_t count = 0, number = 0;  // tiles along it; which, counted from `low`
+    uint32_t low = 0, high = 0;      // ends of the parent's edge, indices in Patches::vertices
+    uint32_t count = 0, number = 0;  // tiles along it, and the index of this one from `low`
+    // Tile, counted over all parents.
     uint32_t tile = 0;
     glm::vec3 normal{0.0f};
 
     auto key() const { return std::make_tuple(low, high, count, number); }
 };
 
+// Makes the edge of a tile on the parent's edge from corner `fromCorner` to `toCorner`. The edge
+// has `count` tiles; `number` is the index of this one from `fromCorner`.
 BorderEdge borderEdge(const Parent& parent, int fromCorner, int toCorner, uint32_t count,
                       uint32_t number, uint32_t tile) {
     const uint32_t from = parent.vertex[size_t(fromCorner)], to = parent.vertex[size_t(toCorner)];
@@ -29,6 +32,7 @@ BorderEdge borderEdge(const Parent& parent, int fromCorner, int toCorner, uint32
     return {to, from, count, count - 1 - number, tile, parent.normal};
 }
 
+// Adds the pairs within a parallelogram, and the edges of tiles on its border.
 void pairParallelogram(const Parent& parent, std::vector<TilePair>& pairs,
                        std::vector<BorderEdge>& border) {
     const uint32_t nA = parent.countA, nB = parent.countB;
@@ -48,7 +52,8 @@ void pairParallelogram(const Parent& parent, std::vector<TilePair>& pairs,
     }
 }
 
-// Upright triangles and those upside down between them, as in Parent::patchAt.
+// Adds the pairs within a triangle, and the edges of tiles on its border. The grid consists of
+// upright triangles with upside-down ones between them, ordered as in Parent::patchAt.
 void pairTriangle(const Parent& parent, std::vector<TilePair>& pairs,
                   std::vector<BorderEdge>& border) {
     const uint32_t n = parent.countA;
@@ -93,8 +98,8 @@ std::vector<TilePair> neighbouringTiles(const Patches& patches, uint32_t firstPa
     for (size_t i = 0; i < border.size();) {
         size_t end = i + 1;
         while (end < border.size() && border[end].key() == border[i].key()) ++end;
-        // Of more than two, as where boxes with split edges stand against each other, those that
-        // have one alone to go on with.
+        // More than two tiles may meet at an edge, for example where boxes with split edges stand
+        // against each other. Pair only tiles for which exactly one other tile continues smoothly.
         auto onlyOne = [&](size_t k) {
             size_t other = k, count = 0;
             for (size_t m = i; m < end; ++m)

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Which lines a patch that lets light through stops. A patch is treated as if it had many holes
-// smaller than any pixel: a line goes on with probability 1 - opacity, whatever came before it on
-// the line. A hash of line and patch decides, so that whoever asks twice gets the same answer and
-// the result does not depend on the number of threads.
+// Which lines a patch that lets light through stops. The patch is treated as if it had many holes
+// smaller than any pixel: a line passes with probability 1 - opacity, independently of what it met
+// before. A hash of the line and the patch decides, so that repeated queries agree and the result
+// does not depend on the number of threads.
 //
-// Differs from tracing images of leaves: the mean opacity over a patch is used, so their shadows
-// are as fine as patches; coloured transparency is grey.
+// Differs from tracing images of leaves: the mean opacity over a patch is used, so that shadows are
+// only as fine as patches. Coloured transparency is treated as grey.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace raybundle {
 
-// Name of a ray, which is a line.
+// Returns an identifier of the line of a ray, a hash of its point and direction.
 inline uint64_t lineName(const glm::vec3& point, const glm::vec3& direction) {
     uint64_t name = 0;
     for (const glm::vec3& v : {point, direction})
@@ -30,7 +30,7 @@ inline uint64_t lineName(const glm::vec3& point, const glm::vec3& direction) {
     return name;
 }
 
-// Whether a patch stops a line.
+// Returns whether a patch stops a line. `line` is the lineName() of the line.
 inline bool stops(const Patches& patches, uint32_t patch, uint64_t line) {
     const float opacity = patches.opacityOf(patch);
     return opacity >= 1 || double(mixBits(line ^ mixBits(patch)) >> 11) * 0x1p-53 < double(opacity);

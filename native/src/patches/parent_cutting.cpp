@@ -10,28 +10,34 @@
 namespace raybundle {
 namespace {
 
-// A triangle is bisected along its longest edge while it is longer than this many times its height
-// and than two patches: a grid of n^2 slivers would waste patches.
+// A triangle is bisected at its longest edge while that edge is longer than this many times the
+// height, and longer than two patches. A grid of n^2 slivers would waste patches.
 constexpr double kMaxElongation = 4.0;
-// More elongated still, it is cut across, into as many pieces as it is long: bisections would end
-// in the power 1.6 of that, one above the other.
+// Triangles elongated by more than this factor are cut across instead, into as many pieces as they
+// are elongated. Bisections would give the elongation to the power of 1.6 as the number of pieces,
+// each as long as the triangle.
 constexpr double kNeedle = 16.0;
-// Faces are left out whose height is less than this share of their longest edge; and those that are
-// less high than what rounding makes of their coordinates, by this many epsilons, and so much
-// longer that they are no small faces of a large scene: their normals would be rounding alone.
+// Faces are left out if their height is less than kFlat times their longest edge. They are also
+// left out if their height is less than the rounding error of their coordinates (kFlatEpsilons
+// epsilons) and less than kSliver times their longest edge, because their normals would be only
+// rounding error. The second condition keeps small well-shaped faces of large scenes.
 constexpr double kFlat = 1e-7;
 constexpr double kFlatEpsilons = 4, kSliver = 1e-2;
-// Share of the edge by which the fourth corner of a parallelogram may be off.
+// Distance of the fourth corner of a parallelogram from its exact place, relative to the longer
+// edge.
 constexpr double kParallelogramTolerance = 1e-4;
+// Largest number of tiles along an edge.
 constexpr int kMaxGrid = 4096;
 
+// Returns the number of patches of about `size` along a length.
 uint16_t gridCount(double length, double size) {
-    // A hundredth of a patch of slack, so that a length of exactly n patches stays n.
+    // The slack of a hundredth of a patch makes a length of exactly n patches give n.
     return uint16_t(std::clamp(int(std::ceil(length / size - 0.01)), 1, kMaxGrid));
 }
 
-// Whether the halves of an edge are shorter than it however their end is rounded, which is by
-// half an epsilon of its coordinates: pieces of pieces else need not get smaller.
+// Returns whether both halves of an edge are certain to be shorter than the edge. The middle is
+// rounded by half an epsilon of its coordinates, and without this check pieces of pieces might not
+// become smaller.
 bool hasMiddle(const glm::vec3& a, const glm::vec3& b) {
     const glm::vec3 most = glm::max(glm::abs(a), glm::abs(b));
     return glm::distance(a, b) > 16 * FLT_EPSILON * std::max({most.x, most.y, most.z});
@@ -45,7 +51,6 @@ bool isParallelogram(const std::vector<glm::dvec3>& p) {
     return off <= kParallelogramTolerance * longest && !isFlat(p[0], p[1], p[3]);
 }
 
-// Whether a triangle, or the parallelogram that it is half of, has no area but for rounding.
 bool isFlat(const glm::dvec3& p0, const glm::dvec3& p1, const glm::dvec3& p2) {
     const double longest =
         std::max({glm::length(p1 - p0), glm::length(p2 - p1), glm::length(p0 - p2)});
@@ -56,6 +61,7 @@ bool isFlat(const glm::dvec3& p0, const glm::dvec3& p1, const glm::dvec3& p2) {
     return !(height > std::max(kFlat * longest, std::min(rounding, kSliver * longest)));
 }
 
+// Returns a parent of a cell with three of its corners, without a grid and vertices.
 Parent ParentCutting::makeParent(uint32_t cell, const std::array<uint32_t, 3>& corners) const {
     const Cell& of = patches.cells[cell];
     const glm::dvec3 p0(patches.vertices[corners[0]]), pa(patches.vertices[corners[1]]),
@@ -64,7 +70,7 @@ Parent ParentCutting::makeParent(uint32_t cell, const std::array<uint32_t, 3>& c
     parent.origin = glm::vec3(p0);
     parent.a = glm::vec3(pa - p0);
     parent.b = glm::vec3(pb - p0);
-    // That of the cell: that of a tiny piece would be rounding alone.
+    // Use the normal of the cell: that of a tiny piece would be only rounding error.
     parent.normal = glm::vec3(of.normal());
     parent.instance = of.instance;
     parent.face = of.face;
@@ -120,7 +126,7 @@ void ParentCutting::cutTriangle(uint32_t cell, const Triangle& v, double size) {
             cutTriangle(cell, {middle, v1, v2}, size);
         } else if (std::min(after, before) > std::max(2 * size, 2 * height) &&
                    foot != patches.vertices[v0] && foot != patches.vertices[v1]) {
-            // Blunt: two needles whose short edge is the height.
+            // The triangle is obtuse: cut it at its height, into two needles.
             patches.vertices.push_back(foot);
             const uint32_t v3 = uint32_t(patches.vertices.size()) - 1;
             cutTriangle(cell, {v0, v3, v2}, size);
@@ -135,15 +141,15 @@ void ParentCutting::cutTriangle(uint32_t cell, const Triangle& v, double size) {
     addTriangle(cell, v, std::sqrt(0.5 * doubleArea), length[longest], size);
 }
 
-// A needle with its point at v[0].
+// Cuts a triangle with a sharp point at v[0] and a short edge opposite.
 void ParentCutting::cutNeedle(uint32_t cell, const Triangle& v, double size) {
     const uint32_t right = middleVertex(v[0], v[1]), left = middleVertex(v[0], v[2]);
     cutTriangle(cell, {v[0], right, left}, size);
     cutStrip(cell, {right, v[1]}, {left, v[2]}, size);
 }
 
-// Between two edges along each other, much longer than they are apart; from `bottom` to `top`
-// is to the left.
+// Cuts the strip between two edges that are almost parallel and much longer than their distance.
+// `top` lies to the left of `bottom`, and both run in the same direction.
 void ParentCutting::cutStrip(uint32_t cell, const std::array<uint32_t, 2>& bottom,
                              const std::array<uint32_t, 2>& top, double size) {
     auto isLong = [&](const std::array<uint32_t, 2>& edge) {
@@ -163,15 +169,15 @@ void ParentCutting::cutStrip(uint32_t cell, const std::array<uint32_t, 2>& botto
 
 void ParentCutting::addTriangle(uint32_t cell, const Triangle& v, double edge, double longest,
                                 double size) {
-    if (!(edge > 0)) return;  // a piece of nothing, by rounding
+    if (!(edge > 0)) return;  // rounding left no area
     Parent parent = makeParent(cell, v);
     std::copy(v.begin(), v.end(), parent.vertex.begin());
-    // As many patches as squares of the patch size would cover, but no edge much longer.
+    // As many patches as squares of the patch size cover the area, but with edges of about 2 `size`
+    // at most.
     parent.countA = parent.countB = gridCount(std::max(edge / size, longest / (2.0 * size)), 1.0);
     patches.parents.push_back(parent);
 }
 
-// Neighbouring faces that bisect the same edge share the new vertex.
 uint32_t ParentCutting::middleVertex(uint32_t v0, uint32_t v1) {
     const auto key = std::minmax(v0, v1);
     const auto found = middles.find(key);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// From cells, or what walls leave of them, to parents: parallelograms as they are, other polygons
-// as triangles, and of these long thin ones in several parts. Each parent gets a grid of patches.
+// Cuts cells, or the pieces that walls leave of them, into parents. A parallelogram becomes one
+// parent. Other polygons are split into triangles, and long thin triangles into several parts. Each
+// parent gets a grid of patches.
 #pragma once
 
 #include <array>
@@ -15,23 +16,25 @@
 
 namespace raybundle {
 
-// Whether four corners are those of a parallelogram with an area.
+// Returns whether four corners, in order around, form a parallelogram with an area.
 bool isParallelogram(const std::vector<glm::dvec3>& corners);
-// Whether a triangle, or the parallelogram that it is half of, has no area but for rounding.
+// Returns whether the area of a triangle is only rounding error, and so also that of the
+// parallelogram of which it is half.
 bool isFlat(const glm::dvec3& p0, const glm::dvec3& p1, const glm::dvec3& p2);
 
+// Adds the parents of cells to Patches::parents, with their grids but without patch indices.
 class ParentCutting {
   public:
-    // Appends to the vertices and parents of `patches`, which must outlive the object.
+    // Adds vertices and parents to `patches`. Keeps a reference to it.
     explicit ParentCutting(Patches& patches) : patches(patches) {}
 
-    // Adds the parents of a cell, or of a part of it with corners at those vertices, in order
-    // around (into Patches::vertices). size: edge of a patch, metres.
+    // Add the parents of a cell, or of a piece of a cell. `vertices` holds the corners in order
+    // around, as indices in Patches::vertices; `size` is the edge length of a patch, m.
     void addParallelogram(uint32_t cell, const std::vector<uint32_t>& vertices, double size);
     void addPolygon(uint32_t cell, const std::vector<uint32_t>& vertices, double size);
 
   private:
-    using Triangle = std::array<uint32_t, 3>;  // into Patches::vertices
+    using Triangle = std::array<uint32_t, 3>;  // indices in Patches::vertices
 
     Parent makeParent(uint32_t cell, const std::array<uint32_t, 3>& corners) const;
     void cutTriangle(uint32_t cell, const Triangle& v, double size);
@@ -39,10 +42,12 @@ class ParentCutting {
     void cutStrip(uint32_t cell, const std::array<uint32_t, 2>& bottom,
                   const std::array<uint32_t, 2>& top, double size);
     void addTriangle(uint32_t cell, const Triangle& v, double edge, double longest, double size);
+    // Returns the vertex in the middle of an edge, which is created at the first call.
     uint32_t middleVertex(uint32_t v0, uint32_t v1);
 
     Patches& patches;
-    std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;  // of edges
+    // By the two vertices of an edge: the vertex in its middle.
+    std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
 };
 
 }  // namespace raybundle

@@ -11,9 +11,10 @@
 namespace raybundle {
 namespace {
 
-// A part is as wide as the root of this share of its object's area, and faces alike.
+// The square of a part's width, as a share of the area of its object.
 constexpr float kPartOfArea = 1.0f / 64;
 
+// Returns the axis that is closest to a vector, 0 to 5: +x, -x, +y, -y, +z, -z.
 int mainAxis(const glm::vec3& v) {
     const glm::vec3 a = glm::abs(v);
     const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;

@@ -12,39 +12,45 @@
 namespace raybundle {
 namespace {
 
+// Patches along the diagonal of an island.
 constexpr double kPatchesAcross = 64;
-// Groups smaller than this share of what is around them get finer patches; kFull times smaller
-// ones get those that they would have alone, and in between there is no jump.
+// Groups smaller than kTiny of the diagonal of their surroundings get finer patches. Groups kFull
+// times smaller than that get the patches that they would have alone, with a continuous transition.
 constexpr double kTiny = 1.0 / 16, kFull = 8;
-// Surfaces not further apart than this share of the larger one's diagonal belong together.
+// Surfaces belong together if their gap is at most this share of the larger one's diagonal.
 constexpr double kTogether = 0.25;
-// Surfaces of one object that touch are one thing, such as a lamp and its rod, unless the object is
-// larger than this share of what is around: a table and all that lies on it may be one object too.
-// They touch where they are not further apart than kTouch of the smaller one's diagonal.
+// Surfaces of one object that touch form one group, such as a lamp and its rod, unless the object
+// is larger than kThing of its surroundings: a table and all that lies on it may also be one
+// object. They touch if their gap is at most kTouch of the smaller one's diagonal.
 constexpr double kThing = 1.0 / 4, kTouch = 0.01;
-// See areOneIsland: two rooms of a size are one island up to a tenth of their length apart.
+// Used by areOneIsland(): two rooms of equal size are one island if the gap between them is at most
+// a tenth of their length.
 constexpr double kMostOfSmaller = 0.8;
-// All tiny groups of one size have at most so many times the patches of what is around them, so
-// that pebbles on a lawn do not have more than the lawn is worth.
+// All tiny groups of one size together have at most this many times the patches of their
+// surroundings, so that pebbles on a lawn do not get more patches than they are worth.
 constexpr double kMostOfTiny = 2;
-// The first island is that with the most patches of those that see themselves. Others that do and
-// have at least this share of its patches are as important, up to so many; all others together have
-// at most so many times the patches of the first.
+// The first island is the one with the most patches among those that see themselves. Other islands
+// that see themselves are equally important if they have at least kAsImportant of its patches, up
+// to kMostImportant islands. All other islands together have at most kMostOfOthers times the
+// patches of the first.
 constexpr double kAsImportant = 0.5;
 constexpr size_t kMostImportant = 4;
 constexpr double kMostOfOthers = 0.25;
-// But no patch is more than so many times as large as those of the first island, so that lines can
-// be dense enough for both (bundles/line_windows.h), unless there would be so many times as many.
+// No patch is more than kLargest times as large as those of the first island, so that lines can be
+// dense enough for both (bundles/line_windows.h), unless the island would then have more than
+// kMostOfVast times the patches of the first.
 constexpr double kLargest = 512, kMostOfVast = 2;
-// More members than these are brought together by a grid before.
+// With more members than this, a grid joins members before they are compared in pairs.
 constexpr size_t kMostMembers = 4096;
 
-using Members = std::vector<size_t>;  // surfaces
+using Members = std::vector<size_t>;  // indices of surfaces
+// Surfaces, and the box that contains them.
 struct Group {
     Extent extent;
     Members members;
 };
 
+// Returns the union of two groups.
 Group joined(Group a, Group b) {
     if (a.members.size() < b.members.size()) std::swap(a, b);
     a.extent.add(b.extent);
@@ -52,7 +58,8 @@ Group joined(Group a, Group b) {
     return a;
 }
 
-// Groups whose middles lie in one cell of a grid, which is made so coarse that few are left.
+// Joins groups whose middles lie in one cell of a grid. The grid is coarsened until at most
+// kMostMembers groups are left.
 std::vector<Group> gathered(std::vector<Group> groups) {
     Extent all;
     for (const Group& group : groups) all.add(group.extent);
@@ -70,8 +77,8 @@ std::vector<Group> gathered(std::vector<Group> groups) {
     return groups;
 }
 
-// What belongs together, by a rule for two extents, and what that belongs to, until there is no
-// more. From the largest on, whatever the order of the members.
+// Joins groups for which `belong` returns true of their extents, repeatedly until no two belong
+// together. Begins with the largest, so that the result does not depend on the order of the groups.
 template <class Belong>
 std::vector<Group> groupsOf(std::vector<Group> open, const Belong& belong) {
     std::vector<Group> groups;
@@ -93,7 +100,7 @@ std::vector<Group> groupsOf(std::vector<Group> open, const Belong& belong) {
             const Extent before = groups[k].extent;
             group = joined(std::move(group), std::move(groups[k]));
             groups.erase(groups.begin() + ptrdiff_t(k));
-            // Grown, it may reach others.
+            // A group that has grown may belong to groups that were compared before.
             if (group.extent.low != before.low || group.extent.high != before.high) k = 0;
         }
         groups.push_back(std::move(group));
@@ -101,7 +108,8 @@ std::vector<Group> groupsOf(std::vector<Group> open, const Belong& belong) {
     return groups;
 }
 
-// Whether two are no longer together than the larger one and most of the smaller laid end to end.
+// Returns whether the extent of both together is at most that of the larger one plus most of that
+// of the smaller one.
 bool areOneIsland(const Extent& a, const Extent& b) {
     Extent both = a;
     both.add(b);
@@ -117,25 +125,27 @@ bool doTouch(const Extent& a, const Extent& b) {
     return a.isNear(b, kTouch * std::min(a.diagonal(), b.diagonal()));
 }
 
+// Computes the patch sizes of all surfaces, island by island.
 class Sizing {
   public:
     explicit Sizing(const std::vector<Surface>& surfaces)
         : surfaces(surfaces), sizes(surfaces.size(), 0) {}
 
-    // Sets the sizes of a island, times a factor.
+    // Sets the sizes of an island's surfaces, multiplied by a factor.
     void setSizes(const Group& island, double factor) {
         for (size_t m : island.members)
             sizes[m] = factor * island.extent.diagonal() / kPatchesAcross;
         refine(island.members, island.extent.diagonal(), factor);
     }
 
-    // Patches of some surfaces.
+    // Returns the estimated number of patches of some surfaces.
     double patchesOf(const Members& members) const {
         double count = 0;
         for (size_t m : members) count += patchesOf(m, sizes[m]);
         return count;
     }
 
+    // Returns the sizes per surface, m, and leaves the object empty.
     std::vector<double> take() { return std::move(sizes); }
 
   private:
@@ -144,8 +154,8 @@ class Sizing {
         return size > 0 ? std::max(faces, surfaces[m].area / (size * size)) : faces;
     }
 
-    // Sets the sizes of tiny groups within one of a diagonal, times a factor, and of those within
-    // them.
+    // Reduces the sizes of groups that are tiny compared to the surfaces around, whose diagonal is
+    // given, and of tiny groups within these groups. Sizes are multiplied by a factor.
     void refine(const Members& around, double diagonal, double factor) {
         std::map<uint32_t, Group> objects;
         for (size_t m : around) {
@@ -202,7 +212,7 @@ PatchSizes automaticPatchSizes(const std::vector<Surface>& surfaces) {
     }
     Sizing sizing(surfaces);
     std::vector<double> count;
-    std::vector<bool> isBlind;  // sees nothing of itself
+    std::vector<bool> isBlind;  // per island: sees nothing of itself
     for (const Group& island : islands) {
         sizing.setSizes(island, 1);
         count.push_back(sizing.patchesOf(island.members));
@@ -210,7 +220,7 @@ PatchSizes automaticPatchSizes(const std::vector<Surface>& surfaces) {
                           !surfaces[island.members.front()].seesItself);
     }
 
-    // By their importance; of equal ones the nearest to the world's origin first.
+    // Order islands by importance, and equal ones by their distance from the world's origin.
     std::vector<size_t> order(islands.size());
     std::iota(order.begin(), order.end(), size_t(0));
     std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {

@@ -8,17 +8,19 @@ namespace raybundle {
 
 namespace {
 
-// A patch of a regular grid over the unit square or the unit triangle, and a place in it: the same
-// affine coordinates in the patch as the grid has in the parent.
+// An element of a regular grid over the unit square or the unit triangle, and a place in the
+// element. `inside` holds affine coordinates of the element, as (s, t) are those of the parent.
 struct GridPlace {
     uint32_t index;
     glm::vec2 inside;
 };
 
+// Returns the element of a grid at affine coordinates, which are clamped to the grid.
 GridPlace placeAt(bool isTriangle, int countA, int countB, glm::vec2 st) {
     const glm::vec2 at = st * glm::vec2(countA, countB);
     const int row = int(std::clamp(at.y, 0.0f, float(countB - 1)));
-    // Row t of a triangle has n - row upright triangles with n - row - 1 upside-down ones between.
+    // Row r of a triangle has n - r upright triangles, with n - r - 1 upside-down ones between
+    // them.
     const int columns = isTriangle ? countA - row : countA;
     const int column = int(std::clamp(at.x, 0.0f, float(columns - 1)));
     const glm::vec2 inside = at - glm::vec2(column, row);
@@ -28,14 +30,14 @@ GridPlace placeAt(bool isTriangle, int countA, int countB, glm::vec2 st) {
             upsideDown ? 1.0f - inside : inside};
 }
 
-// The reverse.
+// Returns the affine coordinates of a place in a grid, the inverse of placeAt().
 glm::vec2 pointAt(bool isTriangle, int countA, int countB, const GridPlace& place) {
     const uint32_t index = place.index;
     if (!isTriangle)
         return {(index % countA + place.inside.x) / countA,
                 (index / countA + place.inside.y) / countB};
     const int n = countA;
-    // Invert row * (2n - row) <= index; float rounding is put right by the two loops.
+    // Find the largest row with row * (2n - row) <= index. The loops correct the rounding of sqrt.
     int row = int(n - std::sqrt(std::max(0.0, double(n) * n - index)));
     while (row > 0 && uint32_t(row * (2 * n - row)) > index) --row;
     while (uint32_t((row + 1) * (2 * n - row - 1)) <= index) ++row;
@@ -73,9 +75,9 @@ glm::vec2 Parent::pointOn(uint32_t patchInParent, glm::vec2 uv) const {
 
 namespace {
 
-// The s and t with d = s a + t b, by the dual basis; d is projected into the plane of a and b. In
-// double precision: the fourth power of a length underflows in float at 1e-10 m, and the difference
-// keeps no digit of slivers 4000 times as long as wide.
+// Returns s and t such that s a + t b is the projection of d on the plane of a and b, by the dual
+// basis. In double precision, because the fourth power of a length underflows in float at 1e-10 m,
+// and because the difference keeps no digit for slivers 4000 times as long as wide.
 std::pair<float, float> affine(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& d) {
     const double aa = glm::dot(a, a), ab = glm::dot(a, b), bb = glm::dot(b, b);
     const double det = aa * bb - ab * ab;

@@ -6,10 +6,10 @@
 //   point = origin + s * a + t * b
 //   parallelogram: s, t in [0, 1];  triangle: s, t >= 0, s + t <= 1
 //
-// so that whoever meets a parent at a point knows the patch without a search, and projecting the
-// parents costs the same however fine the patches are. A patch of the regular grid is a tile; where
-// the light needs it, a tile is cut once more, into 4^level patches of its own regular grid
-// (refinement/refinement.h).
+// The patch at a point of a parent follows from the coordinates without a search, and the cost of
+// projecting the parents does not depend on the size of the patches. An element of the regular grid
+// is a tile. Where the light requires it, a tile is cut once more, into 4^level patches of a
+// regular grid of its own (refinement/refinement.h); otherwise the tile is one patch.
 //
 // Differs from the thesis (section 4.2), which projects each patch by itself.
 #pragma once
@@ -29,198 +29,243 @@
 
 namespace raybundle {
 
+// Stands for no parent where an index of a parent is expected.
 constexpr uint32_t kNoParent = UINT32_MAX;
 
-// The tiles of a parent of which some are cut once more.
+// How the tiles of a parent are cut, if any of them is cut into smaller patches.
 struct CutTiles {
-    std::vector<uint8_t> level;   // per tile: it has 4^level patches
-    std::vector<uint32_t> first;  // per tile: its first patch in the parent; one more at the end
+    std::vector<uint8_t> level;  // per tile, which has 4^level patches
+    // Per tile, its first patch, counted within the parent; one more entry at the end.
+    std::vector<uint32_t> first;
 };
 
+// A triangle or parallelogram that is projected as a unit and carries a regular grid of tiles. Its
+// front is the side to which cross(a, b) points.
 struct Parent {
     glm::vec3 origin, a, b;  // metres, relative to Patches::centre
-    glm::vec3 normal;        // of the front, unit: along cross(a, b)
-    std::array<uint32_t, 4>
-        vertex;  // into Patches::vertices, in order around; [3] unused by triangles
+    glm::vec3 normal;        // of the front, unit, along cross(a, b)
+    // Indices in Patches::vertices, in order around the parent. A triangle does not use the last
+    // one.
+    std::array<uint32_t, 4> vertex;
+    // Index of the first patch over all parents.
     uint32_t firstPatch = 0;
-    uint32_t firstTile = 0;           // its number before any tile was cut
-    uint16_t countA = 1, countB = 1;  // grid along a and b; equal for triangles
+    // Index of the first tile over all parents: the index of its patch if no tile is cut.
+    uint32_t firstTile = 0;
+    uint16_t countA = 1, countB = 1;  // tiles along a and b; equal for triangles
     bool isTriangle = true;
     bool isSolid = false;   // part of a surface that encloses a volume
-    bool isInward = false;  // its front looks into that volume
-    uint32_t surface = 0;   // that it hangs together with (patches/welding.h)
-    // Orders surfaces by the area of their object, and then of the part of it that hangs together.
+    bool isInward = false;  // the front faces that volume
+    // The connected surface (patches/welding.h) that the parent belongs to.
+    uint32_t surface = 0;
+    // A rank of the surface by area: larger objects have larger ranks, and within objects of equal
+    // size larger connected surfaces do.
     uint32_t surfaceSize = 0;
-    // As the instance has it.
+    // Copied from the instance (Instance::stopsDirect and Instance::exchanges).
     bool stopsDirect = true, exchanges = true;
-    uint32_t instance = 0;    // into Scene::instances
-    int32_t face = 0;         // of the instance's mesh
-    uint32_t island = 0;      // into Patches::islands
-    uint32_t scattering = 0;  // half the index of its front's in Patches::scattering
-    // The mesh triangle or quad that the parent is part of, for interpolation between its corners:
-    // one of Patches::cells.
+    uint32_t instance = 0;  // index in Scene::instances
+    int32_t face = 0;       // face of the instance's mesh
+    uint32_t island = 0;    // index in Patches::islands
+    // The sides have the entries 2 * scattering (front) and 2 * scattering + 1 (back) of
+    // Patches::scattering.
+    uint32_t scattering = 0;
+    // Index in Patches::cells of the cell that the parent is part of. The result is interpolated
+    // between the corners of the cell.
     uint32_t cell = 0;
-    // Bit k: no wall stands between the parent and corner k of the cell (patches/crossings.h).
+    // Bit k is set if no wall stands between the parent and corner k of its cell
+    // (patches/crossings.h).
     uint8_t seenCorners = 15;
-    std::shared_ptr<const CutTiles> cut;  // null: each tile is a patch
+    std::shared_ptr<const CutTiles> cut;  // null if each tile is one patch
 
     uint32_t tileCount() const { return isTriangle ? countA * countA : countA * countB; }
+    // Returns the number of patches of the parent.
     uint32_t patchCount() const { return cut ? cut->first.back() : tileCount(); }
-    // The tile that a patch is part of, and how often its edges are halved, both by the number of
-    // the patch in the parent.
+    // Returns the tile that contains a patch. Both are counted within the parent.
     uint32_t tileOf(uint32_t patchInParent) const;
+    // Returns how many times the edges of the patch's tile are halved. The patch is counted within
+    // the parent.
     int levelOf(uint32_t patchInParent) const {
         return cut ? cut->level[tileOf(patchInParent)] : 0;
     }
-    // Of a patch by its number in the parent, whatever it lets through, m^2.
+    // Returns the area of a patch, m^2, including the share that its opacity lets through. The
+    // patch is counted within the parent.
     float areaOf(uint32_t patchInParent) const {
         return std::ldexp(area() / float(tileCount()), -2 * levelOf(patchInParent));
     }
-    // The first patch of a tile in the parent, and the end of its patches.
+    // Returns the first patch of a tile, both counted within the parent. The patches of a tile end
+    // at firstOf(tile + 1).
     uint32_t firstOf(uint32_t tile) const { return cut ? cut->first[tile] : tile; }
-    // The patch at affine coordinates (s, t), counted within the parent. Clamps to the parent.
+    // Returns the patch at affine coordinates (s, t), counted within the parent. Coordinates
+    // outside the parent are clamped to it.
     uint32_t patchAt(float s, float t) const;
-    // The point (u, v) in [0, 1]^2 of a patch, in affine coordinates of the parent; uniform by
-    // area.
+    // Maps (u, v) in [0, 1]^2 to affine coordinates of the parent, on a patch counted within the
+    // parent. Uniform by area.
     glm::vec2 pointOn(uint32_t patchInParent, glm::vec2 uv) const;
+    // Returns the position of affine coordinates, m, relative to Patches::centre.
     glm::vec3 position(glm::vec2 st) const { return origin + st.x * a + st.y * b; }
-    // The affine coordinates of a point in its plane.
+    // Returns the affine coordinates of a point in the plane of the parent. The point is in m,
+    // relative to Patches::centre.
     glm::vec2 affineAt(const glm::dvec3& point) const;
+    // Returns the area of the parent, m^2.
     float area() const { return glm::length(glm::cross(a, b)) * (isTriangle ? 0.5f : 1.0f); }
 };
 
-// A triangle or parallelogram of the user's mesh, over whose corners the result is interpolated.
+// A triangle or parallelogram of the user's mesh. The result is interpolated over its corners.
 struct Cell {
-    glm::vec3 origin, a, b;         // as in Parent
-    std::array<int32_t, 4> corner;  // of the mesh; [3] is -1 for a triangle
+    // As in Parent: m, relative to Patches::centre.
+    glm::vec3 origin, a, b;
+    // Corners of the mesh, in order around the cell. The last one is -1 for a triangle.
+    std::array<int32_t, 4> corner;
+    // Index in Scene::instances, and face of the instance's mesh.
     uint32_t instance = 0;
     int32_t face = 0;
-    bool hasPatches = true;  // slivers have none, but join what lies beside them
-    uint8_t parted = 0;      // bit k: a wall stands on the edge from corner k on (crossings.h)
+    // Slivers have no patches, but connect the cells beside them.
+    bool hasPatches = true;
+    // Bit k is set if a wall stands on the edge from corner k to the next (patches/crossings.h).
+    uint8_t parted = 0;
 
     bool isTriangle() const { return corner[3] < 0; }
     int cornerCount() const { return isTriangle() ? 3 : 4; }
-    // Of corner k, relative to Patches::centre.
+    // Returns the position of corner k, m, relative to Patches::centre.
     glm::vec3 position(int k) const {
         if (k == 0) return origin;
         if (k == 1) return origin + a;
         return isTriangle() || k == 3 ? origin + b : origin + a + b;
     }
-    // Unit, along cross(a, b).
+    // Returns the unit normal of the front, along cross(a, b).
     glm::dvec3 normal() const { return glm::normalize(glm::cross(glm::dvec3(a), glm::dvec3(b))); }
-    // m^2.
+    // Returns the area, m^2.
     double area() const {
         return glm::length(glm::cross(glm::dvec3(a), glm::dvec3(b))) * (isTriangle() ? 0.5 : 1.0);
     }
-    double longestEdge() const {  // metres
+    // Returns the length of the longest edge, m.
+    double longestEdge() const {
         return double(
             std::max({glm::length(a), glm::length(b), isTriangle() ? glm::distance(a, b) : 0.0f}));
     }
-    // Weight of each corner at a point: barycentric in a triangle, bilinear in a parallelogram.
+    // Returns the interpolation weight of each corner at a point of the cell (m, relative to
+    // Patches::centre): barycentric in a triangle, bilinear in a parallelogram.
     std::array<float, 4> weights(const glm::vec3& point) const;
 };
 
-// A parallelogram of the user's mesh that walls cut into several parents (patches/crossings.h).
+// A parallelogram of the user's mesh that walls have cut into several parents
+// (patches/crossings.h).
 struct CrossedCell {
-    std::array<uint32_t, 4> vertex;     // of its corners, in order around, as Parent has them
-    uint32_t firstParent, parentCount;  // into Patches::parents
+    // Indices of its corners in Patches::vertices, in order around.
+    std::array<uint32_t, 4> vertex;
+    // Range of its parents in Patches::parents.
+    uint32_t firstParent, parentCount;
 };
 
-// Surfaces with empty space around them (patches/patch_size.h).
+// Surfaces that are near each other, with empty space around (patches/patch_size.h).
 struct Island {
-    glm::vec3 centre;  // of its bounding box, metres, relative to Patches::centre
-    float radius;      // of a sphere around it that holds the island, metres
-    float reach;       // how far it reaches from Patches::centre: what rounding goes with, metres
-    float size = 0;    // target edge of a tile, metres
-    float finest = 0;  // the same where it is least
-    float touchDistance = 0;  // surfaces not further apart touch, metres
+    glm::vec3 centre;  // centre of the bounding box, m, relative to Patches::centre
+    float radius;      // radius of a sphere around `centre` that contains the island, m
+    // Largest distance of the island from Patches::centre, m. Rounding errors are proportional to
+    // it.
+    float reach;
+    float size = 0;           // largest target length of the edges of tiles, m
+    float finest = 0;         // smallest target length of the edges of tiles, m
+    float touchDistance = 0;  // surfaces within this distance touch, m
 };
 
-// Two indices a patch: side 2 * p is its front, 2 * p + 1 its back.
+// All patches of a scene, as flat arrays. A patch p has two sides: side 2 * p is the front, 2 * p +
+// 1 the back.
 struct Patches {
-    glm::dvec3 centre{
-        0.0};          // world position of the local origin, so that floats stay exact far away
-    float radius = 0;  // of a sphere around the centre that holds everything, metres
-    // To the axes along which most faces lie, for boxes that do not depend on how the scene is
-    // turned.
+    // World position of the local origin, m. Positions are floats relative to it, so that they stay
+    // precise far from the world's origin.
+    glm::dvec3 centre{0.0};
+    // Radius of a sphere around `centre` that contains all surfaces, m.
+    float radius = 0;
+    // Rotation from local to canonical axes, along which most faces lie. Boxes along these axes do
+    // not depend on how the scene is turned.
     glm::mat3 axes{1.0f};
-    std::vector<glm::vec3> vertices;  // metres, relative to centre
-    std::vector<Island>
-        islands;  // the one with the most patches first; the centre is that of its box
+    std::vector<glm::vec3> vertices;  // m, relative to `centre`
+    // The island with the most patches is the first. `centre` is the centre of its box.
+    std::vector<Island> islands;
     std::vector<Parent> parents;
     std::vector<Cell> cells;
-    std::vector<CrossedCell> crossedCells;  // ascending
-    Sheets sheets;                          // of the parents
-    std::vector<uint32_t> parentOf;         // per patch
-    // Per patch, m^2. Of a patch that lets light through only the opaque share counts, as if it had
-    // many small holes: a global line meets that share of it, and reflectance and emission are
-    // those of what is left between the holes.
+    std::vector<CrossedCell> crossedCells;  // by increasing firstParent
+    Sheets sheets;                          // sheets of parents
+    std::vector<uint32_t> parentOf;         // per patch, index in `parents`
+    // Per patch, m^2. Only the opaque share counts, as if a patch that lets light through had many
+    // small holes. A global line meets the patch with that share as its probability, and
+    // reflectance and emission are those of the surface between the holes.
     std::vector<float> area;
-    std::vector<float> opacity;          // per patch; empty where all are opaque
+    // Per patch, the share of the light that the patch stops. Empty if all patches are opaque.
+    std::vector<float> opacity;
     std::vector<glm::vec3> reflectance;  // per side
-    std::vector<AngleFactors> byAngle;   // per side: of the reflectance; empty where all are 0
-    std::vector<Scattering> scattering;  // per Parent::scattering and side; empty: all Lambert's
-    std::vector<glm::vec3> emission;     // per side, W/m^2
-    // Per side: what leaves it of the light that arrives at the other side of the patch; empty
-    // where all are 0.
+    // Per side, dependence of the reflectance on the angle of the light. Empty if no side has one.
+    std::vector<AngleFactors> byAngle;
+    // Two per value of Parent::scattering: front and back. Empty if all sides are Lambert's.
+    std::vector<Scattering> scattering;
+    std::vector<glm::vec3> emission;  // per side, W/m^2
+    // Per side, the share of the light arriving at the other side of the patch that leaves this
+    // side. Empty if it is 0 everywhere.
     std::vector<glm::vec3> translucence;
-    double totalArea = 0;  // of all patches, one side, m^2
-    float size = 0;        // target edge of a tile, metres
-    float finest = 0;      // the same where it is least (patch_size.h)
-    // Metres; the largest of all islands'. Nothing that lies further from a side touches it.
+    double totalArea = 0;  // area of all parents, one side, whatever their opacity, m^2
+    float size = 0;        // largest target length of the edges of tiles, m
+    float finest = 0;      // smallest target length of the edges of tiles, m (patch_size.h)
+    // Largest touch distance of all islands, m. A surface further away touches no side.
     float touchDistance = 0;
-    size_t tileCount = 0;
+    size_t tileCount = 0;  // over all parents
     Warnings warnings;
-    size_t degenerateFaces = 0;  // left out
-    // Of faces that are left out since others stand for them.
+    size_t degenerateFaces = 0;  // faces that were left out because they have no area
+    // Corners of faces that were left out because another face in the same place stands for them.
     std::vector<DoubledCorner> doubledCorners;
-    bool anyCoincide = false;  // whether there are faces that might stand for others
+    // Whether any faces coincide, also those that could not be left out.
+    bool anyCoincide = false;
 
+    // Returns the number of patches.
     size_t count() const { return area.size(); }
-    // Share of the light that a patch stops.
+    // Returns the share of the light that a patch stops, 0 to 1.
     float opacityOf(uint32_t patch) const { return opacity.empty() ? 1.0f : opacity[patch]; }
     size_t sideCount() const { return 2 * area.size(); }
-    // Per side: the area of its patch, m^2.
+    // Returns the area of each side's patch, per side, m^2.
     std::vector<float> sideAreas() const {
         std::vector<float> areas(sideCount());
         for (size_t side = 0; side < areas.size(); ++side) areas[side] = area[side / 2];
         return areas;
     }
+    // Returns the translucence of a side, or 0 if no surface is translucent.
     glm::vec3 translucenceOf(size_t side) const {
         return translucence.empty() ? glm::vec3(0.0f) : translucence[side];
     }
-    // Unit normal of a side.
+    // Returns the unit normal of a side.
     glm::vec3 normal(uint32_t side) const {
         const glm::vec3& front = parents[parentOf[side / 2]].normal;
         return side % 2 ? -front : front;
     }
+    // Returns the island of a side.
     const Island& islandAt(uint32_t side) const {
         return islands[parents[parentOf[side / 2]].island];
     }
+    // Returns the parent of a side.
     const Parent& parentAt(uint32_t side) const { return parents[parentOf[side / 2]]; }
-    // The point (u, v) in [0, 1]^2 of a patch, relative to centre.
+    // Maps (u, v) in [0, 1]^2 to a point on a patch, uniform by area. In m, relative to `centre`.
     glm::vec3 point(uint32_t patch, glm::vec2 uv) const;
-    // The patch of a parent at a point in its plane.
+    // Returns the patch of a parent that contains a point in the plane of the parent. The point is
+    // in m, relative to `centre`; points outside are clamped to the parent.
     uint32_t patchAt(uint32_t parent, const glm::vec3& point) const;
-    // The tile of a patch, counted over all parents.
+    // Returns the tile that contains a patch, counted over all parents.
     uint32_t tileOf(uint32_t patch) const {
         const Parent& parent = parents[parentOf[patch]];
         return parent.firstTile + parent.tileOf(patch - parent.firstPatch);
     }
-    // How often the edges of a patch's tile are halved.
+    // Returns how many times the edges of the patch's tile are halved.
     int level(uint32_t patch) const {
         const Parent& parent = parents[parentOf[patch]];
         return parent.levelOf(patch - parent.firstPatch);
     }
 };
 
-// Cuts all instances of the scene into patches, kMostPatches at most, with edges of about
-// `patchSize` metres (0: as automaticPatchSizes has it), coarser if there would be more than
-// maxPatches, and gives each its reflectance, emission and opacity (means over its area).
+// Cuts all instances of the scene into at most kMostPatches patches, and sets the means of
+// reflectance, emission and opacity over each. The edges of patches are about `patchSize` metres
+// long, or as automaticPatchSizes() chooses if it is 0, and longer if there would be more than
+// maxPatches patches.
 Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches);
 
-// Cuts the tiles once more: levels holds one entry a tile, in the order of the patches of an uncut
-// subdivision; 0 leaves a tile as it is.
+// Cuts tiles into smaller patches. `levels` has an entry per tile, counted over all parents: the
+// edges of the tile are halved so many times, and 0 leaves the tile whole. `patches` must be uncut.
 void cutTiles(const Scene& scene, Patches& patches, const std::vector<uint8_t>& levels);
 
 }  // namespace raybundle

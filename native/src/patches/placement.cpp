@@ -10,19 +10,21 @@
 namespace raybundle {
 namespace {
 
-// What of a surface lies in front of a face of it by more than this share of its diagonal is seen
-// from there; of about so many faces.
+// A surface sees itself if a part of it is in front of one of its faces by more than kBlind of the
+// surface's diagonal. About kBlindFaces faces are tested.
 constexpr double kBlind = 1e-3;
 constexpr size_t kBlindFaces = 16;
-// Directions that are tried for the scene's own axes, and faces that they are judged by.
+// Directions that are tried as axes of the scene, and the largest number of faces that are
+// evaluated.
 constexpr size_t kTriedAxes = 64, kJudgingFaces = size_t(1) << 16;
-// Cosine of what counts as parallel, and as at right angles; of axes that are the world's, and of
-// directions of which one is tried.
+// Cosines of directions that count as parallel (at least kParallel) and as perpendicular (at most
+// kAcross), of axes that count as those of the world (kSameAxes), and of directions so close that
+// only one of them is tried (kSame).
 constexpr double kParallel = 0.9998, kAcross = 0.02, kSameAxes = 1 - 1e-9, kSame = 1 - 1e-13;
 
-// The direction along which most of some vectors lie, by their lengths; 0 without any. pole: what
-// lies at right angles to the direction and to this counts too, as the sides of a grid do and its
-// diagonals do not.
+// Returns the unit direction to which most of the vectors are parallel, weighted by length, or 0 if
+// there are no vectors. If there is a `pole`, vectors perpendicular to both the direction and the
+// pole count too: this holds for the sides of a grid, but not for its diagonals.
 glm::dvec3 commonest(const std::vector<glm::dvec3>& vectors, const glm::dvec3* pole) {
     double total = 0, passed = 0, next = 0, most = 0;
     std::vector<double> lengths;
@@ -46,7 +48,7 @@ glm::dvec3 commonest(const std::vector<glm::dvec3>& vectors, const glm::dvec3* p
             if (std::max(std::abs(glm::dot(vectors[j], direction)),
                          std::abs(glm::dot(vectors[j], other))) > kParallel * lengths[j])
                 along += lengths[j];
-        // By more than rounding, so that equal ones stay in their order.
+        // Better by more than rounding, so that of equally good directions the first is taken.
         if (along > most * (1 + 1e-6)) {
             most = along;
             best = direction;
@@ -72,9 +74,10 @@ Placement::Placement(const Scene& scene) {
     closedOnes = closedSurfaces(allFaces);
 }
 
-// The axes along which most faces lie, for boxes that do not depend on how the scene is turned: the
-// normal of most of the area, and of most of what is at right angles to it; if nothing is, an edge.
-// The world's, where they are the same.
+// Returns the rotation from the world's axes to those along which most faces lie, so that boxes do
+// not depend on how the scene is turned. The axes are the normal of most of the area, and the
+// normal of most of the area perpendicular to it. If no area is perpendicular, an edge takes its
+// place. Returns the identity if the axes are those of the world.
 glm::dmat3 Placement::ownAxes() const {
     std::vector<glm::dvec3> faces, walls, edges;
     const size_t step = 1 + allFaces.count() / kJudgingFaces;
@@ -113,7 +116,7 @@ void Placement::findIslands(Patches& patches) {
     patches.axes = glm::mat3(axes);
     patchSizes = automaticPatchSizes(surfaces());
     const std::vector<Extent>& extents = patchSizes.extent;
-    // Vertices of no face lie anywhere.
+    // Include vertices without faces, which may lie outside all islands.
     Extent all;
     for (const glm::dvec3& vertex : world) all.add(axes * vertex);
     auto middleOf = [&](const Extent& extent) { return glm::transpose(axes) * extent.middle(); };
@@ -138,6 +141,7 @@ void Placement::findIslands(Patches& patches) {
         }
 }
 
+// Returns the extent and properties of each piece.
 std::vector<Surface> Placement::surfaces() const {
     std::vector<Surface> result(allFaces.pieceCount);
     std::vector<bool> isClosed(result.size());
@@ -159,8 +163,9 @@ std::vector<Surface> Placement::surfaces() const {
     return result;
 }
 
-// Whether light goes on from one part of a surface to another: by some of its faces, whether not
-// all vertices lie behind, or in one plane with them. off: what is in the plane, metres.
+// Returns whether light can pass from one part of a surface to another. The test is whether, for
+// some of its faces, vertices lie in front of the face, or for open surfaces also behind it.
+// Vertices closer to the plane of the face than `off` (m) lie in the plane.
 bool Placement::seesItself(const std::vector<uint32_t>& faces, double off, bool isClosed) const {
     for (size_t k = 0; k < faces.size(); k += 1 + faces.size() / kBlindFaces) {
         const glm::dvec3 at = world[allFaces.vertices[allFaces.offsets[faces[k]]]];
@@ -176,7 +181,7 @@ bool Placement::seesItself(const std::vector<uint32_t>& faces, double off, bool 
     return false;
 }
 
-// Along the normal of a face, as long as its area, m^2.
+// Returns the normal of a face multiplied by its area, m^2.
 glm::dvec3 Placement::areaVector(size_t face) const {
     const size_t begin = allFaces.offsets[face], end = allFaces.offsets[face + 1];
     const glm::dvec3 first = world[allFaces.vertices[begin]];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Where the vertices of all instances lie, which of them are one, and what they make: surfaces,
-// and islands of them with empty space around.
+// The positions of the vertices of all instances in the world, the welding of vertices, and the
+// surfaces and islands that result.
 #pragma once
 
 #include <cstddef>
@@ -16,26 +16,31 @@
 
 namespace raybundle {
 
+// Vertices in the world, welded, with their surfaces and islands.
 class Placement {
   public:
-    // Throws Error(INVALID_ARGUMENT) for what lies too far away. `scene` must outlive it.
+    // Transforms and welds all vertices. Throws Error(INVALID_ARGUMENT) if an object reaches
+    // further than kFarthest from the origin. Does not keep a reference to `scene`.
     explicit Placement(const Scene& scene);
 
-    // Whether there are no vertices.
+    // Returns whether the scene has no vertices.
     bool isEmpty() const { return world.empty(); }
 
-    // Finds the islands and the automatic sizes; sets centre, radius, vertices and islands.
+    // Finds the islands and the automatic patch sizes. Sets the axes, centre, radius, vertices and
+    // islands of `patches`.
     void findIslands(Patches& patches);
 
-    // A vertex of an instance's mesh, into Patches::vertices: the one that stands for it.
+    // Returns the index in Patches::vertices of a vertex of an instance's mesh, after welding.
     uint32_t vertex(uint32_t instance, int32_t ofMesh) const {
         return welded[firstVertex[instance] + size_t(ofMesh)];
     }
+    // Returns the faces of all instances, by welded vertices.
     const WeldedFaces& faces() const { return allFaces; }
-    // Of each instance, into Patches::vertices.
+    // Returns, per instance, the index in Patches::vertices of its first vertex.
     const std::vector<size_t>& firstVertices() const { return firstVertex; }
-    // Per surface of them.
+    // Returns, per surface (WeldedFaces::surface), whether it is closed.
     const std::vector<bool>& closed() const { return closedOnes; }
+    // Returns sizes and islands per piece (WeldedFaces::piece). Only after findIslands().
     const PatchSizes& sizes() const { return patchSizes; }
 
   private:
@@ -44,12 +49,12 @@ class Placement {
     bool seesItself(const std::vector<uint32_t>& faces, double off, bool isClosed) const;
     glm::dvec3 areaVector(size_t face) const;
 
-    std::vector<glm::dvec3> world;    // per vertex of all instances, metres
-    glm::dmat3 axes{1.0};             // from the world's to those of the scene, see ownAxes
-    std::vector<size_t> firstVertex;  // per instance
-    std::vector<uint32_t> welded;     // per vertex: the one that stands for it
+    std::vector<glm::dvec3> world;    // per vertex of all instances, m
+    glm::dmat3 axes{1.0};             // from the world's axes to the scene's own, see ownAxes()
+    std::vector<size_t> firstVertex;  // per instance, index in `world`
+    std::vector<uint32_t> welded;     // per vertex: the vertex that represents it
     WeldedFaces allFaces;
-    std::vector<bool> closedOnes;
+    std::vector<bool> closedOnes;  // per surface
     PatchSizes patchSizes;
 };
 

@@ -10,11 +10,12 @@ namespace raybundle {
 namespace {
 
 constexpr float kMaxReflectance = 0.999f;
-// Samples along each edge of a patch: at least kMinSamples, at most kMaxSamples, else one per
-// pixel.
+// Samples along each edge of a patch: one per pixel of the image, but at least kMinSamples and at
+// most kMaxSamples.
 constexpr int kMinSamples = 3;
 constexpr int kMaxSamples = 32;
 
+// Returns a pixel by its column and row, which may lie outside the image.
 glm::vec3 texel(const Image& image, int x, int y) {
     auto wrap = [&](int i, int n) {
         if (image.extension == RB_IMAGE_REPEAT) return ((i % n) + n) % n;
@@ -25,7 +26,7 @@ glm::vec3 texel(const Image& image, int x, int y) {
     return wx < 0 || wy < 0 ? glm::vec3(0.0f) : image.pixels[size_t(wy) * image.width + wx];
 }
 
-// Bilinear lookup, as Blender's default interpolation.
+// Returns the image at `uv` by bilinear interpolation, which is Blender's default.
 glm::vec3 lookup(const Image& image, glm::vec2 uv) {
     const float x = uv.x * image.width - 0.5f, y = uv.y * image.height - 0.5f;
     if (!(std::abs(x) < 1e9f) || !(std::abs(y) < 1e9f)) return glm::vec3(0.0f);
@@ -35,9 +36,11 @@ glm::vec3 lookup(const Image& image, glm::vec2 uv) {
            fy * ((1 - fx) * texel(image, x0, y0 + 1) + fx * texel(image, x0 + 1, y0 + 1));
 }
 
+// Returns whether a mesh has UVs at which to read an image. `image` may be RB_NO_IMAGE.
 bool hasImage(const Mesh& mesh, int image) { return image >= 0 && !mesh.uvs.empty(); }
 
-// Means over a patch of what a material's images and corner colours add or multiply.
+// Means over a patch of the images and corner colours of a material: what they add to the
+// constants, and the factor of the opacity.
 struct Varying {
     struct Side {
         glm::vec3 reflectance{0.0f}, emission{0.0f}, translucence{0.0f};
@@ -46,6 +49,7 @@ struct Varying {
     float opacity = 1;
 };
 
+// Returns whether images or corner colours change the colours of a material on a mesh.
 bool varies(const Mesh& mesh, const Material& material) {
     for (const MaterialSide& side : material.sides)
         for (const SurfaceColor* color : side.colors())
@@ -55,13 +59,13 @@ bool varies(const Mesh& mesh, const Material& material) {
     return false;
 }
 
-// An image that a material reads, and the sum of what was read of it.
+// An image that a material uses, and the sum of its samples.
 struct ReadImage {
     int index;
     glm::vec3 sum{0.0f};
 };
 
-// Each once, though several colours may read it.
+// Returns the images of a material, each once although several colours may use it.
 std::vector<ReadImage> imagesOf(const Mesh& mesh, const Material& material) {
     std::vector<ReadImage> images;
     auto add = [&](int index) {
@@ -76,6 +80,7 @@ std::vector<ReadImage> imagesOf(const Mesh& mesh, const Material& material) {
     return images;
 }
 
+// Returns the means over a patch.
 Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mesh,
                      const Material& material, uint32_t patch) {
     const Parent& parent = patches.parents[patches.parentOf[patch]];
@@ -101,7 +106,7 @@ Varying varyingMeans(const Scene& scene, const Patches& patches, const Mesh& mes
         const glm::vec2 pixels = (high - low) * glm::vec2(image.width, image.height);
         samples = int(std::clamp(std::max(pixels.x, pixels.y), float(samples), float(kMaxSamples)));
     }
-    // A patch is sampled at the centroids of its own regular grid, so that linear colours are
+    // Sample the patch at the centroids of a regular grid, so that the means of linear colours are
     // exact.
     Parent grid;
     grid.isTriangle = parent.isTriangle;
@@ -146,9 +151,10 @@ bool isEmptySpace(const Material& material) {
 }
 
 void assignOpacity(const Scene& scene, Patches& patches) {
-    // What reflects or shines but stops no light would never be met by a line: it stops so much.
+    // The least opacity of a surface that reflects or emits: no line would meet a surface that
+    // stops no light.
     constexpr float kLeastOpacity = 1.0f / 64;
-    // Keeps areas above zero, by which much is divided.
+    // Keeps areas above 0, since many quantities are divided by them.
     constexpr float kLeastArea = 1e-4f;
     auto materialOf = [&](const Parent& parent) -> const Material& {
         return scene.materialOf(parent.instance, size_t(parent.face));
@@ -163,7 +169,7 @@ void assignOpacity(const Scene& scene, Patches& patches) {
         if (material.isOpaque()) return;
         const Mesh& mesh = scene.meshes[scene.instances[parent.instance].mesh];
         const float least = isEmptySpace(material) ? 0.0f : kLeastOpacity;
-        // Light gets in.
+        // Light enters a surface that is not opaque, so that it encloses no dark volume.
         parent.isSolid = false;
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
             float opacity = material.opacity;
@@ -177,6 +183,7 @@ void assignOpacity(const Scene& scene, Patches& patches) {
 
 namespace {
 
+// Sets the scattering of all materials, and the index of each parent.
 void assignScattering(const Scene& scene, Patches& patches) {
     patches.scattering.clear();
     if (std::all_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
@@ -220,7 +227,8 @@ void assignMaterials(const Scene& scene, Patches& patches) {
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p) {
             Varying varying;
             if (isVarying) varying = varyingMeans(scene, patches, mesh, material, p);
-            // The material's values are of the whole patch, a patch's of its opaque share.
+            // The values of the material are relative to the whole patch, those of a patch to its
+            // opaque share.
             const float opacity = patches.opacityOf(p);
             const float scale = opacity > 0 ? 1 / opacity : 0.0f;
             for (size_t side = 0; side < 2; ++side) {

@@ -9,19 +9,21 @@
 
 namespace raybundle {
 
-// Whether a material reflects nothing and shines nowhere.
+// Returns whether a material reflects nothing, emits nothing and is not translucent.
 bool isEmptySpace(const Material& material);
 
-// Gives every patch its opacity, averaged likewise, and takes the share that lets light through off
-// its area. Once, before assignMaterials; lines depend on it.
+// Sets the opacity of every patch, averaged over its area, and multiplies its area by it. Parents
+// that are not opaque are no longer solid. Call it once, before assignMaterials(). Lines depend on
+// the result.
 void assignOpacity(const Scene& scene, Patches& patches);
 
-// Gives every side of every patch its reflectance, by angle too, and its emission. Images and
-// corner colours are averaged over the area of the patch: a lookup at one point would alias.
+// Sets the reflectance, its dependence on the angle, the translucence and the emission of every
+// side, and the scattering of materials. Images and corner colours are averaged over the area of
+// the patch, because a lookup at one point would alias.
 void assignMaterials(const Scene& scene, Patches& patches);
 
-// Per side: how much of its reflectance is diffuse, of the whole patch, what lets light through
-// included.
+// Returns per side the diffuse part of its reflectance, relative to the whole patch, including the
+// share that its opacity lets through.
 std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& patches);
 
 }  // namespace raybundle

@@ -17,24 +17,24 @@
 namespace raybundle {
 namespace {
 
-// Share of the longer edge by which the edges of congruent parents may differ.
+// Difference up to which the edges of parents count as congruent, relative to the longer edge.
 constexpr float kCongruence = 1e-4f;
-// How far a vertex may lie from its place on the sheet: across it, as a share of how far its island
-// reaches (what rounding to float leaves, some units in the last place), and along it, as a share
-// of the parents' edges.
+// Tolerances of the position of a vertex on a sheet. Across the sheet, kFlatness is relative to the
+// reach of the island: a rounding error of a few units in the last place. Along the sheet,
+// kEvenness is relative to the edges of the members.
 constexpr float kFlatness = 3e-7f, kEvenness = 0.01f;
 
-// A parallelogram that may be part of a sheet.
+// A parallelogram that may become part of a sheet.
 struct Member {
-    std::array<uint32_t, 4> vertex;  // as in Parent
+    std::array<uint32_t, 4> vertex;  // in order around, as Parent::vertex
     uint32_t firstParent, parentCount;
-    int countA, countB;  // patches along its edges; 0 where it is uneven
+    int countA, countB;  // tiles along its edges; 0 if it is uneven
 
     bool isUneven() const { return countA == 0; }
 };
 
-// A member in a lattice: corner k of its place there (in order around, (0, 0) first) is its vertex
-// (k + turn) % 4.
+// A member at a position of a lattice, possibly turned. Corner k of the position (in order around,
+// from (0, 0)) is vertex (k + turn) % 4 of the member.
 struct Place {
     const Member* member = nullptr;
     int turn = 0;
@@ -43,12 +43,12 @@ struct Place {
     glm::vec3 position(const Patches& patches, int corner) const {
         return patches.vertices[vertex(corner)];
     }
-    // Patches along the lattice's two directions.
+    // Tiles along the two directions of the lattice.
     int countA() const { return turn % 2 ? member->countB : member->countA; }
     int countB() const { return turn % 2 ? member->countA : member->countB; }
 };
 
-// Where in a lattice.
+// A position in a lattice: column and row.
 using At = std::array<int, 2>;
 struct HashAt {
     size_t operator()(const At& at) const {
@@ -57,9 +57,10 @@ struct HashAt {
 };
 using Lattice = std::unordered_map<At, Place, HashAt>;
 
-// The steps across a parent's edges, in order around.
+// The steps to the neighbours across the four edges of a position, in order around.
 constexpr At kSteps[4] = {{0, -1}, {1, 0}, {0, 1}, {-1, 0}};
 
+// Grows lattices of congruent members, and cuts them into rectangular sheets.
 class SheetSearch {
   public:
     explicit SheetSearch(const Patches& patches) : patches(patches) {}
@@ -68,19 +69,20 @@ class SheetSearch {
         findMembers();
         listEdges();
         isPlaced.assign(members.size(), false);
-        // What is uneven joins others.
+        // Sheets start at even members, which uneven ones may join.
         for (uint32_t i = 0; i < members.size(); ++i) {
             throwIfCancelledAt(i);
             if (!isPlaced[i] && !members[i].isUneven()) cutIntoSheets(growFrom(i));
         }
         for (uint32_t i = 0; i < members.size(); ++i)
             if (!isPlaced[i]) leaveLoose(members[i]);
-        // The order of the faces, in which their vertices lie beside each other.
+        // Restore the order of the faces, whose vertices are close to each other in memory.
         std::sort(result.loose.begin(), result.loose.end());
         return std::move(result);
     }
 
   private:
+    // Finds the parallelograms among the parents. Triangles become loose at once.
     void findMembers() {
         auto crossed = patches.crossedCells.begin();
         for (uint32_t i = 0; i < patches.parents.size(); ++i) {
@@ -106,7 +108,7 @@ class SheetSearch {
             result.loose.push_back(member.firstParent + k);
     }
 
-    // A member's edge by its two vertices in order around.
+    // Edge `side` of a member, by its two vertices in the order around the member.
     struct Edge {
         uint64_t key;
         uint32_t member;
@@ -127,7 +129,8 @@ class SheetSearch {
         tbb::parallel_sort(edges.begin(), edges.end());
     }
 
-    // The lattice of all members like this one that are joined to it by edges.
+    // Returns the lattice of all members that are congruent to this one and connected to it by
+    // edges.
     Lattice growFrom(uint32_t start) {
         Lattice lattice;
         const Place first{&members[start], 0};
@@ -151,13 +154,14 @@ class SheetSearch {
         return lattice;
     }
 
-    // What lies across an edge, as part of the same surface.
+    // Returns the unplaced member across an edge of a position, turned as the lattice is. The edge
+    // runs in opposite directions in both members, so that they belong to one orientable surface.
     std::optional<Place> across(const Place& place, int side) const {
         const uint32_t from = place.vertex(side), to = place.vertex((side + 1) % 4);
         const uint64_t key = keyOf(to, from);
         auto edge = std::lower_bound(edges.begin(), edges.end(), Edge{key, 0, 0});
         for (; edge != edges.end() && edge->key == key; ++edge)
-            // The edge is side (side + 2) % 4 of its place.
+            // In the position of the neighbour, the common edge is side (side + 2) % 4.
             if (!isPlaced[edge->member])
                 return Place{&members[edge->member], (edge->side + 6 - side) % 4};
         return std::nullopt;
@@ -178,7 +182,7 @@ class SheetSearch {
         return p.position(patches, 3) - p.position(patches, 0);
     }
 
-    // Row by row, the widest rectangles that are left.
+    // Cuts a lattice into rectangles: row by row, always the widest rectangle that is left.
     void cutIntoSheets(Lattice lattice) {
         const Place& any = lattice.at({0, 0});
         const uint32_t countA = uint32_t(any.countA()), countB = uint32_t(any.countB());
@@ -189,7 +193,7 @@ class SheetSearch {
         });
         for (const At& low : order) {
             if (!lattice.count(low)) continue;
-            At high = low;  // the first column and row beyond
+            At high = low;  // first column and row outside the rectangle
             while (lattice.count({high[0], low[1]})) ++high[0];
             auto isWhole = [&](int row) {
                 for (int x = low[0]; x < high[0]; ++x)
@@ -203,7 +207,8 @@ class SheetSearch {
         }
     }
 
-    // countA, countB: patches along the edges of a member that is not uneven.
+    // Makes a sheet of a rectangle of a lattice, or leaves its members loose if they do not fit.
+    // `countA` and `countB` are the tiles along the edges of an even member.
     void addSheet(const Lattice& lattice, const At& low, const At& high, uint32_t countA,
                   uint32_t countB) {
         const int width = high[0] - low[0], height = high[1] - low[1];
@@ -225,8 +230,8 @@ class SheetSearch {
         for (int y = 0; y < height; ++y) addEdge(at(width - 1, y), 1);
         for (int x = width - 1; x >= 0; --x) addEdge(at(x, height - 1), 2);
         for (int y = height - 1; y >= 0; --y) addEdge(at(0, y), 3);
-        // Parents that are one with others along some edges only have vertices of their own
-        // elsewhere.
+        // Members that are connected along some edges may have separate vertices along others. The
+        // outline must then not be a closed loop of vertices.
         for (size_t k = 0; k < sheet.outline.size(); ++k)
             isOne =
                 isOne && sheet.outline[k][1] == sheet.outline[(k + 1) % sheet.outline.size()][0];
@@ -256,6 +261,7 @@ class SheetSearch {
         result.sheets.push_back(std::move(sheet));
     }
 
+    // Adds the parents of an uneven member to the parts of a sheet.
     void addParts(Sheet& sheet, const Member& member) const {
         sheet.firstPart.push_back(uint32_t(sheet.parts.size()));
         const glm::dvec3 origin(sheet.origin), a(sheet.a), b(sheet.b);
@@ -267,7 +273,8 @@ class SheetSearch {
         }
     }
 
-    // Whether the vertices of the member in column x and row y are where the sheet has them.
+    // Returns whether the vertices of the member in column x and row y lie where the sheet expects
+    // them.
     bool fits(const Sheet& sheet, const Place& place, int x, int y, int width, int height) const {
         const glm::vec3 a = sheet.a / float(width), b = sheet.b / float(height);
         const glm::vec3 normal = glm::normalize(glm::cross(sheet.a, sheet.b));
@@ -284,12 +291,13 @@ class SheetSearch {
         return true;
     }
 
-    // The patch in a column and row of a member that is no other than a parent, as it lies in the
+    // Returns the patch in a column and row of an even member, as the member is turned in the
     // lattice.
     uint32_t patchOf(const Place& place, uint32_t column, uint32_t row) const {
         const Parent& parent = patches.parents[place.member->firstParent];
         const uint32_t a = parent.countA, b = parent.countB;
-        // Vertex `turn` is the lattice's (0, 0), from where the parent's own column and row run.
+        // Vertex `turn` of the parent lies at (0, 0) of the position, from which column and row are
+        // counted.
         switch (place.turn) {
             case 1:
                 std::swap(column, row);
@@ -310,7 +318,7 @@ class SheetSearch {
     }
 
     const Patches& patches;
-    std::vector<Edge> edges;  // in order of their keys
+    std::vector<Edge> edges;  // sorted by key
     std::vector<Member> members;
     std::vector<bool> isPlaced;  // per member
     Sheets result;
@@ -323,10 +331,10 @@ uint32_t Sheet::patchIn(uint32_t uneven, const Patches& all, float s, float t) c
     const Part* best = parts.data() + firstPart[uneven - kUneven];
     float most = -std::numeric_limits<float>::infinity();
     glm::vec2 at(0.0f);
-    // Until one holds the point: by a rounding error none may.
+    // Search for a parent that contains the point. Rounding may leave none: then take the nearest.
     for (const Part* part = best; part != end && most < 0; ++part) {
         const glm::vec2 st = part->origin + s * part->a + t * part->b;
-        // How far inside, in shares of the parent.
+        // The distance inside the parent, relative to its size; negative outside.
         const float inside = std::min(std::min(st.x, st.y), all.parents[part->parent].isTriangle
                                                                 ? 1 - st.x - st.y
                                                                 : 1 - std::max(st.x, st.y));

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Sheets: congruent neighbouring parallelograms of one plane, which are projected as one. A wall of
-// a mesh made for vertex colours has thousands of faces of a few pixels each; as a sheet it is one.
-// The parallelograms are parents, or what walls have cut into several parents
-// (patches/crossings.h): where these, or tiles that are cut, make it uneven, the patch at a point
-// is looked up.
+// Sheets: congruent neighbouring parallelograms of one plane that are projected as one. A wall of a
+// mesh that was made for vertex colours has thousands of faces of a few pixels each; as a sheet, it
+// is one parallelogram. The members of a sheet are parents, or parallelograms that walls have cut
+// into several parents (patches/crossings.h). A member is uneven if it consists of several parents
+// or of tiles that are cut. On an uneven member, the patch at a point is found by a search.
 //
-// Differs from the thesis (section 4.2), which projects each patch by itself: as a parent stands
-// for its patches, a sheet stands for its parents. Its outline is made of the edges of these, so
-// that it fits what lies beside it to the last bit.
+// Differs from the thesis (section 4.2), which projects each patch by itself: as a parent
+// represents its patches, a sheet represents its parents. Its outline consists of the edges of
+// these parents, so that it fits adjacent surfaces exactly, without rounding.
 #pragma once
 
 #include <algorithm>
@@ -21,21 +21,24 @@ namespace raybundle {
 
 struct Patches;
 
-// A parallelogram of others without gaps. point = origin + s * a + t * b, s and t in [0, 1].
+// A parallelogram that consists of smaller ones without gaps: point = origin + s * a + t * b, with
+// s and t in [0, 1].
 struct Sheet {
-    glm::vec3 origin, a, b;          // metres, relative to Patches::centre
-    uint32_t island = 0;             // into Patches::islands
-    uint32_t columns = 0, rows = 0;  // of its patches, along a and b
-    // Row by row. From kUneven on: an uneven parallelogram, by its number.
+    glm::vec3 origin, a, b;          // m, relative to Patches::centre
+    uint32_t island = 0;             // index in Patches::islands
+    uint32_t columns = 0, rows = 0;  // of the grid of patches, along a and b
+    // Row by row, the index of a patch. Values from kUneven on stand for uneven members: kUneven
+    // plus the number of the member within the sheet.
     std::vector<uint32_t> patches;
-    std::vector<std::array<uint32_t, 2>> outline;  // edges in order around, into Patches::vertices
+    // The edges in order around, by indices in Patches::vertices.
+    std::vector<std::array<uint32_t, 2>> outline;
 
-    // The patches alone.
+    // A view of the grid of patches, for inner loops. The sheet must outlive it.
     struct Grid {
         const uint32_t* patches;
         int columns, rows;
 
-        // What `patches` has at (s, t); clamps to the sheet.
+        // Returns the entry of `patches` at (s, t), which is clamped to the sheet.
         uint32_t patchAt(float s, float t) const {
             const int column = std::min(std::max(int(s * float(columns)), 0), columns - 1);
             const int row = std::min(std::max(int(t * float(rows)), 0), rows - 1);
@@ -44,28 +47,33 @@ struct Sheet {
     };
     Grid grid() const { return {patches.data(), int(columns), int(rows)}; }
 
-    // A parent of an uneven parallelogram, whose affine coordinates are origin + s * a + t * b.
+    // A parent of an uneven member. The affine coordinates of the parent are origin + s * a + t * b
+    // at the point (s, t) of the sheet.
     struct Part {
-        uint32_t parent;  // into Patches::parents
+        uint32_t parent;  // index in Patches::parents
         glm::vec2 origin, a, b;
     };
+    // Least value of an entry of `patches` that stands for an uneven member.
     static constexpr uint32_t kUneven = 1u << 30;
-    std::vector<Part> parts;          // of all uneven parallelograms, one after the other
-    std::vector<uint32_t> firstPart;  // of each; one more at the end
-    // The patch at (s, t) in an uneven parallelogram, by what `patches` has there.
+    std::vector<Part> parts;  // of all uneven members, one after the other
+    // Per uneven member, the index of its first part; one more entry at the end.
+    std::vector<uint32_t> firstPart;
+    // Returns the patch at the point (s, t) of the sheet, on an uneven member. `uneven` is the
+    // entry of `patches` there, and `all` the patches from which the sheet was made.
     uint32_t patchIn(uint32_t uneven, const Patches& all, float s, float t) const;
 };
 
+// All parents that exchange light, joined into sheets where possible.
 struct Sheets {
     std::vector<Sheet> sheets;
-    std::vector<uint32_t> loose;  // the parents that exchange light and are in no sheet
-    size_t joined = 0;            // parents that are in a sheet
+    std::vector<uint32_t> loose;  // parents that exchange light and are in no sheet
+    size_t joined = 0;            // number of parents in sheets
 };
 
-// Of parents whose patches are numbered.
+// Joins parents into sheets. The indices of patches must be set.
 Sheets findSheets(const Patches& patches);
 
-// Each parent by itself.
+// Returns the parents without any sheet.
 Sheets withoutSheets(const Patches& patches);
 
 }  // namespace raybundle

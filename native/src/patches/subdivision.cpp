@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A scene is cut into patches, and its tiles once more: faces into cells and parents
-// (patches/face_cutting.h), whose grids are numbered here.
+// Cuts a scene into patches, and cuts tiles once more. patches/face_cutting.h makes cells and
+// parents from faces; this file sizes and numbers the grids of the parents.
 #include <algorithm>
 #include <cmath>
 
@@ -16,10 +16,12 @@
 namespace raybundle {
 namespace {
 
-// Surfaces not further apart than these shares of an island's radius and of its finest patches
-// touch; far from the centre, where rounding tells less apart, than this share of how far it is.
+// The touch distance of an island is the smaller one of these shares of its radius and of its
+// finest patches. Far from the centre, where positions are less precise, it is at least
+// kTouchOfDistance of the island's distance.
 constexpr float kTouchOfRadius = 1e-4f, kTouchOfPatch = 0.02f, kTouchOfDistance = 1e-6f;
 
+// Sets the indices of the first patches and tiles of all parents. Returns the number of patches.
 size_t numberPatches(Patches& patches) {
     size_t count = 0;
     for (Parent& parent : patches.parents) {
@@ -29,7 +31,7 @@ size_t numberPatches(Patches& patches) {
     return count;
 }
 
-// The grids were made for one patch size; makes them coarser by a factor.
+// Makes the grids coarser by a factor.
 void coarsen(Patches& patches, double factor) {
     for (Parent& parent : patches.parents) {
         parent.countA = uint16_t(std::max(1.0, std::floor(parent.countA / factor)));
@@ -39,7 +41,7 @@ void coarsen(Patches& patches, double factor) {
     }
 }
 
-// What patches have, after they were numbered.
+// Sets all properties of patches. Their indices must be set.
 void fillPatches(const Scene& scene, Patches& patches) {
     patches.parentOf.clear();
     patches.area.clear();
@@ -67,8 +69,9 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     placed.findIslands(patches);
     cutFaces(scene, placed, patchSize, patches);
 
-    // A parent keeps at least one patch. Where many small ones take most of maxPatches, this part
-    // of it is for the grids of the large ones: a ground under dense props is not to be one patch.
+    // A parent keeps at least one patch. If many small parents use up most of maxPatches, an eighth
+    // of maxPatches is still available for the grids of large parents. Otherwise a ground under
+    // dense props would become one patch.
     const size_t most = std::max(maxPatches, patches.parents.size() + maxPatches / 8);
     while (numberPatches(patches) > most) {
         coarsen(patches, 1.1);

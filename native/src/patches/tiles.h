@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Tiles: the patches as they were before some were cut (refinement/refinement.h), and the means
-// over them of what cut patches have. A cut tile has the lines that it had: its patches share them,
-// so that each has more noise and the mean over the tile no more. What is interpolated between the
-// corners of faces, none smaller than a tile, has that of the tiles; so noise is measured on them.
+// Tiles: the patches as they were before some tiles were cut (refinement/refinement.h), and means
+// over tiles of values of patches. A tile that is cut still meets as many lines as before. Its
+// patches share them, so that each patch is noisier but the mean over the tile is not. Values that
+// are interpolated between the corners of faces, none of which is smaller than a tile, have the
+// noise of the tiles. Noise is therefore measured on tiles.
 #pragma once
 
 #include <cstdint>
@@ -15,31 +16,37 @@
 
 namespace raybundle {
 
+// The tiles of a set of patches.
 class Tiles {
   public:
-    // Where nothing is cut, `cut` must outlive the object.
+    // Keeps a reference to `cut`.
     explicit Tiles(const Patches& cut);
     Tiles(const Tiles&) = delete;
 
-    // A patch a tile, without materials.
+    // Returns patches of which each is a whole tile. If any tile is cut, they have no materials and
+    // sheets.
     const Patches& patches() const { return uncut ? *uncut : original; }
     size_t sideCount() const { return patches().sideCount(); }
-    // How often the edges of a tile are halved.
+    // Returns how many times the edges of a tile are halved.
     int level(uint32_t tile) const { return uncut ? levels[tile] : 0; }
-    // The patches of a tile: their number, and of the first the side that a side of the tile has.
+    // Returns the number of patches of a tile.
     uint32_t patchCount(uint32_t tile) const { return uncut ? first[tile + 1] - first[tile] : 1; }
+    // Returns the side of the first patch of a tile that corresponds to a side of the tile.
     uint32_t firstSide(uint32_t side) const {
         return uncut ? 2 * first[side / 2] + side % 2 : side;
     }
 
-    // From values per side of the patches to values per side of the tiles. weight: per side of the
-    // patches; where a whole tile has none, the area counts.
+    // Return, per side of the tiles, the sum or the weighted mean of values per side of the
+    // patches. `weight` is per side of the patches; if it is 0 on a whole tile, values are weighted
+    // by area.
     std::vector<float> sum(const std::vector<float>& weight) const;
     std::vector<float> mean(const std::vector<float>& values,
                             const std::vector<float>& weight) const;
     std::vector<glm::vec3> mean(const std::vector<glm::vec3>& values,
                                 const std::vector<float>& weight) const;
-    // Standard errors of the means by area of values with independent standard errors.
+    // Returns, per side of the tiles, the standard error of the mean by area of values whose
+    // standard errors are `errors` (per side of the patches). The errors of the patches are
+    // independent.
     std::vector<float> errorOfMean(const std::vector<float>& errors) const;
 
   private:
@@ -48,9 +55,9 @@ class Tiles {
                               const std::vector<float>& weight) const;
 
     const Patches& original;
-    std::optional<Patches> uncut;
-    std::vector<uint8_t> levels;
-    std::vector<uint32_t> first;  // per tile: its first patch; one more at the end
+    std::optional<Patches> uncut;  // empty if no tile is cut
+    std::vector<uint8_t> levels;   // per tile, see level()
+    std::vector<uint32_t> first;   // per tile: its first patch; one more entry at the end
 };
 
 }  // namespace raybundle

@@ -14,11 +14,11 @@
 namespace raybundle {
 namespace {
 
-// What is left between vertices in the same place by rounding to float, of their farthest
-// coordinate: those of a mesh, of its matrix and of their sum.
+// Distance by which rounding to float separates vertices in the same place, relative to their
+// largest coordinate. Vertices of meshes, transforms and their sum are rounded.
 constexpr double kRounding = 4 * double(FLT_EPSILON);
 
-// The edges of a mesh that one face has alone, by their keys.
+// Returns the edgeKey() of each edge of a mesh that belongs to one face only.
 std::vector<uint64_t> openEdges(const Mesh& mesh) {
     std::vector<uint64_t> edges;
     edges.reserve(mesh.cornerCount());
@@ -40,27 +40,31 @@ std::vector<uint64_t> openEdges(const Mesh& mesh) {
     return open;
 }
 
+// Returns the distance by which rounding separates vertices at a place, m.
 double roundingAt(const glm::dvec3& place) {
     const glm::dvec3 far = glm::abs(place);
     return kRounding * std::max({far.x, far.y, far.z});
 }
 
-// Vertices that have been met, by the cell that they lie in. Cells are as large as rounding is
-// there: some tens of it, by powers of two.
+// A spatial hash of the vertices that were added so far. The edge of a cell is some tens of the
+// rounding error at its place, rounded to a power of 2.
 class Places {
   public:
-    // near: per vertex, within which others are in the same place, metres.
+    // `near` is per vertex: other vertices within this distance are in the same place, m. Keeps
+    // references to both arguments.
     Places(const std::vector<glm::dvec3>& places, const std::vector<double>& near)
         : places(places), near(near), before(places.size(), kNone) {
         lastIn.reserve(places.size());
     }
 
-    // The first vertex met that lies where this one does, else itself.
+    // Returns the first vertex added that is in the same place as `vertex`. If there is none, adds
+    // `vertex` and returns it.
     uint32_t firstAt(uint32_t vertex) {
         const glm::dvec3& place = places[vertex];
         const double off = roundingAt(place);
         const int level = std::ilogb(std::max(off, DBL_MIN));
-        // Beside a power of two the other may have cells of half or twice the edge.
+        // The other vertex may have cells of half or twice the edge, if a power of 2 lies between
+        // both.
         for (int at = level - 1; at <= level + 1; ++at) {
             const glm::dvec3 low = cellOf(place - off, at), high = cellOf(place + off, at);
             for (double x = low.x; x <= high.x; ++x)
@@ -81,13 +85,13 @@ class Places {
     static glm::dvec3 cellOf(const glm::dvec3& place, int level) {
         return glm::floor(place * std::ldexp(1.0, -level - 6));
     }
-    // Other cells may have the same.
+    // Returns the hash of a cell. Different cells may have equal hashes.
     static uint64_t keyOf(const glm::dvec3& cell, int level) {
         uint64_t key = uint64_t(uint32_t(level));
         for (int axis = 0; axis < 3; ++axis) key = mixBits(key ^ uint64_t(int64_t(cell[axis])));
         return key;
     }
-    // The first met in a cell that lies where a vertex does; kNone.
+    // Returns the first vertex added to a cell that is in the same place as `vertex`, or kNone.
     uint32_t firstIn(uint64_t key, uint32_t vertex) const {
         const auto last = lastIn.find(key);
         uint32_t first = kNone;
@@ -101,8 +105,9 @@ class Places {
     static constexpr uint32_t kNone = UINT32_MAX;
     const std::vector<glm::dvec3>& places;
     const std::vector<double>& near;
-    std::unordered_map<uint64_t, uint32_t> lastIn;  // of those met, by cell
-    std::vector<uint32_t> before;  // per vertex met: the one met before in its cell
+    std::unordered_map<uint64_t, uint32_t> lastIn;  // by cell: the last vertex added to it
+    // Per vertex added: the vertex added before it to its cell.
+    std::vector<uint32_t> before;
 };
 
 }  // namespace
@@ -113,11 +118,11 @@ std::vector<uint32_t> weldedVertices(const Scene& scene, const std::vector<glm::
     std::iota(first.begin(), first.end(), 0u);
     std::vector<std::vector<uint64_t>> open;  // per mesh
     for (const Mesh& mesh : scene.meshes) open.push_back(openEdges(mesh));
-    std::vector<double> near(places.size(), -1);  // see Places; -1: on no open edge
+    std::vector<double> near(places.size(), -1);  // see Places; -1 on no open edge
     for (size_t i = 0; i < scene.instances.size(); ++i)
         for (uint64_t edge : open[size_t(scene.instances[i].mesh)]) {
             const size_t a = firstVertex[i] + (edge >> 32), b = firstVertex[i] + uint32_t(edge);
-            // The ends of an edge stay two, however far away.
+            // Keeps the ends of an edge separate, however large rounding errors are.
             const double length = glm::distance(places[a], places[b]);
             for (size_t v : {a, b}) {
                 if (near[v] < 0) near[v] = roundingAt(places[v]);
@@ -150,7 +155,7 @@ WeldedFaces weldedFaces(const Scene& scene, const std::vector<uint32_t>& welded,
             faces.instance.push_back(uint32_t(i));
         }
     }
-    // Surfaces are sets of vertices joined by faces.
+    // Surfaces are sets of vertices that faces connect.
     DisjointSets joined(welded.size());
     for (size_t f = 0; f < faces.count(); ++f)
         for (size_t c = faces.offsets[f] + 1; c < faces.offsets[f + 1]; ++c)

@@ -10,12 +10,13 @@
 namespace raybundle {
 namespace {
 
-constexpr double kLeastHalf = 1e-3;   // radians; narrower ones count as this wide
-constexpr double kWholeHalf = 1e-5;   // below a quarter turn by less than this is a quarter turn
-constexpr double kSeriesHalf = 0.05;  // below it differences would lose their digits
-constexpr int kBisections = 30;       // to invert the integral
+constexpr double kLeastHalf = 1e-3;  // radians; smaller half spreads are clamped to this
+constexpr double kWholeHalf = 1e-5;  // radians; half spreads closer to pi/2 than this count as pi/2
+constexpr double kSeriesHalf = 0.05;  // radians; below this, series replace formulas that cancel
+constexpr int kBisections = 30;       // bisection steps to invert the integral
 
-// angle - sin angle cos angle.
+// Returns angle - sin(angle) cos(angle), with `angle` in radians. Small angles use the Taylor
+// series because the difference would cancel.
 double segment(double angle) {
     const double a2 = angle * angle;
     if (angle < kSeriesHalf) return angle * a2 * (2.0 / 3 - a2 * (2.0 / 15 - a2 * 4 / 315));
@@ -43,7 +44,8 @@ float AreaSpread::factor(float cosine) const {
     return float(std::max(0.0, 1 - cotangent * std::sqrt(1 - c * c) / c) / total);
 }
 
-// Of 2 factor sin cos from 0 to an angle, times `total`.
+// Returns `total` times the integral of 2 factor(cos t) sin t cos t over t from 0 to `angle`. The
+// angle is in radians, from 0 to `half`.
 double AreaSpread::integral(double angle) const {
     const double s = std::sin(angle);
     return s * s - cotangent * segment(angle);
@@ -51,7 +53,9 @@ double AreaSpread::integral(double angle) const {
 
 glm::vec3 AreaSpread::emit(const glm::vec3& normal, glm::vec2 uv) const {
     if (isWhole()) return cosineDirection(normal, uv);
-    // The radius on the disk is the sine for a cosine distribution: replace it.
+    // onDisk() returns points whose radius is the sine of the angle of a cosine distribution. Keep
+    // the azimuth of the point, but choose the angle at which the integral reaches the share (the
+    // squared radius) that the cosine distribution has within the point's radius.
     const glm::vec2 d = onDisk(uv);
     const double share = double(glm::dot(d, d)), wanted = share * integral(half);
     double low = 0, high = half;

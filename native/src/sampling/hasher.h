@@ -8,19 +8,26 @@
 
 namespace raybundle {
 
-// 64-bit words mixed one after the other, after MurmurHash2 (Appleby, public domain).
+// A 64-bit hash of a sequence of values. Each 8-byte word is mixed into the state in turn, as in
+// MurmurHash2 (Appleby, public domain). Not cryptographic. The hash depends on the byte order of
+// the machine.
 class Hasher {
   public:
-    // Values without padding.
+    // Adds the bytes of each value. The types must have no padding and no pointers, since their
+    // memory is hashed byte by byte.
     template <class... T>
     void add(const T&... values) {
         (addBytes(&values, sizeof(T)), ...);
     }
+    // Adds the bytes of all elements and their total number. The element type must have no padding
+    // and no pointers.
     template <class T>
     void add(const std::vector<T>& values) {
         addBytes(values.data(), values.size() * sizeof(T));
     }
+    // Adds the characters of `text` and their number.
     void add(const std::string& text) { addBytes(text.data(), text.size()); }
+    // Returns the hash of all values added so far.
     uint64_t value() const { return state; }
 
   private:
@@ -33,7 +40,7 @@ class Hasher {
             mix(word);
         }
         uint64_t rest = 0;
-        if (bytes > 0) std::memcpy(&rest, at, bytes);  // an empty vector has no address
+        if (bytes > 0) std::memcpy(&rest, at, bytes);  // data() of an empty vector may be null
         mix(rest);
     }
     void mix(uint64_t word) {

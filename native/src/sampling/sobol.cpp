@@ -6,9 +6,13 @@
 namespace raybundle {
 namespace {
 
+// Generator matrices of the four dimensions. Element [d][k] is the column that bit k of an index
+// contributes to dimension d, with the first binary digit in the highest bit.
 using Columns = std::array<std::array<uint32_t, 32>, 4>;
 
-// Primitive polynomials of degree s with coefficients a, and initial numbers m (Joe and Kuo).
+// Computes the generator matrices from primitive polynomials of degree s with coefficients a, and
+// initial direction numbers m (Joe and Kuo). Dimension 0 is the van der Corput sequence and needs
+// no polynomial.
 Columns sobolColumns() {
     struct Polynomial {
         int s;

@@ -6,7 +6,7 @@
 
 namespace raybundle {
 
-// The largest channel.
+// Returns the largest channel.
 inline float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
 inline double sumOfChannels(const glm::dvec3& v) { return v.x + v.y + v.z; }

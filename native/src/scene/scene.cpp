@@ -11,10 +11,13 @@
 namespace raybundle {
 namespace {
 
-// Results are sparse if a corner has one at most of so many of the mesh, and of so many on the
-// faces that have any: those of a copy, as Array makes them, are not.
+// Results are sparse if at most one in kSparse corners of the mesh has a result, and at most one in
+// kSparseOnFaces corners of the faces that have any. The second condition excludes meshes with many
+// copies of a part, as the modifier Array makes them.
 constexpr size_t kSparse = 4, kSparseOnFaces = 2;
 
+// Returns the item of an id. Throws Error(INVALID_ARGUMENT) if there is none; `what` names the kind
+// in the message.
 template <class T>
 T& checked(std::vector<T>& items, int32_t id, const char* what) {
     if (id < 0 || size_t(id) >= items.size())
@@ -36,8 +39,8 @@ bool isFiniteAndPositive(const V& v) {
     return true;
 }
 
-// Squares of brighter light, times areas, leave the range of floats: the result would be no number.
-// W/m^2, W/sr, W/(m^2 sr); sunlight is 1e3.
+// Largest strength of a light, in W/m^2, W/sr or W/(m^2 sr); sunlight is 1e3 W/m^2. Above it,
+// squares of the light times areas would exceed the range of float and the result would be NaN.
 constexpr float kMostLight = 1e15f;
 constexpr const char* kTooBright = " is too bright to compute with: more than 1e15";
 
@@ -45,6 +48,7 @@ std::string quoted(const char* kind, const std::string& name) {
     return std::string(kind) + " \"" + name + "\"";
 }
 
+// Throws Error(INVALID_ARGUMENT) if a vector is not finite.
 template <class V>
 void checkAllFinite(const std::vector<V>& values, const std::string& object, const char* what) {
     for (size_t i = 0; i < values.size(); ++i)
@@ -81,7 +85,7 @@ int32_t Scene::addImage(Image image) {
 }
 
 int32_t Scene::addMaterial(Material material) {
-    // Reflectance of 1 or more makes light grow without end in a closed scene.
+    // A closed scene with reflectance 1 or more has no finite solution: light grows without bound.
     constexpr float kMaxReflectance = 0.999f;
     const std::string object = quoted("material", material.name);
     auto checkImage = [&](int id) {
@@ -153,7 +157,8 @@ int32_t Scene::addLight(Light light) {
     const float reach = light.radius + glm::length(light.axisU) + glm::length(light.axisV);
     if (!(glm::length(light.position) + reach <= kFarthest))
         throw invalidArgument(object + " reaches further than 1e12 m from the origin");
-    // A small panel may be as bright as it likes.
+    // The strength of an area light is limited by radiance times area, because a small panel may
+    // have any radiance.
     const float area =
         light.kind == Light::Kind::AREA ? glm::length(glm::cross(light.axisU, light.axisV)) : 1.0f;
     if (brightest(light.strength) * area > kMostLight) throw invalidArgument(object + kTooBright);

@@ -16,8 +16,9 @@ glm::dvec3 vectorArea(const std::vector<glm::dvec3>& points) {
 
 namespace {
 
-// A corner is straight where it is lower over the line between its neighbours than this share of
-// their distance, or than so much of its coordinates: a rounding error.
+// A corner counts as straight if its height above the line between its neighbours is at most
+// kStraight times their distance, or at most kRounding times the largest coordinate, which is
+// rounding error.
 constexpr double kStraight = 1e-5;
 constexpr double kRounding = 4 * double(std::numeric_limits<float>::epsilon());
 
@@ -30,12 +31,13 @@ std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& point
     for (const glm::dvec3& p : points)
         rounding =
             std::max(rounding, kRounding * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}));
-    // Positive where the corner a, b, c turns as the polygon does.
+    // Returns a value that is positive if the corner b of a, b, c turns as the polygon does.
     auto turn = [&](int a, int b, int c) {
         return glm::dot(glm::cross(points[b] - points[a], points[c] - points[b]), normal);
     };
-    // Whether the corner turns as the polygon does, by more than rounding does to a straight one:
-    // its triangle would have a normal of rounding alone, or be left out as one without area.
+    // Returns whether the corner b turns as the polygon does by more than rounding turns a straight
+    // corner. The triangle of a straight corner would have a random normal, or be left out for want
+    // of area.
     auto isConvex = [&](int a, int b, int c) {
         const double diagonal = glm::length(points[c] - points[a]);
         return turn(a, b, c) > area * diagonal * std::max(kStraight * diagonal, rounding);
@@ -46,7 +48,7 @@ std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& point
 
     std::vector<int> ring(points.size());
     for (size_t i = 0; i < ring.size(); ++i) ring[i] = int(i);
-    // Only a corner that turns the other way can lie inside an ear.
+    // Only a reflex or straight corner can lie inside an ear.
     std::vector<int> reflex;
     for (size_t i = 0, n = points.size(); i < n; ++i)
         if (!isConvex(int((i + n - 1) % n), int(i), int((i + 1) % n))) reflex.push_back(int(i));
@@ -55,7 +57,7 @@ std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& point
     triangles.reserve(points.size() - 2);
     while (ring.size() > 3) {
         const size_t n = ring.size();
-        // Of all ears cut the best-shaped one: the shortest diagonal gives the fewest slivers.
+        // Of all ears, cut the one with the shortest diagonal, which gives the fewest slivers.
         size_t best = n;
         double bestDiagonal = 0;
         for (size_t i = 0; i < n; ++i) {

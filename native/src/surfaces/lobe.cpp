@@ -11,24 +11,25 @@
 namespace raybundle {
 namespace {
 
-// Points of the mean of a wide lobe: Gauss and Legendre's along the cosine, and equal angles.
+// Quadrature of a wide lobe: Gauss-Legendre points along the cosine, and equal steps of the
+// azimuth.
 constexpr int kCosines = 8, kAngles = 16;
 constexpr float kCosine[kCosines] = {0.01985507f, 0.10166676f, 0.23723380f, 0.40828268f,
                                      0.59171732f, 0.76276620f, 0.89833324f, 0.98014493f};
 constexpr float kWeight[kCosines] = {0.05061427f, 0.11119052f, 0.15685332f, 0.18134189f,
                                      0.18134189f, 0.15685332f, 0.11119052f, 0.05061427f};
-// Of the angles on one side of the plane of incidence.
+// Cosines of the azimuths on one side of the plane of incidence.
 constexpr float kCosineOfAngle[kAngles / 2 + 1] = {
     1, 0.92387953f, 0.70710678f, 0.38268343f, 0, -0.38268343f, -0.70710678f, -0.92387953f, -1};
-// Of the table of gloss: steps of the roughness and of the cosine, and for each entry rings of
-// visible normals and normals in them.
+// The table of gloss: steps of the roughness and of the cosine, and for each entry, rings of
+// visible normals and normals in each ring.
 constexpr int kRoughnesses = 21, kTableCosines = 25, kRings = 48, kInRing = 12;
-// Of Fresnel's edge over Lambert's cosine.
+// Mean of fresnelEdge() over all directions, weighted by the cosine.
 constexpr float kMeanEdge = 0.0534f;
-// Cosines below this are taken for it: V below stays finite.
+// Smaller cosines count as this one, so that visibility() stays finite.
 constexpr float kLeastCosine = 1e-3f;
-// Smoother cloth sends back a few hundredths of the light, into lobes that the points of the mean
-// miss.
+// Least roughness of cloth. Smoother cloth reflects a few hundredths of the light, in lobes that
+// are narrower than the quadrature resolves.
 constexpr float kLeastClothRoughness = 0.2f;
 
 float fifthPower(float x) {
@@ -36,16 +37,19 @@ float fifthPower(float x) {
     return square * square * x;
 }
 
-// Smith's Lambda of GGX, as (1 + 2 Lambda) times the cosine. a2: alpha squared.
+// Returns (1 + 2 Lambda) times the cosine, where Lambda is Smith's for GGX and `a2` is alpha
+// squared.
 float maskingTerm(float cosine, float a2) { return std::sqrt(a2 + (1 - a2) * cosine * cosine); }
 
-// From 0 at right angles to 1, for an index of refraction of 1.5; fitted to Fresnel's law, off by
-// 0.0015 at most. (Schlick's fifth power is off by 0.03, and at 60 degrees by half.)
+// Returns the rise of Fresnel's reflectance, from 0 at normal incidence to 1 at grazing incidence,
+// for an index of refraction of 1.5. Fitted to Fresnel's law with an error of at most 0.0015.
+// (Schlick's fifth power has an error of 0.03, and at 60 degrees of one half of the value.)
 float fresnelEdge(float cosine) {
     const float x = 1 - cosine, x2 = x * x, x3 = x2 * x, x5 = x3 * x2;
     return 0.3429f * x3 + 0.2440f * x5 + 0.4131f * x5 * x2 * x2;
 }
 
+// Returns the RMS deviation relative to the mean.
 float rmsOf(float mean, float meanSquare) {
     return mean > 0 ? std::sqrt(std::max(0.0f, meanSquare / (mean * mean) - 1)) : 0;
 }
@@ -64,8 +68,9 @@ Lobe::Lobe(Kind kind, const glm::vec3& normal, const glm::vec3& incoming, float 
       shadowing(maskingTerm(cosine, roughness)),
       roughness(roughness) {}
 
-// Mean and mean square of a gloss lobe that is not scaled: F is linear in f0, so that they are
-// white f0 + edge (1 - f0), and the same squared. Several facets are white alone.
+// Moments of an unscaled gloss lobe. Fresnel's reflectance is linear in f0: the mean is white f0 +
+// edge (1 - f0), and the mean square is the corresponding square. Several facets use only the white
+// terms.
 struct Lobe::Moments {
     float white = 0, edge = 0, white2 = 0, both2 = 0, edge2 = 0;
 
@@ -83,8 +88,8 @@ struct Lobe::Moments {
     }
 };
 
-// By roughness and the root of the cosine, made once, where first asked for: towards grazing angles
-// lobes change fast.
+// Table of moments by roughness and by the square root of the cosine, since lobes change fast
+// towards grazing angles. Each table is computed at its first use.
 class Lobe::GlossTable {
   public:
     static const GlossTable& of(Kind kind) {
@@ -100,25 +105,27 @@ class Lobe::GlossTable {
         return together;
     }
 
+    // Returns the moments at a roughness and a cosine, by bilinear interpolation.
     Moments at(float roughness, float cosine) const {
         Moments sum;
         around(roughness, cosine,
                [&](float share, const Moments& entry) { sum.add(share, entry); });
         return sum;
     }
-    // Moments::white alone, which is the albedo by the angle of view too.
+    // Returns Moments::white, which is also the albedo by the angle of view.
     float albedo(float roughness, float cosine) const {
         float sum = 0;
         around(roughness, cosine,
                [&](float share, const Moments& entry) { sum += share * entry.white; });
         return sum;
     }
-    // What several facets send over what one does, seen at this angle.
+    // Returns the light that several facets reflect relative to that of one facet, at an angle of
+    // view.
     float lost(float roughness, float cosine) const {
         return std::max(1 / albedo(roughness, cosine) - 1, 0.0f);
     }
 
-    // Of light from everywhere.
+    // Returns the moments for light from all directions.
     Moments everywhere(float roughness) const {
         Moments sum;
         for (int k = 0; k < kCosines; ++k)
@@ -137,6 +144,7 @@ class Lobe::GlossTable {
             }
     }
 
+    // Visits the four entries around a roughness and a cosine, with their weights.
     template <class Visit>
     void around(float roughness, float cosine, const Visit& visit) const {
         const float r = (roughness - kLeastRoughness) / (1 - kLeastRoughness) * (kRoughnesses - 1);
@@ -150,7 +158,8 @@ class Lobe::GlossTable {
                     moments[size_t(i + di)][size_t(j + dj)]);
     }
 
-    // By visible normals, whose weights are F G / G1, on one side of the plane of incidence.
+    // Integrates over visible normals, whose weights are F G / G1, on one side of the plane of
+    // incidence.
     static Moments find(Kind kind, float roughness, float cosine);
 
     std::array<std::array<Moments, kTableCosines>, kRoughnesses> moments;
@@ -165,7 +174,8 @@ Lobe::Moments Lobe::GlossTable::find(Kind kind, float roughness, float cosine) {
     const glm::vec3 t1(0, 1, 0), t2 = glm::cross(stretched, t1);
     for (int i = 0; i < kRings; ++i)
         for (int j = 0; j < kInRing; ++j) {
-            // Closer towards the rim, where what they mirror is near the surface.
+            // Rings are closer towards the rim, where normals mirror light to directions near the
+            // surface.
             const float inward = 1 - (float(i) + 0.5f) / kRings, r = 1 - inward * inward;
             const float angle = glm::pi<float>() * ((float(j) + 0.5f) / kInRing - 0.5f);
             const float p1 = r * std::cos(angle), half = 0.5f * (1 + stretched.z);
@@ -176,7 +186,7 @@ Lobe::Moments Lobe::GlossTable::find(Kind kind, float roughness, float cosine) {
                 glm::normalize(glm::vec3(alpha * n.x, alpha * n.y, std::max(n.z, 0.0f)));
             const float ih = std::min(glm::dot(in, h), 1.0f), no = 2 * ih * h.z - in.z;
             if (no <= 0) continue;
-            // G / G1: G is 4 ni no times the visibility, G1 = 2 ni / (ni + shadowing).
+            // G / G1, with G = 4 ni no visibility and G1 = 2 ni / (ni + shadowing).
             const float visible = 2 * no * (cosine + white.shadowing) * white.visibility(no);
             const float more =
                 kind == Kind::SEVERAL_FACETS ? of(Kind::GLOSS).lost(roughness, no) : 1;
@@ -204,14 +214,16 @@ Lobe Lobe::gloss(const glm::vec3& normal, const glm::vec3& incoming, rb_masking 
 float Lobe::f0Of(float ratio, rb_masking masking, float roughness) {
     const float rough = std::clamp(roughness, kLeastRoughness, 1.0f);
     const GlossTable& table = GlossTable::of(glossOf(masking));
-    // Below the table towards a mirror, about as alpha falls.
+    // Below the table's least roughness, interpolate towards a mirror, about in proportion to
+    // alpha.
     const float share = std::min(roughness * roughness / (kLeastRoughness * kLeastRoughness), 1.0f);
     Moments above, all;
     above.add(share, table.at(rough, 1));
     above.add(1 - share, {1, 0});
     all.add(share, table.everywhere(rough));
     all.add(1 - share, {1, kMeanEdge});
-    // ratio = (white above f0 + edge above (1 - f0)) / (white f0 + edge (1 - f0)).
+    // Solve ratio = (white above f0 + edge above (1 - f0)) / (white f0 + edge (1 - f0)) for f0,
+    // where the numerator holds the moments `above` and the denominator the moments `all`.
     const float rest = above.white - above.edge - ratio * (all.white - all.edge);
     return rest > 0 ? std::clamp((ratio * all.edge - above.edge) / rest, 0.0f, 1.0f) : 1;
 }
@@ -245,7 +257,8 @@ void Lobe::normalise() {
     float mean = 0, meanSquare = 0;
     for (int i = 0; i < kCosines; ++i) {
         const float no = kCosine[i], sines = sineIn * std::sqrt(1 - no * no);
-        // Alike on both sides of the plane of incidence.
+        // The lobe is symmetric about the plane of incidence: only azimuths on one side are
+        // evaluated.
         for (int j = 0; j <= kAngles / 2; ++j) {
             const float value = shape(no, sines * kCosineOfAngle[j] + no * cosine).first;
             const float count = j % (kAngles / 2) == 0 ? 1 : 2;
@@ -272,7 +285,7 @@ glm::vec3 Lobe::towards(const glm::vec3& direction) const {
     return value * (facing + rise * rising);
 }
 
-// facing and rising are f0 and 1 - f0 over it.
+// `facing` and `rising` are f0 and 1 - f0, divided by the mean.
 glm::vec3 Lobe::mean() const { return 1.0f / glm::max(facing + rising, 1e-30f); }
 
 std::pair<float, float> Lobe::shape(float no, float io) const {
@@ -283,7 +296,8 @@ std::pair<float, float> Lobe::shape(float no, float io) const {
         case Kind::GLOSS:
         case Kind::SEPARATE_GLOSS:
         case Kind::SEVERAL_FACETS: {
-            // pi D F G / (4 ni no), by the half vector (incoming + direction) / sqrt(2 + 2 io).
+            // pi D F G / (4 ni no) without F, with the half vector (incoming + direction) / sqrt(2
+            // + 2 io).
             const float nh2 = std::min((ni + no) * (ni + no) / std::max(2 + 2 * io, 1e-6f), 1.0f);
             const float ih = std::sqrt(0.5f * std::max(1 + io, 0.0f));
             const float d = nh2 * (roughness - 1) + 1;
@@ -307,7 +321,8 @@ std::pair<float, float> Lobe::shape(float no, float io) const {
             return {Microfibers::at(roughness, no).towards((io - ni * no) / sine, ni), 0};
         }
         case Kind::VELVET: {
-            // pi D G / (4 ni no), D by the cotangent of the half vector's angle.
+            // pi D G / (4 ni no), where D is a function of the cotangent of the half vector's
+            // angle.
             const float nh2 = std::min((ni + no) * (ni + no) / std::max(2 + 2 * io, 1e-6f), 1.0f);
             const float rest = std::max(1 - nh2, 1e-6f), square = roughness * roughness;
             const float ih = std::sqrt(std::max(0.5f * (1 + io), 1e-6f));

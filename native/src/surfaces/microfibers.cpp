@@ -10,8 +10,9 @@ namespace {
 constexpr int kFiberRoughnesses = 9, kFiberCosines = 7;
 constexpr float kLeastRoughness = 0.2f;
 
-// Rows by roughness, from kLeastRoughness to 1; by the root of the cosine from 1 / 7 to 1, for
-// towards grazing angles they change fast.
+// One row for each roughness from kLeastRoughness to 1, one column for each square root of the
+// cosine from 1 / 7 to 1. The square root gives finer steps towards grazing angles, where the
+// values change fast.
 using Table = float[kFiberRoughnesses][kFiberCosines];
 constexpr Table kAlbedo = {{0.6072f, 0.3602f, 0.1106f, 0.0140f, 0.0015f, 0.0003f, 0.0001f},
                            {0.6474f, 0.4800f, 0.2652f, 0.0906f, 0.0198f, 0.0037f, 0.0008f},

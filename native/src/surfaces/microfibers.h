@@ -1,27 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Upright fibres on a surface: how much light they send towards an angle, and where that comes
-// from.
+// Sheen of upright fibres on a surface: how much light it reflects towards an angle, and from which
+// directions this light comes.
 //
-// Source: Zeltner, Burley and Chiang, "Practical Multiple-Scattering Sheen Using Linearly
-// Transformed Cosines" (2022), Cycles' sheen from Blender 4.0 on. Heitz et al., "Real-Time
+// Sources: Zeltner, Burley and Chiang, "Practical Multiple-Scattering Sheen Using Linearly
+// Transformed Cosines" (2022), which is Cycles' sheen from Blender 4.0 on; Heitz et al., "Real-Time
 // Polygonal-Light Shading with Linearly Transformed Cosines" (2016).
-// Differs: the table is what Cycles (4.5) shows of a sheet of sheen under suns from 48 directions,
-// which the formula fits to 1e-4, in larger steps: of the light from one direction 0.5 % goes
-// elsewhere at most, RMS over the directions.
+// Differs: the table was fitted to renders of a sheet of sheen in Cycles 4.5, under suns from 48
+// directions, which the formula fits to 1e-4. Its steps are larger than those of Cycles. At most
+// 0.5 % of the light from one direction is sent elsewhere, RMS over the directions.
 #pragma once
 
 namespace raybundle {
 
+// The sheen towards one angle.
 struct Microfibers {
-    float albedo;  // of light from everywhere, towards the angle
-    float a, b;    // of the transform: of the light's frame below into that of a cosine
+    float albedo;  // reflectance towards the angle of light from all directions
+    // The linear transform that takes directions to the light to a cosine distribution. In the
+    // frame of towards(), it maps (x, y, z) to (a x + b z, a y, z).
+    float a, b;
 
-    // roughness: 0 to 1, as 0.2 below it. cosine: of the angle towards which the light goes.
+    // Returns the sheen of a roughness, 0 to 1 (less than 0.2 counts as 0.2), towards an angle
+    // whose cosine to the normal is given.
     static Microfibers at(float roughness, float cosine);
 
-    // Exitance towards the angle over irradiance. x, z: of a unit vector to the light, along the
-    // way the light goes, on the surface, and along the normal.
+    // Returns the exitance towards the angle divided by the irradiance (both for light from one
+    // direction). x and z are coordinates of the unit vector to the light: z along the normal, and
+    // x along the surface in the direction in which the light leaves.
     float towards(float x, float z) const {
         const float along = a * x + b * z, y2 = 1 - x * x - z * z;
         const float square = along * along + a * a * (y2 > 0 ? y2 : 0) + z * z;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// How much of light from one direction a side that is not Lambert's mirrors, how much its lobes
-// send (scene/scene.h), and how much it reflects diffusely.
+// How much of the light from one direction a side that is not Lambert's reflects as gloss, by its
+// other lobes, and diffusely (scene/material.h).
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,16 @@
 
 namespace raybundle {
 
+// The reflectance of a patch side, divided into gloss, lobes and the diffuse rest. All values are
+// relative to the opaque share of the patch, per channel.
 class SideReflectance {
   public:
-    // patches must outlive the object, and have scattering.
+    // `patches` must have scattering. Keeps references to it.
     SideReflectance(const Patches& patches, uint32_t side)
         : surface(patches.scattering[2 * patches.parentAt(side).scattering + side % 2]),
           all(patches.reflectance[side]),
           byAngle(patches.byAngle.empty() ? nullptr : &patches.byAngle[side]),
-          // Of its opaque share, what the whole patch has is so many times as much.
+          // Factor from values relative to the whole patch to values relative to its opaque share.
           whole(1 / std::max(patches.opacityOf(side / 2), 1e-6f)),
           mirrored(glm::clamp(surface.glossScale * all + whole * surface.glossOffset,
                               glm::vec3(0.0f), all)) {
@@ -34,13 +36,14 @@ class SideReflectance {
 
     const Scattering& scattering() const { return surface; }
 
-    // Of light from everywhere.
+    // Return the reflectance of each part for light from all directions.
     const glm::vec3& mirroredMean() const { return mirrored; }
     glm::vec3 lobeMean(const LobeReflectance& lobe) const {
         return fits * glm::max(whole * lobe.reflectance, 0.0f);
     }
     glm::vec3 diffuseMean() const { return all - mirrored - inLobes; }
-    // Of light that comes in at an angle (scene/angles.h).
+    // Return the reflectance of each part for light from one angle. `terms` holds its angleTerms()
+    // (scene/angles.h).
     glm::vec3 mirroredAt(const glm::vec4& terms) const {
         return glm::clamp(mirrored + whole * sumOfTerms(surface.glossByAngle, terms - kEverywhere),
                           0.0f, 1.0f);
@@ -55,7 +58,7 @@ class SideReflectance {
         for (const LobeReflectance& lobe : surface.lobes) sum -= lobeAt(lobe, terms);
         return glm::clamp(sum, 0.0f, 1.0f);
     }
-    // Of the gloss alone (surfaces/lobe.h): what is mixed with it does not count.
+    // Returns the f0 of the gloss alone (Lobe::gloss), per channel, without the other parts.
     glm::vec3 f0() const {
         const glm::vec3 above = mirroredAt(glm::vec4(0.0f));
         glm::vec3 result(1.0f);
@@ -72,7 +75,8 @@ class SideReflectance {
     const AngleFactors* byAngle;
     float whole;
     glm::vec3 mirrored, inLobes{0.0f};
-    glm::vec3 fits;  // of what the lobes send, as much as the rest has room for
+    // Factor that reduces the lobes to the reflectance that gloss leaves.
+    glm::vec3 fits;
 };
 
 }  // namespace raybundle
