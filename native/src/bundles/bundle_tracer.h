@@ -46,8 +46,8 @@ class BundleTracer {
     // Number of cycles that Newell's order broke.
     uint64_t cycleCount() const { return cycles; }
 
-    // Area of the scene's cross-section that a line stands for, m^2. Per unit of exitance and per
-    // area of a patch, a line carries the power 2 * pixelArea / (number of all bundles) each way.
+    // Area of the scene's cross-section that a line stands for, m^2. A side of exitance B (W/m^2)
+    // sends the power 2 * pixelArea * B / (number of all bundles) along each of its lines, W.
     double pixelArea;
 
   private:

@@ -31,8 +31,8 @@ std::vector<uint64_t> allotLines(const std::vector<double>& expected, double xi)
 // The end of one line.
 struct LineEnd {
     static constexpr uint32_t kSky = UINT32_MAX;  // the line meets nothing
-    static constexpr uint32_t kNowhere =
-        UINT32_MAX - 1;  // the line could not leave; it carries nothing
+    // The line could not leave; it carries nothing.
+    static constexpr uint32_t kNowhere = UINT32_MAX - 1;
     // Patch side that the line meets, or one of the constants above.
     uint32_t side = kNowhere;
     glm::vec3 weight{1.0f};  // factor on the power of a line, by channel
