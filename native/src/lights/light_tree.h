@@ -14,8 +14,8 @@
 //   which nearly all of the light comes.
 // - In a flat cluster that is far enough in front of the receiver, a face is chosen by its power
 //   alone. Its bounds would hardly improve the choice, and would take most of the time.
-// - Clusters are halved at the middle of their longest extent, not at the minimum of the surface
-//   area orientation heuristic, since the faces of one mesh are similar.
+// - Clusters are halved by number of faces along their longest extent, not at the minimum of the
+//   surface area orientation heuristic, since the faces of one mesh are similar.
 #pragma once
 
 #include <cstdint>

@@ -27,9 +27,10 @@ int mostGrowth(float targetError) {
     return int(std::clamp(std::pow(kUsualTarget / targetError, kGrowthPower), 1.0f, kMostGrowth));
 }
 
-// Returns the factor by which all tolerances may grow such that the total squared error stays below
-// `most` squared for each receiver that has light. If few receivers have errors, each may have a
-// larger one. Only receivers with `counts` are considered. `tolerance` and `most` are in W/m^2.
+// Returns the factor by which all tolerances may grow, at least 1, such that the sum of the squared
+// errors stays below most^2 times the number of receivers that have light. If few receivers have
+// errors, each may have a larger one. Only receivers with `counts` are considered. `tolerance` (per
+// receiver) and `most` are in W/m^2.
 float laxity(const std::vector<Gathered>& results, const std::vector<bool>& counts,
              const std::vector<float>& tolerance, double most) {
     double allowed = 0;

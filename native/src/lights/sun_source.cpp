@@ -70,7 +70,8 @@ class SunSource : public LightSource {
   private:
     static constexpr float kCover = 1.001f;  // radius of this disk, in radii of the scene
 
-    // Returns radiance times solid angle of the disk relative to the irradiance across its middle.
+    // Returns the radiance times the solid angle of the disk, relative to the irradiance on a plane
+    // that faces its middle.
     float perCosine() const { return half > 0 ? 2 / (1 + cosHalf) : 1; }
 
     const glm::vec3 direction, strength;

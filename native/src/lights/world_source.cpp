@@ -101,8 +101,7 @@ void WorldSource::findParts(uint32_t index) {
 }
 
 void WorldSource::findPartNeighbours() {
-    // The corners of two touching regions may meet at a single point, which is as far from each
-    // middle as half the region's diagonal.
+    // If two regions touch, their middles are at most as far apart as both half diagonals together.
     auto halfDiagonal = [&](const Region& region) {
         return std::asin(std::min(region.reach, 1.0f));
     };

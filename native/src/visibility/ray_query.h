@@ -144,8 +144,8 @@ void meetAfterStart(const RTCFilterFunctionNArguments* args);
 // Filter for a ray of a RayQuery, which starts on no surface and searches for the first one.
 void meetFirst(const RTCFilterFunctionNArguments* args);
 
-// Sets the origin, direction (unit) and length (metres) of a ray. A ray with values outside the
-// range of isValid() is set to meet nothing.
+// Sets the origin, direction (unit) and length (metres) of a ray. A ray with NaN, or with values
+// whose squares leave the range of floats, is set to meet nothing.
 void setRay(RTCRay& ray, glm::vec3 origin, glm::vec3 direction, float length);
 
 }  // namespace raybundle

@@ -124,7 +124,8 @@ float Visibility::visibleShare(uint32_t side, const ShadowRay& shadow) const {
 
 void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
                                float* shares) const {
-    // A SideQuery has one Passage, so it can follow only one ray through translucent surfaces.
+    // A SideQuery has one Passage, so it can follow only one ray through surfaces that let light
+    // through.
     if (!patches.opacity.empty() || count == 1) {
         for (int k = 0; k < count; ++k) shares[k] = visibleShare(side, rays[k]);
         return;
