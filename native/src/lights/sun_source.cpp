@@ -68,7 +68,8 @@ class SunSource : public LightSource {
     }
 
   private:
-    static constexpr float kCover = 1.001f;  // radius of this disk, in radii of the scene
+    // Radius of the disk that rays start from, in radii of the scene.
+    static constexpr float kCover = 1.001f;
 
     // Returns the radiance times the solid angle of the disk, relative to the irradiance on a plane
     // that faces its middle.
