@@ -2,25 +2,26 @@
 //
 // ADAPTIVE: directions along which much power was transported are chosen more often.
 //
-// The hemisphere is divided into regions of equal area; region i is chosen with
+// The hemisphere is divided into regions of equal solid angle Omega_i. Region i is chosen with the
+// probability
 //
-//   p_i = (1 - a) phi_i + a Omega_i / 2 pi,
+//   p_i = (1 - a) phi_i + a Omega_i / 2 pi.
 //
-// a direction in it uniformly, and what the bundle transports is weighted with (Omega_i / 2 pi) /
-// p_i, at most 1 / a.
+// A direction within the region is uniform, and the power that the bundle transports is multiplied
+// by (Omega_i / 2 pi) / p_i, which is at most 1 / a.
 //
 // Source: thesis section 4.5.
 // Differs:
-// - A share a of the directions is uniform (defensive mixture): in the thesis one poor probe
-//   removes a region for ever, which is a bias, and weights have no bound, while they multiply
-//   along the light's path.
-// - phi_i is proportional to the root of the mean square of the power in the region, not to its
-//   mean: within a region directions are uniform, and the variance of the estimate, sum_i Omega_i^2
-//   E_i[power^2] / p_i, is least for p_i ~ Omega_i sqrt(E_i[power^2]). The two differ where one
-//   part of a region is bright, which is worth looking at.
-// - There is no initial probe of each region: a region counts as if it had been looked at once
-//   already, with the mean over all regions.
-// - A bundle's direction follows from bundles before it alone, so each bundle is unbiased.
+// - A share a of the directions is uniform (defensive mixture). In the thesis, one poor probe
+//   removes a region for ever, which is a bias, and weights have no bound, although they multiply
+//   along the path of the light.
+// - phi_i is proportional to the root of the mean square of the power in the region, not to the
+//   mean. Directions are uniform within a region, so the variance of the estimate, sum_i Omega_i^2
+//   E_i[power^2] / p_i, is least for p_i ~ Omega_i sqrt(E_i[power^2]). The two differ if one part
+//   of a region is bright, and such a region deserves more directions.
+// - There is no initial probe of each region. A region counts as if it had been probed once, with
+//   the mean power of all regions as the result.
+// - The direction of a bundle depends on previous bundles only, so each bundle is unbiased.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -31,7 +32,7 @@ namespace raybundle {
 namespace {
 
 constexpr int kRings = 8, kSectors = 8, kRegions = kRings * kSectors;
-constexpr double kUniformShare = 0.3;  // a
+constexpr double kUniformShare = 0.3;  // a in the formula above
 
 class AdaptiveDirections : public DirectionSequence {
   public:
@@ -57,12 +58,12 @@ class AdaptiveDirections : public DirectionSequence {
 
   private:
     struct Learned {
-        double squares = 0, bundles = 0;  // sum of power^2, W^2
+        double squares = 0, bundles = 0;  // sum of power^2, W^2, and number of bundles
 
         double root() const { return bundles > 0 ? std::sqrt(squares / bundles) : 0; }  // W
     };
 
-    // The inverse of onHemisphere.
+    // Inverts onHemisphere().
     static int regionOf(const glm::dvec3& direction) {
         const double turn = std::atan2(direction.y, direction.x) / (2 * std::acos(-1.0));
         const int ring = std::clamp(int(direction.z * kRings), 0, kRings - 1);
@@ -72,7 +73,7 @@ class AdaptiveDirections : public DirectionSequence {
     }
 
     void update() {
-        // The mean over the hemisphere: that of the regions looked at.
+        // The mean over the hemisphere is taken to be that of the regions with bundles.
         double mean = 0, looked = 0;
         for (const Learned& l : regions)
             if (l.bundles > 0) {
@@ -94,7 +95,7 @@ class AdaptiveDirections : public DirectionSequence {
 
     std::array<Learned, kRegions> regions;
     std::array<double, kRegions> probability;
-    bool isOld = false;  // probability: something was learned since
+    bool isOld = false;  // whether learn() was called since `probability` was computed
 };
 
 }  // namespace

@@ -28,7 +28,7 @@ BundleTracer::BundleTracer(ProjectorKind projector, const ProjectorInput& input,
 std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
     const std::vector<Bundle> sequence = directions.next(count);
     std::vector<TracedBundle> traced(sequence.size());
-    std::vector<uint64_t> joined(sequence.size());  // lines of the exchanges, per bundle
+    std::vector<uint64_t> joined(sequence.size());  // per bundle: number of lines of its exchanges
     parallelFor(size_t(0), sequence.size(), [&](size_t k) {
         traced[k].bundle = sequence[k];
         projectors.local()->project(sequence[k], traced[k].lines);
@@ -47,7 +47,7 @@ std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
 
 Surroundings surroundings(const ProjectorInput& input, uint32_t seed) {
     if (input.patches.count() == 0) return {};
-    // Not by ROULETTE, which lets neighbouring patches of a surface lie against each other.
+    // ROULETTE is not used here, since it lets neighbouring patches of a surface touch each other.
     ProjectorInput exact = input;
     exact.smallPatches = SmallPatches::CENTRE_SAMPLING;
     BundleTracer tracer(ProjectorKind::FRAGMENT_LISTS, exact, DirectionKind::LOW_DISCREPANCY, seed);

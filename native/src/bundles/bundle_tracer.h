@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bundles, traced: the directions of a bake and the projector that finds their exchanges.
+// Traces bundles: combines the directions of a bake with the projector that finds the exchanges.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -15,35 +15,39 @@
 
 namespace raybundle {
 
+// A bundle and its lines.
 struct TracedBundle {
     Bundle bundle;
     BundleLines lines;
 };
 
+// Traces the bundles of a sequence of directions.
 class BundleTracer {
   public:
-    // clusters: of the patches, whose sides lines are to join; null: those of the patches
-    // themselves. What `input` refers to and the clusters must outlive it.
+    // `clusters` are clusters of the patches; the lines then join sides of clusters instead of
+    // sides of patches. Null if there are none. The clusters, and the objects that `input` refers
+    // to, must outlive the tracer.
     BundleTracer(ProjectorKind projector, const ProjectorInput& input, DirectionKind directions,
                  uint32_t seed, const Clusters* clusters = nullptr);
 
-    // Traces the next `count` bundles (even; see Directions::next) in parallel.
+    // Traces the next `count` bundles in parallel. `count` must be even (see Directions::next).
     std::vector<TracedBundle> trace(uint32_t count);
 
-    // Tells the directions how much power a bundle transported, W.
+    // Reports to the directions the power that a bundle transported, W.
     void learn(const Bundle& bundle, double power) { directions.learn(bundle, power); }
 
     uint32_t bundleCount() const { return bundles; }
-    uint64_t lineCount() const { return lines; }  // that met the scene
-    // The share of all exchanges that join sides in a wrong order of depth (painters) or through a
-    // surface (ROULETTE).
+    uint64_t lineCount() const { return lines; }  // lines that met the scene
+    // Returns the share of all exchanges that join sides in the wrong order of depth (painters) or
+    // through a surface (ROULETTE).
     double disorderedShare() const {
         return exchanges > 0 ? double(disordered) / double(exchanges) : 0;
     }
-    uint64_t cycleCount() const { return cycles; }  // that Newell's order broke
+    // Number of cycles that Newell's order broke.
+    uint64_t cycleCount() const { return cycles; }
 
-    // Power per area and unit of exitance that one line carries each way is 2 * pixelArea / bundles
-    // of all: the cross-section of the scene that a line stands for, m^2.
+    // Area of the scene's cross-section that a line stands for, m^2. A side of exitance B (W/m^2)
+    // sends the power 2 * pixelArea * B / (number of all bundles) along each of its lines, W.
     double pixelArea;
 
   private:
@@ -51,16 +55,19 @@ class BundleTracer {
     const Clusters* const clusters;
     tbb::enumerable_thread_specific<std::unique_ptr<Projector>> projectors;
     uint32_t bundles = 0;
-    uint64_t lines = 0, exchanges = 0, disordered = 0, cycles = 0;  // exchanges: line by line
+    // Exchanges and disordered exchanges are counted line by line.
+    uint64_t lines = 0, exchanges = 0, disordered = 0, cycles = 0;
 };
 
-// What lines of exact projection meet on each side.
+// Properties of each patch side, measured by lines of the exact projector.
 struct Surroundings {
-    std::vector<float> exposed;  // per side: the share of it that lies against no other surface
-    std::vector<float> open;  // per side: the share of the lines from the rest that leave the scene
+    std::vector<float> exposed;  // per side: share of its area that touches no other surface
+    // Per side: share of the lines from the exposed part that leave the scene.
+    std::vector<float> open;
 };
 
-// By some bundles, with `input`'s pixels; sides that no line met are exposed and not open.
+// Measures the surroundings of all sides by some bundles with the pixel size of `input`. A side
+// that no line meets counts as exposed and not open.
 Surroundings surroundings(const ProjectorInput& input, uint32_t seed);
 
 }  // namespace raybundle

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What two consecutive surfaces along a line are to each other: apart, touching, coinciding, or in
-// the wrong order. All projectors that see whole lines decide it here.
+// The relation of two consecutive surfaces along a line: apart, touching, coinciding, or in the
+// wrong order. All projectors that see whole lines use it.
 //
-// Words: sides a and b face against the direction; `along` is how much deeper b lies than a at the
-// line, metres (negative where b is nearer).
+// In this file, the sides a and b face against the direction of the bundle, and `along` is the
+// depth of b less the depth of a on the line, in metres. It is negative if b is nearer.
 #pragma once
 
 #include <algorithm>
@@ -18,22 +18,25 @@
 
 namespace raybundle {
 
+// Decides about contacts of surfaces along the lines of one bundle.
 class Contacts {
   public:
     // `patches` must outlive the object.
     explicit Contacts(const Patches& patches)
         : patches(patches), touchDistance(double(patches.touchDistance)) {}
 
-    // Turns to the bundle along a direction.
+    // Sets the direction of the current bundle, a unit vector.
     void begin(const glm::dvec3& newDirection) { direction = newDirection; }
 
-    // Surfaces not further apart than this coincide: depth does not tell their order, metres.
+    // Returns the distance up to which two surfaces coincide, metres. The depth of coinciding
+    // surfaces does not determine their order.
     double coincidence() const { return kCoincidence * touchDistance; }
 
-    // Surfaces further apart along a line neither touch nor coincide, metres. (A grazing line
-    // stretches the gap; beyond some stretch it is not worth a look.)
+    // Returns the distance along a line beyond which two surfaces neither touch nor coincide,
+    // metres. A grazing line stretches the gap between them; gaps stretched beyond this distance
+    // are not examined.
     double zone() const { return kZone * touchDistance; }
-    // The same in some islands.
+    // Returns the largest such distance in the given islands, metres.
     double zone(const std::vector<uint32_t>& islands) const {
         double most = 0;
         for (uint32_t island : islands)
@@ -41,27 +44,29 @@ class Contacts {
         return kZone * most;
     }
 
-    // Distance between the two across the nearer surface, metres.
+    // Returns the distance of the two sides, measured along the normal of side a, metres; the
+    // distance along the line if that exceeds zone().
     double gapAcross(uint32_t a, double along) const {
         if (std::abs(along) > zone()) return std::abs(along);
         return std::abs(along * glm::dot(glm::dvec3(patches.normal(a)), direction));
     }
 
-    // Whether the two lie against each other and exchange nothing.
+    // Returns whether the two sides touch, so that they exchange nothing.
     bool touches(uint32_t a, uint32_t b, double along) const {
-        // Surfaces that meet at an angle are close only at their edge, and see each other.
-        constexpr float kOpposite = -0.99f;  // cosine below which normals point against each other
+        // Surfaces that meet at an angle are close only at their common edge, and see each other.
+        constexpr float kOpposite = -0.99f;  // cosine below which normals are opposite
         return gapAcross(a, along) <= touchAt(a) &&
                glm::dot(patches.normal(a ^ 1), patches.normal(b)) < kOpposite;
     }
 
-    // Whether the two coincide and b belongs before a.
+    // Returns whether the two sides coincide and b belongs before a.
     bool belongBackwards(uint32_t a, uint32_t b, double along) const {
         return gapAcross(a, along) <= coincidenceAt(a) && areSidesParallel(a, b) && isFirst(b, a);
     }
 
-    // Whether b was put after a and belongs before it. Of surfaces that meet at an angle, only
-    // beyond the touching distance: nearer to the common edge rounding decides.
+    // Returns whether b was placed after a but belongs before it. Surfaces that meet at an angle
+    // can be disordered only beyond the touch distance, since rounding decides their order nearer
+    // to the common edge.
     bool isDisordered(uint32_t a, uint32_t b, double along) const {
         const double gap = gapAcross(a, along);
         if (along >= 0 && gap > coincidenceAt(a)) return false;
@@ -69,13 +74,13 @@ class Contacts {
         return gap <= coincidenceAt(a) ? isFirst(b, a) : along < 0;
     }
 
-    // Whether a line would have to pass through the surface of a solid between two sides that face
-    // each other: one lies on the inside of a solid and the other does not. (Where solids cross or
-    // hold other objects, such a pair may be right.)
+    // Returns whether a line between two sides that face each other would have to pass through the
+    // surface of a solid, because one of them lies on the inside of a solid and the other does not.
+    // Such a pair may be correct where solids intersect or contain other objects.
     bool passesIntoSolid(uint32_t i, uint32_t j) const { return isInside(i) != isInside(j); }
 
   private:
-    // This share of the touching distance tells coinciding surfaces from merely close ones.
+    // Share of the touch distance up to which close surfaces coincide.
     static constexpr double kCoincidence = 0.05;
     static constexpr double kZone = 100;
 

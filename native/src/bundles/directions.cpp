@@ -9,7 +9,7 @@
 
 namespace raybundle {
 
-// The sequences, each in a file of its own but for the plainest.
+// Constructors of the sequences. Each has its own file, except the uniform random one below.
 std::unique_ptr<DirectionSequence> lowDiscrepancyDirections(std::mt19937_64& random);
 std::unique_ptr<DirectionSequence> randomDirections(std::mt19937_64& random);
 std::unique_ptr<DirectionSequence> adaptiveDirections(std::mt19937_64& random);
@@ -18,7 +18,8 @@ namespace {
 
 struct SequenceKind {
     DirectionKind value;
-    std::unique_ptr<DirectionSequence> (*make)(std::mt19937_64& random);  // `random`: of the half
+    // `random` is that of the half.
+    std::unique_ptr<DirectionSequence> (*make)(std::mt19937_64& random);
 };
 constexpr SequenceKind kKinds[] = {
     {DirectionKind::LOW_DISCREPANCY, lowDiscrepancyDirections},
@@ -27,7 +28,7 @@ constexpr SequenceKind kKinds[] = {
 };
 static_assert(hasEveryValue(kKinds));
 
-// RANDOM: uniform and independent (thesis section 4.2.1).
+// RANDOM: uniform and independent directions (thesis section 4.2.1).
 class RandomDirections : public DirectionSequence {
   public:
     Direction at(uint32_t, std::mt19937_64& random) override {

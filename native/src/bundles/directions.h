@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Directions of bundles. Each kind is a DirectionSequence in a file of its own, a row of the table
-// in directions.cpp, and a row of kDirectionKinds (job/choices.h), which says what it can do.
-// What all kinds have in common (two independent halves, roll, shift) is here.
+// Directions of bundles. Each kind of sequence is a DirectionSequence in its own file, a row of the
+// table in directions.cpp, and a row of kDirectionKinds (job/choices.h), which holds its abilities.
+// This file holds what all kinds share: two independent halves, roll and shift.
 //
 // Sources: thesis sections 4.2.1 (uniform random), 4.5 (adaptive) and 7.3.1 (quasi-Monte Carlo).
 // Differs: a sequence covers a hemisphere, since a line serves both ways.
@@ -21,24 +21,25 @@
 
 namespace raybundle {
 
-// The noise of what bundles tell falls with their number to about this power.
+// The noise of a result falls about with this power of the number of bundles.
 constexpr double kNoiseSlope = 0.65;
 
-// One bundle: all lines along `direction`. The orthonormal frame (right, up, direction) carries the
-// random roll; shift in [0, 1)^2 moves the pixel grid, in pixels.
+// A bundle: all lines along `direction`. The orthonormal frame (right, up, direction) contains the
+// random roll. The pixel grid of the transillumination plane is moved by `shift`, in pixels, in
+// [0, 1)^2.
 struct Bundle {
     glm::dvec3 right, up, direction;
     glm::dvec2 shift;
-    uint32_t half;      // 0 or 1: of the two independent sets, for the error estimate
-    uint32_t index;     // in the half's sequence
-    double weight = 1;  // uniform density of directions over that of the sequence
+    uint32_t half;      // 0 or 1: the independent half that the bundle belongs to
+    uint32_t index;     // index in the sequence of the half
+    double weight = 1;  // uniform density of directions over the density of the sequence
 };
 
-// The name of its lines, to be joined with a pixel, where patches let lines through by chance
-// (patches/opacity.h).
+// Returns an identifier of the bundle's lines. Together with a pixel it decides by chance which
+// lines pass patches that let light through (patches/opacity.h).
 inline uint64_t lineName(const Bundle& bundle) {
     uint64_t name = mixBits(uint64_t(bundle.half) << 32 | bundle.index);
-    // The grid's shift carries the seed of the directions.
+    // The grid's shift depends on the seed of the directions.
     for (double x : {bundle.shift.x, bundle.shift.y}) {
         uint64_t bits;
         std::memcpy(&bits, &x, sizeof bits);
@@ -47,48 +48,53 @@ inline uint64_t lineName(const Bundle& bundle) {
     return name;
 }
 
-// A direction with its weight (see Bundle).
+// A direction (unit vector) and its weight (see Bundle::weight).
 struct Direction {
     glm::dvec3 direction;
     double weight = 1;
 };
 
-// The directions of one half.
+// Generates the directions of one half of the bundles.
 class DirectionSequence {
   public:
     virtual ~DirectionSequence() = default;
 
-    // Direction `index` on the hemisphere; `random` is for this direction alone.
+    // Returns the direction with this index, on the hemisphere. `random` is used for this direction
+    // alone.
     virtual Direction at(uint32_t index, std::mt19937_64& random) = 0;
 
-    // Tells how much power the bundle along a direction transported, W, without the weight it had.
-    // Not called by transports that transport nothing while they trace.
+    // Reports the power that the bundle along `direction` transported, W, not multiplied by the
+    // weight of the direction. Not called by transports that move no power while they trace.
     virtual void learn(const glm::dvec3& /*direction*/, double /*power*/) {}
 };
 
-// Uniform in [0, 1), alike on every platform (std::uniform_real_distribution is not).
+// Returns a number uniform in [0, 1), equal on every platform (std::uniform_real_distribution is
+// not).
 double uniform(std::mt19937_64& random);
-// From [0, 1)^2 to the upper hemisphere, by area.
+// Maps [0, 1)^2 to the upper hemisphere, uniformly by solid angle.
 glm::dvec3 onHemisphere(double u, double v);
-// Shoemake, "Uniform Random Rotations" (Graphics Gems III, 1992).
+// Returns a uniform random rotation. Source: Shoemake, "Uniform Random Rotations" (Graphics Gems
+// III, 1992).
 glm::dmat3 randomRotation(std::mt19937_64& random);
 
-// The bundles of an endless sequence given by kind and seed.
+// The endless sequence of bundles given by a kind, a seed and the index of its first bundle.
 class Directions {
   public:
+    // `first` must be even.
     Directions(DirectionKind kind, uint32_t seed, uint32_t first = 0);
 
-    // The next `count` bundles: count is even and half of them belong to each half, those of the
-    // first coming first.
+    // Returns the next `count` bundles. `count` must be even. The first half of the result belongs
+    // to half 0, the second to half 1.
     std::vector<Bundle> next(uint32_t count);
 
+    // Reports the power that a bundle transported, W (see DirectionSequence::learn).
     void learn(const Bundle& bundle, double power) {
         sequences[bundle.half]->learn(bundle.direction, power);
     }
 
   private:
     const uint32_t seed;
-    uint32_t done;  // bundles of both halves
+    uint32_t done;  // number of bundles of both halves so far
     std::array<std::unique_ptr<DirectionSequence>, 2> sequences;
 };
 

@@ -8,9 +8,11 @@
 namespace raybundle {
 namespace {
 
-// Steps of a key from the nearest to the farthest depth, and those before, which rounding may need.
+// Number of steps from the nearest to the farthest depth, and the step of the nearest depth. The
+// steps before and after serve for rounding.
 constexpr double kDepthSteps = 4294967040.0, kFirstStep = 64;
-// A double of about this size has steps of 1, and its digits in its low half.
+// A double of about this size has a spacing of 1, and the digits of its integer part are in its low
+// half.
 constexpr double kIntegers = 0x1p52;
 
 uint32_t sideOf(uint64_t key) { return uint32_t(key); }
@@ -26,7 +28,7 @@ void sort(uint64_t* first, uint64_t* last) {
     }
 }
 
-// Four keys in a row, without branches, whose way would be hard to foretell.
+// Sorts four consecutive keys without branches, which would be hard to predict.
 void sortFour(uint64_t* key) {
     auto order = [](uint64_t& a, uint64_t& b) {
         const uint64_t low = std::min(a, b), high = std::max(a, b);
@@ -61,7 +63,8 @@ std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input) {
 void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
     rasteriser.begin(bundle);
     contacts.begin(bundle.direction);
-    // By chance per pixel of the whole view: ROULETTE.
+    // ROULETTE draws patches by chance per pixel of the whole view, so it cannot be split into
+    // regions.
     if (hasLeaks)
         projectView(out);
     else
@@ -156,7 +159,7 @@ void FragmentLists::pairLists(BundleLines& out) {
     for (uint32_t p = 0; p < pixels; ++p) {
         const uint32_t count = counts[p];
         if (count == 0) continue;
-        if (count == 2) {  // nearly all where surfaces are closed
+        if (count == 2) {  // most pixels, where surfaces are closed
             const uint64_t a = layers[p], b = layers[pixelRoom + p];
             const uint64_t nearer = std::min(a, b), farther = std::max(a, b);
             if (!hasLeaks && !areNear(nearer, farther)) {

@@ -19,32 +19,33 @@ double IslandDensity::windowPixels() const {
 
 namespace {
 
-// Patches with fewer pixels than this are starved: 64 bundles give them 4 lines. Where they are at
-// least kLeastStarvedShare of all patches, windows are made.
+// Patches with fewer pixels than kStarvedPixels are starved: 64 bundles give them 4 lines. Windows
+// are made if at least kLeastStarvedShare of all patches are starved.
 constexpr double kStarvedPixels = 1.0 / 8, kLeastStarvedShare = 0.1;
-// A patch belongs into the next level while it has fewer pixels than this. A whole window gets
-// finer only for this share of the patches that it was made for.
+// A patch belongs to the next level as long as it has fewer pixels than kFewPixels. A whole window
+// gets finer only for at least kLeastFinerShare of the patches that it was made for.
 constexpr double kFewPixels = 0.35, kLeastFinerShare = 0.2;
-// Pixels of all windows along a direction, in the mean: finer levels are left out beyond it.
+// Largest number of pixels of all windows, averaged over directions. Finer levels that would exceed
+// it are left out.
 constexpr double kMostWindowPixels = 1 << 17;
-constexpr double kAlmostAll = 0.6;  // a window with so much of the one around replaces it
-// The counts' bits: lines of the largest patch in the finest pixels, times the bundles.
+// A window that fills more than this share of the one around it replaces it.
+constexpr double kAlmostAll = 0.6;
+// Limit on the bits of the counts: finest lines on the largest patch, times the number of bundles.
 constexpr double kMostUnits = double(1u << 31) / kMostWindowBundles;
 
-// Patches of a window that are still too small for its pixels, and the window; kNoWindow is the
-// scene.
+// Patches of a window that are still too small for its pixels. The window kNoWindow is the scene.
 struct Dense {
     ParentGroup members;
     int32_t window;
 };
 
-// Plans the windows level by level.
+// Plans the windows of an island, level by level.
 class Planner {
   public:
     Planner(const ParentGroups& groups, double coarse, LineDensity& density)
         : groups(groups), coarse(coarse), density(density) {}
 
-    // Windows of one level within those of the level before.
+    // Returns the windows of one level inside those of the previous level.
     std::vector<Dense> refine(const std::vector<Dense>& outer, int level) {
         std::vector<Dense> inner;
         const double around = pixelArea(level - 1);
@@ -70,8 +71,8 @@ class Planner {
         return box.meanRectangle() / pixelArea(level);
     }
 
-    // Adds a window, or makes the one around finer if that is hardly larger. kNoWindow if it would
-    // have too many pixels.
+    // Adds a window, or makes the surrounding window finer if it is hardly larger. Returns the
+    // index of the window, or kNoWindow if it would have too many pixels.
     int32_t place(const ParentGroup& members, int32_t around, int level) {
         const WindowBox box = groups.boxOf(members);
         if (around != kNoWindow) {
@@ -102,8 +103,8 @@ class Planner {
     const ParentGroups& groups;
     const double coarse;  // edge of a pixel outside of all windows, metres
     LineDensity& density;
-    std::vector<size_t> madeFor;  // per window: patches
-    double pixels = 0;            // of all windows
+    std::vector<size_t> madeFor;  // per window: number of patches that it was made for
+    double pixels = 0;            // total of all windows
 };
 
 }  // namespace
@@ -129,7 +130,7 @@ void findWindows(const Patches& patches, const ParentGroups& groups, float pixel
         double(starved) < kLeastStarvedShare * double(groups.patchCount(members)))
         return;
 
-    // Outside of the windows the pixels follow the patches that most of the area is made of.
+    // Outside of the windows, the pixel size follows the patches that most of the area consists of.
     const double usual = std::exp(logSum / island.area);
     const float before = density.pixelSize;
     density.pixelSize =

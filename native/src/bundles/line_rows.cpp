@@ -12,21 +12,22 @@
 namespace raybundle {
 namespace {
 
-// Sides are handled in blocks of 2^kBlockBits rows: a block is the unit of parallel work.
+// Rows are processed in blocks of 2^kBlockBits rows. A block is the unit of parallel work.
 constexpr uint32_t kBlockBits = 8;
-// Of the number of lines m * 8^e.
+// Largest m and e in a number of lines m * 8^e.
 constexpr uint32_t kMostM = 31, kMostE = 7;
-// Rows that tell how much is repeated, and the repetition from which on it is joined.
+// Number of rows that repetition() examines, and the factor of its growth at which entries are
+// joined.
 constexpr size_t kSampledRows = 64;
 constexpr double kMostRepetition = 2;
 
-// Memory without the zeros that a vector would write first.
+// Returns an array without the zeros that a vector would write first.
 template <class T>
 std::unique_ptr<T[]> uninitialised(size_t n) {
     return std::unique_ptr<T[]>(new T[n]);
 }
 
-// Calls visit(entry) for the entries that stand for some lines to a side.
+// Calls visit(entry) for the entries that represent a number of lines to a side.
 template <class Visit>
 void encode(uint32_t side, uint64_t lines, const Visit& visit) {
     while (lines > 0) {
@@ -43,7 +44,7 @@ template <class Visit>
 void forEachEntry(const BundleLines& bundle, const Visit& visit) {
     bundle.forEachExchange([&](const Exchange& e, uint32_t weight) {
         const uint64_t lines = uint64_t(e.lines) * weight;
-        if (lines <= kMostM) {  // nearly all
+        if (lines <= kMostM) {  // nearly always
             visit(e.i, e.j << 8 | uint32_t(lines));
             visit(e.j, e.i << 8 | uint32_t(lines));
             return;
@@ -64,7 +65,7 @@ size_t LineRows::byteCount() const {
 }
 
 std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bundles) {
-    // Bring the entries to their blocks, in the order of the bundles.
+    // Sort the entries by block, in the order of the bundles.
     const size_t n = sideCount(), blocks = (n >> kBlockBits) + 1;
     std::vector<std::vector<size_t>> places(bundles.size(), std::vector<size_t>(blocks, 0));
     parallelFor(size_t(0), bundles.size(), [&](size_t b) {
@@ -97,7 +98,7 @@ std::vector<uint32_t> LineRows::append(const std::vector<const BundleLines*>& bu
         });
     };
 
-    // Put them behind the entries that their rows have.
+    // Append the new entries to the existing entries of their rows.
     std::vector<size_t> ends(n + 1, 0);
     std::vector<uint32_t> got(n, 0);
     const LinesOf<uint32_t>& lines = linesOf<uint32_t>();
@@ -150,7 +151,8 @@ double LineRows::repetition() const {
     size_t all = 0, different = 0;
     const size_t rows = std::min(sideCount(), kSampledRows);
     std::vector<uint32_t> sides;
-    // One of each step, for at equal steps they could all be fronts, of closed boxes say.
+    // Pick a random row from each step, since rows at equal distances could all be fronts, for
+    // example those of closed boxes.
     std::mt19937_64 random;
     for (size_t s = 0; s < rows; ++s) {
         const size_t first = s * sideCount() / rows, last = (s + 1) * sideCount() / rows;
@@ -167,7 +169,7 @@ double LineRows::repetition() const {
 void LineRows::joinRepeated() {
     const size_t n = sideCount(), blocks = (n >> kBlockBits) + 1;
     const LinesOf<uint32_t>& lines = linesOf<uint32_t>();
-    // Per thread: the place of each side in the row in hand, plus 1.
+    // Per thread: 1 plus the index of each side in the current row.
     tbb::enumerable_thread_specific<std::vector<uint32_t>> places(std::vector<uint32_t>(n, 0));
     std::vector<std::vector<uint32_t>> joinedOf(blocks);
     std::vector<size_t> ends(n + 1, 0);

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The exchanges of one half of the bundles as the rows of a symmetric matrix: for each patch side,
-// the sides that lines join it with, and how many lines.
+// The exchanges of one half of the bundles, as the rows of a symmetric matrix. The row of a patch
+// side holds the other sides of its lines and the numbers of lines.
 //
-// An entry takes 4 bytes, 24 bits of them the other side and 8 the number of lines, and each
-// exchange has one in the row of either end. The number is m * 8^e with m in 5 bits and e in 3: few
-// lines fit exactly, and so do few lines that stand for 4^n each (bundles/line_windows.h); others
-// take several entries. Rows are in the order of the bundles, and a pair that several bundles found
-// has several entries: most pairs are found once (256 bundles of cornell_box leave 1.23 entries a
-// pair), so that looking for equal ones costs more than it saves. They are joined when there are
-// twice as many entries as needed.
+// An entry takes 4 bytes: 24 bits for the other side and 8 bits for the number of lines. Each
+// exchange has one entry in the rows of both of its sides. The number of lines is m * 8^e, with m
+// in 5 bits and e in 3 bits. Few lines, or few lines that stand for 4^n lines each
+// (bundles/line_windows.h), are represented exactly by one entry. Other numbers take several
+// entries. Rows are in the order of the bundles, and a pair that several bundles found has several
+// entries. Since most pairs are found only once (256 bundles of cornell_box give 1.23 entries per
+// pair), a search for equal ones would cost more than it saves. Entries of equal pairs are joined
+// when there are twice as many entries as needed.
 #pragma once
 
 #include <array>
@@ -22,50 +23,58 @@
 
 namespace raybundle {
 
+// Rows of a sparse symmetric matrix of line counts.
 class LineRows {
   public:
-    // sideCount: at most 2^24.
+    // `sideCount` must be at most 2^24.
     explicit LineRows(size_t sideCount);
 
-    // Appends the exchanges of some bundles. Returns how many of their lines each side has.
+    // Appends the exchanges of some bundles. Returns the number of these lines per side.
     std::vector<uint32_t> append(const std::vector<const BundleLines*>& bundles);
 
-    // An entry: its side, and its lines by this table.
+    // Returns the side of an entry. The entry's number of lines is linesOf()[entry & 255].
     static uint32_t sideOf(uint32_t entry) { return entry >> 8; }
     template <class Number>
-    using LinesOf = std::array<Number, 256>;  // by entry & 255
+    using LinesOf = std::array<Number, 256>;  // indexed by entry & 255
     template <class Number>
+    // Returns the table of the numbers of lines.
     static const LinesOf<Number>& linesOf();
 
-    // The entries of row i.
+    // Return the range of the entries of row i.
     const uint32_t* first(uint32_t i) const { return entries.get() + begin[i]; }
     const uint32_t* last(uint32_t i) const { return entries.get() + begin[i + 1]; }
 
-    // Visits entries of row i that stand for all of its lines: visit(side, lines). All entries if
-    // there are no more than `enough`; else those of one line of each of so many equal steps
-    // through the lines of the row: within(step) says where in a step, 0 to 1 (less). (Of each so
-    // many-th entry, one that has a third of all lines would count for nearly all, or not at all.)
+    // Visits entries of row i that represent all of its lines, by visit(side, lines). Visits all
+    // entries if there are at most `enough`. Otherwise the lines of the row are divided into
+    // `enough` equal steps, and the entry of one line in each step is visited; within(step) returns
+    // the position of this line in the step, in [0, 1). (Visiting entries at equal distances
+    // instead would give an entry with a third of all lines either nearly all of the weight or
+    // none.)
     template <class Within, class Visit>
     void visitSome(uint32_t i, size_t enough, const Within& within, const Visit& visit) const;
 
-    // Of all rows.
+    // Returns the number of entries of all rows.
     size_t entryCount() const { return begin.back(); }
     size_t byteCount() const;
 
   private:
     size_t sideCount() const { return begin.size() - 1; }
-    // Entries of a row over the different sides in it, by some of the rows.
+    // Returns the number of entries of a row over the number of different sides in it, estimated
+    // from some of the rows.
     double repetition() const;
+    // Joins the entries of equal sides in each row.
     void joinRepeated();
+    // Computes `marks`.
     void mark();
-    // Lines of all entries before one, modulo 2^32.
+    // Returns the number of lines of all entries before an entry, modulo 2^32.
     uint32_t linesBefore(size_t entry) const;
 
-    std::vector<size_t> begin;  // per side, into the entries; one more at the end
+    // Per side: index of its first entry; one more value at the end.
+    std::vector<size_t> begin;
     std::unique_ptr<uint32_t[]> entries;
     static constexpr size_t kMark = 64;
-    std::vector<uint32_t> marks;  // linesBefore each kMark-th entry, and all
-    double leastRepetition = 1;   // after the last joining
+    std::vector<uint32_t> marks;  // linesBefore() of each kMark-th entry
+    double leastRepetition = 1;   // repetition() after the last joining
 };
 
 template <class Number>
@@ -92,8 +101,8 @@ inline void LineRows::visitSome(uint32_t i, size_t enough, const Within& within,
     const uint32_t start = linesBefore(first);
     const double step = double(linesBefore(last) - start) / double(enough);
     size_t at = first;
-    uint32_t before = 0;  // lines of the row before entry `at`
-    int steps = 0;        // of entry `at`
+    uint32_t before = 0;  // number of lines of the row before entry `at`
+    int steps = 0;        // number of steps that fall into entry `at`
     for (size_t s = 0; s < enough; ++s) {
         const auto line = uint32_t(step * (double(s) + within(s)));
         if (line - before < lines[entries[at] & 255]) {

@@ -13,29 +13,30 @@
 namespace raybundle {
 namespace {
 
-// The counts' bits between islands: lines of the largest patch in the finest pixels, with the least
-// bundles that must be possible. A side has half of the units in each bundle at most, so that they
-// need not fit twice.
+// Limit on the bits of the counts when islands differ: the number of finest lines on the largest
+// patch per bundle. With it, at least kLeastMostBundles bundles are possible. On average a side has
+// half of these lines in a bundle, so that no further factor of 2 is needed.
 constexpr double kLeastMostBundles = 4096, kMostIslandUnits = 0x1p32 / kLeastMostBundles;
-// All islands together may cost so much more than each would alone, as a share of what the first
-// one costs: else the pixels of large ones are coarser.
+// All islands together may cost this much more than each of them alone, as a share of the cost of
+// the first island. Otherwise the pixels of the large islands become coarser.
 constexpr double kMostMore = 0.25;
 constexpr int kMostHalvings = 30;
 
-// How often the edge of a pixel is halved for an island: of those after the first not at all as
-// long as their patches have pixels enough.
+// Returns how often the edge of a pixel is halved for an island. Islands after the first one keep
+// the common pixels as long as these are fine enough for their patches.
 int halvings(const IslandDensity& island, double pixel, bool isFirst) {
     const double finer = std::log2(pixel / double(island.density.pixelSize));
     return isFirst || finer > 1.25 ? std::clamp(int(std::lround(finer)), 0, kMostHalvings) : 0;
 }
 
-// The parents of each island, and what their patches have.
+// Returns the parents of each island and the areas of their patches.
 std::vector<IslandDensity> islandsOf(const Patches& patches) {
     std::vector<IslandDensity> islands(patches.islands.size());
     for (uint32_t i = 0; i < patches.parents.size(); ++i) {
         throwIfCancelledAt(i);
         const Parent& parent = patches.parents[i];
-        if (patches.parentOf[parent.firstPatch] != i) continue;  // another stands for its cluster
+        // Another parent stands for the cluster of this one.
+        if (patches.parentOf[parent.firstPatch] != i) continue;
         IslandDensity& island = islands[parent.island];
         island.members.push_back(i);
         island.patchCount += parent.patchCount();
@@ -47,8 +48,8 @@ std::vector<IslandDensity> islandsOf(const Patches& patches) {
     return islands;
 }
 
-// The edge of a pixel of the first island, or coarser by a power of two, so that all islands
-// together cost little more than each would alone; metres.
+// Returns the edge of a pixel of the first island, or this edge times a power of two, such that all
+// islands together cost little more than each alone, metres.
 double commonPixel(const std::vector<IslandDensity>& islands) {
     double alone = 0;
     for (const IslandDensity& island : islands) alone += island.costAlone();
@@ -68,7 +69,8 @@ double commonPixel(const std::vector<IslandDensity>& islands) {
     return std::ldexp(first, level);
 }
 
-// The windows of all islands, and windows around those whose pixels are finer. parents: of all.
+// Returns the windows of all islands, and further windows around islands with finer pixels.
+// `parents` is the number of all parents.
 LineDensity joined(const std::vector<IslandDensity>& islands, size_t parents) {
     const double pixel = commonPixel(islands);
     double largest = 0;
@@ -76,7 +78,7 @@ LineDensity joined(const std::vector<IslandDensity>& islands, size_t parents) {
     const int mostLevel =
         int(std::floor(0.5 * std::log2(kMostIslandUnits * pixel * pixel / largest)));
 
-    // The first islands have the most patches.
+    // The islands with the most patches come first.
     LineDensity all;
     all.pixelSize = float(pixel);
     all.windowOf.assign(parents, kNoWindow);
@@ -91,7 +93,7 @@ LineDensity joined(const std::vector<IslandDensity>& islands, size_t parents) {
         const int32_t offset = int32_t(all.windows.size());
         const int finer = int(std::lround(std::log2(pixel / double(island.density.pixelSize))));
         for (LineWindow window : island.density.windows) {
-            // Of no effect where pixels are finer already.
+            // A window has no effect where pixels are finer already.
             window.level = std::clamp(window.level + finer, 1, std::max(1, mostLevel));
             all.windows.push_back(window);
         }
@@ -115,7 +117,7 @@ LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pi
         island.density.pixelSize = pixelSizes[k];
         island.box = groups.boxOf(island.members);
         findWindows(patches, groups, pixelsPerPatch, leastPixelSizes[k], island);
-        // Long wires, say, have a shadow of many pixels for few patches.
+        // Long wires, for example, have a shadow of many pixels for few patches.
         const double most = islands.front().costAlone();
         if (k > 0 && island.costAlone() > most &&
             island.costAlone() > kMostPixelsEach * double(island.patchCount)) {
@@ -127,7 +129,7 @@ LineDensity densityByDetail(const Patches& patches, const std::vector<float>& pi
     }
     LineDensity density = islands.size() == 1 ? std::move(islands.front().density)
                                               : joined(islands, patches.parents.size());
-    // All parents of a cluster have the window of the one that stands for it.
+    // All parents of a cluster get the window of the parent that stands for the cluster.
     for (size_t i = 0; i < density.windowOf.size(); ++i)
         density.windowOf[i] = density.windowOf[patches.parentOf[patches.parents[i].firstPatch]];
     return density;
@@ -139,7 +141,7 @@ uint32_t mostBundles(const Patches& patches, const LineDensity& density) {
     double largest = 0;  // m^2
     for (uint32_t p = 0; p < patches.count(); ++p)
         largest = std::max(largest, double(patches.area[p]));
-    // Of a half: half of the bundles. A line counts as many as there are finest ones in its pixel.
+    // A half has half of the bundles. A line counts as many finest lines as fit into its pixel.
     const double pixel = double(density.pixelSize);
     const double units = std::ldexp(largest / (pixel * pixel), 2 * finest);
     const double most = density.windows.empty() ? 0x1p30 : double(kMostWindowBundles);

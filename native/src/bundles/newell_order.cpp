@@ -17,8 +17,8 @@ constexpr int kMaxCells = 2048;  // along each axis of the plane
 
 using Interval = std::pair<double, double>;
 
-// Of the corners of a patch, where the first is at `corner` and the edges lead `da` and `db`
-// further.
+// Returns the range of a coordinate over the corners of a patch. `corner` is the coordinate of its
+// first corner, `da` and `db` are the changes along its edges.
 Interval interval(double corner, double da, double db, bool isTriangle) {
     if (isTriangle) return {corner + std::min({0.0, da, db}), corner + std::max({0.0, da, db})};
     return {corner + std::min(0.0, da) + std::min(0.0, db),
@@ -73,15 +73,16 @@ void NewellOrder::place(const Bundle& bundle, const std::vector<uint32_t>& drawn
         s.parent = patches.parentOf[patch];
         const Parent& parent = patches.parents[s.parent];
         const ParentFrame& f = frames[s.parent];
-        // The first corner is that of (0, 0); the second tells which way up a triangle is.
+        // The first corner is that of (0, 0). The second shows whether a triangle is upside down.
         const uint32_t inParent = patch - parent.firstPatch;
-        const double scale = std::ldexp(1.0, -parent.levelOf(inParent));  // of a tile's edges
+        // Length of the patch's edges relative to a tile's.
+        const double scale = std::ldexp(1.0, -parent.levelOf(inParent));
         const glm::dvec2 counts = glm::dvec2(parent.countA, parent.countB) / scale;
         const glm::dvec2 st = glm::dvec2(parent.pointOn(inParent, {0, 0})) * counts;
         s.turn = parent.isTriangle && parent.pointOn(inParent, {1, 0}).x < float(st.x / counts.x)
                      ? -scale
                      : scale;
-        // Whole numbers but for the rounding to float.
+        // Whole numbers, except for the rounding to float.
         s.corner = f.origin + scale * (std::round(st.x) * f.a + std::round(st.y) * f.b);
         std::tie(s.nearest, s.farthest) =
             interval(s.corner.z, s.turn * f.a.z, s.turn * f.b.z, parent.isTriangle);
@@ -126,7 +127,7 @@ void NewellOrder::fillGrid() {
     auto row = [&](float y) {
         return std::clamp(int((double(y) - low.y) * perMetre.y), 0, rows - 1);
     };
-    // Counts, then fills back to front.
+    // Count the entries of each cell, then fill the cells.
     cellEnd.assign(size_t(columns) * size_t(rows) + 1, 0);
     for (Entry& e : bounds) {
         e.column = uint16_t(column(e.x0));
@@ -141,7 +142,7 @@ void NewellOrder::fillGrid() {
     for (const Entry& e : bounds) forEachCell(e, [&](size_t c) { ++cellEnd[c + 1]; });
     for (size_t c = 1; c < cellEnd.size(); ++c) cellEnd[c] += cellEnd[c - 1];
     entries.resize(cellEnd.back());
-    // From here cellEnd[c] runs from the begin of cell c to its end.
+    // During this loop, cellEnd[c] moves from the beginning of cell c to its end.
     for (const Entry& e : bounds) forEachCell(e, [&](size_t c) { entries[cellEnd[c]++] = e; });
 }
 
@@ -159,7 +160,7 @@ void NewellOrder::findEdges() {
                     if (e.parent == f.parent) continue;
                     // Test (1).
                     if (e.x0 >= f.x1 || f.x0 >= e.x1 || e.y0 >= f.y1 || f.y0 >= e.y1) continue;
-                    // Of the cells that both share, only the first looks at the pair.
+                    // Of the cells that both shapes cover, only the first compares them.
                     if (std::max(e.column, f.column) != column || std::max(e.row, f.row) != row)
                         continue;
                     const Order order = compare(shapes[e.shape], shapes[f.shape]);
@@ -193,7 +194,7 @@ NewellOrder::Order NewellOrder::compare(const Shape& p, const Shape& q) {
 bool NewellOrder::doProjectionsOverlap(const Shape& p, const Shape& q) const {
     const ParentFrame &f = frames[p.parent], &g = frames[q.parent];
     const bool isTriangleP = f.axisCount == 3, isTriangleQ = g.axisCount == 3;
-    // They do not if they are apart along the normal of an edge.
+    // The projections do not overlap if they are separated along the normal of an edge.
     auto isApart = [&](const glm::dvec2& axis) {
         const auto [pLow, pHigh] =
             interval(glm::dot(axis, glm::dvec2(p.corner)), p.turn * glm::dot(axis, glm::dvec2(f.a)),
@@ -231,7 +232,7 @@ NewellOrder::Order NewellOrder::compareCoplanar(const Shape& p, const Shape& q,
 }
 
 NewellOrder::Order NewellOrder::compareInOverlap(const Shape& p, const Shape& q) {
-    // The corners of a projection, in either order around.
+    // Returns the corners of a projection, in either orientation.
     auto cornersOf = [&](const Shape& s) {
         const ParentFrame& f = frames[s.parent];
         const glm::dvec2 c(s.corner), a = s.turn * glm::dvec2(f.a), b = s.turn * glm::dvec2(f.b);
@@ -279,7 +280,7 @@ void NewellOrder::draw(std::vector<uint32_t>& drawn) {
     for (const auto& [first, second] : edges) ++edgeBegin[second + 1];
     for (size_t k = 1; k <= n; ++k) edgeBegin[k] += edgeBegin[k - 1];
     before.resize(edges.size());
-    // Filled back to front, so that edgeBegin comes down to the begins again.
+    // Fill the predecessors of each shape.
     std::vector<uint32_t> next(edgeBegin.begin(), edgeBegin.end() - 1);
     for (const auto& [first, second] : edges) before[next[second]++] = first;
 

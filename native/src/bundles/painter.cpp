@@ -10,10 +10,10 @@ namespace raybundle {
 namespace {
 
 constexpr uint32_t kEmpty = UINT32_MAX;
-constexpr uint32_t kSlots = 16;  // of the run lengths
+constexpr uint32_t kSlots = 16;  // of RunLengths
 
-// By the depth of the centroids, as the thesis draws them. That is no order of visibility: a long
-// patch in front of a small one may have its centroid behind it.
+// Order by the depth of the centroids, as in the thesis. This is not an order of visibility: the
+// centroid of a long patch in front of a small one may lie behind it.
 class CentroidOrder : public PatchOrder {
   public:
     explicit CentroidOrder(const Patches& patches) {
@@ -34,7 +34,7 @@ class CentroidOrder : public PatchOrder {
     }
 
   private:
-    std::vector<glm::vec3> centroids;  // per patch, relative to Patches::centre
+    std::vector<glm::vec3> centroids;  // per patch, metres, relative to Patches::centre
     std::vector<std::pair<double, uint32_t>> keys;
 };
 
@@ -85,7 +85,7 @@ void Painter::paint(BundleLines& out) {
             ++out.lines;
             out.sky.push_back(f.side);
         } else {
-            // The far side of what was drawn before sees the near side of what is drawn now.
+            // The far side of the previous patch sees the near side of the current one.
             const uint32_t i = pixel.side ^ 1, j = f.side;
             const double along = f.depth - pixel.depth;
             const bool touches = contacts.touches(pixel.side, j, along);
@@ -95,8 +95,8 @@ void Painter::paint(BundleLines& out) {
             } else {
                 runs.add(i / 2 % kSlots, i, j);
             }
-            // A contact in the wrong order counts too: what lies on both sides of it sees the wrong
-            // side of it.
+            // A contact in the wrong order counts, too, since the surfaces before and behind it see
+            // the wrong sides.
             if (contacts.isDisordered(pixel.side, j, along) ||
                 (hasLeaks && !touches && contacts.passesIntoSolid(i, j)))
                 ++out.disordered;

@@ -7,14 +7,15 @@
 namespace raybundle {
 namespace {
 
-// An object of less than this share of the surface of its box is dust or wires. It gathers with
-// local rays.
+// An object whose area is less than this share of the surface of its box is dust or wires. Such an
+// object gathers by local rays.
 constexpr double kLeastFilled = 1e-3;
-// Starved patches that are less than this share of their object's area have no windows.
+// Starved patches whose area is less than this share of their object's area get no windows.
 constexpr double kCrumbs = 1e-3;
-// What a window costs besides its pixels, in pixels: looking whether the parents meet it.
+// Cost of a window besides its own pixels, in pixels, which is the time to test whether parents
+// meet it: fixed, and per parent.
 constexpr double kWindowCost = 500, kParentCost = 1.0 / 32;
-constexpr double kWorthSplitting = 0.97;  // share of the cost that splitting must come below
+constexpr double kWorthSplitting = 0.97;  // splitting must reduce the cost to less than this share
 constexpr int kBins = 16;
 
 }  // namespace
@@ -65,7 +66,7 @@ double ParentGroups::cost(const WindowBox& box, double pixelArea) const {
     return box.meanRectangle() / pixelArea + kWindowCost + kParentCost * double(boxes.size());
 }
 
-// Moves a part of the group to `part` if two windows cost less than one.
+// Moves a part of `group` to `part` if two windows cost less than one. Returns whether it did.
 bool ParentGroups::cut(ParentGroup& group, ParentGroup& part, double pixelArea) const {
     const WindowBox box = boxOf(group);
     double best = kWorthSplitting * cost(box, pixelArea);
@@ -80,7 +81,7 @@ bool ParentGroups::cut(ParentGroup& group, ParentGroup& part, double pixelArea) 
             return std::clamp(int((middle - low) / width), 0, kBins - 1);
         };
         for (uint32_t m : group) bins[size_t(binOf(m))].add(boxes[m]);
-        std::array<WindowBox, kBins> above;  // this bin and all above
+        std::array<WindowBox, kBins> above;  // bounds of a bin and all bins above it
         above[kBins - 1] = bins[kBins - 1];
         for (size_t b = kBins - 1; b-- > 0;) {
             above[b] = above[b + 1];

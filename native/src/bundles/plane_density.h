@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Where along a bundle its planes are placed: a density over the depth range, which is [0, 1] here.
+// The density by which the planes of a bundle are placed along its depth range, which is [0, 1]
+// here.
 //
-// Systematic and stratified placement draw from a uniform density. CLOSE_DISTANCE draws from a
-// mixture, half uniform and half the density of the scene's fragments, so that more planes cross
-// where there are many surfaces. A pair of surfaces at depths a < b is then crossed by planeCount *
-// (below(b) - below(a)) planes on average. As all planes come from the one mixture, each crossing
-// divided by this number is the balance heuristic of multiple importance sampling for its two
-// halves.
+// Systematic and stratified placement use a uniform density. CLOSE_DISTANCE uses a mixture, half
+// uniform and half the density of the scene's fragments, so that more planes cross where there are
+// many surfaces. On average, planeCount * (below(b) - below(a)) planes cross a pair of surfaces at
+// depths a < b. Since all planes are drawn from the one mixture, dividing each crossing by this
+// number is the balance heuristic of multiple importance sampling for the two halves of the
+// mixture.
 //
 // Sources: thesis section 7.3.5, which asks for a heuristic for surfaces close together and
 // proposes systematic sampling; Veach and Guibas, "Optimally Combining Sampling Techniques for
 // Monte Carlo Rendering" (1995).
-// Differs: the thesis names no density.
+// Differs: the thesis does not give a density.
 #pragma once
 
 #include <algorithm>
@@ -22,11 +23,13 @@
 
 namespace raybundle {
 
+// A piecewise constant probability density over [0, 1], with bins of equal width.
 class PlaneDensity {
   public:
+    // Sets the uniform density.
     void setUniform() { share = {0, 1}; }
 
-    // fragments: per bin of equal depth.
+    // Sets the mixture. `fragments` is the number of fragments in each bin of equal depth.
     void setMixture(const std::vector<uint32_t>& fragments) {
         const double bins = double(fragments.size());
         double all = 0;
@@ -40,7 +43,7 @@ class PlaneDensity {
         }
     }
 
-    // The probability of a plane below a depth.
+    // Returns the probability that a plane lies below a depth.
     double below(double depth) const {
         if (share.size() == 2) return depth;
         const double bins = double(share.size() - 1), x = depth * bins;
@@ -48,7 +51,7 @@ class PlaneDensity {
         return share[bin] + (x - double(bin)) * (share[bin + 1] - share[bin]);
     }
 
-    // The depth with a given probability of a plane below it.
+    // Returns the depth below which a plane lies with the given probability.
     double depthAt(double probability) const {
         const size_t bins = share.size() - 1;
         const size_t bin = std::min(
@@ -60,7 +63,7 @@ class PlaneDensity {
     }
 
   private:
-    std::vector<double> share;  // below each border of the bins
+    std::vector<double> share;  // per border of the bins: probability of a plane below it
 };
 
 }  // namespace raybundle

@@ -6,15 +6,19 @@
 namespace raybundle {
 namespace {
 
-constexpr uint64_t kNone = 0;          // a key; fragments lie inside the range, with depths above 0
-constexpr uint32_t kSky = UINT32_MAX;  // a side
-constexpr double kRange = 0x1p32;      // steps of depth
+// Key of no fragment. Fragments lie inside the range, so that their depths are above 0.
+constexpr uint64_t kNone = 0;
+constexpr uint32_t kSky = UINT32_MAX;  // stands for a patch side
+constexpr double kRange = 0x1p32;      // steps of depth in the range of the planes
 
-// The range of the planes reaches beyond the scene by this share of the scene's depth at both ends.
+// The range of the planes extends beyond the scene at both ends, by this share of the scene's
+// depth.
 constexpr double kMargin = 0.1;
-// Least depth of the scene to reckon with, of its radius: one flat surface has none.
+// Least depth of the scene that is assumed, as a share of its radius, since a single flat surface
+// has no depth.
 constexpr double kLeastDepth = 0.01;
-// Fewer crossings than these are expected of pairs closer than rounding error only.
+// Lower bound of the expected number of crossings. Only pairs closer than rounding error have
+// fewer.
 constexpr double kLeastCrossings = 0x1p-20;
 constexpr double kMostLines = 0x1p30;  // of an exchange
 constexpr size_t kDensityBins = 256;
@@ -26,17 +30,18 @@ double unit(uint64_t hash) { return double(hash >> 11) * 0x1p-53; }
 
 }  // namespace
 
-// Collects the lines of neighbouring pixels, of which consecutive ones usually see the same pair,
-// and rounds their sum: one rounding a run makes less noise than one a pixel.
+// Merges the lines of neighbouring pixels, since consecutive pixels usually see the same pair, and
+// rounds their sum. One rounding per run makes less noise than one per pixel.
 class Planes::Runs {
   public:
     Runs(uint64_t seed, uint32_t planeCount, BundleLines& out)
         : seed(seed), runs(planeCount, Run{0, 0, 0, 0}), out(out) {}
 
-    // A line that meets the scene.
+    // Counts a line that meets the scene.
     void countLine() { ++out.lines; }
 
-    // firstPlane: that crosses the pair; no two pairs of a pixel have it in common.
+    // Adds lines between sides i and j in a pixel. `firstPlane` is the first plane that crosses the
+    // pair; it differs between all pairs of a pixel. `j` may be kSky.
     void add(uint32_t pixel, uint32_t firstPlane, uint32_t i, uint32_t j, double lines) {
         Run& run = runs[firstPlane];
         if (run.i != i || run.j != j) {
@@ -46,6 +51,7 @@ class Planes::Runs {
         run.lines += lines;
     }
 
+    // Appends all runs to the output.
     void finish() {
         for (uint32_t k = 0; k < runs.size(); ++k) finish(runs[k], k);
     }
@@ -53,7 +59,7 @@ class Planes::Runs {
   private:
     struct Run {
         uint32_t i, j;
-        uint32_t pixel;  // the first
+        uint32_t pixel;  // first pixel of the run
         double lines;
     };
 
@@ -85,7 +91,7 @@ Planes::Planes(const ProjectorInput& input, int planeCount)
 std::unique_ptr<Projector> plane(const ProjectorInput& input) {
     ProjectorInput one = input;
     one.planePlacement = PlanePlacement::SYSTEMATIC;
-    one.planeCoherence = false;  // with a single plane
+    one.planeCoherence = false;  // there is only one plane
     return std::make_unique<Planes>(one, 1);
 }
 
@@ -157,7 +163,8 @@ void Planes::keepLast(Key& last, Key fragment) const {
     if (last == kNone || isBefore(last, fragment)) last = fragment;
 }
 
-// All planes at once: a plane's buffers are those of the last plane and what lies between.
+// Computes the pairs of all planes at once: a plane's buffers follow from those of the previous
+// plane and the fragments between the two.
 void Planes::sweep(Runs& runs) {
     const size_t slabCount = planeCount + 1;
     slabs.assign(rasteriser.pixelCount() * slabCount, Slab{kNone, kNone});
@@ -175,7 +182,7 @@ void Planes::sweep(Runs& runs) {
     for (size_t pixel = 0; pixel < rasteriser.pixelCount(); ++pixel) {
         const Slab* const ofPixel = slabs.data() + pixel * slabCount;
         Key below = kNone;
-        uint32_t from = 0;  // the first plane above it
+        uint32_t from = 0;  // first plane above `below`
         for (uint32_t k = 0; k < slabCount; ++k) {
             if (ofPixel[k].first == kNone) continue;
             if (k > from) addPair(uint32_t(pixel), from, k - from, below, ofPixel[k].first, runs);
@@ -189,7 +196,7 @@ void Planes::sweep(Runs& runs) {
     }
 }
 
-// The same without coherence.
+// Computes the same pairs as sweep(), with separate depth buffers for each plane.
 void Planes::projectOneByOne(Runs& runs) {
     buffers.assign(rasteriser.pixelCount() * planeCount, Buffers{kNone, kNone});
     for (uint32_t k = 0; k < planeCount; ++k)

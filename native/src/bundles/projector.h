@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What turns a bundle into exchanges. Each projector is a file of its own and a row of the table in
-// projector.cpp; their inner loops are their own, and only whole bundles go through this interface.
+// Projectors turn a bundle into exchanges. Each projector has its own file and a row of the table
+// in projector.cpp. The inner loops belong to the projectors; only whole bundles pass through this
+// interface.
 #pragma once
 
 #include <cstdint>
@@ -23,26 +24,30 @@ struct Exchange {
     uint32_t lines;
 };
 
-// What one bundle gives. Numbers of lines are integers also where a projector finds an exchange
-// only with some probability p: it stands for 1 / p lines, rounded up or down at random without
-// bias.
+// The lines of one bundle. Numbers of lines are integers even if a projector finds an exchange only
+// with a probability p. The exchange then stands for 1 / p lines, rounded up or down at random
+// without bias.
 struct BundleLines {
-    std::vector<Exchange> exchanges;  // equal pairs may occur several times
-    std::vector<uint32_t> sky;        // sides from which a line leaves the scene, once per line
-    std::vector<uint32_t>
-        touching;  // sides that lie against another one, once per line; no exchange
-    // Lines of one density after the other: how many of the finest lines one stands for, and where
-    // they end in the lists above. Empty: each stands for itself.
+    std::vector<Exchange> exchanges;  // a pair may occur several times
+    // One entry per line that leaves the scene: the patch side that the line leaves.
+    std::vector<uint32_t> sky;
+    // Sides that touch another surface, one entry per line. These lines exchange nothing.
+    std::vector<uint32_t> touching;
+    // The lists above hold the lines of one density after those of another. Each entry gives the
+    // number of finest lines that a line of this density stands for, and the ends of its ranges in
+    // the lists. If `densities` is empty, each line stands for itself.
     struct Density {
         uint32_t weight;
         size_t exchanges, sky, touching;
     };
     std::vector<Density> densities;
-    uint64_t lines = 0;       // that meet the scene
-    uint64_t disordered = 0;  // exchanges between sides whose order in depth is wrong (painters)
-    uint64_t cycles = 0;      // of patches that cover each other, broken anywhere (Newell)
+    uint64_t lines = 0;  // number of lines that meet the scene
+    // Number of exchanges in the wrong order of depth (painters) or through a solid (ROULETTE).
+    uint64_t disordered = 0;
+    uint64_t cycles = 0;  // number of broken cycles of patches that cover each other (Newell)
 
-    // Calls visit(entry, weight) for all entries of a list.
+    // Calls visit(entry, weight) for all entries of a list. `weight` is the number of finest lines
+    // that the entry's lines stand for.
     template <class Visit>
     void forEachExchange(const Visit& visit) const {
         forEach(exchanges, &Density::exchanges, visit);
@@ -56,6 +61,7 @@ struct BundleLines {
         forEach(touching, &Density::touching, visit);
     }
 
+    // Returns the memory of the lists in bytes.
     size_t byteCount() const {
         return exchanges.size() * sizeof(Exchange) +
                (sky.size() + touching.size()) * sizeof(uint32_t);
@@ -72,40 +78,41 @@ struct BundleLines {
     }
 };
 
+// Interface of all projectors.
 class Projector {
   public:
     virtual ~Projector() = default;
 
-    // Projects the scene along a bundle and appends its lines to `out`.
+    // Projects the scene along a bundle and appends the lines to `out`.
     virtual void project(const Bundle& bundle, BundleLines& out) = 0;
 };
 
-// What projectors are made of. References must outlive them.
+// Arguments of the projectors' constructors. The referenced objects must outlive the projectors.
 struct ProjectorInput {
     const Patches& patches;
     const Visibility& visibility;
-    float pixelSize;  // edge of a pixel in metres, the same for every bundle
+    float pixelSize;  // edge of a pixel in metres, equal for all bundles
     SmallPatches smallPatches = SmallPatches::CENTRE_SAMPLING;
-    int planeCount = 4;  // of PLANES
+    int planeCount = 4;  // number of planes per bundle, for PLANES
     PlanePlacement planePlacement = PlanePlacement::SYSTEMATIC;
-    // PLANES: false makes the depth buffers of each plane anew, to measure what coherence saves.
+    // For PLANES: false rasterises the scene anew for each plane, to measure what coherence saves.
     bool planeCoherence = true;
-    bool singleLine = false;               // a bundle is one line through the whole scene
-    std::vector<LineWindow> windows = {};  // of FRAGMENT_LISTS with CENTRE_SAMPLING
+    bool singleLine = false;  // whether a bundle is a single line through the whole scene
+    std::vector<LineWindow> windows = {};  // for FRAGMENT_LISTS with CENTRE_SAMPLING
 };
 
-// The projectors, one a row of the table.
+// Constructors of the projectors in the table.
 std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input);
 std::unique_ptr<Projector> painter(const ProjectorInput& input);
 std::unique_ptr<Projector> painterNewell(const ProjectorInput& input);
 std::unique_ptr<Projector> plane(const ProjectorInput& input);
 std::unique_ptr<Projector> planes(const ProjectorInput& input);
 
-// The projector of bundles that are one line, instead of any row.
+// Returns the projector of bundles that are single lines.
 std::unique_ptr<Projector> singleLine(const ProjectorInput& input);
 
-// A projector of a kind, or that of single lines. One object per thread: it keeps its memory from
-// bundle to bundle.
+// Returns a projector of the given kind, or that of single lines if input.singleLine is set. Each
+// thread needs its own projector, which keeps its memory from bundle to bundle.
 std::unique_ptr<Projector> makeProjector(ProjectorKind kind, const ProjectorInput& input);
 
 }  // namespace raybundle

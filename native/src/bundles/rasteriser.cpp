@@ -13,7 +13,7 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
       windows(std::move(windows)) {
     islands.resize(std::max<size_t>(1, patches.islands.size()));
     const bool all = smallPatches == SmallPatches::ROULETTE;
-    // Per vertex: the last island that has it, plus 1.
+    // Per vertex: 1 plus the index of the last island that uses it.
     std::vector<uint32_t> user(patches.vertices.size(), 0);
     auto use = [&](uint32_t island, uint32_t vertex) {
         if (user[vertex] == island + 1) return;
@@ -76,8 +76,8 @@ void Rasteriser::begin(const Bundle& bundle) {
     if (windows.empty()) return;
 
     for (uint32_t k : shown) findBounds(islands[k]);
-    // The shadows of the boxes do not depend on the shift, or lines near their borders would not be
-    // uniform.
+    // The shadows of the boxes do not depend on the shift. Otherwise the density of lines near
+    // their borders would not be uniform.
     openings.clear();
     const glm::dmat3 axes(patches.axes);
     const glm::dvec3 right = axes * frame.right, up = axes * frame.up;
@@ -128,26 +128,26 @@ void Rasteriser::showIslands(std::vector<uint32_t> shown, const glm::dvec2& low,
         lowest = k == 0 ? island.lowest : std::min(lowest, island.lowest);
         highest = k == 0 ? island.highest : std::max(highest, island.highest);
     }
-    // Move the view to the scene by whole pixels, so that its corner does not undo the random
+    // Move the view to the scene by whole pixels, so that its corner does not cancel the random
     // shift.
     level = 0;
     zoom = 1;
     corner = glm::floor(low) - frame.shift;
-    // A pixel more than needed, for the rounding to float. (The whole of a vast scene may have too
-    // many, but is looked at in regions.)
+    // One pixel more than needed, for the rounding to float. The view of a vast scene may exceed
+    // the limit on pixels, but such a scene is viewed in regions.
     constexpr double kMost = 1 << 30;
     width = int(std::min(kMost, high.x - corner.x)) + 2;
     height = int(std::min(kMost, high.y - corner.y)) + 2;
 }
 
-// Shadows that have pixels in common become one region, and regions likewise, by a sweep along x
-// until there are no more.
+// Merges shadows that share pixels into regions, and regions that share pixels into larger ones, by
+// a sweep along x that is repeated until nothing changes.
 void Rasteriser::findRegions() {
     regions.clear();
     for (uint32_t k = 0; k < islands.size(); ++k) {
         if (islands[k].vertices.empty()) continue;
         const Rectangle& shadow = islands[k].shadow;
-        // As wide as its view.
+        // As large as the view of the island.
         const glm::dvec2 first = glm::floor(shadow.low);
         regions.push_back(
             {first, first + glm::floor(shadow.high - first + frame.shift) + 2.0, {k}});
@@ -193,11 +193,12 @@ void Rasteriser::lookAt(size_t region) {
 bool Rasteriser::lookThrough(size_t window) {
     level = windows[window].level;
     zoom = std::ldexp(1.0, level);
-    // Other lines than those of the same pixels in other views.
+    // Use other lines than those of pixels with equal indices in other views.
     if (!patches.opacity.empty()) line = lineName(frame) + mixBits(window + 1);
-    // The grid is shifted by the same length as the whole scene's: uniformly over its pixel too.
+    // The grid is shifted by the same length as that of the whole scene. The shift is then also
+    // uniform over the smaller pixel.
     const glm::dvec2 shift = glm::fract(frame.shift * zoom);
-    // Pixels whose centres are in the opening.
+    // Pixels whose centres lie in the opening.
     const glm::dvec2 first = glm::ceil(openings[window].low * zoom + shift - 0.5);
     const glm::dvec2 last = glm::ceil(openings[window].high * zoom + shift - 0.5);
     corner = first - shift;
@@ -208,7 +209,7 @@ bool Rasteriser::lookThrough(size_t window) {
     for (uint32_t k = 0; k < islands.size(); ++k) {
         const Island& island = islands[k];
         if (island.vertices.empty() || !isInView(island.shadow)) continue;
-        // The shadow of a long wire lies in many views, the wire itself in few.
+        // The shadow of a long wire overlaps many views, but the wire itself only a few.
         auto isSeen = [&](const Bounds& bounds) { return isInView(bounds); };
         if (islands.size() > 1 &&
             std::none_of(island.sheetBounds.begin(), island.sheetBounds.end(), isSeen) &&
@@ -239,19 +240,19 @@ void Rasteriser::findTaken(size_t window) {
 }
 
 bool Rasteriser::findPlane(const Axes& axes, Plane& plane) const {
-    // In double from the world's coordinates, so that faces of different objects that coincide have
-    // the same depth.
+    // Computed in double from world coordinates, so that coinciding faces of different objects have
+    // equal depths.
     const glm::dvec3 o(axes.origin), da(axes.a), db(axes.b), normal = glm::cross(da, db);
     const double slant = glm::dot(normal, frame.direction);
     if (slant == 0) return false;
     const double size = double(pixelSize) / zoom;
-    const glm::dvec2 first = (corner + 0.5) * size;  // the centre of pixel (0, 0), metres
+    const glm::dvec2 first = (corner + 0.5) * size;  // centre of pixel (0, 0), metres
     plane.dzdx = -glm::dot(normal, frame.right) / slant * size;
     plane.dzdy = -glm::dot(normal, frame.up) / slant * size;
     plane.z0 =
         glm::dot(normal, o) / slant + (corner.x + 0.5) * plane.dzdx + (corner.y + 0.5) * plane.dzdy;
-    // (right, up, direction) is right-handed: the front faces against the direction where the
-    // outline turns clockwise.
+    // (right, up, direction) is right-handed, so the front faces against the direction if the
+    // outline is clockwise.
     plane.facing = slant < 0 ? 0 : 1;
     const glm::dvec2 ea(glm::dot(da, frame.right), glm::dot(da, frame.up)),
         eb(glm::dot(db, frame.right), glm::dot(db, frame.up));

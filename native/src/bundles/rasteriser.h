@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The scene on the transillumination plane of a bundle, fragment by fragment.
+// Rasterises the scene on the transillumination plane of a bundle, fragment by fragment.
 //
 // CENTRE_SAMPLING: pixels are sampled at their centres with half-open edges, on a grid with a
-// random shift: the expected number of lines of a patch is its projected area over the pixel's, for
-// every shape and size, and neighbouring faces never both take or both miss a pixel.
+// random shift. The expected number of lines of a patch is its projected area over the pixel's
+// area, for every shape and size. Neighbouring faces never both take a pixel, nor both miss it.
 // ROULETTE: see bundles/roulette.h.
 //
-// The plane can be looked at in several views, one after the other: the regions where the shadows
-// of islands are (patches/patch_size.h), with nothing between, and each window with its finer
-// pixels (bundles/line_windows.h). Each point of the plane belongs to one view at most; regions
-// have the pixels that the whole has there.
+// The plane can be viewed in several parts, one after the other. These views are the regions that
+// contain the shadows of islands (patches/patch_size.h), without the empty space between, and the
+// windows with their finer pixels (bundles/line_windows.h). Each point of the plane belongs to at
+// most one view. Regions have the pixels that the view of the whole scene has there.
 //
-// Differs from the thesis (section 4.2): but for ROULETTE, whole parents are rasterised, and sheets
-// of them (patches/sheets.h); the patch follows from the affine coordinates.
+// Differs from the thesis (section 4.2): except with ROULETTE, whole parents are rasterised, and
+// sheets of parents (patches/sheets.h). The patch follows from the affine coordinates.
 #pragma once
 
 #include <algorithm>
@@ -31,34 +31,37 @@
 
 namespace raybundle {
 
+// Rasterises the parents of a scene along bundles. Keeps its memory from bundle to bundle.
 class Rasteriser {
   public:
-    static constexpr int kRun = 64;  // pixels of a row that are looked at together, at most
-    // Loose parents beside each other in the mesh that are passed over together.
+    static constexpr int kRun = 64;  // largest number of pixels of a row in a run
+    // Number of loose parents, adjacent in the mesh, that are skipped together.
     static constexpr size_t kGroup = 32;
-    static constexpr double kSlack = 1e-6;  // pixels: more than rounding moves an edge by
+    static constexpr double kSlack = 1e-6;  // pixels; larger than the rounding error of an edge
 
-    // pixelSize: edge of a pixel in metres, outside of the windows. `patches` must outlive it.
-    // Keeps its memory from bundle to bundle. ROULETTE has no windows.
+    // `pixelSize` is the edge of a pixel outside of the windows, metres. `patches` must outlive the
+    // object. ROULETTE has no windows.
     Rasteriser(const Patches& patches, float pixelSize, SmallPatches smallPatches,
                std::vector<LineWindow> windows = {});
 
-    // Turns to a bundle and to the view of the whole scene.
+    // Projects the scene along a bundle and selects the view of the whole scene.
     void begin(const Bundle& bundle);
 
-    // Turns to the view of a region: all of them together hold what the whole does.
+    // Selects the view of a region. All regions together contain what the view of the whole scene
+    // does.
     void lookAt(size_t region);
     size_t regionCount() const { return regions.size(); }
 
-    // Turns to the view of a window; false if no pixel is in it.
+    // Selects the view of a window. Returns false if the view has no pixels.
     bool lookThrough(size_t window);
     size_t windowCount() const { return windows.size(); }
-    // How many lines of the finest window a line of the view in hand stands for.
+    // Returns the number of lines of the finest window that a line of the current view stands for.
     uint32_t lineWeight() const { return 1u << (2 * (finestLevel - level)); }
 
-    // Calls visit(pixel, count, depths in metres, sides that face against the direction) for all
-    // fragments in the view, parent after parent, neighbouring pixels of a row at a time. Where a
-    // patch lets a line through, there is none.
+    // Calls visit(pixel, count, depths, sides) for all fragments in the view, parent after parent.
+    // Each call covers `count` neighbouring pixels of a row, the first of which is `pixel`. Depths
+    // are in metres, and the sides are those that face against the direction. There is no fragment
+    // where a patch lets the line through.
     template <class Visit>
     void forEachRun(const Visit& visit) {
         if (patches.opacity.empty() && taken.empty()) return forEachCovered(visit);
@@ -71,7 +74,7 @@ class Rasteriser {
         });
     }
 
-    // The same, one by one: visit(pixel, depth, side).
+    // Calls visit(pixel, depth, side) for each fragment in the view; otherwise like forEachRun().
     template <class Visit>
     void forEachFragment(const Visit& visit) {
         forEachRun([&](uint32_t pixel, int count, const double* z, const uint32_t* side) {
@@ -79,22 +82,22 @@ class Rasteriser {
         });
     }
 
-    // The view, pixels; a pixel's index is y * width + x.
+    // Returns the number of pixels of the view. The index of a pixel is y * width + x.
     size_t pixelCount() const { return size_t(width) * size_t(height); }
     const glm::dvec3& direction() const { return frame.direction; }
-    // Depths along the direction that hold what is in the view, metres.
+    // Return the range of depths along the direction in the view, metres.
     double depthLow() const { return lowest; }
     double depthHigh() const { return highest; }
-    // The islands in the view.
+    // Returns the indices of the islands in the view, ascending.
     const std::vector<uint32_t>& islandsInView() const { return inSight; }
 
   private:
-    // Whether the line of a pixel belongs to the view and meets the patch of a side.
+    // Returns whether the line of a pixel belongs to the view and meets the patch of a side.
     bool isMet(uint32_t pixel, uint32_t side) const {
         return (taken.empty() || !taken[pixel]) &&
                (patches.opacity.empty() || stops(patches, side / 2, line + pixel));
     }
-    // As if all patches were opaque and all pixels belonged to the view.
+    // Visits fragments as if all patches were opaque and all pixels belonged to the view.
     template <class Visit>
     void forEachCovered(const Visit& visit) {
         if (smallPatches == SmallPatches::ROULETTE) {
@@ -116,38 +119,40 @@ class Rasteriser {
     void sampleSheet(const Sheet& sheet, const Visit& visit);
     template <class Visit>
     void sampleParent(const Parent& parent, const Visit& visit);
-    // Affine coordinates (s, t) in a plane: the point origin + s a + t b; metres.
+    // A plane with affine coordinates (s, t): the point is origin + s a + t b, metres.
     struct Axes {
         glm::vec3 origin, a, b;
     };
-    // Visits the pixels within a convex outline: edge k runs from vertex edge(k)[0] to edge(k)[1],
-    // around the front; patchAt(s, t): of all patches; lookUp(side, count, s, t, dsdx, dtdx): mends
-    // the sides of a run where patchAt is not enough.
+    // Visits the pixels inside a convex outline. Edge k runs from vertex edge(k)[0] to vertex
+    // edge(k)[1], counter-clockwise as seen from the front. patchAt(s, t) returns the index of the
+    // patch. lookUp(side, count, s, t, dsdx, dtdx) corrects the sides of a run where patchAt does
+    // not suffice.
     template <class EdgeAt, class PatchAt, class LookUp, class Visit>
     void sampleOutline(int edges, const EdgeAt& edge, const Axes& axes, const PatchAt& patchAt,
                        const LookUp& lookUp, const Visit& visit);
-    // Patch by patch, for ROULETTE.
+    // Draws a parent patch by patch, for ROULETTE.
     template <class Visit>
     void fillPatches(const Parent& parent, const Visit& visit);
 
-    // Over the view, at the centre of pixel (0, 0) and its change per pixel: depth, metres, and the
-    // affine coordinates of a parent or sheet.
+    // Depth (metres) and affine coordinates of a parent or sheet, as linear functions over the
+    // view: the value at the centre of pixel (0, 0), and the change per pixel.
     struct Plane {
         double z0, dzdx, dzdy;
         double s0, dsdx, dsdy;
         double t0, dtdx, dtdy;
-        uint32_t facing;  // the side that faces against the direction: 0 for the front
+        uint32_t facing;  // side that faces against the direction; 0: front, 1: back
+        // Returns the depth at a position in pixels, metres.
         double at(glm::dvec2 p) const { return z0 + (p.x - 0.5) * dzdx + (p.y - 0.5) * dzdy; }
     };
-    // False where it is seen edge-on.
+    // Computes `plane` from `axes` for the current view. Returns false if it is seen edge-on.
     bool findPlane(const Axes& axes, Plane& plane) const;
 
-    // On the plane, in pixels of the whole scene's view, before the shift.
+    // A rectangle on the plane, in pixels of the whole scene's view, before the shift.
     struct Rectangle {
         glm::dvec2 low{std::numeric_limits<double>::max()},
             high{-std::numeric_limits<double>::max()};
     };
-    // The same, a little larger, in half the memory.
+    // A rectangle, enlarged by the rounding to float, in half the memory.
     struct Bounds {
         glm::vec2 low{std::numeric_limits<float>::max()}, high{-std::numeric_limits<float>::max()};
 
@@ -157,25 +162,27 @@ class Rasteriser {
             high = glm::max(high, other.high);
         }
     };
-    // What an island has, and where it is seen along the bundle in hand.
+    // The content of an island, and its projection along the current bundle.
     struct Island {
-        std::vector<uint32_t> sheets;    // into Patches::sheets
-        std::vector<uint32_t> loose;     // parents that are in none, as the mesh has them
-        std::vector<uint32_t> vertices;  // all but those inside of sheets
-        // If there are windows, of each sheet, of each loose parent, and of groups of these.
+        std::vector<uint32_t> sheets;    // indices into Patches::sheets
+        std::vector<uint32_t> loose;     // parents in no sheet, in the order of the mesh
+        std::vector<uint32_t> vertices;  // all vertices except those inside of sheets
+        // Bounds of each sheet, of each loose parent, and of groups of loose parents. Only set if
+        // there are windows.
         std::vector<Bounds> sheetBounds, looseBounds, groupBounds;
         Rectangle shadow;
-        double lowest = 0, highest = 0;  // depth, metres
+        double lowest = 0, highest = 0;  // range of depths, metres
     };
-    // Islands whose shadows overlap, in pixels.
+    // A part of the plane with islands whose shadows overlap.
     struct Region {
-        glm::dvec2 first, end;  // pixels before the shift
+        glm::dvec2 first, end;  // pixels, before the shift
         std::vector<uint32_t> islands;
     };
     void findRegions();
-    // The view of some islands, which lie between two places of the plane.
+    // Selects a view of the given islands, which lie between two corners on the plane.
     void showIslands(std::vector<uint32_t> shown, const glm::dvec2& low, const glm::dvec2& high);
-    // A vertex in the view, pixels. The same for all parents that have it.
+    // Returns the position of a vertex in the view, in pixels. It is identical for all parents that
+    // share the vertex.
     glm::dvec2 inView(uint32_t vertex) const { return projected[vertex] * zoom - corner; }
     bool isInView(const Rectangle& r) const {
         return r.high.x * zoom > corner.x && r.low.x * zoom < corner.x + width &&
@@ -184,7 +191,7 @@ class Rasteriser {
     bool isInView(const Bounds& b) const {
         return isInView(Rectangle{glm::dvec2(b.low), glm::dvec2(b.high)});
     }
-    // False where no pixel of the view has its centre within.
+    // Returns false if no pixel of the view has its centre inside the bounds.
     bool mayHavePixels(const Bounds& b) const {
         const glm::dvec2 low = glm::dvec2(b.low) * zoom - corner - kSlack;
         const glm::dvec2 high = glm::dvec2(b.high) * zoom - corner + kSlack;
@@ -193,7 +200,7 @@ class Rasteriser {
     static bool hasPixels(double low, double high, int count) {
         return std::max(0.0, std::ceil(low - 0.5)) < std::min(double(count), std::ceil(high - 0.5));
     }
-    // Calls visit(k) for those of Island::loose that may have pixels in the view.
+    // Calls visit(k) for the entries of Island::loose that may have pixels in the view.
     template <class Visit>
     void forEachLooseInView(const Island& island, const Visit& visit) const {
         if (windows.empty()) {
@@ -208,7 +215,8 @@ class Rasteriser {
         }
     }
     void findBounds(Island& island);
-    // Marks the pixels that belong to finer windows; of windows as fine, to the first.
+    // Marks the pixels that belong to finer windows. Pixels of two windows of equal level belong to
+    // the first.
     void findTaken(size_t window);
 
     const Patches& patches;
@@ -217,19 +225,20 @@ class Rasteriser {
     const std::vector<LineWindow> windows;
     int finestLevel = 0;
 
-    Bundle frame{};                  // the bundle in hand
-    uint64_t line = 0;               // lineName of the bundle and the view
-    int level = 0;                   // of the view
+    Bundle frame{};                  // the current bundle
+    uint64_t line = 0;               // lineName of the bundle, changed for each view
+    int level = 0;                   // level of the view
     double zoom = 1;                 // 2^level
-    glm::dvec2 corner{0.0};          // of the view, its pixels
-    int width = 0, height = 0;       // of the view, its pixels
-    double lowest = 0, highest = 0;  // depth, metres
-    std::vector<Island> islands;     // of Patches::islands
+    glm::dvec2 corner{0.0};          // of the view, in its pixels
+    int width = 0, height = 0;       // of the view, in its pixels
+    double lowest = 0, highest = 0;  // range of depths in the view, metres
+    std::vector<Island> islands;     // in the order of Patches::islands
     std::vector<Region> regions;
-    std::vector<uint32_t> inSight;            // islands, ascending
-    std::vector<glm::dvec2> projected;        // per vertex: on the plane
-    std::vector<Rectangle> openings;          // per window: what of the plane is in it
-    std::vector<uint8_t> taken;               // per pixel of the view; empty: none
+    std::vector<uint32_t> inSight;      // islands in the view, ascending
+    std::vector<glm::dvec2> projected;  // per vertex: position on the plane, pixels
+    std::vector<Rectangle> openings;    // per window: its rectangle on the plane
+    // Per pixel of the view: whether it belongs to another view. Empty if no pixel does.
+    std::vector<uint8_t> taken;
     std::vector<double> depth;                // per vertex, metres
     std::vector<double> spanLeft, spanRight;  // per row of a parent, pixels
     Roulette roulette;
@@ -239,7 +248,8 @@ class Rasteriser {
 template <class Visit>
 void Rasteriser::sampleSheet(const Sheet& sheet, const Visit& visit) {
     auto edge = [&](int k) { return sheet.outline[size_t(k)]; };
-    // By value: the sheet could lie where patches are written, for all the compiler knows.
+    // By value, since the compiler cannot exclude that the sheet's grid is modified by writing
+    // sides.
     auto patchAt = [grid = sheet.grid()](float s, float t) { return grid.patchAt(s, t); };
     auto lookUp = [&](uint32_t* side, int count, float s, float t, float dsdx, float dtdx) {
         if (sheet.parts.empty()) return;
@@ -295,8 +305,8 @@ void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const Axes& axes,
     Plane plane;
     if (!findPlane(axes, plane)) return;
 
-    // Find the span of each row. An edge is evaluated from its lower end whichever way the outline
-    // turns, so that two outlines with a common edge find the same crossing to the last bit.
+    // Find the span of each row. An edge is evaluated from its lower end, whatever the orientation
+    // of the outline, so that two outlines with a common edge compute identical crossings.
     if (spanLeft.size() < size_t(row1 - row0)) {
         spanLeft.resize(size_t(row1 - row0));
         spanRight.resize(size_t(row1 - row0));
@@ -324,7 +334,7 @@ void Rasteriser::sampleOutline(int edges, const EdgeAt& edge, const Axes& axes,
         const float s0 = float(plane.s0 + y * plane.dsdy + x0 * plane.dsdx);
         const float t0 = float(plane.t0 + y * plane.dtdy + x0 * plane.dtdx);
         const uint32_t rowStart = uint32_t(y) * uint32_t(width);
-        // Apart from what is visited, so that the compiler makes these loops SIMD.
+        // Separate from the visit, so that the compiler vectorises these loops.
         for (int first = x0; first < x1; first += kRun) {
             const int count = std::min(kRun, x1 - first);
             uint32_t side[kRun];

@@ -11,7 +11,7 @@
 namespace raybundle {
 
 void Roulette::begin(const Bundle& bundle) {
-    // The grid's shift carries the seed of the directions.
+    // The grid's shift depends on the seed of the directions.
     uint64_t bits;
     static_assert(sizeof bits == sizeof bundle.shift.x);
     std::memcpy(&bits, &bundle.shift.x, sizeof bits);
@@ -24,7 +24,8 @@ bool Roulette::isDrawn(uint32_t patch, double projectedArea) const {
 
 namespace {
 
-// The pixels along an axis whose centres lie in [low, high), or at least the one in the middle.
+// The pixels along an axis whose centres lie in [low, high), or the one in the middle if there is
+// none.
 struct Range {
     Range(double low, double high)
         : first(int(std::ceil(low - 0.5))), last(int(std::ceil(high - 0.5))) {
@@ -33,7 +34,7 @@ struct Range {
         first = int(std::floor(0.5 * (low + high)));
         last = first + 1;
     }
-    // Where to cut the polygon for a row or column of the range.
+    // Returns the coordinate at which the polygon is cut for row or column k of the range.
     double cut(int k, double low, double high) const {
         return isEnlarged ? 0.5 * (low + high) : k + 0.5;
     }
@@ -56,7 +57,7 @@ Extent extent(const glm::dvec2* corners, int count, int axis) {
     return e;
 }
 
-// Of the polygon along the other axis, where coordinate `axis` is c.
+// Returns the extent of the polygon along the other axis, where its coordinate `axis` equals c.
 Extent crossSection(const glm::dvec2* corners, int count, int axis, double c) {
     Extent e;
     for (int k = 0; k < count; ++k) {

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// ROULETTE: the thesis' way with small patches. Each patch is projected by itself by a polygon
-// filler, which makes it at least a pixel wide and high; a patch whose projection is smaller than a
-// pixel is drawn only with the probability of its projected area over the pixel's, and then on the
-// one pixel that holds its centroid. So the expected number of lines of such a patch, seen alone,
-// is its projected area over the pixel's.
+// ROULETTE: the thesis' treatment of small patches. Each patch is projected separately by a polygon
+// filler, which makes it at least one pixel wide and high. A patch whose projection is smaller than
+// a pixel is drawn only with the probability of its projected area over the pixel's area, and then
+// on the one pixel that contains its centroid. The expected number of lines of a patch seen alone
+// is therefore its projected area over the pixel's area.
 //
 // Sources: thesis sections 4.1.1 and 4.3.1 (polygon filler), 4.6 and figures 4.21-4.23.
 // Differs:
-// - A pixel belongs to the patch that holds its centre, so that the area of large patches comes out
-//   right (as section 4.3.1 has it); a row or column whose centre the patch's extent holds, but
-//   which gets no pixel by that, gets one.
+// - A pixel belongs to the patch that contains its centre, so that the area of large patches is
+//   right (as in section 4.3.1). If the patch's extent contains the centre of a row or column, but
+//   the patch gets no pixel there, it gets one.
 // - A patch drawn by chance takes one pixel, where the thesis' filler may take several.
-// - The random number is a hash of bundle and patch.
+// - The random number is a hash of the bundle and the patch.
 //
-// What remains wrong with it, and is left for comparison with CENTRE_SAMPLING: patches of more than
-// a pixel's area but thinner than a pixel get too many lines; neighbouring patches take a pixel
-// twice (which then lie against each other) or miss it, and where the patches of a closed surface
-// miss a pixel, its line passes into the solid.
+// Errors that remain, for comparison with CENTRE_SAMPLING: patches of more than a pixel's area that
+// are thinner than a pixel get too many lines. Neighbouring patches take a pixel twice, and then
+// touch each other, or they miss it. Where the patches of a closed surface miss a pixel, its line
+// passes into the solid.
 #pragma once
 
 #include <cstdint>
@@ -28,31 +28,34 @@
 
 namespace raybundle {
 
+// The coordinates of a pixel.
 struct Pixel {
     int x, y;
 };
 
+// Decides at random which small patches are drawn.
 class Roulette {
   public:
+    // Sets the current bundle.
     void begin(const Bundle& bundle);
 
-    // Whether to draw a patch whose projected area, in pixels, is less than one.
+    // Returns whether to draw a patch. `projectedArea` is its projected area in pixels, below 1.
     bool isDrawn(uint32_t patch, double projectedArea) const;
 
   private:
-    uint32_t seed = 0;  // of the bundle in hand
+    uint32_t seed = 0;  // of the current bundle
 };
 
-// The pixels of convex polygons.
+// Finds the pixels of convex polygons.
 class PolygonFiller {
   public:
-    // Fills the polygon with the given corners in order around (at most 4), pixels. The pixels stay
-    // valid until the next call and come without duplicates.
+    // Returns the pixels of the polygon with the given corners (at most 4, in order around the
+    // polygon, in units of pixels), without duplicates. The result is valid until the next call.
     const std::vector<Pixel>& fill(const glm::dvec2* corners, int count);
 
   private:
     std::vector<Pixel> pixels;
-    std::vector<bool> filledColumns;  // of the polygon's extent
+    std::vector<bool> filledColumns;  // per column of the polygon's extent
 };
 
 }  // namespace raybundle

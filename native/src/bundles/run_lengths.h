@@ -10,11 +10,13 @@
 
 namespace raybundle {
 
-// Collects the exchanges of neighbouring pixels: pixel after pixel the same pair often occurs
-// again. Keeps its memory.
+// Collects exchanges and merges equal ones of neighbouring pixels, since the same pair often occurs
+// in many consecutive pixels. Keeps its memory.
 class RunLengths {
   public:
-    // slot: small; a pair that occurs again should come with the slot of the last time.
+    // Adds one line between sides i and j. `slot` should be a small number that is equal each time
+    // the same pair occurs, such as its place in the pixel's list. A pair is merged with the last
+    // one of its slot.
     void add(size_t slot, uint32_t i, uint32_t j) {
         const uint32_t low = std::min(i, j), high = std::max(i, j);
         if (slot >= last.size()) last.resize(slot + 1, 0);
@@ -25,14 +27,14 @@ class RunLengths {
         }
         if (count == runs.size()) runs.resize(2 * count);
         last[slot] = count;
-        // Part by part: the copy of a temporary waits for its parts to be stored.
+        // Assign each member, since copying a temporary would wait until its members are stored.
         Exchange& next = runs[count++];
         next.i = low;
         next.j = high;
         next.lines = 1;
     }
 
-    // Appends all runs to a list and starts anew.
+    // Appends all exchanges to `out` and clears the collection.
     void moveTo(std::vector<Exchange>& out) {
         out.insert(out.end(), runs.begin() + 1, runs.begin() + ptrdiff_t(count));
         std::fill(last.begin(), last.end(), 0);
@@ -40,10 +42,10 @@ class RunLengths {
     }
 
   private:
-    // The first is of no pair.
+    // The first entry is a sentinel of no pair.
     std::vector<Exchange> runs{{0, 0, 0}, {0, 0, 0}};
     size_t count = 1;
-    std::vector<size_t> last;  // per slot: the run in hand
+    std::vector<size_t> last;  // per slot: index of its current run
 };
 
 }  // namespace raybundle

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bundles of one line: a random line through the whole scene, traced and not projected. All its
-// crossings count, ordered and paired like the list of one pixel in fragment_lists.cpp.
+// Bundles of one line: a random line through the whole scene, which is traced instead of projected.
+// All its crossings count. They are ordered and paired like the list of one pixel in
+// fragment_lists.cpp.
 //
 // Sources: thesis sections 2.3.2 and 2.4.1, figure 2.8 (multipath by single global lines).
-// Differs: a line is a direction and a point on the disc across it instead of two points on the
-// sphere around the scene. Both densities are the uniform one of global lines (Crofton); with a
-// direction of the common sequences, low discrepancy and importance serve single lines too.
+// Differs: a line is given by a direction and a point on the disc across it, instead of two points
+// on the sphere around the scene. Both have the uniform density of global lines (Crofton). With the
+// directions of the other projectors, low discrepancy and importance sampling also apply to single
+// lines.
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 #include <utility>
@@ -23,7 +25,7 @@ class SingleLine : public Projector {
     explicit SingleLine(const ProjectorInput& input) : input(input), contacts(input.patches) {}
 
     void project(const Bundle& bundle, BundleLines& out) override {
-        // Uniform on a disc as large as the sphere around the scene.
+        // Uniform on a disc with the radius of the sphere around the scene.
         const double r = double(input.patches.radius) * std::sqrt(bundle.shift.x);
         const double phi = glm::two_pi<double>() * bundle.shift.y;
         input.visibility.lineHits(r * (std::cos(phi) * bundle.right + std::sin(phi) * bundle.up),

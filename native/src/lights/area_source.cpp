@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Area lamps: rectangles and ellipses, whose light may be spread less than by Lambert's law.
+// Area lamps: rectangles and ellipses. Their spread may be narrower than that of a Lambertian
+// emitter.
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
@@ -76,7 +77,7 @@ class AreaSource : public LightSource {
     }
 
   private:
-    // In front of the light.
+    // Returns a sample at a point in front of the lamp.
     LightSample sampleBefore(const glm::vec3& point, const glm::vec3& receiver,
                              glm::vec2 uv) const {
         if (spread.isWhole())
@@ -84,7 +85,8 @@ class AreaSource : public LightSource {
         const Part part = partSeenFrom(point);
         if (!(part.area > 0)) return {};
         if (part.isCone) {
-            // The light fills the cone of directions (but for the rim of an ellipse).
+            // The directions of the spread seen from the point all meet the lamp (except near the
+            // rim of an ellipse).
             LightSample sample;
             sample.direction = -spread.emit(normal, uv);
             const float cosine = -glm::dot(normal, sample.direction);
@@ -95,7 +97,7 @@ class AreaSource : public LightSource {
                                             std::max(0.0f, glm::dot(receiver, sample.direction)));
             return sample;
         }
-        // Else the part of the surface whose light reaches the point, or rather its bounds.
+        // Otherwise, sample the bounds of the part of the surface whose light reaches the point.
         const glm::vec2 d =
             part.isAll && isEllipse ? onDisk(uv) : part.low + uv * (part.high - part.low);
         if (isEllipse && glm::dot(d, d) > 1) return {};
@@ -110,21 +112,23 @@ class AreaSource : public LightSource {
         return position + d.x * u + d.y * v;
     }
 
-    // Of the light's surface, in shares of u and v from -1 to 1.
+    // A rectangular part of the lamp's surface, in units of u and v from -1 to 1.
     struct Part {
         glm::vec2 low, high;
         float area;  // m^2
+        // isAll: the part is the whole surface. isCone: the part holds all directions of the
+        // spread.
         bool isAll, isCone;
     };
 
-    // The foot of a point in the plane of the light, in shares of u and v.
+    // Returns the projection of a point on the plane of the lamp, in units of u and v.
     glm::vec2 inPlane(const glm::vec3& point) const {
         const glm::vec3 d = point - position, n = glm::cross(u, v);
         return glm::vec2(glm::dot(glm::cross(d, v), n), glm::dot(glm::cross(u, d), n)) /
                glm::dot(n, n);
     }
 
-    // Bounds of the points within the spread of their light from a point.
+    // Returns the bounds of the surface points whose spread contains the direction to a point.
     Part partSeenFrom(const glm::vec3& point) const {
         const float radius = std::max(0.0f, glm::dot(point - position, normal)) * spread.tangent();
         const float cross = glm::length(glm::cross(u, v));

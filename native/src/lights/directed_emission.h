@@ -6,13 +6,15 @@
 
 namespace raybundle {
 
-// Of light that surfaces do not send alike to all directions.
+// Interface for emitted light whose radiance depends on the direction.
 class DirectedEmission {
   public:
     virtual ~DirectedEmission() = default;
 
-    // What a side sends towards a direction (unit, away from it) more than in the mean over all
-    // directions, or less, W/m^2. mean: its exitance, W/m^2.
+    // Returns how much the exitance of a patch side towards `direction` differs from `mean`, in
+    // W/m^2; negative where the side sends less than the mean. `direction` is a unit vector that
+    // points away from the side. `mean` is the side's exitance, averaged over all directions,
+    // W/m^2.
     virtual glm::vec3 beyondMean(uint32_t side, const glm::vec3& direction,
                                  const glm::vec3& mean) const = 0;
 };

@@ -13,9 +13,10 @@
 namespace raybundle {
 namespace {
 
+// Largest number of connected surfaces of one object and material that are separate sources.
 constexpr ptrdiff_t kMostOfObject = 32;
 
-// LightSource::shape of the fronts (back = 0) or backs of emissive faces.
+// Returns LightSource::shape of the fronts (back = 0) or the backs (back = 1) of emissive faces.
 uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents, uint32_t back,
                  const std::vector<glm::vec3>& emission, const glm::vec3& strength) {
     Hasher hasher;
@@ -32,9 +33,10 @@ uint64_t shapeOf(const Patches& patches, const std::vector<uint32_t>& parents, u
     return hasher.value();
 }
 
-// Lamps that are one object are several sources, or few samples would tell what all of them
-// together give, and which one is hidden from a receiver. Of an object with more than
-// kMostOfObject, as a tree full of little lights is, they are one.
+// Joins the groups of an object and material that consists of more than kMostOfObject connected
+// surfaces, such as a tree full of small lights. With fewer surfaces, each remains a source of its
+// own, since a few samples of one joint source could not show how much light all lamps give
+// together and which of them are hidden.
 template <class Groups>
 void joinMany(Groups& groups) {
     Groups joined;
@@ -85,7 +87,8 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
                 varies = varies || emission[side] != emission[first + k % 2];
             }
         }
-        // Fronts and backs apart: of a lamp that encloses a volume one of them is never seen.
+        // Fronts and backs are separate sources: of a lamp that encloses a volume, one of them is
+        // never seen.
         Enclosing enclosing;
         for (uint32_t p : parents) enclosing.add(surfaces[patches.parents[p].surface]);
         for (uint32_t back = 0; back < 2; ++back) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Which emissive faces make a light source together: those of one object, material and connected
-// surface, fronts and backs apart.
+// Groups emissive faces into light sources. A source consists of the faces of one object, material
+// and connected surface. Fronts and backs are separate sources.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -12,9 +12,10 @@
 
 namespace raybundle {
 
-// The emissive faces of sides that are marked, whose emission per side of all patches (W/m^2 of the
-// whole patch, 0 where not marked) is given; directed: what they send towards a direction more than
-// that, or less; null: nothing. All that is passed must outlive them.
+// Returns the light sources of the sides that `gatheredSides` marks. `emission` is per side of all
+// patches, averaged over the whole patch, W/m^2, and 0 for sides that are not marked. `directed`
+// adds the dependence of the emission on the direction; null if there is none. All arguments must
+// outlive the sources, except `gatheredSides`.
 std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
                                                       const std::vector<bool>& gatheredSides,
                                                       const std::vector<glm::vec3>& emission,

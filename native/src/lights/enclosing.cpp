@@ -6,7 +6,8 @@
 namespace raybundle {
 namespace {
 
-// Pairs of surfaces and parents that are looked at.
+// Largest number of pairs (surface, parent) that emptyInsides compares. Above it, no inside is
+// taken to be empty.
 constexpr size_t kMostPairs = size_t(1) << 26;
 
 }  // namespace
@@ -53,7 +54,7 @@ std::vector<bool> emptyInsides(const Scene& scene, const Patches& patches,
         for (uint32_t p = parent.firstPatch; p < parent.firstPatch + parent.patchCount(); ++p)
             if (patches.opacityOf(p) < 1 || patches.translucenceOf(2 * p + 1) != glm::vec3(0.0f))
                 isEmpty[parent.surface] = false;
-        // What touches it from outside is not in it.
+        // A parent that only touches the surface from outside does not lie inside it.
         const Extent box = boxOf(patches, parent);
         const double touch = double(patches.islands[parent.island].touchDistance);
         for (uint32_t s : candidates)

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What surfaces that enclose a volume hide: of those that let no light through, a line from outside
-// meets the outer side first. So light of their inner side, as the body of a lamp has it whose
-// material emits from both sides, is out of sight from outside; and where nothing else is inside,
-// nobody ever sees it.
+// Surfaces that enclose a volume, and which of their sides they hide. If such a surface lets no
+// light through, any line from outside meets its outer side first. The light of the inner side is
+// then out of sight from outside. An example is the body of a lamp whose material emits from both
+// sides. If nothing else is inside, nobody ever sees this light.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -15,23 +15,25 @@
 
 namespace raybundle {
 
-// Of a surface, or of several.
+// The bounds of one surface or of several surfaces, and the sides that they hide.
 struct Enclosing {
-    Extent box;                    // relative to Patches::centre
-    bool hides[2] = {true, true};  // whether nothing outside sees its fronts, or its backs
+    Extent box;  // metres, relative to Patches::centre
+    // Whether the fronts [0], and the backs [1], are out of sight from outside.
+    bool hides[2] = {true, true};
 
+    // Extends the box by that of `other`. A side stays hidden only if it is hidden in both.
     void add(const Enclosing& other);
 };
 
-// Of a parent, relative to Patches::centre.
+// Returns the bounding box of a parent in metres, relative to Patches::centre.
 Extent boxOf(const Patches& patches, const Parent& parent);
 
-// Per surface (Parent::surface).
+// Returns the box and the hidden sides of each surface, indexed by Parent::surface.
 std::vector<Enclosing> enclosingSurfaces(const Patches& patches);
 
-// Per surface: whether its backs see nothing but each other and are not what is baked. Only asked
-// of surfaces with `emission` (per side) on their backs; false of all others, and empty without
-// any.
+// Returns for each surface whether its backs see only each other and are not baked. The result is
+// indexed by Parent::surface. Only surfaces with emission on their backs are examined; the result
+// is false for all others, and empty if no back emits. `emission` is per patch side, W/m^2.
 std::vector<bool> emptyInsides(const Scene& scene, const Patches& patches,
                                const std::vector<glm::vec3>& emission);
 

@@ -9,13 +9,13 @@
 namespace raybundle {
 namespace {
 
-// A cluster is far at so many times its radius: what it gives is then off by less than 1 %, and all
-// of them together by 0.1 %.
+// A cluster counts as far from this number of its radii on. The error of its irradiance is then
+// below 1 %, and that of all clusters together about 0.1 %.
 constexpr float kFarFromCluster = 4;
 
 glm::dmat3 square(const glm::dvec3& v) { return glm::outerProduct(v, v); }
 
-// Mean product of what the points of a face are off its middle, m^2.
+// Returns the mean outer product of the offset of a face's points from its middle with itself, m^2.
 glm::dmat3 spreadOf(const LightFace& face) {
     const glm::dvec3 a(face.a), b(face.b);
     if (!face.isTriangle) return (square(a) + square(b)) / 12.0;
@@ -24,7 +24,7 @@ glm::dmat3 spreadOf(const LightFace& face) {
 
 }  // namespace
 
-// The product of both cosines over the square of the distance, expanded about the middle.
+// Expands the product of both cosines over the squared distance to second order about the middle.
 float FaceClusters::DistantLight::irradiance(const glm::vec3& point,
                                              const glm::vec3& normal) const {
     const glm::vec3 d = middle - point, v = spread * d;
@@ -43,7 +43,7 @@ float FaceClusters::DistantLight::irradiance(const glm::vec3& point,
 
 FaceClusters::FaceClusters(const LightTree& tree, const std::vector<LightFace>& faces,
                            const std::vector<glm::vec3>& radiance) {
-    // Relative to the first face of a cluster.
+    // Sums over the faces of a cluster. Places are relative to the first face, to keep precision.
     struct Sum {
         double power = 0;
         glm::dvec3 vector{0.0}, place{0.0};
@@ -87,10 +87,11 @@ glm::vec3 FaceClusters::irradiance(const LightTree& tree, const glm::vec3& point
     glm::vec3 sum(0.0f);
     for (size_t k = 0; k < nodes.size();) {
         const LightTree::Node& node = nodes[k];
-        const size_t next = k + 2 * node.count - 1;  // after all within it
+        // Index after this cluster and all clusters within it.
+        const size_t next = k + 2 * node.count - 1;
         const glm::vec3 d = node.centre - point;
         const float distance = glm::length(d), height = glm::dot(d, normal);
-        // Normals in a cone of more than half a turn face any way.
+        // In a cone wider than half a turn, the normals may point in any direction.
         const float opening = node.cosine > 0 ? node.sine : 1;
         const float slant = -glm::dot(node.axis, d), spread = opening * distance + node.radius;
         if (height <= -node.radius || slant <= -spread) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The lamps of Blender as light sources: a file for each kind, and a row in lightSources
-// (lights/light_source.cpp).
+// Constructors of the light sources for Blender's lamps. Each kind of lamp has its own source file
+// and a case in lampSource (lights/light_source.cpp).
 #pragma once
 
 #include <glm/glm.hpp>
@@ -12,11 +12,11 @@
 
 namespace raybundle {
 
-// Each makes the source of a lamp of its kind. centre: Patches::centre, metres. The lamp must
-// outlive its source.
+// Each function returns the light source of a lamp of its kind. `centre` is Patches::centre in
+// metres. `light` must outlive the returned source.
 std::unique_ptr<LightSource> pointSource(const Light& light, const glm::dvec3& centre);
 std::unique_ptr<LightSource> sunSource(const Light& light, const glm::dvec3& centre);
-// Null for a lamp without area.
+// Returns null if the lamp has no area.
 std::unique_ptr<LightSource> areaSource(const Light& light, const glm::dvec3& centre);
 
 }  // namespace raybundle

@@ -24,7 +24,7 @@ std::unique_ptr<LightSource> lampSource(const Light& light, const glm::dvec3& ce
     return nullptr;
 }
 
-// LightSource::shape of a lamp.
+// Returns LightSource::shape of a lamp.
 uint64_t shapeOf(const Light& l) {
     Hasher hasher;
     hasher.add(l.kind, l.position, l.radius, l.pointShape, l.direction, l.angle, l.axisU, l.axisV,

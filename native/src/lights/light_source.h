@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Light sources as the first shot sees them: points to sample, and where there is one the closed
-// form of the irradiance without occluders. Sources: Lambert's formula for polygons;
-// Blender's light units (addon/raybundle/light_export.py).
+// Light sources as the first shot uses them: each source can be sampled by points, and some have a
+// closed form of the irradiance without occluders.
+//
+// Sources: Lambert's formula for polygons; Blender's light units (addon/raybundle/light_export.py).
 #pragma once
 
 #include <algorithm>
@@ -23,52 +24,57 @@ namespace raybundle {
 
 struct ReceiverPlace;
 
-// What one sampled point of a source gives to a receiver if nothing is in between.
+// One sampled point of a source, and the irradiance that it gives to a receiver without occluders.
 struct LightSample {
-    glm::vec3 direction{0.0f};    // unit vector towards the sampled point
-    float distance = 0;           // metres; infinite for suns
-    glm::vec3 irradiance{0.0f};   // W/m^2, divided by the sample's probability; 0: receives nothing
-    uint32_t part = 0;            // of the source, if it has any
-    uint32_t parent = kNoParent;  // that the sampled point lies on, if the source is a mesh
-    // This much before the point, along the ray, nothing blocks it any more, metres: what lies in
-    // the plane of the source may stand before it by a rounding error.
+    glm::vec3 direction{0.0f};  // unit vector towards the sampled point
+    float distance = 0;         // metres; infinite for suns and worlds
+    // W/m^2, divided by the probability of the sample; 0 if the receiver gets no light.
+    glm::vec3 irradiance{0.0f};
+    uint32_t part = 0;            // of the source that the point lies in, if the source has parts
+    uint32_t parent = kNoParent;  // parent that contains the point, if the source is a mesh
+    // Length of the last part of the ray on which nothing blocks it, metres. Surfaces in the plane
+    // of the source may lie in front of the sampled point by a rounding error.
     float margin = 0;
 
-    // From the receiver's point.
+    // Returns the shadow ray from the receiver's point to the sampled point.
     ShadowRay ray(const glm::vec3& point) const {
         return {point, direction, std::max(0.0f, distance - margin), parent};
     }
-    // For a plane source of that normal and half thickness, metres.
+    // Sets the margin for a planar source with the given normal (unit) and half thickness (metres).
     void setMargin(const glm::vec3& normal, float halfThickness) {
         margin = 2 * halfThickness / std::max(0.01f, -glm::dot(direction, normal));
     }
 };
 
-// A ray that leaves a source with an equal share of its power.
+// A ray that leaves a source. All rays of a source carry equal shares of its power, times `weight`.
 struct EmittedRay {
     glm::vec3 origin{0.0f}, direction{0.0f};
-    glm::vec3 weight{1.0f};        // times the mean share, by channel
-    glm::vec3 normal{0.0f};        // of the lamp's surface; zero if it has none
-    std::optional<uint32_t> side;  // the patch side that it leaves, if its source is a mesh
-    float from = 0;  // metres along the ray: surfaces before that get nothing, but block
+    glm::vec3 weight{1.0f};        // factor on the mean share, by channel
+    glm::vec3 normal{0.0f};        // unit normal of the lamp's surface; zero if it has none
+    std::optional<uint32_t> side;  // patch side that the ray leaves, if the source is a mesh
+    // Distance along the ray, metres. Surfaces nearer than that receive nothing, but block the ray.
+    float from = 0;
 
-    // The origin, moved off the lamp's surface.
+    // Returns the origin moved off the lamp's surface. `offset` is in metres.
     glm::vec3 start(float offset) const { return origin + offset * (direction + normal); }
 };
 
+// A point of a patch, metres relative to Patches::centre, and its weight in the mean over the
+// patch.
 struct PatchPoint {
     glm::vec3 point;
     float weight = 1;
 };
 
-// What becomes of the power of a source, as shares of it by channel.
+// The fractions of a source's power that reach no receiver, by channel, 0 to 1.
 struct PowerShares {
-    glm::dvec3 escaped{0.0};  // meets no surface
+    glm::dvec3 escaped{0.0};  // leaves the scene without meeting a surface
     glm::dvec3 covered{0.0};  // stays between the source's surface and one that it touches
 };
 
-// Sample of a surface point `on` with normal onNormal and radiance towards the receiver; area: m^2
-// per sample.
+// Returns the sample of a point `on` of a surface with the unit normal `onNormal`, seen from
+// `point` with the unit normal `normal`. `radiance` leaves `on` towards the receiver, W/(m^2 sr).
+// `area` is the area of the surface that one sample stands for, m^2.
 inline LightSample surfaceSample(const glm::vec3& point, const glm::vec3& normal,
                                  const glm::vec3& on, const glm::vec3& onNormal,
                                  const glm::vec3& radiance, float area) {
@@ -85,102 +91,114 @@ inline LightSample surfaceSample(const glm::vec3& point, const glm::vec3& normal
     return sample;
 }
 
-// Per part of a source.
+// For each part of a source, the indices of the parts that touch it.
 using PartNeighbours = std::vector<std::vector<uint32_t>>;
 
+// Base class of all light sources. Positions are in metres relative to Patches::centre.
 class LightSource {
   public:
     virtual ~LightSource() = default;
 
-    // Samples the source from a point with a unit normal; uv uniform in [0, 1)^2.
+    // Returns a sample of the source as seen from a point with a unit normal. `uv` is uniform in
+    // [0, 1)^2.
     virtual LightSample sample(const glm::vec3& point, const glm::vec3& normal,
                                glm::vec2 uv) const = 0;
 
-    // The parts of the source, each of which may be visible or not (direct_light/outlook.h): of
-    // each those that it touches. Empty: none are told apart.
+    // Returns for each part of the source the parts that touch it. Each part may be visible or not
+    // (direct_light/outlook.h). Empty if the source is not divided into parts.
     virtual const PartNeighbours& parts() const {
         static const PartNeighbours kNone;
         return kNone;
     }
 
-    // Per part: the sum up to it of what a plane with that normal gets from it without occluders,
-    // times the share of the part that is seen.
+    // Returns cumulative sums over the parts of the source: of each part's irradiance without
+    // occluders on a plane with the unit normal `normal`, times the part's entry in `seen`. `seen`
+    // has one weight per part. Empty if the source has no parts.
     virtual std::vector<float> sumOfSeen(const glm::vec3& /*normal*/,
                                          const std::vector<float>& /*seen*/) const {
         return {};
     }
 
-    // A sample in proportion to that, of the same expectation.
+    // Returns a sample whose part is chosen in proportion to its share of `sumOfSeen`. The
+    // expectation is the same as that of sample().
     virtual LightSample sampleSeen(const glm::vec3& /*normal*/, glm::vec2 /*uv*/,
                                    const std::vector<float>& /*sumOfSeen*/) const {
         return {};
     }
 
-    // Irradiance without occluders in closed form, W/m^2, if the source has one.
+    // Returns the irradiance without occluders at a point with a unit normal, W/m^2. Empty if the
+    // source has no closed form there.
     virtual std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                                 const glm::vec3& normal) const = 0;
 
-    // The same, as the mean over a patch, where the source knows that better than by points of it.
+    // Returns the mean irradiance without occluders over a patch, W/m^2. Empty unless the source
+    // has a formula that is better than the mean of irradiance() over points of the patch.
     virtual std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& /*patch*/) const {
         return std::nullopt;
     }
 
-    // Whether the points of a patch to look at its light from are those of placeOn, and not
-    // uniform.
+    // Returns whether samples on a patch must start at the points that placeOn() returns instead of
+    // points that are uniform by area.
     virtual bool choosesPlaces() const { return false; }
 
-    // Such a point, by uv uniform in [0, 1)^2, and what it counts for in the mean over the patch:
-    // most of the light of a source close by arrives at few points of it.
+    // Returns a point of a patch, and its weight in the mean over the patch. `uv` is uniform in
+    // [0, 1)^2. A source close by needs this because most of its light arrives at a small part of
+    // the patch.
     virtual PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const;
 
-    // Whether no point of a receiver can get any of its light, occluders aside. False where that is
-    // not certain.
+    // Returns whether no point of a receiver can get light from the source, occluders aside.
+    // Returns false if that is not certain.
     virtual bool isOutOfSight(const ReceiverPlace& place) const = 0;
 
-    // A lower bound of the distance from a point to the source, metres.
+    // Returns a lower bound of the distance between a point and the source, metres.
     virtual float distance(const glm::vec3& point) const = 0;
 
-    // A patch smaller than this share of its distance from the source needs one point of the closed
-    // form only: the error is a quarter of the square of that, and of one sign under a lamp.
+    // Returns the ratio of a patch's size to its distance from the source below which one point of
+    // the closed form suffices. The relative error is a quarter of the square of this ratio. Under
+    // a lamp it has the same sign everywhere.
     virtual float farPatch() const { return 0.05f; }
 
-    // Most shadow rays that a receiver needs.
+    // Returns the largest number of shadow rays that a receiver takes.
     virtual int mostSamples() const { return 256; }
 
-    // Whether it is so wide that anything near a receiver hides part of it, or most of it: that a
-    // few samples agree means little then.
+    // Returns whether the source is so wide that any object near a receiver hides a part of it, or
+    // most of it. If so, a few samples that agree prove little.
     virtual bool surrounds() const { return false; }
 
-    // Whether its light stays within what it is part of, as that of the insides of a lamp's body:
-    // it is not dark in there.
+    // Returns whether the light of the source stays inside the closed surface that the source is
+    // part of, like that of the inner sides of a lamp's body. The inside of this surface is then
+    // not dark.
     virtual bool staysInside() const { return false; }
 
-    // Emitted power, W; zero for sources whose power depends on where their light arrives: suns,
-    // worlds, and disks that turn towards each receiver.
+    // Returns the emitted power, W. Zero for sources whose power depends on where their light
+    // arrives: suns, worlds, and disks that turn towards each receiver.
     virtual glm::vec3 power() const = 0;
 
-    // Power of all that emit() gives, W, in a scene within a sphere of this radius around
-    // Patches::centre.
+    // Returns the power of all rays that emit() returns, W, for a scene inside a sphere of this
+    // radius (metres) around Patches::centre.
     virtual glm::vec3 shootingPower(float /*sceneRadius*/) const { return power(); }
 
-    // As messages have it: its kind and the name of the lamp or object.
+    // The kind and the name of the lamp or object, as used in messages.
     std::string name;
-    // Whether surfaces stop its light. If not, it brings more than power() in all.
+    // Whether surfaces stop the light. If not, the source brings more light than power() in all.
     bool castsShadows = true;
-    // Whether many samples may miss it although it is seen.
+    // Whether most samples of a source can be zero although the source is visible.
     bool isNarrow = false;
-    // What its light is proportional to, by channel, and all else that its light depends on (a
-    // hash; not comparable between two geometries).
+    // `magnitude` is the factor, by channel, that the light is proportional to. `shape` is a hash
+    // of everything else that the light depends on; hashes of different geometries are not
+    // comparable.
     glm::vec3 magnitude{1.0f};
     uint64_t shape = 0;
 
-    // A ray of the source's light into such a scene; u uniform in [0, 1)^4. Not called when
-    // shootingPower() is zero.
+    // Returns a ray of the source's light into a scene of this radius (metres). `u` is uniform in
+    // [0, 1)^4. Must not be called if shootingPower() is zero.
     virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;
 };
 
-// All sources of a light set whose light the first shot gathers: its lights, the image of the world
-// if that is in it, and its emissive faces (lights/emissive_meshes.h).
+// Returns all sources of a light set whose light the first shot gathers: the lamps, the image of
+// the world if it is in the light set, and the emissive faces (lights/emissive_meshes.h).
+// `gatheredSides` marks the patch sides whose emission is gathered; `emission` is per patch side,
+// W/m^2. `scene`, `patches` and `emission` must outlive the sources.
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
                                                        const std::vector<bool>& gatheredSides,
                                                        const std::vector<glm::vec3>& emission,

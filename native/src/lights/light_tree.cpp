@@ -8,8 +8,9 @@
 namespace raybundle {
 namespace {
 
-// A cluster with a cone of normals narrower than that is flat; it is far at so many times its
-// radius, and the receiver is clear of its horizon at so many times the sine of the cone.
+// A cluster is flat if the cosine of its cone of normals is at least kFlatNode. It is far from
+// kFarFromNode radii on. The receiver is clear of the cluster's horizon if the sine of its
+// elevation over it exceeds kClear times the sine of the cone.
 constexpr float kFlatNode = 0.999f, kFarFromNode = 2, kClear = 2;
 
 float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1 - cosine * cosine)); }
@@ -18,13 +19,14 @@ struct Angle {
     float cosine, sine;
 };
 
-// max(x - y, 0) of two angles up to half a turn.
+// Returns max(x - y, 0) of two angles up to half a turn.
 Angle rest(const Angle& x, const Angle& y) {
     if (x.cosine >= y.cosine) return {1, 0};
     return {x.cosine * y.cosine + x.sine * y.sine, x.sine * y.cosine - x.cosine * y.sine};
 }
 
-// As the rows of a matrix: along its first edge, across that, and its normal.
+// Returns the axes of a face as the rows of a matrix: along the first edge, across it, and the
+// normal.
 glm::mat3 axesOf(const LightFace& face) {
     const glm::vec3 along = glm::normalize(face.a);
     const glm::vec3 normal = glm::normalize(glm::cross(face.a, face.b));
@@ -91,7 +93,7 @@ uint32_t LightTree::build(std::vector<LightFace>& faces, uint32_t first, uint32_
 
     const glm::vec3 size = middleHigh - middleLow;
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    // By place, then by normal, so that the order of the faces in the mesh does not matter.
+    // Sort by place, then by normal, so that the order of the faces in the mesh does not matter.
     auto key = [&](const LightFace& face) {
         const glm::vec3 at = axes * face.middle(), n = axes * face.normal;
         return std::array<float, 6>{at[axis], at.x, at.y, n.x, n.y, n.z};
@@ -104,8 +106,8 @@ uint32_t LightTree::build(std::vector<LightFace>& faces, uint32_t first, uint32_
     return index;
 }
 
-// About what the cluster gives to a plane with that normal at a point, an upper bound of it in
-// angle: 0 only where it gives nothing.
+// Returns about the irradiance from the cluster at a point with a unit normal. The cosines are
+// upper bounds, so the result is 0 only if the cluster gives no light.
 float LightTree::importance(const Node& node, const glm::vec3& point, const glm::vec3& normal,
                             const glm::vec3& boxNormal) const {
     const glm::vec3 d = node.centre - point;
@@ -119,12 +121,14 @@ float LightTree::importance(const Node& node, const glm::vec3& point, const glm:
         const Angle sphere{sineOf(sinSphere), sinSphere};
         const float c = glm::dot(normal, towards);
         received = rest({c, sineOf(c)}, sphere).cosine;
-        // From the cone's axis to the receiver, less the cone, less the sphere.
+        // The angle from the cone's axis to the receiver, less the cone, less the sphere.
         const float e = -glm::dot(node.axis, towards);
         emitted = rest(rest({e, sineOf(e)}, {node.cosine, node.sine}), sphere).cosine;
         if (received <= 0 || emitted <= 0) return 0;
     }
-    // No cosine is more than the height over the face, or over the receiver, over the distance.
+    // The cosine at a face is at most the height of the receiver over the face, divided by the
+    // distance. The cosine at the receiver is at most the height of the face over the receiver,
+    // divided by the distance.
     const glm::vec3 away = axes * d;
     const float nearest = glm::length(glm::max(glm::abs(away) - node.half, 0.0f));
     if (nearest > 0) {
@@ -162,7 +166,7 @@ LightTree::Choice LightTree::chooseByPower(double u) const {
     const double at = u * powerBefore.back();
     const uint32_t last = uint32_t(faceAt.size()) - 1;
     uint32_t face = faceAt[std::min(uint32_t(at * sharesPerPower), last)];
-    // A share holds one more than it starts in, in the mean.
+    // On average, one more face begins within a share.
     while (face < last && powerBefore[face + 1] <= at) ++face;
     return chosen(face, at, powerBefore.back());
 }

@@ -11,16 +11,16 @@
 namespace raybundle {
 namespace {
 
-// Edges that follow each other and turn by less are one, radians.
+// Consecutive edges that turn by less than this angle form one edge, radians.
 constexpr double kStraight = 1e-5;
-// Faces of one facet are off its plane by no more than this share of what the plane is thick: what
-// is in front of it is in front of all of them.
+// Faces of one facet deviate from its plane by at most this share of the plane's thickness. A point
+// in front of the plane is then in front of all these faces.
 constexpr double kFlatOutline = 0.25;
-// Meshes of more parents are not looked at.
+// Meshes of more parents get no outline.
 constexpr size_t kMostParents = 1 << 17;
 
-// An edge's part of Lambert's sum: the angle it spans times the cosine of its normal; a and b are
-// relative to the receiver.
+// Returns the term of an edge in Lambert's sum: the angle that the edge spans times the cosine of
+// the angle between its normal and the receiver's. `a` and `b` are relative to the receiver.
 double edgeTerm(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& normal) {
     const glm::dvec3 c = glm::cross(a, b);
     const double length = glm::length(c);
@@ -29,7 +29,7 @@ double edgeTerm(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& norm
     return double(std::atan2(float(length), float(glm::dot(a, b)))) * glm::dot(c, normal) / length;
 }
 
-// The facets of a mesh and the edges between them.
+// Finds the facets of a mesh and the edges between them.
 class Facets {
   public:
     Facets(const Patches& patches, const std::vector<uint32_t>& parents, bool ofBacks,
@@ -44,12 +44,12 @@ class Facets {
             if (facetOf[k] == kNone) grow(k);
     }
 
-    // from, to: into `places`; along, against: facets, or kNone.
+    // `from` and `to` are indices into `places`. `along` and `against` are facets, or kNone.
     struct Edge {
         uint32_t from, to, along, against;
     };
 
-    // Those between different facets, as long as they are straight.
+    // Returns the edges between different facets. Edges in a line are joined.
     std::vector<Edge> edges() const {
         std::vector<Edge> all;
         for (const auto& [ends, users] : usersOf) {
@@ -66,17 +66,17 @@ class Facets {
     }
 
     static constexpr uint32_t kNone = ~0u;
-    std::vector<Plane> planes;      // of the facets
-    std::vector<glm::vec3> places;  // of vertices, each once
+    std::vector<Plane> planes;      // one per facet
+    std::vector<glm::vec3> places;  // positions of the vertices, each once
 
   private:
-    using Ends = std::pair<uint32_t, uint32_t>;  // the smaller one first
+    using Ends = std::pair<uint32_t, uint32_t>;  // the smaller index first
     struct User {
-        uint32_t parent;  // into `parents`
-        bool isAlong;     // it passes the edge from the smaller end to the larger
+        uint32_t parent;  // index into `parents`
+        bool isAlong;  // whether the parent traverses the edge from the smaller index to the larger
     };
 
-    // Vertices of split edges lie in the same place: they are one here.
+    // Joins vertices in the same place, such as those of split edges.
     void weld() {
         std::map<std::array<float, 3>, uint32_t> known;
         cornersOf.resize(parents.size());
@@ -97,7 +97,8 @@ class Facets {
         }
     }
 
-    // A facet from a parent on, over edges, as far as its plane reaches.
+    // Grows a facet from a parent across shared edges, to all parents that lie in the plane of the
+    // first.
     void grow(uint32_t seed) {
         const Parent& first = patches.parents[parents[seed]];
         const Plane plane(first.origin, first.a, first.b,
@@ -132,16 +133,17 @@ class Facets {
                });
     }
 
-    // Joins edges that go on in a line between the same facets.
+    // Joins consecutive edges that lie in a line and separate the same two facets.
     std::vector<Edge> straightened(const std::vector<Edge>& all) const {
-        // Each edge so that `along` is the smaller number: a chain is then passed one way.
+        // Turn each edge so that `along` is the smaller facet. All edges of a chain then have one
+        // direction.
         std::vector<Edge> turned = all;
         for (Edge& edge : turned)
             if (edge.along > edge.against) {
                 std::swap(edge.along, edge.against);
                 std::swap(edge.from, edge.to);
             }
-        // Per vertex and pair of facets: the edges that arrive and leave.
+        // For each vertex and pair of facets: the edges that arrive and those that leave.
         using Key = std::tuple<uint32_t, uint32_t, uint32_t>;
         struct Meeting {
             uint32_t edge = 0;
@@ -174,7 +176,7 @@ class Facets {
                 glm::length(glm::cross(u, v)) <= kStraight * glm::length(u) * glm::length(v);
             return isStraight ? out : std::nullopt;
         };
-        std::vector<bool> goesOn(turned.size(), false);  // it is not the first of its line
+        std::vector<bool> goesOn(turned.size(), false);  // whether the edge continues another edge
         for (const Edge& edge : turned)
             if (const auto out = next(edge)) goesOn[*out] = true;
         std::vector<Edge> lines;
@@ -187,16 +189,18 @@ class Facets {
                 line.to = turned[*out].to;
             lines.push_back(line);
         }
-        // A circle of very many edges has no corner to begin at.
+        // A closed loop of very short edges has no first edge. The edges then remain as they are.
         return used == turned.size() ? lines : all;
     }
 
     const Patches& patches;
     const std::vector<uint32_t>& parents;
-    const double turn;              // -1: backs are looked at, which are passed the other way round
+    // -1: the backs emit, whose outlines are traversed in the opposite direction.
+    const double turn;
     const double extent;            // metres
-    std::vector<uint32_t> facetOf;  // per parent
-    std::vector<std::vector<uint32_t>> cornersOf;  // per parent, into places
+    std::vector<uint32_t> facetOf;  // per index into `parents`
+    // Per index into `parents`: indices into `places`.
+    std::vector<std::vector<uint32_t>> cornersOf;
     std::map<Ends, std::vector<User>> usersOf;
 };
 
@@ -241,14 +245,15 @@ MeshOutline::MeshOutline(const Patches& patches, const std::vector<uint32_t>& pa
     if (edges.size() > kMostEdges) edges.clear();
 }
 
-// Per facet: whether it looks at a point (one more for `none`), and the first place where the
-// horizon cuts it, from which the angles of others count.
+// Per facet: whether it is turned towards the point (one more entry for "no facet"), and the first
+// place where the horizon cuts the facet. The angles of further cuts are measured from this place.
 struct MeshOutline::Facing {
     std::array<bool, kMostFacets + 1> looks;
     std::array<bool, kMostFacets> isCut;
     std::array<glm::dvec3, kMostFacets> firstCut;
 
-    // How often the sum over all that do passes an edge, one way less the other.
+    // Returns how often the outlines of all facets turned towards the point traverse an edge: the
+    // number of times along it less the number of times against it.
     int countOf(const Edge& edge) const { return looks[edge.along] - looks[edge.against]; }
 };
 
@@ -272,14 +277,15 @@ double MeshOutline::irradiance(const glm::dvec3& point, const glm::dvec3& normal
         else if (const int count = facing.countOf(edge))
             sum += count * edgeTerm(edge.from - point, edge.to - point, normal);
     }
-    // What is passed counter-clockwise as its own normal sees it is passed clockwise about that of
-    // the receiver.
+    // An outline that is counter-clockwise about the facet's own normal is clockwise about the
+    // receiver's.
     return std::max(0.0, -0.5 * sum);
 }
 
-// Where the receiver's horizon cuts facets, the cuts close their outlines: of each along the line
-// in which the two planes meet, from where edges go down to where they come up, whichever belong
-// together. All cuts of a facet lie within half a turn, since the receiver is not in its plane.
+// Where the receiver's horizon cuts a facet, the cuts close the facet's outline along the line in
+// which the horizon meets the facet's plane, from points where edges go below the horizon to points
+// where edges come up. It does not matter which of these points are paired. All cuts of a facet lie
+// within half a turn, since the receiver is not in the facet's plane.
 double MeshOutline::clippedTerm(const Edge& edge, Facing& facing, const glm::dvec3& point,
                                 const glm::dvec3& normal) const {
     if (!facing.looks[edge.along] && !facing.looks[edge.against]) return 0;

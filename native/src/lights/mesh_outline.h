@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The irradiance that one side of a mesh of even emission gives without occluders, in closed form:
-// Lambert's sum over the edges of each face that looks at the receiver. The edge between two such
-// faces is passed once each way and cancels, so that only the outline of the mesh as it is seen
-// from the receiver is left: of a bulb of hundreds of faces some dozens of edges.
+// The irradiance without occluders from one side of a mesh of even emission, in closed form:
+// Lambert's sum over the edges of all faces that are turned towards the receiver. An edge between
+// two of these faces is traversed once in each direction and cancels. Only the outline of the mesh
+// as seen from the receiver remains. For a bulb of hundreds of faces it has a few dozen edges.
 //
-// Sources: Lambert, "Photometria" (1760), for polygons; the silhouette of a mesh as the edges
-// between faces that look at a point and faces that do not: Appel, "The Notion of Quantitative
-// Invisibility and the Machine Rendering of Solids" (1967).
+// Sources: Lambert, "Photometria" (1760), for polygons; Appel, "The Notion of Quantitative
+// Invisibility and the Machine Rendering of Solids" (1967), for the silhouette of a mesh as the
+// edges between faces turned towards a point and faces turned away.
 // Differs:
-// - Faces of one plane that hang together are one facet, and edges in a line are one edge.
-// - Faces that hide each other both count: what is seen of them is what shadow rays tell.
+// - Connected faces of one plane form one facet, and edges in a line form one edge.
+// - Faces that hide each other are both counted. Shadow rays find what is visible of them.
 #pragma once
 
 #include <cstdint>
@@ -22,44 +22,53 @@
 
 namespace raybundle {
 
+// The outline of one side of a mesh. Empty if default-constructed.
 class MeshOutline {
   public:
     MeshOutline() = default;
-    // Of the fronts of parents (into Patches::parents) or of their backs. extent: radius of what
-    // they are part of, metres: vertices are off by rounding in proportion to it.
+    // Uses the fronts of `parents` (indices into Patches::parents), or their backs if `ofBacks`.
+    // `extent` is the radius of the object that they are part of, in metres; rounding errors of
+    // vertices are proportional to it.
     MeshOutline(const Patches& patches, const std::vector<uint32_t>& parents, bool ofBacks,
                 double extent);
 
-    // Whether there is no closed form: more facets or edges than sampling the mesh costs.
+    // Returns whether there is no closed form, because the mesh has so many facets or edges that
+    // sampling it is faster.
     bool isEmpty() const { return edges.empty(); }
-    // The plane in which all of it lies, if it does, with its normal where the light goes; or null.
+    // Returns the plane of the mesh, with its normal on the side of the light, or null if the mesh
+    // is not planar.
     const Plane* plane() const { return facets.size() == 1 ? &facets.front() : nullptr; }
 
-    // Irradiance at a point with a unit normal from a radiance of 1. m^2 and sr cancel.
+    // Returns the irradiance at a point with a unit normal from a mesh of radiance 1, in units of
+    // that radiance (m^2 and sr cancel).
     double irradiance(const glm::dvec3& point, const glm::dvec3& normal) const;
 
-    // Of more the sum takes longer than the samples that it saves.
+    // Limits above which the sum takes longer than the samples that it saves.
     static constexpr size_t kMostFacets = 2048, kMostEdges = 3 * kMostFacets;
 
   private:
     struct Edge {
         glm::dvec3 from, to;
-        // The facets for whose outline it runs that way and the other way; facets.size(): none.
+        // The facets whose outline contains the edge in the direction from `from` to `to`, and in
+        // the opposite direction. facets.size() if there is none.
         uint32_t along, against;
     };
+    // The facets as a receiver sees them.
     struct Facing;
+    // Returns the term of an edge, and of the cuts that it makes, if the receiver's horizon cuts
+    // the mesh.
     double clippedTerm(const Edge& edge, Facing& facing, const glm::dvec3& point,
                        const glm::dvec3& normal) const;
 
-    glm::dvec3 centre{0.0};  // of a sphere around them
+    glm::dvec3 centre{0.0};  // centre of a sphere around the mesh
     double radius = 0;       // metres
     std::vector<Plane> facets;
     std::vector<Edge> edges;
 };
 
-// Irradiance at a point with a unit normal from a planar polygon of radiance 1 around it, by
-// Lambert's formula after clipping at the horizon; the polygon's side does not matter. m^2 and sr
-// cancel.
+// Returns the irradiance at a point with a unit normal from a planar polygon of radiance 1, in
+// units of that radiance (m^2 and sr cancel). Uses Lambert's formula after clipping at the horizon.
+// The polygon's orientation does not matter. `count` is the number of corners.
 double polygonIrradiance(const glm::dvec3& point, const glm::dvec3& normal,
                          const glm::dvec3* polygon, int count);
 

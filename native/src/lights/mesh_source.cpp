@@ -17,24 +17,24 @@ namespace {
 
 float strength(const glm::vec3& emission) { return emission.x + emission.y + emission.z; }
 
-// A face that is nearer than so many times its radius is sampled by solid angle: by area, the light
-// of what touches the receiver would have no finite variance.
+// Faces nearer than this number of radii are sampled by solid angle. If they were sampled by area,
+// the light of a face that touches the receiver would have infinite variance.
 constexpr float kNearFace = 1.5f;
 
-// Uniform by area: the unit square is folded onto a triangle.
+// Maps the unit square to points uniform by area; the part beyond a triangle is folded onto it.
 glm::vec3 pointOn(const LightFace& face, glm::vec2 uv) {
     if (face.isTriangle && uv.x + uv.y > 1) uv = 1.0f - uv;
     return face.origin + uv.x * face.a + uv.y * face.b;
 }
 
-// A direction to a face, uniform in the solid angle of it.
+// A direction to a face, uniform in the face's solid angle.
 struct FaceDirection {
     glm::vec3 direction;
     float distance;    // metres
     float solidAngle;  // sr
 };
 
-// None: it is sampled by area.
+// Samples a direction to a face. Returns nothing if the face must be sampled by area.
 std::optional<FaceDirection> directionTo(const LightFace& face, const glm::vec3& point,
                                          glm::vec2 uv) {
     const glm::dvec3 o = glm::dvec3(face.origin) - glm::dvec3(point), a(face.a), b(face.b);
@@ -80,7 +80,7 @@ MeshSource::MeshSource(const Patches& patches, const EmissiveFaces& own)
         clusters = FaceClusters(tree, faces, radiances());
 }
 
-// Sphere around the source.
+// Computes a sphere that contains the source.
 void MeshSource::boundSource(const std::vector<uint32_t>& parents) {
     Extent box;
     for (uint32_t index : parents) box.add(boxOf(patches, patches.parents[index]));
@@ -124,7 +124,8 @@ MeshSource::FaceShape MeshSource::shapeOf(const LightFace& face) const {
     const Parent& parent = patches.parents[index];
     const Plane plane(parent.origin, parent.a, parent.b, face.normal, wholeExtent);
     const float size = 0.5f * (glm::length(face.a) + glm::length(face.b));
-    // Twice the half thickness, for what floats make of the height; (x + y)^2 <= 2 x^2 + 2 y^2.
+    // The plane's half thickness is doubled because heights are computed in float; (x + y)^2 <= 2
+    // x^2 + 2 y^2.
     const double most = 2 * plane.halfThicknessWithin(double(size));
     const double slope = 2 * (plane.halfThicknessWithin(1) - plane.halfThicknessWithin(0));
     return {plane,
@@ -189,7 +190,8 @@ std::optional<glm::vec3> MeshSource::irradiance(const glm::vec3& point,
                                                 const glm::vec3& receiver) const {
     if (!clusters.isEmpty()) {
         const auto ofFace = [&](uint32_t face) { return irradianceOf(face, point, receiver); };
-        // By reference, for a std::function with all this in it allocates memory at every point.
+        // Passed by reference, since a std::function with all these captures would allocate memory
+        // at every point.
         return clusters.irradiance(tree, point, receiver, std::cref(ofFace));
     }
     if (outline.isEmpty()) return std::nullopt;
@@ -210,7 +212,8 @@ EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     if (faces.empty()) return ray;
     const LightTree::Choice choice = tree.chooseByPower(double(r.x));
     const LightFace& face = faces[choice.face];
-    // The side is chosen by the sum of the channels.
+    // The face is chosen by the sum of the channels, so the weight corrects the share of each
+    // channel.
     const glm::vec3 own = emissionOf(face.side);
     for (int c = 0; c < 3; ++c)
         if (totalPower[c] > 0)

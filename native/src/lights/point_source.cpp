@@ -17,7 +17,8 @@
 namespace raybundle {
 namespace {
 
-// A patch larger than this share of its distance from a point lamp gets light that varies over it.
+// Patches larger than this share of their distance from a point lamp receive light that varies over
+// them.
 constexpr float kNearPatch = 0.3f;
 
 class PointSource : public LightSource {
@@ -36,7 +37,7 @@ class PointSource : public LightSource {
         LightSample sample;
         if (distance2 <= 0) return sample;
         if (radius > 0 && light.pointShape == RB_POINT_SPHERE && distance2 <= radius * radius)
-            return sample;  // inside the sphere
+            return sample;  // the point is inside the sphere
         const float distance = std::sqrt(distance2);
         const glm::vec3 axis = towards / distance;
         if (radius == 0) {
@@ -44,14 +45,15 @@ class PointSource : public LightSource {
             sample.distance = distance;
             sample.irradiance = intensity * std::max(0.0f, glm::dot(normal, axis)) / distance2;
         } else if (light.pointShape == RB_POINT_DISK) {
-            // Disk of radius r facing the receiver with radiance I / (pi r^2).
+            // Disk of radius r that faces the receiver, with radiance I / (pi r^2).
             const auto [x, y] = frame(axis);
             const glm::vec2 d = radius * onDisk(uv);
             sample = surfaceSample(point, normal, position + d.x * x + d.y * y, -axis,
                                    intensity / (glm::pi<float>() * radius * radius),
                                    glm::pi<float>() * radius * radius);
         } else {
-            // Uniform direction in the cone that the sphere of the same radiance fills.
+            // Uniform direction in the cone that the sphere fills. The sphere's radiance is I / (pi
+            // r^2), too.
             const float cosMax = std::sqrt(std::max(0.0f, 1 - radius * radius / distance2));
             const float solidAngle =
                 glm::two_pi<float>() * (radius * radius / distance2) / (1 + cosMax);
@@ -66,7 +68,7 @@ class PointSource : public LightSource {
         return sample;
     }
 
-    // A sphere that is wholly above the horizon gives what its centre would.
+    // A sphere that is wholly above the horizon gives the irradiance of a point lamp at its centre.
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& normal) const override {
         const glm::vec3 towards = position - point;
@@ -79,14 +81,16 @@ class PointSource : public LightSource {
         return intensity * (share * height / (distance * distance2));
     }
 
-    // What leaves towards the patch: its solid angle times the intensity, however near it is.
+    // The power that leaves towards the patch is its solid angle times the intensity, at any
+    // distance.
     std::optional<glm::vec3> meanIrradiance(const ReceiverPlace& patch) const override {
         if (cone || isDisk() || !isBefore(patch)) return std::nullopt;
         const std::array<SphericalTriangle, 2> halves = seen(patch);
         return intensity * float((halves[0].area() + halves[1].area()) / areaOf(patch));
     }
 
-    // Uniform by the angle at which the source sees them, as its light is.
+    // Points on the patch are uniform in the solid angle under which the lamp sees the patch, since
+    // the light of the lamp is.
     bool choosesPlaces() const override { return true; }
     PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const override {
         if (patch.radius == 0 || patch.radius < kNearPatch * distance(patch.middle) ||
@@ -104,7 +108,7 @@ class PointSource : public LightSource {
         const double height = glm::dot(glm::dvec3(position - patch.origin), n);
         const double cosine = -glm::dot(d, n), along = height / cosine;
         if (!(cosine > 0)) return LightSource::placeOn(patch, uv);
-        // Over the density at which an equal area of the patch is seen.
+        // The weight is the density of points uniform by area over the density of this sampling.
         return {position + glm::vec3(along * d),
                 float(all * along * along / (cosine * areaOf(patch)))};
     }
@@ -120,8 +124,8 @@ class PointSource : public LightSource {
 
     glm::vec3 power() const override { return isDisk() ? glm::vec3(0.0f) : totalPower; }
 
-    // A disk that faces each receiver has no surface to emit from, but each line through it has
-    // its radiance (see emit), and they carry as much as those of the sphere.
+    // A disk that faces each receiver has no fixed surface to emit from. But each line through it
+    // has its radiance (see emit()), and these lines carry as much power as those of the sphere.
     glm::vec3 shootingPower(float) const override { return totalPower; }
 
     EmittedRay emit(const glm::vec4& u, float) const override {
@@ -135,15 +139,17 @@ class PointSource : public LightSource {
             ray.direction = uniformDirection({u.x, u.y});
         }
         if (light.radius == 0) return ray;
-        // All lines of a direction that pass within the radius r of the centre, at a distance d.
+        // Rays follow all lines of one direction that pass within the radius r of the centre, each
+        // at a distance d from it.
         const float r2 = float(light.radius * light.radius);
         const glm::vec2 across = float(light.radius) * onDisk({u.z, u.w});
         const auto [x, y] = frame(ray.direction);
         const float d2 = glm::dot(across, across), rest = std::sqrt(std::max(0.0f, r2 - d2));
         ray.origin += across.x * x + across.y * y;
-        // A sphere emits them where they leave it. The disk that faces a point at t along the line
-        // (t = 0 where it is nearest to the centre) lies across the line only if the point is
-        // far enough, t > d^2 / sqrt(r^2 - d^2): nearer points see the line pass beside the disk.
+        // A sphere emits such a ray where the line leaves the sphere. Let t be the position along
+        // the line, 0 where the line is nearest to the centre. The disk that faces the point at t
+        // intersects the line only if the point is far enough: t > d^2 / sqrt(r^2 - d^2). From
+        // nearer points the line passes beside the disk.
         if (isDisk())
             ray.from = rest > 0 ? d2 / rest : std::numeric_limits<float>::infinity();
         else
@@ -155,13 +161,14 @@ class PointSource : public LightSource {
     bool isPoint() const { return light.radius == 0; }
     bool isDisk() const { return light.radius > 0 && light.pointShape == RB_POINT_DISK; }
 
-    // Whether the source is wholly in front of a patch, and not in its plane.
+    // Returns whether the source is wholly in front of a patch and not in its plane.
     bool isBefore(const ReceiverPlace& patch) const {
         const Plane plane(patch.origin, patch.a, patch.b, patch.normal, double(patch.radius));
         return plane.height(position) >= std::max(double(light.radius), plane.thickness);
     }
 
-    // A patch as it is seen from the centre; a triangle has no second half.
+    // Returns a patch as seen from the centre of the lamp, as two triangles. Only the first counts
+    // for a triangle.
     std::array<SphericalTriangle, 2> seen(const ReceiverPlace& patch) const {
         const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
         const glm::dvec3 end = o + (patch.isTriangle ? b : a + b);

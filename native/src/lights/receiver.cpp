@@ -7,26 +7,30 @@
 namespace raybundle {
 namespace {
 
-// Receivers darker than this share of the mean may have the error of one that bright.
+// Receivers whose light is below this share of the mean light may have the absolute error of a
+// receiver at this share.
 constexpr float kDarkShare = 0.25f;
-// Where few receivers have noise, each may have up to so many times the error that it may have
-// elsewhere, while all of them together keep to this share of the target.
+// Where few receivers have noise, the error of each may be up to kMostLaxity times its usual
+// tolerance, as long as the error of all receivers together stays below kLaxShare times the target.
 constexpr float kMostLaxity = 1.5f;
 constexpr double kLaxShare = 0.25;
-// For this target receivers have enough by the most samples of sources; for a lower one they may
-// have so many times as many: what Sobol's points leave of an error falls with nearly their number.
+// At the target kUsualTarget, the maximum number of samples of a source suffices. At a lower target
+// the maximum grows, by a power a little above 1, since the error of Sobol points falls nearly in
+// proportion to their number.
 constexpr float kUsualTarget = 0.02f, kGrowthPower = 1.33f, kMostGrowth = 64;
-// A shadow's edge lies between two neighbours where so much more of the light is visible to one, or
-// where one has more of its contrast by so many times the error that it may have.
+// The edge of a shadow lies between two neighbours if their visible shares of the light differ by
+// more than kStep, or if the contrast of one exceeds that of the other by more than kEdgeTimes its
+// tolerance.
 constexpr float kStep = 0.15f, kEdgeTimes = 2;
 
 int mostGrowth(float targetError) {
     return int(std::clamp(std::pow(kUsualTarget / targetError, kGrowthPower), 1.0f, kMostGrowth));
 }
 
-// How many times these tolerances the errors may be, so that all of them together are no more than
-// `most` at each receiver that has light: where few receivers have any, each may have more. Of
-// those that count.
+// Returns the factor by which all tolerances may grow, at least 1, such that the sum of the squared
+// errors stays below most^2 times the number of receivers that have light. If few receivers have
+// errors, each may have a larger one. Only receivers with `counts` are considered. `tolerance` (per
+// receiver) and `most` are in W/m^2.
 float laxity(const std::vector<Gathered>& results, const std::vector<bool>& counts,
              const std::vector<float>& tolerance, double most) {
     double allowed = 0;
@@ -43,9 +47,10 @@ float laxity(const std::vector<Gathered>& results, const std::vector<bool>& coun
     return 1;
 }
 
-// See Aim::besideShadow: of receivers that have a neighbour with an edge of a shadow, or that lies
-// behind one. Of a source that surrounds them all samples count as having missed a part in any
-// case. tolerance: W/m^2.
+// Returns Aim::besideShadow per receiver. The value is positive for receivers with a neighbour that
+// sees the edge of a shadow or lies beyond the edge. The contrast of a source that surrounds the
+// receivers is left out, since its samples are always taken to have missed a part. `tolerance` is
+// per receiver, W/m^2.
 std::vector<float> besideShadows(const std::vector<Gathered>& results,
                                  const std::vector<ReceiverPair>& neighbours,
                                  const std::vector<float>& tolerance) {
@@ -69,7 +74,8 @@ std::vector<float> besideShadows(const std::vector<Gathered>& results,
 Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
                const std::function<Receiver(size_t)>& receiverAt,
                const std::vector<ReceiverPair>& neighbours, float targetError) {
-    // Of what is shown, if any light reaches that: a sunny yard says nothing of a room.
+    // The mean light is that of the shown receivers, if they get any light. A sunny yard must not
+    // set the error of a room.
     double lit[2] = {0, 0}, litArea[2] = {0, 0};
     std::vector<float> light(results.size());
     for (size_t k = 0; k < results.size(); ++k) {
@@ -82,7 +88,8 @@ Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
         }
     }
     const bool anyShown = litArea[true] > 0;
-    // Not its square: a few receivers beside a lamp may have most of that.
+    // The mean of the light is used, not the mean of its square, most of which may come from a few
+    // receivers beside a lamp.
     const double meanLight = litArea[anyShown] > 0 ? lit[anyShown] / litArea[anyShown] : 0;
     const float floor = kDarkShare * float(meanLight);
     std::vector<float> tolerance(results.size());

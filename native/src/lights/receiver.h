@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What gathers direct light (direct_light/direct_light.h), what it gets, and what it aims at.
+// Receivers of direct light (direct_light/direct_light.h), the results of a gather, and the aims
+// that control how many samples a receiver takes.
 #pragma once
 
 #include <algorithm>
@@ -18,35 +19,42 @@
 
 namespace raybundle {
 
-// Where direct light is to be known: a whole patch side (the mean over it), or a point on one.
+// A place where direct light is gathered: a whole patch side, for which the result is the mean over
+// the patch, or a point on a side.
 struct Receiver {
+    // Index of the patch side.
     uint32_t side = 0;
     glm::vec3 normal{0.0f};          // unit; a point may have a shading normal
-    std::optional<glm::vec3> point;  // relative to Patches::centre
-    uint32_t seed = 0;               // of its samples
-    // Only the light that lines which end at the first surface do not bring it.
+    std::optional<glm::vec3> point;  // metres, relative to Patches::centre
+    uint32_t seed = 0;               // of the random samples
+    // Whether to gather only the light that passes surfaces: that of sources without shadows, and,
+    // on surfaces that do not stop direct light, that of all sources. Lines that end at the first
+    // surface cannot bring this light.
     bool passingOnly = false;
-    float errorFactor = 1;  // its error may be so many times that of others
-    bool isShown = true;    // whether its light is shown, and not only that of what it lights
-    float otherLight = 0;   // what it gets beside that, of the brightest channel, W/m^2
+    float errorFactor = 1;  // factor on the error that the receiver may have
+    bool isShown = true;    // false: the result shows only light that this receiver reflects
+    // Irradiance that the receiver gets besides the gathered light, brightest channel, W/m^2.
+    float otherLight = 0;
 };
 
 struct Outlook;
 
-// Two receivers beside each other, by their numbers.
+// Two adjacent receivers, given by their indices.
 struct ReceiverPair {
     uint32_t first = 0, second = 0;
 };
 
-// What one receiver got from one source.
+// The light that one receiver gets from one source.
 struct LightPart {
     glm::vec3 irradiance{0.0f};  // W/m^2
-    float variance = 0;          // of the brightest channel
-    float contrast = 0;          // standard deviation over the receiver that shadows make, W/m^2
-    glm::vec4 angles{0.0f};      // the brightest channel times the means of angleTerms
-    Incoming incoming;           // where surfaces scatter by direction
+    float variance = 0;          // of the brightest channel, (W/m^2)^2
+    float contrast = 0;          // standard deviation over the receiver caused by shadows, W/m^2
+    glm::vec4 angles{0.0f};      // brightest channel times the means of angleTerms, W/m^2
+    Incoming incoming;           // directions of the light; set where surfaces scatter by direction
 
-    // From a source so many times as strong. The samples have the colour of the light.
+    // Returns this light for a source that is `factor` times as strong in each channel. The samples
+    // have the colour of the light, so the variance and the angles scale with the brightest
+    // channel.
     LightPart scaled(const glm::vec3& factor) const {
         const glm::vec3 light = factor * irradiance;
         const float most = brightest(irradiance) > 0 ? brightest(light) / brightest(irradiance)
@@ -55,27 +63,30 @@ struct LightPart {
     }
 };
 
-// What one receiver got.
+// The light that one receiver gets from all sources.
 struct Gathered {
     glm::vec3 irradiance{0.0f};  // W/m^2
-    glm::vec3 unpowered{0.0f};   // part of it from sources without a power of their own
-    float variance = 0;          // of the brightest channel
-    float contrast = 0;          // sums over the sources: of theirs
-    float shadowContrast = 0;    // of theirs, of those that do not surround the receiver
-    glm::vec4 angles{0.0f};      // of theirs
-    float brightness = 0;        // of their brightest channels
-    float lampLight = 0;         // of those of sources that do not surround the receiver
-    float unblockedLight = 0;    // the same if nothing was in between
-    Incoming incoming;           // of theirs, by brightness
-    uint32_t noisiest = 0;       // of them: the one with the most variance
-    float mostVariance = 0;      // of that one
+    // Part of `irradiance` that is not a share of a source's power(): see isUnpowered in add().
+    glm::vec3 unpowered{0.0f};
+    float variance = 0;        // of the brightest channel, (W/m^2)^2
+    float contrast = 0;        // sum over the sources, W/m^2
+    float shadowContrast = 0;  // sum over the sources that do not surround the receiver, W/m^2
+    glm::vec4 angles{0.0f};    // sum over the sources, W/m^2
+    float brightness = 0;      // sum of the brightest channels over the sources, W/m^2
+    float lampLight = 0;  // part of `brightness` from sources that do not surround the receiver
+    float unblockedLight = 0;  // value of `lampLight` without occluders, W/m^2
+    Incoming incoming;         // directions of the light of all sources, weighted by brightness
+    uint32_t noisiest = 0;     // source with the largest variance
+    float mostVariance = 0;    // variance of this source
     uint64_t rays = 0;
-    uint64_t unblocked = 0;  // sources without noise: wholly visible
-    uint64_t hidden = 0;     // sources that it cannot face, without a sample
-    uint64_t weak = 0;       // sources that took fewer rays since they give little of the light
-    uint64_t inside = 0;     // sources that took fewer rays since it is the inside of a solid
+    uint64_t unblocked = 0;  // number of sources without noise that are wholly visible
+    uint64_t hidden = 0;     // number of sources that the receiver cannot face; no samples taken
+    uint64_t weak = 0;    // number of sources with fewer rays because they give little of the light
+    uint64_t inside = 0;  // number of sources with fewer rays because the side is inside a solid
 
-    // random: see Incoming::add.
+    // Adds the light of one source. `source` is its index. `isUnpowered` is true if the light is
+    // not a share of the source's power(): the source has none, or surfaces do not stop its light.
+    // For `random` see Incoming::add.
     void add(uint32_t source, const LightPart& part, bool isUnpowered, uint32_t random) {
         if (part.variance > mostVariance) {
             mostVariance = part.variance;
@@ -94,39 +105,44 @@ struct Gathered {
         incoming.add(part.incoming, sampled / all, random);
         incoming.weight = all / brightness;
     }
-    // Share of the light of sources that do not surround the receiver that nothing stops on its
-    // way; 1 where there is none.
+    // Returns the fraction, 0 to 1, of the unoccluded light that arrives from sources that do not
+    // surround the receiver. Returns 1 if there is no such light.
     float visibleShare() const { return unblockedLight > 0 ? lampLight / unblockedLight : 1.0f; }
-    // Means of angleTerms.
+    // Returns the means of angleTerms over the received light.
     glm::vec4 meanAngles() const { return brightness > 0 ? angles / brightness : kEverywhere; }
 };
 
-// Standard error that direct light may keep, as a share of the target: errors of receivers are
-// independent, while those of bundles are shared by many.
+// Standard error that direct light may have, as a share of the target error. Errors of receivers
+// are independent, while an error of the bundles is shared by many receivers.
 constexpr float kDirectShare = 0.75f;
 
-// What a receiver's samples are to reach.
+// The accuracy that the samples of one receiver must reach.
 struct Aim {
-    float tolerance = INFINITY;  // standard error, W/m^2
-    int samples = 0;             // of each source, at least
-    int mostGrowth = 1;          // at most, so many times the samples that a source otherwise takes
-    // Where a shadow's edge may have been missed: the least contrast that a neighbour has more,
-    // W/m^2; infinite if all such neighbours see far more or less of the light; 0 elsewhere.
+    float tolerance = INFINITY;  // largest standard error, W/m^2
+    int samples = 0;             // minimum number of samples of each source
+    // Largest factor by which the number of samples may exceed that which a source otherwise takes.
+    int mostGrowth = 1;
+    // Positive if the samples may have missed the edge of a shadow that a neighbour sees: the
+    // smallest amount by which the contrast of a neighbour exceeds that of this receiver, W/m^2.
+    // Infinite if all these neighbours see far more or far less of the light. Otherwise 0.
     float besideShadow = 0;
-    // On the source that surrounds the receiver, if that is known.
+    // Visibility of the source that surrounds the receiver, or null if it is not known. Not owned.
     const Outlook* outlook = nullptr;
 };
 
-// After a coarse shot: the receivers that need more samples, and the aims of these.
+// The receivers that need more samples after a coarse shot, and the aim of each of them.
 //
-// Differs from an equal error for all: where few receivers have noise (the edges of shadows), each
-// may have more of it, as long as all together have little beside the mean light. And samples that
-// agree prove little where a neighbour disagrees: those receivers take more.
+// Differs from an equal error for all receivers:
+// - Where few receivers have noise (at the edges of shadows), each of them may have a larger error,
+//   as long as their total error is small relative to the mean light.
+// - Samples that agree prove little if a neighbour disagrees, so receivers with such neighbours
+//   take more samples.
 struct Aims {
+    // Indices of the receivers, and the aims in the same order.
     std::vector<uint32_t> receivers;
     std::vector<Aim> aims;
 
-    // Those alone of which isKept(receiver, aim) is true.
+    // Removes all receivers for which isKept(receiver, aim) returns false.
     template <class IsKept>
     void keep(const IsKept& isKept) {
         size_t count = 0;
@@ -139,12 +155,15 @@ struct Aims {
         aims.resize(count);
     }
 };
+// Returns the receivers that need more samples. `results` is the outcome of the coarse shot per
+// receiver, `receiverAt` returns the receiver of an index, and `neighbours` are all adjacent pairs.
+// `targetError` is relative.
 Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
                const std::function<Receiver(size_t)>& receiverAt,
                const std::vector<ReceiverPair>& neighbours, float targetError);
 
-// Shadow rays per receiver and source at first: of those that can tell from their neighbours
-// whether they are enough, and of others.
+// First number of shadow rays per receiver and source: for receivers that can compare themselves
+// with their neighbours, and for all other receivers.
 constexpr int kNeighbourSamples = 8, kFirstSamples = 16;
 
 }  // namespace raybundle

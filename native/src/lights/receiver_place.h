@@ -9,17 +9,19 @@
 
 namespace raybundle {
 
-// Where a receiver is: all of a patch, or a point. Metres, relative to Patches::centre.
+// The position of a receiver: a whole patch or a single point. Positions and lengths are in metres,
+// relative to Patches::centre.
 struct ReceiverPlace {
-    glm::vec3 origin, a{0.0f}, b{0.0f};  // a point is origin + u * a + v * b
+    glm::vec3 origin, a{0.0f}, b{0.0f};  // a point of the patch is origin + u * a + v * b
     glm::vec3 middle, normal;
-    float radius = 0;  // of a sphere around the middle that holds it, metres
+    float radius = 0;  // of a sphere around `middle` that contains the receiver
     bool isTriangle = false;
 
-    // A point.
+    // The place of a single point with a unit normal.
     ReceiverPlace(const glm::vec3& point, const glm::vec3& normal)
         : origin(point), middle(point), normal(normal) {}
 
+    // The place of a receiver: its point if it has one, else the patch of its side.
     ReceiverPlace(const Patches& patches, const Receiver& receiver)
         : ReceiverPlace(receiver.point.value_or(glm::vec3(0.0f)), receiver.normal) {
         if (receiver.point) return;
@@ -33,12 +35,14 @@ struct ReceiverPlace {
         radius = 0.5f * (glm::length(a) + glm::length(b));
     }
 
-    // u, v uniform in [0, 1]^2: uniform by area. The square is folded onto a triangle.
+    // Returns a point of the patch. Uniform u and v in [0, 1]^2 give points uniform by area: the
+    // part of the square beyond a triangle is folded onto the triangle.
     glm::vec3 at(glm::vec2 uv) const {
         if (isTriangle && uv.x + uv.y > 1) uv = 1.0f - uv;
         return origin + uv.x * a + uv.y * b;
     }
-    // No point of it is further from the middle along that direction (unit), metres.
+    // Returns an upper bound of the distance between `middle` and any point of the receiver,
+    // measured along a direction (unit vector), metres.
     float reach(const glm::vec3& direction) const {
         return 0.5f * (std::abs(glm::dot(a, direction)) + std::abs(glm::dot(b, direction)));
     }

@@ -8,12 +8,13 @@
 
 namespace raybundle {
 
-// A way to a light from a point on a side of a patch, relative to Patches::centre.
+// A ray from a point on a patch side to a point of a light source. Positions are in metres relative
+// to Patches::centre.
 struct ShadowRay {
     glm::vec3 point;
-    glm::vec3 direction;          // unit
+    glm::vec3 direction;          // unit vector towards the light
     float distance;               // metres; may be infinite
-    uint32_t target = kNoParent;  // the parent that it ends on, which does not block it
+    uint32_t target = kNoParent;  // parent on which the ray ends, which does not block it
 };
 
 }  // namespace raybundle

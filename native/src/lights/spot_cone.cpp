@@ -10,8 +10,8 @@
 namespace raybundle {
 namespace {
 
-constexpr int kGrid = 64;        // points each way, to know the mean of a deformed cone
-constexpr int kBisections = 40;  // to invert the integral
+constexpr int kGrid = 64;        // grid points per axis for the mean over a deformed cone
+constexpr int kBisections = 40;  // steps to invert the integral of the share
 
 }  // namespace
 
@@ -22,7 +22,7 @@ SpotCone::SpotCone(const Light& light)
       soft((1 - edge) * light.coneBlend),
       dims(light.coneDims) {
     total = integral(1);
-    if (!(total > 0) || glm::determinant(toLocal) == 0) return;  // nothing comes out
+    if (!(total > 0) || glm::determinant(toLocal) == 0) return;  // the lamp emits nothing
     double sum = 0, low = INFINITY, high = 0;
     for (int i = 0; i < kGrid; ++i)
         for (int j = 0; j < kGrid; ++j) {
@@ -46,11 +46,11 @@ double SpotCone::shareAt(double cosine) const {
     return t * t * (3 - 2 * t) * (dims ? std::max(0.0, cosine) : 1);
 }
 
-// Of the share, over the cosine from the rim on.
+// Returns the integral of the share over the cosine to the axis, from the rim to `cosine`.
 double SpotCone::integral(double cosine) const {
     auto primitive = [&](double z) {
         const double t = soft > 0 ? std::clamp((z - edge) / soft, 0.0, 1.0) : 0;
-        const double full = edge + soft;  // where the light has its whole strength
+        const double full = edge + soft;  // from this cosine on the light has its full strength
         const double t3 = t * t * t, flat = t3 * (1 - 0.5 * t);
         if (!dims) return soft * flat + std::max(0.0, z - full);
         const double sloped = t3 * t * (0.75 - 0.4 * t);
@@ -60,7 +60,7 @@ double SpotCone::integral(double cosine) const {
     return cosine > least ? primitive(cosine) - primitive(least) : 0;
 }
 
-// A direction in the space in which the cone looks along -z, drawn by the share.
+// Samples a direction in proportion to the share, in the cone's own space, whose axis is -z.
 glm::dvec3 SpotCone::local(glm::vec2 uv) const {
     const glm::dvec2 d(onDisk(uv));
     const double r2 = glm::dot(d, d), wanted = (1 - r2) * total;
@@ -74,7 +74,7 @@ glm::dvec3 SpotCone::local(glm::vec2 uv) const {
     return {scale * d.x, scale * d.y, -z};
 }
 
-// Solid angle in the world over that in the cone's space.
+// Returns the ratio of a solid angle in world space to the corresponding one in the cone's space.
 double SpotCone::stretch(const glm::dvec3& local) const {
     return std::abs(glm::determinant(fromLocal)) / std::pow(glm::length(fromLocal * local), 3);
 }

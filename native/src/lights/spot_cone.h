@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The cone of a spot: which share of the lamp's intensity goes in which direction, and directions
-// that are drawn by it. Source: Blender's spot (a smoothstep over the cosine to the axis).
+// The cone of a spot lamp: the share of the lamp's intensity that leaves in each direction, and the
+// sampling of directions by this share.
+//
+// Source: Blender's spot lamp, whose share is a smoothstep over the cosine of the angle to the
+// axis.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -10,20 +13,24 @@
 
 namespace raybundle {
 
+// The angular distribution of a spot lamp's intensity.
 class SpotCone {
   public:
-    // A light with a cone.
+    // `light` must have a cone (Light::hasCone).
     explicit SpotCone(const Light& light);
 
-    // Share of the intensity in a direction away from the lamp (unit vector).
+    // Returns the share of the lamp's intensity, 0 to 1, in a direction (unit vector) that points
+    // away from the lamp.
     float share(const glm::vec3& direction) const;
 
-    // Mean of it over all directions.
+    // Returns the mean of share() over all directions of the sphere.
     float meanOverSphere() const { return mean; }
 
-    // A direction with about the density of the share; weight: what is missing in it, 1 in the
-    // mean. Exactly 1 unless the light's scale deforms the cone. uv uniform in [0, 1)^2.
+    // A direction sampled about in proportion to share(). The weight is share() divided by the
+    // density of the sample, relative to the mean of this ratio, so that the mean weight is 1. All
+    // weights are exactly 1 unless the lamp's scale deforms the cone.
     struct Ray {
+        // Samples a direction. `uv` is uniform in [0, 1)^2.
         glm::vec3 direction;
         float weight;
     };
@@ -36,11 +43,11 @@ class SpotCone {
     double stretch(const glm::dvec3& local) const;
 
     const glm::dmat3 toLocal, fromLocal;
-    const double edge;  // cosine at the rim
-    const double soft;  // range of the cosine over which the light fades
+    const double edge;  // cosine of the angle between the axis and the rim
+    const double soft;  // range of the cosine over which the light fades out
     const bool dims;
     double total = 0;        // integral of the share over the cosine
-    double meanStretch = 1;  // of directions drawn by the share
+    double meanStretch = 1;  // mean of stretch() over directions sampled by the share
     bool isDeformed = false;
     float mean = 0;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Suns: disks of the sky, infinitely far away.
+// Sun lamps: disks of the sky, infinitely far away.
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
@@ -26,7 +26,7 @@ class SunSource : public LightSource {
         LightSample sample;
         sample.distance = std::numeric_limits<float>::infinity();
         sample.direction = half > 0 ? inCone(direction, cosHalf, uv) : direction;
-        // Radiance E / (pi sin^2 half) over the solid angle 2 pi (1 - cos half).
+        // Radiance E / (pi sin^2 half) times the solid angle 2 pi (1 - cos half) of the disk.
         sample.irradiance =
             strength * perCosine() * std::max(0.0f, glm::dot(normal, sample.direction));
         return sample;
@@ -34,7 +34,8 @@ class SunSource : public LightSource {
 
     std::optional<glm::vec3> irradiance(const glm::vec3&, const glm::vec3& normal) const override {
         const float c = glm::dot(normal, direction);
-        // Wholly above or wholly below the horizon; in between it is sampled.
+        // The closed form holds if the disk is wholly above or wholly below the horizon. Other
+        // disks are sampled.
         if (c >= sinHalf) return strength * c;
         if (c <= -sinHalf) return glm::vec3(0.0f);
         return std::nullopt;
@@ -50,7 +51,7 @@ class SunSource : public LightSource {
 
     glm::vec3 power() const override { return glm::vec3(0.0f); }
 
-    // Parallel rays of each direction, from a disk that covers the scene.
+    // Parallel rays of each direction start from a disk that covers the scene.
     glm::vec3 shootingPower(float sceneRadius) const override {
         const float r = kCover * sceneRadius;
         return strength * (perCosine() * glm::pi<float>() * r * r);
@@ -67,13 +68,15 @@ class SunSource : public LightSource {
     }
 
   private:
-    static constexpr float kCover = 1.001f;  // radius of the disk over the scene's
+    // Radius of the disk that rays start from, in radii of the scene.
+    static constexpr float kCover = 1.001f;
 
-    // Irradiance across a ray of the sun, whose disk it covers, over that across its middle.
+    // Returns the radiance times the solid angle of the disk, relative to the irradiance on a plane
+    // that faces its middle.
     float perCosine() const { return half > 0 ? 2 / (1 + cosHalf) : 1; }
 
     const glm::vec3 direction, strength;
-    const float half;  // angular radius
+    const float half;  // angular radius, radians
     const float cosHalf, sinHalf;
 };
 

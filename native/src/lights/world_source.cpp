@@ -12,31 +12,35 @@
 namespace raybundle {
 namespace {
 
-// A region whose radiance varies by less than this share of the mean radiance's integral over the
-// sphere has no children if it is also small enough to be flat: the cosine's mean over a flat
-// piece is wrong by about the square of its size, on a ring as wide as that.
+// A region has no children if it is flat (smaller than kFlatCell) and its radiance varies by less
+// than kLeastVariation times the integral of the mean radiance over the sphere. The mean cosine of
+// a flat region is wrong by about the square of its size, and only on a ring of this width around
+// the horizon.
 constexpr double kLeastVariation = 1e-4;
 constexpr double kFlatCell = 0.12;  // radians
 
-// Of a flat region at the horizon the children are looked at if its light, times its reach, is more
-// than this share of all light: below it they change the irradiance by less than 1e-4 of it.
+// The children of a flat region at the horizon are visited if its light times its reach exceeds
+// this share of all light. Below this share, the children change the irradiance by less than 1e-4
+// of it.
 constexpr float kLeastCut = 1e-4f;
 
-// Of a part, sr, if it has children: some 500 of them.
+// Solid angle below which a region with children is a part of the source, sr. A sphere has some 500
+// parts.
 constexpr float kPartSolidAngle = 0.03f;
 
-// Of the cosine that a region may have at most: what its samples take for sure.
+// Least share of its largest possible cosine that a region at the horizon is sampled with, so that
+// each region with visible directions gets samples.
 constexpr float kLeastAbove = 1e-3f;
-// Reach of regions that no horizon leaves whole.
+// Reach of regions that are so large that no horizon leaves them whole.
 constexpr float kMoreThanHalf = 2;
 
-constexpr float kTouching = 1.01f;  // for rounding
+constexpr float kTouching = 1.01f;  // margin for rounding in the test of whether parts touch
 constexpr float kBelowOne = 0.9999999f;
-constexpr float kCover = 1.001f;  // radius of the disk that rays start from over the scene's
+constexpr float kCover = 1.001f;  // radius of the disk that rays start from, in radii of the scene
 
 float sum(const glm::vec3& v) { return v.x + v.y + v.z; }
 
-// Mean over the unit square [-1, 1]^2 of max(0, s + a x + b y).
+// Returns the mean of max(0, s + a x + b y) over the square [-1, 1]^2.
 double meanAbove(double s, double a, double b) {
     a = std::abs(a);
     b = std::abs(b);
@@ -49,7 +53,7 @@ double meanAbove(double s, double a, double b) {
            (24 * a * b);
 }
 
-// The same light on pixels that are small enough to be flat.
+// Returns an image of the same light whose pixels are small enough to be flat.
 WorldImage refined(const WorldImage& image) {
     const int across = int(std::ceil(glm::two_pi<double>() / kFlatCell / image.width)),
               up = int(std::ceil(glm::pi<double>() / kFlatCell / image.height));
@@ -97,7 +101,7 @@ void WorldSource::findParts(uint32_t index) {
 }
 
 void WorldSource::findPartNeighbours() {
-    // Touching corners are as far from each other as from both middles.
+    // If two regions touch, their middles are at most as far apart as both half diagonals together.
     auto halfDiagonal = [&](const Region& region) {
         return std::asin(std::min(region.reach, 1.0f));
     };
@@ -113,8 +117,8 @@ void WorldSource::findPartNeighbours() {
         }
 }
 
-// Appends the region and what is in it; children first looked at, then left out where they differ
-// little.
+// Appends a region and all its descendants. The children are always built first, and removed again
+// if their radiances differ little.
 WorldSource::Extremes WorldSource::build(uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1) {
     const size_t index = regions.size();
     regions.emplace_back();
@@ -129,7 +133,7 @@ WorldSource::Extremes WorldSource::build(uint32_t x0, uint32_t x1, uint32_t y0, 
         const float value = light.solidAngle > 0 ? made.strength / light.solidAngle : 0;
         return {value, value};
     }
-    // The longer edge is cut.
+    // Cut across the longer edge.
     const double width = double(glm::length(made.half[0])),
                  height_ = double(glm::length(made.half[1]));
     made.cutsColumns = x1 - x0 > 1 && (y1 - y0 == 1 || width >= height_);
@@ -155,7 +159,7 @@ WorldSource::Extremes WorldSource::build(uint32_t x0, uint32_t x1, uint32_t y0, 
     return both;
 }
 
-// Everything but the light.
+// Sets all members except the light.
 void WorldSource::measure(Region& region, RegionLight& light) const {
     const double azimuth = glm::two_pi<double>() * (light.x1 - light.x0) / image.width;
     light.solidAngle = float(azimuth * (height[light.y1] - height[light.y0]));
@@ -175,7 +179,8 @@ void WorldSource::measure(Region& region, RegionLight& light) const {
         glm::vec3(0.5 * (high - low) *
                   glm::dvec3(-std::sin(elevation) * std::cos(middle),
                              -std::sin(elevation) * std::sin(middle), std::cos(elevation)));
-    // The farthest directions are corners, or on the edge that is nearest to the equator.
+    // The farthest directions from the axis are the corners, or lie where an edge is nearest to the
+    // equator.
     double least = 1;
     const double equator = std::clamp(0.0, low, high);
     for (double e : {low, high, equator})
@@ -185,13 +190,13 @@ void WorldSource::measure(Region& region, RegionLight& light) const {
                        : float(std::sqrt(std::max(0.0, 1 - least * least)));
 }
 
-// The light of one pixel, whose radiance is constant.
+// Sets the light of a region of one pixel, whose radiance is constant.
 void WorldSource::setPixel(Region& region, RegionLight& light) const {
     const uint32_t x = light.x0, y = light.y0;
     const glm::vec3& radiance = image.pixels[size_t(y) * size_t(image.width) + x];
     const double across = heightAngle[y + 1] - heightAngle[y];
     const double azimuth = glm::two_pi<double>() / image.width;
-    // The azimuth falls from column to column.
+    // The azimuth decreases from column to column.
     const glm::dvec3 directions(
         across * (sine[x] - sine[x + 1]), across * (cosine[x + 1] - cosine[x]),
         0.5 * azimuth * (height[y + 1] * height[y + 1] - height[y] * height[y]));
@@ -221,14 +226,14 @@ WorldSource::Choice WorldSource::choose(uint32_t from, glm::vec2 uv, float proba
     return choice;
 }
 
-// By radiance times cosine.
+// Chooses in proportion to radiance times cosine.
 WorldSource::Choice WorldSource::chooseFacing(uint32_t from, glm::vec2 uv, float probability,
                                               const glm::vec3& normal) const {
     const Facing& facing = facingOf(normal);
     return choose(from, uv, probability, [&](uint32_t region) { return weightOf(region, facing); });
 }
 
-// Uniform by solid angle.
+// Returns a direction that is uniform in the solid angle of the region.
 glm::vec3 WorldSource::directionIn(const RegionLight& region, glm::vec2 uv) const {
     const double x = region.x0 + double(uv.x) * (region.x1 - region.x0);
     const double z = height[region.y0] + double(uv.y) * (height[region.y1] - height[region.y0]);
@@ -237,7 +242,7 @@ glm::vec3 WorldSource::directionIn(const RegionLight& region, glm::vec2 uv) cons
     return glm::vec3(r * std::cos(azimuth), r * std::sin(azimuth), z);
 }
 
-// A region without children has the same radiance everywhere.
+// The radiance is taken as constant in a region without children.
 LightSample WorldSource::sampleOf(const Choice& choice, const glm::vec3& normal) const {
     LightSample sample;
     if (choice.region == kNone) return sample;
@@ -286,7 +291,7 @@ float WorldSource::weightOf(const Region& region, const glm::vec3& normal) {
     const float s = glm::dot(normal, region.axis), h = region.reach;
     if (!(region.strength > 0) || s <= -h) return 0;
     if (s >= h) return std::max(0.0f, glm::dot(normal, region.moment));
-    // A curved piece may rise above a horizon that the flat one is below.
+    // A curved piece may rise above a horizon that lies above the flat piece.
     return region.strength *
            std::max(meanCosine(region, normal), kLeastAbove * (s + h) * (s + h) / h);
 }
@@ -297,14 +302,14 @@ bool WorldSource::isFlat(const Region& region) {
     return 4 * double(longest) < kFlatCell * kFlatCell;
 }
 
-// As of a flat piece in the mean direction of the light.
+// Treats the region as a flat piece in the mean direction of its light.
 float WorldSource::meanCosine(const Region& region, const glm::vec3& normal) {
     return float(meanAbove(double(glm::dot(normal, region.moment)) / double(region.strength),
                            double(glm::dot(normal, region.half[0])),
                            double(glm::dot(normal, region.half[1]))));
 }
 
-// Irradiance from a region; notes the weights of all regions that it looks at.
+// Returns the irradiance from a region, W/m^2, and stores the weights of all visited regions.
 glm::vec3 WorldSource::look(uint32_t index, Facing& facing) const {
     const Region& region = regions[index];
     const glm::vec3& normal = facing.normal;
@@ -360,7 +365,7 @@ float WorldSource::distance(const glm::vec3&) const {
     return std::numeric_limits<float>::infinity();
 }
 
-// Parallel rays of each direction, from a disk that covers the scene.
+// Parallel rays of each direction start from a disk that covers the scene.
 glm::vec3 WorldSource::shootingPower(float sceneRadius) const {
     const float r = kCover * sceneRadius;
     return lights[0].flux * (glm::pi<float>() * r * r);

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The image of a world as a source of light: a tree of its regions, from which receivers take
-// samples in proportion to radiance times cosine, and the irradiance without occluders.
+// The image of a world as a light source: a binary tree of the image's regions. Receivers sample it
+// in proportion to radiance times cosine, and it gives the irradiance without occluders.
 //
-// Sources: Clarberg, Jarosz, Akenine-Moller and Jensen, "Wavelet Importance Sampling" (2005) for
+// Sources: Clarberg, Jarosz, Akenine-Moller and Jensen, "Wavelet Importance Sampling" (2005), for
 // warping points level by level by the product of light and cosine; Arvo, "Applications of
-// Irradiance Tensors to the Simulation of Non-Lambertian Phenomena" (1995): above the horizon,
-// irradiance is the product of the light's first moment with the normal.
+// Irradiance Tensors to the Simulation of Non-Lambertian Phenomena" (1995), for the irradiance from
+// regions above the horizon, which is the product of the light's first moment with the normal.
 // Differs:
-// - No wavelets: a binary tree of equirectangular regions with the exact first moments of their
-//   light. Its branches end where the radiance hardly varies, so that smooth skies are cheap and a
-//   sun of a few pixels is found by every sample that should.
-// - The product is exact for regions above the horizon. Those that it cuts take the cosine's mean
-//   over a flat piece in the mean direction of their light, and are looked into no further than the
-//   irradiance needs to be right to 1e-4.
+// - There are no wavelets. The tree consists of equirectangular regions with the exact first
+//   moments of their light. Its branches end where the radiance hardly varies. Smooth skies are
+//   therefore cheap, and a sun of a few pixels is found by every sample that should find it.
+// - The product of light and cosine is exact only for regions above the horizon. For regions that
+//   the horizon cuts, the cosine is that of a flat piece in the mean direction of the region's
+//   light. Such a region is subdivided only until the irradiance is accurate to 1e-4.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -27,9 +27,10 @@
 
 namespace raybundle {
 
+// A light source that radiates the image of a world from infinity. Thread-safe after construction.
 class WorldSource : public LightSource {
   public:
-    // The image must not be black.
+    // Copies the image. The image must not be black.
     explicit WorldSource(const WorldImage& given);
 
     LightSample sample(const glm::vec3& point, const glm::vec3& normal,
@@ -49,44 +50,54 @@ class WorldSource : public LightSource {
     glm::vec3 shootingPower(float sceneRadius) const override;
     EmittedRay emit(const glm::vec4& u, float sceneRadius) const override;
 
-    // Of the tree.
+    // Returns the number of regions in the tree.
     size_t regionCount() const { return regions.size(); }
 
   private:
-    // Pixels [x0, x1) x [y0, y1): what samples look at on their way, one cache line.
+    // The pixels [x0, x1) x [y0, y1) of the image. Holds only what a sample reads on its way
+    // through the tree, which is one cache line.
     struct Region {
-        glm::vec3 axis{0.0f};    // its middle
-        float reach = 0;         // sine of the angle from the axis to the farthest direction
-        glm::vec3 moment{0.0f};  // integral of the radiance's channels' sum times direction
-        float strength = 0;      // integral of the radiance's channels' sum, W/m^2
-        std::array<glm::vec3, 2> half{glm::vec3(0.0f), glm::vec3(0.0f)};  // edges from the middle
-        uint32_t second = 0;       // child; the first child is the next region. 0: no children
-        int16_t part = -1;         // that it is, if it is one
-        bool cutsColumns = false;  // the children lie side by side, else one above the other
+        glm::vec3 axis{0.0f};  // unit vector to the middle
+        // Sine of the angle from the axis to the farthest direction; kMoreThanHalf if no horizon
+        // leaves the region whole.
+        float reach = 0;
+        // Integral of radiance (sum of the channels) times direction over the solid angle, W/m^2.
+        glm::vec3 moment{0.0f};
+        float strength = 0;  // integral of the radiance (sum of the channels), W/m^2
+        // Vectors from the middle to the middle of an edge, along azimuth and along elevation.
+        std::array<glm::vec3, 2> half{glm::vec3(0.0f), glm::vec3(0.0f)};
+        // Index of the second child, or 0 without children. The first child is the next region.
+        uint32_t second = 0;
+        int16_t part = -1;  // index of the part that the region is, or -1
+        // Whether the children lie side by side; if not, one lies above the other.
+        bool cutsColumns = false;
     };
-    // The same, of all its directions: what is asked for at the end.
+    // Further data of a region, read only at the end of a sample's way. Indexed like `regions`.
     struct RegionLight {
         uint32_t x0 = 0, x1 = 0, y0 = 0, y1 = 0;
         float solidAngle = 0;                // sr
         glm::vec3 flux{0.0f};                // integral of the radiance, W/m^2
         std::array<glm::vec3, 3> moments{};  // Region::moment by channel
     };
+    // Extremes of the radiance, sum of the channels, W/(m^2 sr).
     struct Extremes {
-        float least, most;  // sum of the channels of the radiance
+        float least, most;
     };
+    // A region without children that a sample has chosen.
     struct Choice {
-        uint32_t region;  // without children; kNone: no light comes from any
+        uint32_t region;  // kNone: no region gives light
         glm::vec2 uv;
         float probability;
         int32_t part;
     };
     static constexpr uint32_t kNone = UINT32_MAX;
 
-    // The light as a plane sees it: neighbouring receivers have it in common.
+    // The light of the regions as a plane with a certain normal receives it. Neighbouring receivers
+    // often have the same normal, so that it is computed once for all of them.
     struct Facing {
         glm::vec3 normal{0.0f}, irradiance{0.0f};
-        // Per region: the irradiance from it, all channels together, if it is one of those that
-        // were looked at. -1 of all others.
+        // Irradiance from each region, sum of the channels, W/m^2. -1 for regions that look() did
+        // not visit.
         std::vector<float> weight;
         std::vector<uint32_t> looked;
     };
@@ -96,7 +107,8 @@ class WorldSource : public LightSource {
     void findPartNeighbours();
     void measure(Region& region, RegionLight& light) const;
     void setPixel(Region& region, RegionLight& light) const;
-    // Walks from a region to one without children; weightOf(region) tells how to share them out.
+    // Descends from a region to one without children. weightOf(region) returns the weight by which
+    // two siblings are chosen.
     template <class WeightOf>
     Choice choose(uint32_t from, glm::vec2 uv, float probability, const WeightOf& weightOf) const;
     Choice chooseFacing(uint32_t from, glm::vec2 uv, float probability,
@@ -104,27 +116,36 @@ class WorldSource : public LightSource {
     LightSample sampleOf(const Choice& choice, const glm::vec3& normal) const;
     glm::vec3 directionIn(const RegionLight& region, glm::vec2 uv) const;
     static bool isFlat(const Region& region);
-    // Of the cosine by which a plane sees the light of a region that its horizon cuts.
+    // Returns the mean cosine by which a plane receives the light of a region that its horizon
+    // cuts.
     static float meanCosine(const Region& region, const glm::vec3& normal);
     glm::vec3 look(uint32_t index, Facing& facing) const;
     const Facing& facingOf(const glm::vec3& normal) const;
-    // The irradiance from a region, all channels together, or nearly.
+    // Returns the irradiance from a region, sum of the channels, W/m^2. Approximate if look() did
+    // not visit the region.
     float weightOf(uint32_t region, const Facing& facing) const;
     static float weightOf(const Region& region, const glm::vec3& normal);
     bool isSeen(uint32_t region, const glm::vec3& normal) const;
 
     const WorldImage image;
-    std::vector<double> height;        // z of the lower edge of each row, and of the top
-    std::vector<double> heightAngle;   // integral of the cosine of the elevation below it, squared
-    std::vector<double> cosine, sine;  // of the azimuth of the left edge of each column, and last
-    float leastVariation = 0;          // of a region with children, W/m^2
-    float leastCut = 0;  // of a flat region whose children matter at the horizon, W/m^2
+    std::vector<double> height;  // z of the lower edge of each row, and of the top edge
+    // Integral of the squared cosine of the elevation, up to the lower edge of each row and to the
+    // top.
+    std::vector<double> heightAngle;
+    // Cosine and sine of the azimuth of each column's left edge, and of the last one's right edge.
+    std::vector<double> cosine, sine;
+    // Least variation of the light of a flat region with children, W/m^2.
+    float leastVariation = 0;
+    // Least light times reach, W/m^2, of a flat region whose children are visited at the horizon.
+    float leastCut = 0;
     std::vector<Region> regions;
-    std::vector<RegionLight> lights;    // of each
-    std::vector<uint32_t> partRegions;  // that together are all of the source
+    std::vector<RegionLight> lights;  // indexed like `regions`
+    // The regions that are parts of the source. Together they are all of it.
+    std::vector<uint32_t> partRegions;
     PartNeighbours partNeighbours;
 
-    mutable tbb::enumerable_thread_specific<Facing> facing;  // of the last receiver
+    // Per thread, for the normal of its last receiver.
+    mutable tbb::enumerable_thread_specific<Facing> facing;
 };
 
 }  // namespace raybundle

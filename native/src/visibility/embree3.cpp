@@ -6,8 +6,8 @@
 namespace raybundle {
 namespace {
 
-// Of Embree 3's own library, which is loaded with this one; where it is linked in statically, the
-// one that was linked.
+// Looks up a function in the shared library of Embree 3, which is loaded together with this
+// library. Returns `linked` if Embree is linked statically.
 template <class Function>
 Function find(const char* name, Function linked) {
     static void* const library = dlopen("libembree3.so.3", RTLD_LAZY | RTLD_NOLOAD);

@@ -5,9 +5,9 @@
 
 namespace raybundle {
 
-// The functions of Embree 3, each found in that very library. Embree 4 has functions of the same
-// names, without versions: in a process that loaded it first, such as official Blender, a plain
-// call would reach those, and end the process.
+// The functions of Embree 3, each looked up in the library of Embree 3. Embree 4 exports functions
+// of the same names without symbol versions. If a process has loaded Embree 4 first, as official
+// Blender does, a plain call would reach Embree 4 and end the process.
 struct Embree3 {
     Embree3();
 
@@ -32,7 +32,7 @@ struct Embree3 {
     decltype(&rtcOccluded8) occluded8;
 };
 
-// Found when this library is loaded.
+// The functions, looked up when this library is loaded.
 extern const Embree3 embree3;
 
 }  // namespace raybundle

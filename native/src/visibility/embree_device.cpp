@@ -15,8 +15,8 @@
 namespace raybundle {
 namespace {
 
-// Builds a tree of one box, which Embree does in the thread that asks. Returns whether it is built.
-// Throws std::bad_alloc too, where Embree has no memory for its error.
+// Builds a tree of one box, which Embree does in the calling thread. Returns whether this succeeds.
+// May throw std::bad_alloc if Embree has no memory for its own error.
 bool buildLeastTree(RTCDevice device) {
     const std::unique_ptr<RTCBVHTy, decltype(&rtcReleaseBVH)> tree(embree3.newBVH(device),
                                                                    embree3.releaseBVH);
@@ -48,15 +48,15 @@ RTCDeviceTy* newEmbreeDevice() {
 
 void makeRoomForTreeBuilders() {
     static std::mutex mutex;
-    static size_t callers = 0;  // threads that called this
-    static size_t ended = 0;    // threads in the list that ended at once
+    static size_t callers = 0;  // number of threads that have called this function
+    static size_t ended = 0;    // number of threads in Embree's list that ended at once
     thread_local bool isKnown = false;
     const std::lock_guard lock(mutex);
     if (!isKnown) ++callers;
     isKnown = true;
 
-    // oneTBB's workers build too. The list doubles whenever it is full: with `room` + 1 threads in
-    // it, it has places for as many again but one.
+    // oneTBB's workers build trees, too. The list doubles whenever it is full. With `room` + 1
+    // threads in it, it therefore has space for `room` - 1 more.
     const size_t builders = callers + 2 * std::thread::hardware_concurrency();
     size_t room = 1;
     while (room <= builders) room *= 2;
@@ -70,11 +70,13 @@ void makeRoomForTreeBuilders() {
                 try {
                     isBuilt = device && buildLeastTree(device.get());
                 } catch (const std::bad_alloc&) {
-                    // Not built.
+                    // The tree is not built, which is reported below.
                 }
             }).join();
         } catch (const std::system_error&) {
-            return;  // no more threads: without room, as long as there is memory
+            // No thread can be started. Go on without the room; it is only needed if memory runs
+            // out.
+            return;
         }
         if (!isBuilt) throw std::bad_alloc();
     }

@@ -8,7 +8,8 @@
 namespace raybundle {
 namespace {
 
-// On a side of which a straight edge covers a part these tell that to half a percent.
+// If a straight edge covers a part of a side, this number of points measures the part to half a
+// percent.
 constexpr uint32_t kPoints = 256;
 
 float shareExposed(uint32_t side, const Visibility& visibility, const Clusters& clusters,

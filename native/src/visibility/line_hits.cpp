@@ -9,15 +9,15 @@
 namespace raybundle {
 namespace {
 
-// Collects the parents that a line crosses; starts with Embree's own part.
+// Collects the parents that a line crosses. It begins with Embree's context.
 struct Crossed {
     RTCIntersectContext context;
     const uint32_t* parentOf;
     MetParents parents;
 };
 
-// Notes a hit and lets the ray go on. A parent is plane and crossed once: a line along the diagonal
-// of a quad meets both of its triangles, and Embree may offer a hit twice.
+// Records a hit and lets the ray continue. A parent is plane, so it is crossed once; but a line
+// along the diagonal of a quad meets both of its triangles, and Embree may report a hit twice.
 void collect(const RTCFilterFunctionNArguments* args) {
     Crossed& crossed = *reinterpret_cast<Crossed*>(args->context);
     const uint32_t parent = crossed.parentOf[RTCHitN_primID(args->hit, args->N, 0)];
@@ -50,8 +50,8 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
     const uint64_t name = lineName(glm::vec3(point), glm::vec3(direction));
     crossed.parents.check();
     for (uint32_t index : crossed.parents.all) {
-        // In double and from the plane of the parent, as the rasteriser does: surfaces that
-        // coincide then have the same depth.
+        // Depths are computed in double from the plane of the parent, as in the rasteriser, so that
+        // surfaces that coincide have the same depth.
         const Parent& parent = patches.parents[index];
         const glm::dvec3 normal = glm::cross(glm::dvec3(parent.a), glm::dvec3(parent.b));
         const double slant = glm::dot(normal, direction);

@@ -10,10 +10,11 @@
 namespace raybundle {
 namespace {
 
-// Lines that share a random generator, and lines between two looks at the cancel flag.
+// kBatch lines share a random generator. The cancel flag is checked every kSlice lines.
 constexpr uint64_t kBatch = 1024, kSlice = 256 * kBatch;
 
-// What the lines of one emitter brought to each side, until it is added to the sums of all.
+// Sums the weights of one emitter's lines on each side, until they are added to the sums of all
+// emitters.
 class Tally {
   public:
     explicit Tally(size_t sides) : weight(sides), squares(sides) {}
@@ -24,13 +25,14 @@ class Tally {
         squares[side] += w * w;
     }
 
-    // Adds the sums times `scale` and their variance, and starts anew.
+    // Adds the sums times `scale`, and their variance, to `sums`. Resets the sums.
     void moveTo(LocalLines& sums, uint64_t lines, const glm::dvec3& perLine, double scale) {
         const double n = double(lines);
         for (uint32_t side : touched) {
             glm::dvec3& w = weight[side];
             glm::dvec3& w2 = squares[side];
-            // A single line knows its second moment only: an upper bound, close where p is small.
+            // The variance of a single line is unknown. Its second moment is an upper bound, close
+            // if p is small.
             const glm::dvec3 variance = lines > 1 ? n / (n - 1) * (w2 - w * w / n) : w2;
             sums.received[side] += scale * w * perLine;
             sums.variance[side] +=
@@ -42,7 +44,7 @@ class Tally {
 
   private:
     std::vector<glm::dvec3> weight, squares;  // per side
-    std::vector<uint32_t> touched;            // sides with a weight
+    std::vector<uint32_t> touched;            // sides with a non-zero weight
 };
 
 }  // namespace
@@ -79,7 +81,7 @@ glm::vec4 uniformPoint(std::mt19937_64& random) {
 void LocalLines::cast(const std::vector<uint64_t>& counts, const std::vector<glm::dvec3>& perLine,
                       const CastLine& castLine, const std::array<uint32_t, 3>& stream, double scale,
                       const std::function<void()>& checkCancel) {
-    std::vector<uint64_t> end(counts.size());  // per emitter: lines of it and all before
+    std::vector<uint64_t> end(counts.size());  // per emitter: lines of all emitters up to this one
     uint64_t total = 0;
     for (size_t k = 0; k < counts.size(); ++k) end[k] = total += counts[k];
     lines += total;
@@ -87,7 +89,7 @@ void LocalLines::cast(const std::vector<uint64_t>& counts, const std::vector<glm
     Tally tally(received.size());
     std::vector<LineEnd> ends(size_t(std::min(kSlice, total)));
     size_t emitter = 0;
-    uint64_t left = counts.empty() ? 0 : counts[0];  // lines of the emitter that are not in yet
+    uint64_t left = counts.empty() ? 0 : counts[0];  // lines of the emitter that are not yet added
     for (uint64_t slice = 0; slice < total; slice += kSlice) {
         checkCancel();
         const uint64_t sliceEnd = std::min(slice + kSlice, total);
@@ -101,7 +103,7 @@ void LocalLines::cast(const std::vector<uint64_t>& counts, const std::vector<glm
                 ends[line - slice] = castLine(k, random);
             }
         });
-        // In the order of the lines, whatever thread cast them.
+        // Add in the order of the lines, whatever thread cast them.
         for (uint64_t line = slice; line < sliceEnd; ++line) {
             while (left == 0) {
                 tally.moveTo(*this, counts[emitter], perLine[emitter], scale);

@@ -7,6 +7,7 @@
 namespace raybundle {
 namespace {
 
+// The ray of a hit that Embree reports, and the point that it hits.
 struct Hit {
     explicit Hit(const RTCFilterFunctionNArguments* args, uint32_t k = 0)
         : direction(RTCRayN_dir_x(args->ray, args->N, k), RTCRayN_dir_y(args->ray, args->N, k),
@@ -22,7 +23,7 @@ struct Hit {
     const glm::vec3 point;
 };
 
-// Of a ray that is to find the first surface and meets one.
+// Records a hit of a ray that searches for the first surface.
 void meet(RayQuery& query, const RTCFilterFunctionNArguments* args, uint32_t parent,
           const Hit& hit) {
     const float cosine =
@@ -32,8 +33,9 @@ void meet(RayQuery& query, const RTCFilterFunctionNArguments* args, uint32_t par
                            2 * offsetAt(*query.passage.patches, parent) / std::max(0.01f, cosine));
 }
 
-// Lets a ray pass the surface that it starts on, what coincides with it on its other side, and what
-// it meets behind: the next face of a box whose edge is near.
+// Returns whether a ray passes a surface near its start: the surface that it leaves, surfaces that
+// coincide with this one on its other side, and surfaces that the ray meets behind its start, such
+// as the next face of a box whose edge is near.
 bool passesStart(const SideQuery& start, uint32_t other, const glm::vec3& direction, float distance,
                  float behind) {
     if (other == start.parent) return true;
@@ -44,22 +46,23 @@ bool passesStart(const SideQuery& start, uint32_t other, const glm::vec3& direct
     const Parent& b = patches.parents[other];
     if (distance < behind && !areParallel(a, b)) return true;
     const float turn = glm::dot(glm::cross(b.a, b.b), direction);
-    // Faces of one object that the ray crosses the same way lie beside its start; of others, those
-    // that coincide with it may lie behind it.
+    // Faces of the same object that the ray crosses in the same direction lie beside its start.
+    // Faces of other objects that coincide with the start may lie behind it.
     const bool alike = a.instance == b.instance && (turn > 0) == start.isFront;
     return alike || (areParallel(a, b) &&
                      !comesBefore(patches, start.parent, !start.isFront, other, turn < 0));
 }
 
-// Whether a ray goes on through a parent that it hits; id: of the ray in its packet.
+// Returns whether a ray passes a parent that it hits. `id` is the index of the ray in its packet.
 bool goesOn(SideQuery& start, uint32_t id, uint32_t other, const Hit& hit) {
     return other == start.target[id] ||
            passesStart(start, other, hit.direction, hit.distance, start.behind[id]) ||
            start.passage.goesOn(other, hit.point);
 }
 
-// Embree's assertions end the process for rays from or to where squares leave the range of floats.
-// Such a ray, of points that are no numbers too, meets nothing and is blocked.
+// Returns whether the squares of a vector's components are well within the range of floats. For
+// other rays, including those of NaN, Embree's assertions would end the process. setRay() makes
+// them meet nothing; shadow rays of this kind count as blocked.
 bool isValid(const glm::vec3& v) {
     constexpr float kMost = 1e18f;
     return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
@@ -94,7 +97,7 @@ float NearestHit::meet(uint32_t other, float at, float otherZone) {
 
 void NearestHit::keep(const Other& other) {
     if (count == others.size()) {
-        // What was about as far away as one that was nearer meanwhile.
+        // Remove hits that are farther than a nearer hit that was found in the meantime.
         const auto isFar = [&](const Other& o) { return o.distance > distance + zone; };
         count = size_t(std::remove_if(others.begin(), others.end(), isFar) - others.begin());
     }

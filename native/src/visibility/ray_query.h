@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What is asked of a ray while Embree follows it: through which of the surfaces that it offers the
-// ray goes on. The queries start with Embree's own part, through which its callbacks find them.
-// Only visibility/*.cpp includes this.
+// The state of a ray while Embree follows it, and the filter callbacks that decide which surfaces
+// the ray passes. Each query begins with Embree's context, through which the callbacks find the
+// query. Only the source files of this folder include this header.
 #pragma once
 
 #include <algorithm>
@@ -20,18 +20,20 @@
 
 namespace raybundle {
 
-// Share of how far an island reaches: some tens of float rounding errors.
+// Tolerance of positions as a share of how far an island reaches: some tens of float rounding
+// errors.
 constexpr float kRelativeOffset = 2e-6f;
 
-// Some tens of float rounding errors at a parent, metres.
+// Returns the tolerance of positions at a parent: some tens of float rounding errors, metres.
 inline float offsetAt(const Patches& patches, uint32_t parent) {
     return kRelativeOffset * patches.islands[patches.parents[parent].island].reach;
 }
 
-// The acceleration structure. parentOf: per quad of it, into Patches::parents.
+// The acceleration structure. Owns Embree's device and scene.
 struct Visibility::Embree {
     RTCDevice device = nullptr;
     RTCScene scene = nullptr;
+    // Per quad of the scene: index into Patches::parents.
     std::vector<uint32_t> parentOf;
 
     ~Embree() {
@@ -40,8 +42,8 @@ struct Visibility::Embree {
     }
 };
 
-// A list that filters write to. Embree swallows their exceptions: that there is no memory left is
-// kept until the ray is done.
+// A list that filter callbacks append to. Since Embree swallows their exceptions, a failed
+// allocation is stored, and check() throws when the ray is done.
 struct MetParents {
     std::vector<uint32_t> all;
     bool isIncomplete = false;
@@ -56,27 +58,30 @@ struct MetParents {
             isIncomplete = true;
         }
     }
+    // Throws std::bad_alloc if the list is incomplete.
     void check() const {
         if (isIncomplete) throw std::bad_alloc();
     }
 };
 
-// How a ray passes what lets light through: in part, or by chance.
+// How a ray passes patches that let light through: it loses a share of its light, or passes by
+// chance.
 struct Passage {
     const Patches* patches;
     const uint32_t* parentOf;
-    std::optional<uint64_t> line;  // its name, where it passes by chance
-    float share = 1;               // that has come through, where it passes in part
-    // Parents that have taken their part: a ray along the diagonal of a quad meets both of its
-    // triangles, and Embree may offer a hit twice.
+    std::optional<uint64_t> line;  // identifier of the ray (lineName); set if it passes by chance
+    float share = 1;               // share of the light that has passed so far
+    // The parents that have already taken their share. A ray along the diagonal of a quad meets
+    // both of its triangles, and Embree may report a hit twice.
     MetParents passed;
 
-    // Whether the ray goes on through a parent that it meets at a point.
+    // Returns whether the ray passes a parent that it meets at a point. Updates `share`.
     bool goesOn(uint32_t parent, const glm::vec3& point);
 };
 
-// What a ray meets first. Of surfaces that coincide there it is the one that comesBefore the
-// others; so a ray that has met one goes on a little, through all that may coincide with it.
+// The first surface that a ray meets. Of surfaces that coincide there, it is the one that
+// comesBefore the others. Therefore a ray that has met a surface continues a little, through all
+// surfaces that may coincide with it.
 struct NearestHit {
     struct Other {
         uint32_t parent;
@@ -84,23 +89,26 @@ struct NearestHit {
     };
     uint32_t parent = kNoParent;
     float distance = 0;  // metres along the ray
-    float zone = 0;      // what it meets less than this behind may coincide, metres
-    // What it has met about as far away; of more than that, those that it met first. Without memory
-    // of its own: Embree would swallow the exception if there were none left.
+    float zone = 0;      // hits at most this far behind the first may coincide with it, metres
+    // Further hits at about the same distance. If there are more than fit, those that were met
+    // first are kept. The array has a fixed size, since Embree would swallow the exception of a
+    // failed allocation.
     std::array<Other, 16> others;
     size_t count = 0;
 
-    // Notes what the ray meets; returns how far it goes on, metres.
+    // Records a hit on parent `other` at the distance `at`, with the tolerance `otherZone`, all
+    // metres. Returns the distance up to which the ray continues, metres.
     float meet(uint32_t other, float at, float otherZone);
 
-    // Of the nearest one and those that coincide with it, the first.
+    // Returns the parent that comes before the others, of the nearest one and those that coincide
+    // with it. kNoParent if there was no hit.
     uint32_t first(const Patches& patches, const glm::vec3& direction) const;
 
   private:
     void keep(const Other& other);
 };
 
-// What the filters need to know of a ray; starts with Embree's own part.
+// The state of one ray. It begins with Embree's context.
 struct RayQuery {
     RTCIntersectContext context;
     Passage passage;
@@ -113,29 +121,31 @@ struct RayQuery {
     }
 };
 
-// What they need to know of rays that leave a side.
+// The state of rays that leave a patch side.
 struct SideQuery : RayQuery {
     using RayQuery::RayQuery;
+    // Parent of the side that the rays leave.
     uint32_t parent;
-    bool isFront;      // the ray leaves the front of the parent
+    bool isFront;      // whether the rays leave the front of the parent
     glm::vec3 normal;  // of the side
     float zone;        // height over the side within which a hit coincides with it, metres
-    // Of each ray, by its id in the packet: how far behind the surface it starts, metres along it,
-    // and the parent that it ends on. A parent whose corners lie in a plane but for a rounding
-    // error may stand before a point of its plane.
+    // Per ray, by its index in the packet: the distance along the ray by which it starts behind the
+    // surface (metres), and the parent on which it ends. The target needs to be known because a
+    // parent that is not exactly plane may lie in front of a point of its plane by a rounding
+    // error.
     std::array<float, Visibility::kPacket> behind;
     std::array<uint32_t, Visibility::kPacket> target;
 };
 
-// Filters, one for each kind of ray.
-// Of rays of a SideQuery that are blocked or not.
+// Filter for rays of a SideQuery of which it is only asked whether they are blocked.
 void passStart(const RTCFilterFunctionNArguments* args);
-// Of a ray of a SideQuery that is to find the first surface.
+// Filter for a ray of a SideQuery that searches for the first surface.
 void meetAfterStart(const RTCFilterFunctionNArguments* args);
-// Of a ray of a RayQuery, which starts on no surface.
+// Filter for a ray of a RayQuery, which starts on no surface and searches for the first one.
 void meetFirst(const RTCFilterFunctionNArguments* args);
 
-// A ray of this length, metres.
+// Sets the origin, direction (unit) and length (metres) of a ray. A ray with NaN, or with values
+// whose squares leave the range of floats, is set to meet nothing.
 void setRay(RTCRay& ray, glm::vec3 origin, glm::vec3 direction, float length);
 
 }  // namespace raybundle

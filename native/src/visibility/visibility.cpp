@@ -17,8 +17,8 @@ namespace raybundle {
 namespace {
 
 [[noreturn]] void fail(RTCError code, const char* what) {
-    // A tree that is built in several threads knows of an allocation that failed in one of them
-    // only that it was cancelled, which is RTC_ERROR_UNKNOWN; nothing else can fail in it.
+    // If an allocation fails in one of several threads that build a tree, Embree only reports that
+    // the build was cancelled, as RTC_ERROR_UNKNOWN. Nothing else can fail in a build.
     const bool isMemory = code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_UNKNOWN;
     throw Error(
         isMemory                            ? RB_ERROR_OUT_OF_MEMORY
@@ -37,7 +37,7 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     if (!embree->device) fail(embree3.getDeviceError(nullptr), "no device");
     embree->scene = embree3.newScene(embree->device);
     if (!embree->scene) fail(embree3.getDeviceError(embree->device), "no scene");
-    // Robust: rays must not slip between neighbouring triangles.
+    // Robust, so that rays do not slip between neighbouring triangles.
     embree3.setSceneFlags(embree->scene,
                           RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
 
@@ -61,7 +61,7 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
         std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
         for (const Parent& parent : patches.parents) {
             if (!blocks(parent)) continue;
-            // A triangle is a quad with its last corner twice.
+            // A triangle is stored as a quad whose last corner is repeated.
             for (int k = 0; k < 4; ++k)
                 *indices++ = parent.vertex[parent.isTriangle && k == 3 ? 2 : k];
         }
@@ -86,20 +86,21 @@ struct Visibility::FromSide : SideQuery {
         zone = 2 * offsetAt(patches, parent);
         target.fill(kNoParent);
     }
-    // Rays start this much behind the surface, so that they meet what coincides with it.
-    // Behind along the ray and not along the normal: the ray still passes through the point.
+    // Moves the start of a ray slightly behind the surface, so that the ray meets surfaces that
+    // coincide with it. The shift is along the ray, not along the normal, so that the ray still
+    // passes through the point.
     glm::vec3 origin(const glm::vec3& point, const glm::vec3& direction, size_t id = 0) {
         behind[id] = 0.5f * zone / std::max(0.01f, glm::dot(direction, normal));
         return point - behind[id] * direction;
     }
-    // Sets a shadow ray; false if it is so short that nothing is between.
+    // Sets a shadow ray. Returns false if the ray is so short that nothing can lie in between.
     bool setShadowRay(RTCRay& ray, const ShadowRay& shadow, size_t id = 0) {
         const glm::vec3 from = origin(shadow.point, shadow.direction, id);
         if (std::isfinite(shadow.distance)) {
             // Aim at the far end from the shifted origin, or the ray would pass beside it.
             const glm::vec3 segment = shadow.point + shadow.distance * shadow.direction - from;
             const float length = glm::length(segment);
-            // The far end is rounded by how far it is.
+            // The rounding error of the far end grows with its distance.
             const float end = std::max(zone, kRelativeOffset * length);
             if (length <= end) return false;
             setRay(ray, from, segment / length, length - end);
@@ -123,15 +124,16 @@ float Visibility::visibleShare(uint32_t side, const ShadowRay& shadow) const {
 
 void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
                                float* shares) const {
-    // What a ray has passed is noted for one ray alone.
+    // A SideQuery has one Passage, so it can follow only one ray through surfaces that let light
+    // through.
     if (!patches.opacity.empty() || count == 1) {
         for (int k = 0; k < count; ++k) shares[k] = visibleShare(side, rays[k]);
         return;
     }
     FromSide start(*this, side);
     start.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    // Embree without kernels for eight rays, on a processor without AVX, looks at all of them:
-    // those that are not there end before they start.
+    // Without kernels for eight rays (on processors without AVX), Embree also follows the invalid
+    // rays of a packet. These are set to end before they start.
     alignas(32) int valid[kPacket] = {};
     RTCRay8 packet{};
     std::fill_n(packet.dir_z, kPacket, 1.0f);
@@ -160,7 +162,7 @@ void Visibility::visibleShares(uint32_t side, const ShadowRay* rays, int count,
         shares[k] = isShort[size_t(k)] || packet.tfar[k] >= 0 ? 1.0f : 0.0f;
 }
 
-// The side of a parent, at a point on it, that a direction looks at.
+// `point` lies on the parent.
 uint32_t Visibility::sideOf(uint32_t parent, const glm::vec3& point,
                             const glm::vec3& direction) const {
     const bool front = glm::dot(patches.parents[parent].normal, direction) < 0;
@@ -181,7 +183,7 @@ std::optional<uint32_t> Visibility::firstHit(uint32_t side, const glm::vec3& poi
     const NearestHit& nearest = start.nearest;
     if (nearest.parent == kNoParent) return std::nullopt;
     if (distance) *distance = std::max(0.0f, nearest.distance - glm::length(point - origin));
-    // What coincides with the start has its order already.
+    // The order of surfaces that coincide with the start was settled by the filter.
     const bool isAtStart = nearest.distance * glm::dot(direction, start.normal) <= 2 * start.zone;
     return sideOf(isAtStart ? nearest.parent : nearest.first(patches, direction),
                   origin + nearest.distance * direction, direction);
