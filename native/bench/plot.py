@@ -3,10 +3,10 @@
 
     /usr/bin/python3 native/bench/plot.py RESULTS_FOLDER [--images docs/images] [--only FIGURE ...]
 
-RESULTS_FOLDER holds NAME.jsonl for each figure of figure_table.py; figures without one are left out.
-The pictures are written to IMAGES/NAME.svg, the tables to RESULTS_FOLDER/summary.md. A point combines
-all seeds of a run: the root mean square of the errors and the median of the times. Bars extend from
-the least to the largest value.
+RESULTS_FOLDER holds NAME.jsonl for each figure of figure_table.py; figures without one are left
+out. The pictures are written to IMAGES/NAME.svg, the tables to RESULTS_FOLDER/summary.md. A point
+combines all seeds of a run: the root mean square of the errors and the median of the times. Bars
+extend from the least to the largest value.
 """
 
 from __future__ import annotations

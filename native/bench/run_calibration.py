@@ -110,7 +110,7 @@ def draw(rows: list[dict], path: Path) -> None:
 
 
 def print_table(rows: list[dict]) -> None:
-    """Prints a Markdown table: means over the seeds in per cent, and the number of covered bakes."""
+    """Prints a Markdown table: means over the seeds in per cent, and how many bakes are covered."""
     print("| scene | target | noise: stated, true | covered | discretisation | mesh "
           "| surface: stated, true | covered | noise of objects: covered |")
     print("|---|---|---|---|---|---|---|---|---|")
