@@ -70,7 +70,7 @@ TEST(StopRule, GoesOnAfterRaysOnlyWhereThatIsWorthIt) {
     StopRule noisy(settings, kAll, 0);
     EXPECT_EQ(noisy.afterRays(64, 6), Stop::NOT_YET);  // more than twice the target is left
     EXPECT_EQ(noisy.excess(), 3);
-    EXPECT_EQ(noisy.afterRays(128, 5), Stop::NOISE_AT_TARGET);  // and hardly less than before
+    EXPECT_EQ(noisy.afterRays(128, 5), Stop::NOISE_AT_TARGET);  // the noise has hardly fallen
     EXPECT_TRUE(noisy.isOutOfReach());
     StopRule hopeless(settings, kAll, 0);
     EXPECT_EQ(hopeless.afterRays(64, 20), Stop::NOISE_AT_TARGET);

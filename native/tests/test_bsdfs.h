@@ -23,9 +23,9 @@ Bsdf severalFacets(double roughness);
 Bsdf burley(double roughness);
 // Burley (2012): sheen.
 Bsdf burleySheen();
-// Fujii (2012).
+// Fujii (2012): Oren and Nayar's diffuse reflection.
 Bsdf orenNayar(double sigma);
-// Ashikhmin, Premoze and Shirley (2000).
+// Ashikhmin, Premoze and Shirley (2000): velvet.
 Bsdf velvet(double sigma);
 // Zeltner et al. (2022): a linearly transformed cosine. It is normalised over the directions of the
 // light for a given direction of the eye.

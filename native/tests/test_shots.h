@@ -52,8 +52,8 @@ void placeReceiver(Scene& scene, const glm::vec3& at = glm::vec3(0), const glm::
                    const glm::vec3& v = {0, 1, 0});
 
 // Mean irradiance over the fronts or backs (side 0 or 1) of all patches of an instance, and an
-// upper bound of its standard error, W/m^2. It is a bound because the errors of sides are
-// correlated: all sides take part in the same lines.
+// upper bound of its standard error, W/m^2. It is a bound because sides compete for the
+// same lines, so that their errors partly cancel.
 struct Mean {
     double value = 0, error = 0;
 };

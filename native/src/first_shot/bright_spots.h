@@ -23,9 +23,9 @@ namespace raybundle {
 // Gathers the reflected light of bright spots, if there are any. Fills `indirect` and `unshot` of a
 // shot of GATHER, and adds to its errors. Returns the number of sides that are bright spots.
 //   exchange  visibility between surfaces that reflect light to each other
-//   density   density of the lines that will be traced There are no bright spots in scenes with
-//             translucent or partly transparent surfaces. Bundles add the light that surfaces which
-//             are not Lambert's send otherwise than by Lambert's law.
+//   density   density of the lines that will be traced
+// There are no bright spots in scenes with translucent or partly transparent surfaces. Bundles add
+// the light that surfaces which are not Lambert's send otherwise than by Lambert's law.
 size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
                          const Visibility& exchange, const LineDensity& density, FirstShot& shot);
 
