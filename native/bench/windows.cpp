@@ -12,9 +12,9 @@
 //   vertices      share that is spent on rotating all vertices to the bundle
 //   missed        share that is spent on parents that meet no pixel centre, and the share of these
 //                 parents
-// For a building of N x N closed rooms (N = 6 by default) an upper bound of the gain is printed too:
-// the time to project the building whole, divided by the time to project each room with its own
-// window. The density of lines is equal in both.
+// For a building of N x N closed rooms (N = 6 by default) an upper bound of the gain is printed
+// too: the time to project the building whole, divided by the time to project each room with its
+// own window. The density of lines is equal in both.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -43,8 +43,8 @@ inline void expectInvalid(rb_error found, const std::string& named) {
     expectFailure(found, RB_ERROR_INVALID_ARGUMENT, named);
 }
 
-// A test with a scene and a bake of coarse patches, which are released at the end. addFurnace() adds
-// a furnace whose exact exitance is 2 W/m^2.
+// A test with a scene and a bake of coarse patches, which are released at the end. addFurnace()
+// adds a furnace whose exact exitance is 2 W/m^2.
 class Api : public ::testing::Test {
   protected:
     void SetUp() override {

@@ -299,7 +299,7 @@ TEST(MeshSource, FillsTheHemisphereInsideOfItself) {
         for (bool isTurned : {false, true}) {
             Scene scene;
             place(scene, lamp.mesh, grey("lamp", 0.5f, 5, 5), isTurned ? kTurn : glm::dmat4(1));
-            // otherwise the emission inside is left out
+            // The back has the result; otherwise the emission inside is left out.
             scene.instances.back().side = RB_SIDE_BACK;
             // A large dark surface makes the emission bright enough to be a source.
             place(scene, rectangle("floor", {-5, -5, -2}, {10, 0, 0}, {0, 10, 0}), grey("", 0));

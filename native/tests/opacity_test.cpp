@@ -292,8 +292,8 @@ TEST(VaryingEmission, SidesOfOtherColoursAreShotInTheirColours) {
 }
 
 TEST(VaryingEmission, CornerColoursShineInBundles) {
-    // A closed box of reflectance 0.5 that emits 0.5 W/m^2 in the mean, varying over the corners. By
-    // reciprocity the mean light is that of uniform emission.
+    // A closed box of reflectance 0.5 that emits 0.5 W/m^2 in the mean, varying over the corners.
+    // By reciprocity the mean light is that of uniform emission.
     Scene scene;
     Mesh mesh = box("box", {0, 0, 0}, {1, 1, 1}, true);
     for (int32_t v : mesh.cornerVertices)

@@ -241,7 +241,7 @@ FurnaceError furnace(const Scene& scene, ProjectorKind projector, bool boxesStan
         if (boxesStand && cell.instance > 0 && cell.face == 0) continue;
         const std::vector<glm::vec3> light =
             cornerLight(bake, int32_t(cell.instance), RB_OUTPUT_LIGHTING);
-        // all cells are quads
+        // All cells are quads.
         const double cellArea = double(glm::length(glm::cross(cell.a, cell.b)));
         area += cellArea;
         for (int32_t corner : cell.corner) {

@@ -72,7 +72,7 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const Aims& these,
                               const std::function<Receiver(size_t)>& receiverAt, Seen& seen,
                               const std::function<void(double)>& progress, LightBySource* bySource,
                               std::vector<Sightings>* sightings) const {
-    // receivers between two calls of `progress`, which may cancel
+    // Receivers between two calls of `progress`, which may cancel.
     constexpr size_t kSlice = 1 << 14;
     const size_t count = these.receivers.size();
     for (size_t from = 0; from < count; from += kSlice) {

@@ -113,7 +113,7 @@ double metShare(const Patches& patches, const Visibility& visibility,
     // its step.
     std::mt19937_64 random(seed);
     uint32_t lit = 0, met = 0, path = 0;
-    // running sum, and start of the next path: power / kPaths
+    // Running sum over the sides, and start of the next path, in units of power / kPaths.
     double sum = 0, start = uniform(random);
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
         throwIfCancelledAt(side);

@@ -18,8 +18,8 @@ constexpr float kNormalExtent = 0.5f;
 constexpr float kPriorSamples = 2;
 // Weight of a sample of a neighbouring part, because visible regions are connected.
 constexpr float kBesideShare = 0.3f;
-// Least visible share of a part, relative to the mean of all parts. The largest sample weights are
-// its inverse.
+// Least visible share of a part, relative to the mean of all parts. It limits the largest weight of
+// a sample to 1 / kLeastSeen times the mean weight.
 constexpr float kLeastSeen = 0.1f;
 
 using Key = std::array<float, 6>;  // position and scaled normal

@@ -244,7 +244,7 @@ std::vector<float> DirectLight::unblockedWeights(const ReceiverPlace& place) con
 AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) const {
     AngleFactors factors{};
     if (!showsByAngle) return factors;
-    // bound for sides that show too little of the light for clean results
+    // Least shown share: below it a side shows too little of its light to look clean.
     constexpr float kLeastShown = 0.05f;
     const Parent& parent = patches.parentAt(side);
     const MaterialSide& surface =

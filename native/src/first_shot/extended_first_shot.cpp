@@ -58,8 +58,8 @@ uint64_t sourceLines(const FirstShotInput& input) {
     if (settings.minBundles != settings.maxBundles || !(input.linesPerBundle > 0)) return 0;
     const Patches& patches = input.patches;
     const double radius = double(patches.radius);
-    // Crofton: a line through the bounding sphere of radius R meets a surface of area A with the
-    // mean frequency A / (2 pi R^2).
+    // Crofton: a line through the bounding sphere of radius R meets a surface of area A on average
+    // A / (2 pi R^2) times.
     const double intersections = patches.totalArea / (2 * glm::pi<double>() * radius * radius);
     const double reflectance = sumOfChannels(meanReflectance(patches)) / 3;
     const double lines = localToGlobalRatio(intersections, reflectance, reflectance, 1) *
