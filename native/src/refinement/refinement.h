@@ -10,9 +10,9 @@
 // A cut pays if the squared error that it removes, relative to the squared light, is more than that
 // of kWorth targets. One tile of N is 1 / N of the area, and its cut adds 3 / N to the number of
 // patches. If a share c of the run time is proportional to the number of patches, bundles traced in
-// the same time would reduce the square of the noise, which is that of the target, by the factor 2
-// * kNoiseSlope (bundles/directions.h) * 3 * c of it. For c = 1/2 this is the square of 1.4
-// targets.
+// the time that the cut takes would reduce the square of the noise, which is that of the target, on
+// this area by 2 * kNoiseSlope (bundles/directions.h) * 3 * c times its value. For c = 1/2 this is
+// the square of 1.4 targets.
 //
 // Contacts are cut here only where the light of the sources shows them. Narrow gaps are cut
 // independently of the light (refinement/contacts.h).
