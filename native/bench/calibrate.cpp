@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Stated errors against true ones: bakes scenes with many seeds and targets and writes one line of
-// JSON per bake. Usage: see kUsage.
+// Compares stated errors with true errors: bakes scenes with many seeds and targets and writes one
+// line of JSON per bake. Usage: see kUsage.
 //
-// - True noise: the light per side of a tile against the mean over all seeds at the least target,
-//   which is as many times the bundles as there are seeds. A bake's own share in that mean is
-//   allowed for.
-// - True surface error: the light interpolated between the corners against that of patches with a
-//   third of the edge, at each of them. The reference is two bakes of independent bundles and
-//   shadow rays; the mean of the product of the two differences is the square of the error without
-//   the reference's own noise. Not where patches of some objects are much finer than those of
-//   others: a third of the largest edge would be no reference for them.
-// - True noise of an object: the light at its corners against the mean over all seeds at the same
-//   target, which has the same faults otherwise.
-// All by exposed area.
+// - True noise: the difference of the light per side of a tile from its mean over all seeds at the
+//   least target, which has as many times the bundles as there are seeds. The result is corrected
+//   for the share that the bake itself has in this mean.
+// - True surface error: the difference of the light interpolated between the corners from the light
+//   on patches with a third of the edge length, at each of these patches. The reference consists of
+//   two bakes with independent bundles and shadow rays. The mean product of the two differences is
+//   the square of the error without the noise of the reference. It is not computed if some objects
+//   have much finer patches than others, because a third of the largest edge would be no reference
+//   for these.
+// - True noise of an object: the difference of the light at its corners from the mean over all
+//   seeds at the same target, which has the same error apart from the noise.
+// All errors are weighted by exposed area.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -48,13 +49,14 @@ constexpr char kUsage[] =
   --out FILE          lines are appended to it (standard output)
 )";
 
-// Seeds that no bake has.
+// Seeds that no calibrated bake has.
 constexpr int kReferenceSeeds[2] = {1 << 29, 1 << 30};
-// The largest patches' edge over the finest ones', up to which there is a surface error.
+// The surface error is computed only if the largest patches' edge is at most this many times that
+// of the finest ones.
 constexpr float kMostSizes = 4;
-// Objects whose RMS light is less than this share of the brightest one's are black.
+// Objects whose RMS light is below this share of that of the brightest object count as black.
 constexpr double kBlack = 1e-4;
-// Relative standard error of the direct light of each half of the reference.
+// Relative standard error of the direct light in each half of the reference.
 constexpr float kReferenceShotError = 0.01f;
 
 struct Options {
@@ -95,7 +97,7 @@ Options parseOptions(const std::vector<std::string>& arguments) {
     return options;
 }
 
-// The baked side of a patch, or none if it has no result.
+// Returns the side of a patch that has a result, if there is one.
 std::optional<uint32_t> bakedSide(const Scene& scene, const Patches& patches, uint32_t patch) {
     const Instance& instance = scene.instances[patches.parents[patches.parentOf[patch]].instance];
     if (instance.role != RB_ROLE_BAKE) return std::nullopt;
@@ -115,8 +117,8 @@ struct Point {
     uint32_t instance = 0;
     std::array<int32_t, 4> corner{};
     std::array<float, 4> weights{};
-    double area = 0;  // exposed, m^2
-    std::array<glm::dvec3, 2> light;
+    double area = 0;                  // exposed, m^2
+    std::array<glm::dvec3, 2> light;  // irradiance of each half of the reference, W/m^2
 };
 
 std::vector<Point> reference(const Scene& scene, float patchSize, const Options& options) {
@@ -206,13 +208,13 @@ double noise(const SideLight& one, const std::vector<glm::dvec3>& mean) {
     return signal > 0 ? std::sqrt(squares / signal) : 0;
 }
 
-// What one object shows, at its corners.
+// The light that one object shows at its corners.
 struct CornerLight {
     std::vector<glm::dvec3> light;  // W/m^2
     std::vector<double> area;       // exposed, m^2
 };
 
-// Of each instance that is baked, by its number.
+// Returns the light of each baked instance, by index of the instance.
 std::vector<CornerLight> cornerLights(const Scene& scene, const Bake& bake) {
     const Patches& patches = bake.patches();
     std::vector<CornerLight> result(scene.instances.size());
@@ -236,8 +238,8 @@ std::vector<CornerLight> cornerLights(const Scene& scene, const Bake& bake) {
     return result;
 }
 
-// Notes in the rows of bakes of one target the stated and the true noise of each object. seen: per
-// bake and instance.
+// Adds the stated and the true noise of each object to the last rows, which are those of the bakes
+// of one target. `seen` is indexed by bake and instance.
 void compareObjects(const std::vector<std::vector<CornerLight>>& seen,
                     const std::vector<Json>& reports, std::vector<Json>& rows) {
     const double count = double(seen.size());

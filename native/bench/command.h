@@ -10,8 +10,8 @@
 
 namespace raybundle::bench {
 
-// The main function of a program with arguments: run(arguments) returns its exit code. Without
-// arguments, or with --help, the usage is printed; what run throws is, and the exit code is 2.
+// Runs the main function of a program with arguments. run(arguments) returns the exit code. Without
+// arguments, or with --help, prints the usage. If `run` throws, prints the message and returns 2.
 template <class Run>
 int runCommand(const char* name, const char* usage, int count, char** values, const Run& run) {
     try {
@@ -27,9 +27,9 @@ int runCommand(const char* name, const char* usage, int count, char** values, co
     }
 }
 
-// Reads arguments of the form `NAME ... --option VALUE ...`: calls takeName(name) for each name and
-// takeOption(option, value) for each option. Throws Error(INVALID_ARGUMENT) for one without a
-// value, and where takeOption returns false: it does not know the option.
+// Reads arguments of the form `NAME ... --option VALUE ...`. Calls takeName(name) for each name and
+// takeOption(option, value) for each option. Throws Error(INVALID_ARGUMENT) if an option has no
+// value, or if takeOption returns false because the option does not exist.
 template <class TakeName, class TakeOption>
 void readArguments(const std::vector<std::string>& arguments, const TakeName& takeName,
                    const TakeOption& takeOption) {

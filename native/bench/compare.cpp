@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Run time against error: bakes scenes with any set of method combinations and seeds, and writes
-// one line of JSON per bake. Usage: see kUsage.
+// Compares run time and error: bakes scenes with any set of method combinations and seeds, and
+// writes one line of JSON per bake. Usage: see kUsage.
 //
-// Errors are those of the light per patch side (patch_light.h) against a reference bake with the
-// same patches and many more bundles, so that they are the noise and the bias of the method and not
-// the discretisation. The reference is kept in the working folder.
+// The errors are those of the light per patch side (patch_light.h) relative to a reference bake
+// with the same patches and many more bundles. They are therefore the noise and the bias of the
+// method, without the discretisation. The reference is kept in the working folder.
 //
-// Each bake is a process of its own: the peak of its memory is its own, none starts with what
-// another one has warmed up, and one that fails stops no other.
+// Each bake runs in its own process. Its peak memory is then measured separately, no bake starts
+// with data or caches of another bake, and a bake that fails does not stop the others.
 #include <signal.h>
 #include <sys/wait.h>
 #include <tbb/info.h>
@@ -65,9 +65,9 @@ constexpr int kFailed = 3;  // exit code of a bake that threw
 
 struct Run {
     std::string label;
-    Json x;  // null: not given
+    Json x;  // null if not given
     Settings settings;
-    Json given = Json::object();  // the settings that were named, as they were written
+    Json given = Json::object();  // the named settings, as they were written
 };
 
 struct Options {
@@ -180,7 +180,7 @@ Options parseOptions(const std::vector<std::string>& arguments) {
 // ------------------------------------------------------------------------------------------------
 
 struct Outcome {
-    Json result;  // null: failed
+    Json result;  // null if the bake failed
     std::string failure;
 };
 
@@ -199,7 +199,7 @@ void writeAll(int file, const std::string& text) {
     }
 }
 
-// Runs `work` in a child process, for `limit` seconds at most. The caller must not have started
+// Runs `work` in a child process, for at most `limit` seconds. The caller must not have started
 // threads.
 Outcome inProcessOfItsOwn(unsigned limit, const std::function<Json()>& work) {
     int ends[2];
@@ -251,11 +251,12 @@ std::string contents(const fs::path& path) {
 
 struct BenchScene {
     std::string name;
-    std::string text;  // of the file
+    std::string text;  // text of the file
     Scene scene;
 };
 
-// The path of the reference of this scene with the run's patches, made if it is missing.
+// Returns the path of the reference of this scene with the patches of `run`. Makes the reference if
+// it does not exist.
 std::string reference(const BenchScene& scene, const Settings& run, const Options& options) {
     std::ostringstream key;
     key << scene.text << '\n'
@@ -322,7 +323,7 @@ Json bakeAndCompare(const BenchScene& scene, const Run& run, int seed, const Opt
             {"skipped", report.at("skipped")}};
 }
 
-// Returns whether all went well.
+// Returns whether all bakes succeeded.
 bool compareAll(const Options& options) {
     fs::create_directories(options.work);
     std::ofstream file;
@@ -335,7 +336,7 @@ bool compareAll(const Options& options) {
     std::vector<BenchScene> scenes;
     for (const std::string& path : options.scenes)
         scenes.push_back({fs::path(path).stem().string(), contents(path), readScene(path)});
-    std::set<std::pair<size_t, size_t>> failed;  // scene and run
+    std::set<std::pair<size_t, size_t>> failed;  // pairs of scene and run
     for (int seed = 1; seed <= options.seeds; ++seed)
         for (size_t s = 0; s < scenes.size(); ++s)
             for (size_t r = 0; r < options.runs.size(); ++r) {

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every figure of the comparison of methods: what is baked, and what is drawn of it.
+"""The figures that compare methods: which bakes each one needs, and what it draws of them.
 
-A run is a line of settings for `compare`; runs with the same label are one curve. To add a figure,
+A run is a line of settings for `compare`. Runs with the same label form one curve. To add a figure,
 add a row to FIGURES.
 """
 
@@ -11,14 +11,14 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-# As many patches as in the office of the thesis (3818), and the same for all methods: only LINE_REUSE
-# would cut those beside narrow gaps.
+# About as many patches as the office of the thesis (3818), equal for all methods: without
+# contacts=0 only LINE_REUSE would cut patches beside narrow gaps.
 PATCHES = "max_patches=4000 contacts=0"
-# Lines of a bundle in the thesis.
+# Lines per bundle in the thesis.
 LINES = 10_000
 SHARED = f"{PATCHES} lines_per_bundle={LINES}"
 
-# Name of each exported scene -> .blend, and collections to show and to hide.
+# Name of each exported scene -> name of its .blend file, collections to show, collections to hide.
 SCENES: dict[str, tuple[str, list[str], list[str]]] = {
     'cornell_box': ('cornell_box', [], []),
     'office_down': ('office', ['lamps_down'], ['lamps_up']),
@@ -40,7 +40,7 @@ ALL, UNLIT, INDIRECT = 'error', 'error_unlit', 'error_indirect'
 
 @dataclass(frozen=True)
 class Panel:
-    """One diagram per scene: y against x, both keys of AXES in plot.py."""
+    """A diagram for each scene: y over x, both keys of AXES in plot.py."""
 
     x: str
     y: str
@@ -48,15 +48,15 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    name: str  # of the picture and of the results
+    name: str  # file name of the picture and of the results
     title: str
-    claim: str  # of the thesis, for the summary
+    claim: str  # what the thesis claims, for the summary
     scenes: tuple[str, ...]
     runs: list[str]
     panels: tuple[Panel, ...]
     seeds: int = 3
-    error: str = ALL  # which error is drawn
-    draws_table: bool = False  # speed-up instead of diagrams
+    error: str = ALL  # key of the error that is drawn
+    draws_table: bool = False  # a table of speed-ups instead of diagrams
 
 
 def run(label: str, settings: str, **values: object) -> str:
@@ -82,13 +82,16 @@ REUSE = "solver=LINE_REUSE"
 # --------------------------------------------------------------------------------------------------
 
 TOTAL_LINES = (50_000, 100_000, 200_000, 400_000, 800_000)
-# The mean reflectance of the thesis' scene; ours have about the same.
+# Mean reflectance of the thesis' scene. The scenes here have about the same.
 MEAN_REFLECTANCE = 0.577
 
 
 def first_shots(ratio: float, share_of_lamps: float) -> list[str]:
-    """Equal numbers of local and global lines in all. ratio: eq. 3.1 for the plain first shot;
-    share_of_lamps: of the local lines of EXTENDED, those that start at the lamps, as measured."""
+    """Runs in which the sum of local and global lines is equal for all methods.
+
+    ratio: local lines over global lines by eq. 3.1, for the plain first shot.
+    share_of_lamps: measured share of the local lines of EXTENDED that start at the lamps.
+    """
     runs = []
     for total in TOTAL_LINES:
         for label, kind, local_per_global, share in (
@@ -100,8 +103,8 @@ def first_shots(ratio: float, share_of_lamps: float) -> list[str]:
             runs.append(run(label, f"{PATCHES} {MULTIPATH}", first_shot=kind, lines_per_bundle=1,
                             local_rays=round(share * local), min_bundles=lines, max_bundles=lines,
                             x=total))
-        # Paths from the lamps: the first line by SHOOT, the others by the walk. A path has
-        # 1 / (1 - R) lines, and the share R of the first ones go on.
+        # Paths from the lamps: SHOOT makes the first line, the walk the others. A path has 1 / (1 -
+        # R) lines, and the share R of the first lines continues.
         first = total * (1.0 - MEAN_REFLECTANCE)
         walks = even(first * MEAN_REFLECTANCE / 1000)
         runs.append(run("local_walk", f"{PATCHES} {WALK}", first_shot='SHOOT',
@@ -225,11 +228,13 @@ def all_methods() -> list[str]:
             ("multipath,plane", f"{MULTIPATH} projector=PLANE"),
             ("multipath,planes", f"{MULTIPATH} projector=PLANES"),
             ("stochastic_iteration", ITERATION)):
-        # LINE_REUSE would come too near to the reference with more; Newell's tests take long.
+        # With more bundles LINE_REUSE would come too close to the reference. Newell's tests are
+        # slow.
         most = 512 if "NEWELL" in settings else 1024 if "LINE_REUSE" in settings else 4096
         runs += over_bundles(label, f"{PATCHES} {settings}", [n for n in counts if n <= most])
     for n in counts[:4]:
-        # A shot from the lamps grows with the bundles, so that neither is the whole error.
+        # The number of rays from the lamps grows with that of the bundles, so that neither
+        # dominates the error.
         for label, kind in (("first_shot+multipath", 'SHOOT'), ("extended+multipath", 'EXTENDED')):
             runs.append(run(label, f"{PATCHES} {MULTIPATH}", first_shot=kind,
                             local_rays=4_000 * n, min_bundles=n, max_bundles=n))

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Prints the error of each estimator of a form factor over the number of lines, as lines of JSON:
-// the relative RMS error over some seeds against the closed form, for two unit squares that face
-// each other at distance 1, and for two with a common edge.
+// Prints the error of each estimator of a form factor over the number of lines, as lines of JSON.
+// The error is the relative RMS difference from the closed form, over several seeds. The two scenes
+// are two unit squares that face each other at a distance of 1, and two unit squares with a common
+// edge.
 //
 //   form_factor_bench [SEEDS]
 #include <chrono>

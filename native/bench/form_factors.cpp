@@ -12,13 +12,13 @@
 namespace raybundle {
 namespace {
 
-// Visits the surfaces along a line from outside the scene: the sides that face each other across
-// each gap, kNone for the outside.
+// Calls visit(s, t) for each gap along a line that starts outside the scene: s and t are the sides
+// that face each other across the gap, or kNone for the outside.
 constexpr uint32_t kNone = UINT32_MAX;
 template <class Visit>
 void walkLine(const FormFactor& f, glm::vec3 point, const glm::vec3& direction,
               const Visit& visit) {
-    std::vector<uint32_t> passed;  // a line meets each plane once; at an edge rays may turn round
+    std::vector<uint32_t> passed;  // parents met so far; at an edge a ray may turn back
     float distance = 0;
     uint32_t before = kNone;
     auto met = f.visibility.firstHit(point, direction, &distance);

@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The inner loops of a bake, one by one, so that a change can be judged in a minute.
+// Measures the inner loops of a bake one by one, so that a change can be judged within a minute.
 // Usage: micro SCENE.json [options of Google Benchmark] [--threads N]
 // The script of the same name exports a scene first.
 //
-// On one thread, or with --threads N where the work is parallel inside (Merge, Solve, ...).
-//   Project           a bundle, of the default pixels; lines and fragments per second
-//   Project10k        a bundle of 100 x 100 lines over 20 000 patches, as in the thesis
-//   Merge             128 bundles into the counts that 128 made
-//   Solve             both halves of 256 bundles, to a tenth of the default target
-//   ShadowRays        from patches to a point light in the middle of the scene
-//   ClosestHits       cosine-distributed rays from patches
-//   FirstShotGather   at the default target
-//   LeastSquares      of all objects, one field
+// The loops run on one thread, or with --threads N on N threads where they are parallel (Merge,
+// Solve, ...).
+//   Project           projects a bundle with the default pixels; reports lines and fragments per
+//                     second
+//   Project10k        projects a bundle of 100 x 100 lines over 20 000 patches, as in the thesis
+//   Merge             adds 128 bundles to the line counts of 128 other bundles
+//   Solve             solves both halves of 256 bundles, to a tenth of the default target
+//   ShadowRays        casts rays from patches to a point light at the centre of the scene
+//   ClosestHits       casts cosine-distributed rays from patches
+//   FirstShotGather   runs the first shot at the default target
+//   LeastSquares      reconstructs one field of light on all objects
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
@@ -41,11 +43,11 @@
 namespace raybundle::bench {
 namespace {
 
-constexpr float kPixelsPerPatch = 2;  // as in bake.cpp
+constexpr float kPixelsPerPatch = 2;  // as in bake/trace.cpp
 constexpr uint32_t kTraced = 256, kMerged = 128;
-constexpr uint32_t kRays = 1024;  // from the table of Sobol points
+constexpr uint32_t kRays = 1024;  // number of precomputed Sobol points
 
-// A scene ready to be traced.
+// A scene prepared for tracing.
 struct Subject {
     explicit Subject(const std::string& path)
         : scene(readScene(path)),
@@ -98,7 +100,7 @@ BENCHMARK(Project)->Unit(benchmark::kMicrosecond);
 void Project10k(benchmark::State& state) {
     const float size = float(std::sqrt(subject->patches.totalArea / 20000));
     const Patches patches = subdivide(subject->scene, size, 1 << 20);
-    // The disc of the bounding sphere has 10 000 pixels.
+    // The disk of the bounding sphere has 10 000 pixels.
     project(state, patches, patches.radius * std::sqrt(3.14159265f / 10000));
     state.counters["patches"] = double(patches.count());
 }
@@ -140,7 +142,7 @@ void Solve(benchmark::State& state) {
             benchmark::DoNotOptimize(
                 lines.solve(half, 0.1f * subject->settings.targetError, reflected));
         }
-    // A pair may be kept more than once.
+    // The rows may hold a pair more than once.
     size_t pairs = 0;
     for (uint32_t i = 0; i < counts.sideCount(); ++i) pairs += counts.row(i).size();
     pairs /= 2;
@@ -163,7 +165,7 @@ void shootRays(benchmark::State& state, const Ray& ray) {
 
 void ShadowRays(benchmark::State& state) {
     shootRays(state, [](uint32_t side, const glm::vec3& point, const glm::vec4&) {
-        const glm::vec3 to = -point;  // the middle
+        const glm::vec3 to = -point;  // towards the centre of the scene
         const float distance = std::max(glm::length(to), 1e-6f);
         return subject->visibility.visibleShare(side, {point, to / distance, distance});
     });

@@ -23,26 +23,29 @@ namespace {
 constexpr float kUnlit = 0.01f;
 constexpr char kMagic[8] = {'r', 'b', 'l', 'i', 'g', 'h', 't', '1'};
 
-// Of the reference: samples per side and source where it is partly visible, of which an eighth
-// tells whether it is (as many as there are bundles, at most this); points of closed forms; and a
-// seed that no run has.
+// Settings of the reference. kMostSamples: samples per side and source if the source is partly
+// visible; an eighth of them decides whether it is. Their number is that of the bundles, but at
+// most this. kClosedSamples: points at which closed forms are evaluated.
 constexpr uint32_t kMostSamples = 8192, kClosedSamples = 256;
-// A surface no further away than this share of a patch lies against it.
+// A surface no further away than this share of the patch size lies against a patch.
 constexpr float kTouchOfPatch = 1e-3f;
+// A seed that no compared bake has.
 constexpr int kReferenceSeed = 1 << 30;
-// The GATHER of the reference bake, whose noise enters the indirect light alone.
+// Target error of the first shot GATHER of the reference bake. Its noise affects only the indirect
+// light.
 constexpr float kReferenceShotError = 0.002f;
 
 float sum(const glm::vec3& v) { return v.x + v.y + v.z; }
 
-// Whether the light of a side is a result.
+// Returns whether the light of a side is part of a result.
 bool isBaked(const Scene& scene, const Patches& patches, size_t side) {
     const Instance& instance =
         scene.instances[patches.parents[patches.parentOf[side / 2]].instance];
     return instance.role == RB_ROLE_BAKE && side % 2 == size_t(instance.side);
 }
 
-// Mean irradiance of a side from a source. A share below eight in `samples` may be overlooked.
+// Returns the mean irradiance of a side from a source, W/m^2. A visible or hidden part smaller than
+// 8 / `samples` may be missed.
 glm::dvec3 sampledIrradiance(const LightSource& source, const Patches& patches,
                              const Visibility& visibility, uint32_t side, uint32_t seed,
                              uint32_t samples) {
@@ -63,7 +66,7 @@ glm::dvec3 sampledIrradiance(const LightSource& source, const Patches& patches,
     }
     mean /= double(k);
     if (open == 0 || blocked > 0) return mean;
-    // Wholly visible: the closed form, if there is one, has no noise.
+    // The source is fully visible. Its closed form, if there is one, has no noise.
     glm::dvec3 closedMean(0.0);
     for (k = 0; k < kClosedSamples; ++k) {
         const glm::vec4 u = sobolPoint(k, seed);
@@ -74,7 +77,7 @@ glm::dvec3 sampledIrradiance(const LightSource& source, const Patches& patches,
     return closedMean / double(kClosedSamples);
 }
 
-// The share of a side that no other surface lies against.
+// Returns the share of a side against which no other surface lies.
 float exposedShare(const Patches& patches, const Visibility& visibility, uint32_t side) {
     const float touching = kTouchOfPatch * patches.size;
     uint32_t open = 0;
@@ -128,7 +131,7 @@ PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles)
     bake.run(scene);
     PatchLight light = patchLight(scene, bake);
 
-    // Replace the gathered part of the direct light.
+    // Replace the gathered part of the direct light by finer samples.
     const Patches& patches = bake.patches();
     const Visibility visibility(patches);
     const DirectLight directLight(scene, patches, visibility, uint32_t(kReferenceSeed));
@@ -144,7 +147,7 @@ PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles)
             gathered +=
                 sampledIrradiance(*sources[k], patches, visibility, side,
                                   hash(uint32_t(kReferenceSeed), hash(side, uint32_t(k))), samples);
-        // All light comes in through the exposed part.
+        // All light arrives through the exposed part of the side.
         light.exposed[i] = exposedShare(patches, visibility, side);
         const double concentrated = light.exposed[i] > 0 ? 1 / double(light.exposed[i]) : 0;
         light.direct[i] +=
@@ -170,7 +173,7 @@ LightError lightError(const PatchLight& light, const PatchLight& reference, Part
     const double darkest = double(kUnlit) * mean / area;
 
     LightError error;
-    std::vector<std::pair<double, double>> differences;  // squared, and area
+    std::vector<std::pair<double, double>> differences;  // squared difference, and area
     double squares = 0, signal = 0, found = 0, wanted = 0;
     for (size_t i = 0; i < n; ++i) {
         if (part == Part::UNLIT && double(sum(reference.direct[i])) > darkest) continue;
@@ -202,7 +205,8 @@ LightError lightError(const PatchLight& light, const PatchLight& reference, Part
 }
 
 void writePatchLight(const std::string& path, const PatchLight& light) {
-    // Whoever is interrupted leaves no half file under the name.
+    // Write to another name first, so that an interruption leaves no incomplete file under the
+    // final name.
     const std::string partial = path + ".partial";
     {
         std::ofstream file(partial, std::ios::binary);

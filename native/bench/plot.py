@@ -3,9 +3,10 @@
 
     /usr/bin/python3 native/bench/plot.py RESULTS_FOLDER [--images docs/images] [--only FIGURE ...]
 
-RESULTS_FOLDER has NAME.jsonl for each figure of figure_table.py; missing ones are left out. The
-pictures are IMAGES/NAME.svg, the tables RESULTS_FOLDER/summary.md. A point is all seeds of a run:
-errors as root mean squares, times as medians; bars go from the least to the largest.
+RESULTS_FOLDER holds NAME.jsonl for each figure of figure_table.py; figures without one are left
+out. The pictures are written to IMAGES/NAME.svg, the tables to RESULTS_FOLDER/summary.md. A point
+combines all seeds of a run: the root mean square of the errors and the median of the times. Bars
+extend from the least to the largest value.
 """
 
 from __future__ import annotations
@@ -36,15 +37,15 @@ STYLE = {
 COLORS = pyplot.get_cmap('tab10').colors
 MARKERS = "osD^vPX*<>"
 LINE_STYLES = ('-', '--')
-# Pixels per mean patch that lines_per_bundle 0 aims at (native/src/bake/bake.cpp).
+# Pixels per mean patch that lines_per_bundle = 0 aims at (native/src/bake/trace.cpp).
 AUTOMATIC_PIXELS = 2.0
-# Noise for which the time is read from the curves.
+# Noise levels for which the time is read from the curves.
 NOISES_OF_INTEREST = (0.05, 0.02, 0.01)
 
 
 @dataclass(frozen=True)
 class Point:
-    """One run on one scene, over all its seeds."""
+    """All seeds of one run on one scene."""
 
     rows: list[dict]
     error: str
@@ -70,7 +71,7 @@ def _pixel_per_patch(point: Point) -> float:
     return np.pi * row['scene_radius'] ** 2 / lines / row['patch_area']
 
 
-# Label, value of a point, and whether the scale is logarithmic.
+# Key of an axis -> its label, the value of a point, and whether its scale is logarithmic.
 AXES: dict[str, tuple[str, Callable[[Point], float], bool]] = {
     'x': ("local and global lines in all", lambda p: p.rows[0]['x'], True),
     'planes': ("planes per direction", lambda p: p.rows[0]['x'], True),
@@ -86,11 +87,11 @@ AXES: dict[str, tuple[str, Callable[[Point], float], bool]] = {
 ERROR_NAMES = {'error': "all light", 'error_indirect': "indirect light",
                'error_unlit': "all light, on sides without direct light"}
 
-Curves = dict[str, list[Point]]  # by label
+Curves = dict[str, list[Point]]  # points by label of the curve
 
 
 def read_curves(path: Path, error: str) -> dict[str, Curves]:
-    """By scene, curves and points in the order of the file."""
+    """Returns the curves of each scene, with curves and points in the order of the file."""
     groups: dict[tuple[str, str, str], list[dict]] = {}
     for line in path.read_text().splitlines():
         row = json.loads(line)
@@ -129,7 +130,7 @@ def draw(results: Path, images: Path, names: Sequence[str]) -> None:
 
 def draw_figure(figure: Figure, scenes: dict[str, Curves], path: Path) -> None:
     places = [(scene, panel) for scene in scenes for panel in figure.panels]
-    # A row per scene, unless there is but one diagram of each. The legend has a place of its own.
+    # One row per scene, unless there is only one diagram per scene. The legend has its own place.
     columns = len(figure.panels) if len(figure.panels) > 1 else min(3, len(places))
     rows = -(-len(places) // columns)
     beside = len(places) == rows * columns
@@ -184,7 +185,7 @@ def draw_panel(axis: Axes, panel, curves: Curves, styles: dict[str, dict]) -> No
 
 
 def plain_ticks(scale) -> None:
-    """1 2 5 10 20 50 ... instead of powers of ten, unless there are many decades."""
+    """Sets the ticks 1 2 5 10 20 50 ... instead of powers of ten, unless there are many decades."""
     low, high = scale.get_view_interval()
     if np.log10(high / low) > 3.5:
         return
@@ -233,7 +234,10 @@ def figure_table(figure: Figure, scenes: dict[str, Curves]) -> Iterator[str]:
 
 
 def time_to(noise: float, points: list[Point]) -> str:
-    """Interpolated in the logarithms; no extrapolation."""
+    """Returns the time at which a curve reaches a noise, interpolated in the logarithms.
+
+    Outside the curve the result is a bound; nothing is extrapolated.
+    """
     points = sorted(points, key=lambda p: p.seconds)
     if points[0].noise <= noise:
         return f"< {points[0].seconds:.2g}"
@@ -245,7 +249,7 @@ def time_to(noise: float, points: list[Point]) -> str:
 
 
 def speed_up_table(scenes: dict[str, Curves]) -> Iterator[str]:
-    """Speed-up and efficiency of bundles and of the first shot, against one thread."""
+    """Yields tables of speed-up and efficiency, relative to one thread, for each stage."""
     stages = {"first shot": lambda row: row['seconds']['first_shot'],
               "bundles": lambda row: row['seconds']['bundles'],
               "whole": lambda row: row['seconds']['total']}

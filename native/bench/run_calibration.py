@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs `calibrate` on all scenes, draws stated against true errors and prints their coverage; see
-`calibration`.
+"""Runs `calibrate` on all scenes, draws true over stated errors and prints how many are covered.
+
+The script `calibration` builds what is needed and calls this one.
 
     /usr/bin/python3 native/bench/run_calibration.py [OUT_FOLDER] [--draw]
 
---draw: only draws the results that OUT_FOLDER has.
+--draw: only draws the results that are in OUT_FOLDER.
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ from plot import COLORS, MARKERS, STYLE, plain_ticks  # noqa: E402
 from run_figures import ROOT, export  # noqa: E402
 
 CALIBRATE = ROOT / "build/release/native/bench/calibrate"
-# Of blend_tests/lamp_rooms.py: props under a box that shines, a sky in the window, a screen.
+# Rooms of blend_tests/lamp_rooms.py: objects under a luminous box, a sky in the window, a screen.
 ROOMS = ("room_box", "room_sky", "room_screen")
-# A bake is covered if its true error is at most so many times the stated one.
+# A bake is covered if its true error is at most this many times the stated error.
 COVERING = 1.25
-# Errors below are nothing, as in a furnace: not drawn, and covered.
+# Smaller errors count as none, as in a furnace: they are not drawn and count as covered.
 NOTHING = 1e-5
-# Of each half of the reference, where the default's noise is not small beside what is compared: of the
-# lines between the two squares there are few.
+# Bundles of each half of the reference, for scenes where the noise of the default number is not
+# small compared with the measured error: few lines pass between the two squares.
 REFERENCE_BUNDLES = {'facing_squares': 20000}
-# Title of each diagram -> the stated and the true error that it compares.
+# Title of each diagram -> keys of the stated and the true error that it compares.
 KINDS = {
     "noise of the light on patches": ('patches', 'noise'),
     "surface error, all parts": ('total', 'surface'),
@@ -58,7 +59,7 @@ def calibrate(names: list[str], seeds: int, folder: Path) -> None:
 
 
 def errors(rows: list[dict], kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) stated and (n,) true errors, relative, of the bakes whose true error was found."""
+    """Returns (n,) stated and (n,) true relative errors of the bakes whose true error is known."""
     stated, true = KINDS[kind]
     rows = [row for row in rows if true in row['true']]
     return (np.array([row['stated'][stated] for row in rows]),
@@ -70,7 +71,7 @@ def is_covered(stated: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def covered_objects(objects: list[dict]) -> str:
-    """The share of objects, each in each bake, whose stated noise covers their true one."""
+    """Returns the share of objects, over all bakes, whose stated noise covers the true noise."""
     stated, true = (np.array([entry[key] for entry in objects]) for key in ('stated', 'true'))
     covered = is_covered(stated, true)
     return f"{100 * covered.mean():.1f} % of {len(covered)}" if len(covered) else ""
@@ -109,7 +110,7 @@ def draw(rows: list[dict], path: Path) -> None:
 
 
 def print_table(rows: list[dict]) -> None:
-    """Markdown: means over the seeds in per cent, and the share of bakes that are covered."""
+    """Prints a Markdown table: means over the seeds in per cent, and how many bakes are covered."""
     print("| scene | target | noise: stated, true | covered | discretisation | mesh "
           "| surface: stated, true | covered | noise of objects: covered |")
     print("|---|---|---|---|---|---|---|---|---|")

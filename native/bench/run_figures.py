@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exports the scenes, runs the comparisons of figure_table.py and draws them; see `figures`."""
+"""Exports the scenes, runs the comparisons of figure_table.py and draws them. See `figures`."""
 
 from __future__ import annotations
 
@@ -18,14 +18,17 @@ from plot import draw  # noqa: E402
 ROOT = Path(__file__).parent.parent.parent
 COMPARE = ROOT / "build/release/native/bench/compare"
 EXPORT = ROOT / "blend_tests/export_scene.py"
-# At least 10 times the bundles of any run that is nearly as good.
+# At least 10 times the bundles of any run whose error is close to that of the reference.
 REFERENCE_BUNDLES = 8192
 SMOKE_REFERENCE_BUNDLES = 64
 SECONDS_PER_BAKE = 60
 
 
 def export(name: str, folder: Path) -> Path:
-    """The scene, or room_NAME of lamp_rooms.py, as JSON, made again if its file is newer."""
+    """Exports a scene, or the room `room_NAME` of lamp_rooms.py, as JSON and returns the path.
+
+    Does nothing if the JSON file is newer than its source.
+    """
     target = folder / f"{name}.json"
     if name in SCENES:
         blend, show, hide = SCENES[name]
@@ -49,7 +52,7 @@ def first_of_each_curve(runs: list[str]) -> list[str]:
 
 
 def compare(figure: Figure, folder: Path, is_smoke: bool) -> bool:
-    """Writes FOLDER/NAME.jsonl; returns whether every run went well."""
+    """Writes FOLDER/NAME.jsonl. Returns whether every run succeeded."""
     runs, results = folder / f"{figure.name}.runs", folder / f"{figure.name}.jsonl"
     lines = first_of_each_curve(figure.runs) if is_smoke else figure.runs
     runs.write_text("\n".join(lines) + "\n")

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// A vector of the GLM type V from its components, starting at `first`.
+// Returns a vector of the GLM type V from consecutive components that start at index `first`.
 template <class V>
 V vectorAt(const Json& values, size_t first = 0) {
     V v;
@@ -48,7 +48,7 @@ SurfaceColor color(const Json& item) {
             vectorAt<glm::vec3>(item.at("corner_color_weight"))};
 }
 
-// Matt: what else a side has is not read.
+// Reads a matt side. Gloss and all other members of the side are ignored.
 MaterialSide side(const Json& item) {
     MaterialSide made;
     made.reflectance = color(item.at("reflectance"));

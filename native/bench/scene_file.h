@@ -7,8 +7,8 @@
 
 namespace raybundle::bench {
 
-// Reads a scene that blend_tests/export_scene.py wrote. Throws Error, or nlohmann's exceptions for
-// text that is not such a scene.
+// Reads a scene that blend_tests/export_scene.py has written. Throws Error, or an exception of
+// nlohmann JSON if the text is not a scene.
 Scene readScene(const std::string& path);
 
 }  // namespace raybundle::bench

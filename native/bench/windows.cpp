@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What windows of their own for rooms, and culling to them, could gain where a scene has many
-// rooms. Usage: windows [--rooms N] [--bundles N] [SCENE.json ...]
+// Measures how much time separate windows for rooms, and culling to these windows, could save in a
+// scene of many rooms. Usage: windows [--rooms N] [--bundles N] [SCENE.json ...]
 //
 // Source of the question: thesis section 7.3.2 (a hierarchy of subscenes bounded by boxes, 4 times
-// faster for single global lines). All on one thread, with the default patches and pixels. Printed
-// per scene:
-//   pixels        of a bundle's window; how many of them no fragment meets
-//   lines         fragments per pixel that any meets
-//   empty pixels  share of the time to project a bundle that goes into passing over them
-//   vertices      share that goes into turning all vertices to the bundle
-//   missed        share that goes into parents that meet no pixel centre; how many they are
-// For a building of N x N closed rooms (6) also the bound of the gain: the time to project it whole
-// over that to project each room with a window of its own. The lines are as dense in both.
+// faster for single global lines). Everything runs on one thread, with the default patches and
+// pixels. Printed per scene:
+//   pixels        of a bundle's window, and the share that no fragment meets
+//   fragments     on each of the other pixels
+//   empty pixels  share of the projection time that is spent on pixels without fragments
+//   vertices      share that is spent on rotating all vertices to the bundle
+//   missed        share that is spent on parents that meet no pixel centre, and the share of these
+//                 parents
+// For a building of N x N closed rooms (N = 6 by default) an upper bound of the gain is printed
+// too: the time to project the building whole, divided by the time to project each room with its
+// own window. The density of lines is equal in both.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -33,12 +35,12 @@
 namespace raybundle::bench {
 namespace {
 
-constexpr float kPixelsPerPatch = 2;  // as in bake.cpp
+constexpr float kPixelsPerPatch = 2;  // as in bake/trace.cpp
 constexpr int kRepeats = 7;           // the least time counts
 constexpr glm::vec3 kRoom{5, 4, 2.8f};
-constexpr float kWall = 0.2f;  // thickness between two rooms, metres
+constexpr float kWall = 0.2f;  // thickness between two rooms, m
 
-// The least time of each kind of work, all taken in turns.
+// Returns the least time of each kind of work, s. The kinds are run in turns.
 std::vector<double> seconds(const std::vector<std::function<void()>>& kinds) {
     using Clock = std::chrono::steady_clock;
     std::vector<double> least(kinds.size(), std::numeric_limits<double>::max());
@@ -82,7 +84,7 @@ void addBox(Scene& scene, const glm::vec3& low, const glm::vec3& high, bool inwa
     scene.addInstance(std::move(instance));
 }
 
-// A table of five boxes, a cupboard and a shelf with eight books.
+// Adds a closed room with a table of five boxes, a cupboard and a shelf with eight books.
 void addRoom(Scene& scene, int column, int row) {
     const glm::vec3 at(float(column) * (kRoom.x + kWall), float(row) * (kRoom.y + kWall), 0);
     addBox(scene, at, at + kRoom, true);
@@ -103,7 +105,7 @@ void addRoom(Scene& scene, int column, int row) {
 // Measurements
 // ------------------------------------------------------------------------------------------------
 
-// One projector per window, all with the same pixels.
+// One projector per window. All have the same pixel size.
 class Windows {
   public:
     Windows(const std::vector<Patches>& parts, float pixel) {
@@ -125,7 +127,8 @@ class Windows {
     BundleLines lines;
 };
 
-// What FragmentLists does for each pixel whether or not a fragment meets it.
+// Returns the time of the work that FragmentLists does per pixel whether or not a fragment meets
+// it, s.
 double secondsToPassPixels(size_t pixels) {
     std::vector<uint32_t> begin;
     volatile size_t lists = 0;
@@ -193,7 +196,7 @@ void measureBuilding(int rooms, uint32_t bundleCount) {
     Scene building;
     for (int row = 0; row < rooms; ++row)
         for (int column = 0; column < rooms; ++column) addRoom(building, column, row);
-    // The patches that a room on its own would have: in both the same.
+    // Both use the patch size that a single room would have.
     Scene single;
     addRoom(single, 0, 0);
     const float patchSize = subdivide(single, 0, 100000).size;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The whole interface on one page: bake a closed box that emits and reflects alike everywhere, a furnace.
- * Its exact answer is the same exitance everywhere, B = E / (1 - rho), which the program checks.
- * It is also the test that the header is C99. */
+ * The C interface on one page: a program that bakes a closed box whose walls all have the same
+ * emission and the same reflectance, a so-called furnace. The exact exitance is B = E / (1 - rho)
+ * everywhere, and the program compares its result with it. The tests also compile this file to
+ * check that the header is valid C99. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@
 
 static const double kPi = 3.14159265358979323846;
 
-/* Stop at the first failure and say why. */
+/* Prints the message of the library and exits if a call failed. */
 static void check(rb_error error) {
     if (error != RB_ERROR_NONE) {
         fprintf(stderr, "error %d: %s\n", (int)error, rb_get_error_message());
@@ -21,7 +22,7 @@ static void check(rb_error error) {
 static bool showProgress(void* user, rb_stage stage, double fraction) {
     (void)user;
     if (fraction == 1) printf("stage %d done\n", (int)stage);
-    return true; /* go on */
+    return true; /* continue the bake */
 }
 
 int main(void) {
@@ -33,7 +34,7 @@ int main(void) {
     static const int32_t faces[7] = {0, 4, 8, 12, 16, 20, 24};
     static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-    /* The walls: of reflectance 0.5 on both sides, and inside of emission 1 W/m^2. */
+    /* The walls have reflectance 0.5 on both sides and emit 1 W/m^2 on the inside. */
     rb_surface inside, outside;
     check(rb_init_surface(&outside, sizeof outside));
     for (int c = 0; c < 3; ++c) outside.reflectance.constant[c] = 0.5f;
@@ -50,7 +51,7 @@ int main(void) {
     check(rb_add_mesh(scene, "box", vertices, 8, corners, 24, faces, 6, materials, &mesh));
     check(rb_add_instance(scene, mesh, "box", identity, RB_ROLE_BAKE, RB_SIDE_FRONT, &instance));
 
-    /* Bake it. */
+    /* Bake the scene. */
     rb_bake bake;
     check(rb_new_bake(&bake));
     check(rb_set_bake_float(bake, "target_error", 0.01f));

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The C border under arbitrary calls: bytes become calls with arbitrary numbers, ids, enums, counts
-// and settings, and a small bake. Nothing may crash, hang, leak or give a number that is not
-// finite; every refusal has a message. A libFuzzer target; native/fuzz/replay.cpp runs saved inputs
-// without it.
+// Fuzz target that makes arbitrary calls of the C interface: the input bytes select calls with
+// arbitrary numbers, ids, enum values, counts and settings, and a small bake. No call may crash,
+// hang, leak or return a number that is not finite, and every failure must have a message. This is
+// a target of libFuzzer; native/fuzz/replay.cpp runs saved inputs without libFuzzer.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -20,7 +20,8 @@ namespace {
 
 using namespace raybundle::test;
 
-// Reads the input from its front; past its end everything is 0, so that each prefix is an input.
+// Reads the input from front to end. After the end every byte is 0, so that each prefix is a valid
+// input.
 class Bytes {
   public:
     Bytes(const uint8_t* data, size_t size) : at(data), end(data + size) {}
@@ -34,12 +35,13 @@ class Bytes {
         for (int k = 0; k < 4; ++k) value = int32_t(uint32_t(value) << 8 | byte());
         return value;
     }
-    // An id or an enum: mostly small, sometimes anything.
+    // Returns an id or an enum value: mostly small, sometimes any integer.
     int32_t small() {
         const uint8_t first = byte();
         return first < 240 ? first % 4 : first < 248 ? -1 : integer();
     }
-    // Mostly of the size of rooms, sometimes anything: huge, tiny, negative, infinite, no number.
+    // Returns mostly a number in the range of rooms, sometimes any float: huge, tiny, negative,
+    // infinite, NaN.
     float number() {
         const uint8_t first = byte();
         if (first < 200) return float(first) / 50 - 1;
@@ -81,7 +83,7 @@ void expectMessage(rb_error error) {
     if (error == RB_ERROR_UNKNOWN) die("an error that is not known");
 }
 
-// A mesh: a box in reach of the rest, or whatever the bytes say.
+// Adds a mesh: a box near the other objects, or arbitrary arrays.
 void addMesh(Bytes& in, rb_scene scene) {
     int32_t id = -1;
     const std::string name = in.text();
@@ -170,7 +172,8 @@ struct Opacity {
     int32_t image = RB_NO_IMAGE;
 };
 
-// Sets a member of a surface, or a few that belong together, or the opacity. a, b: numbers for it.
+// Sets one member of a surface, several that belong together, or the opacity. `a` and `b` hold
+// numbers to use.
 void spoil(Bytes& in, rb_surface& surface, Opacity& opacity, const std::array<float, 6>& a,
            const std::array<float, 6>& b) {
     switch (in.below(11)) {
@@ -303,7 +306,7 @@ void set(Bytes& in, rb_bake bake) {
     }
 }
 
-// Returns false at the call that the bytes name.
+// Progress function that cancels the bake at call number `after`; 0: never.
 struct Canceller {
     uint32_t after;
     static bool goesOn(void* user, rb_stage, double fraction) {
@@ -337,7 +340,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     rb_bake bake = nullptr;
     if (rb_new_scene(&scene) != RB_ERROR_NONE || rb_new_bake(&bake) != RB_ERROR_NONE)
         die("no handles");
-    // Small, so that a bake takes milliseconds.
+    // Small settings, so that a bake takes milliseconds.
     rb_set_bake_int(bake, "max_patches", 300);
     rb_set_bake_int(bake, "min_bundles", 2);
     rb_set_bake_int(bake, "max_bundles", 8);

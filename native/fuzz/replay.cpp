@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Runs a fuzz target on saved inputs, without libFuzzer, so that the tests can with any compiler:
-// replay_... FILE_OR_FOLDER ...
+// Runs a fuzz target on saved inputs without libFuzzer, so that the tests can run it with any
+// compiler:
+//   replay_... FILE_OR_FOLDER ...
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>

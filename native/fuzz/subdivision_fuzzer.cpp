@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// rb_new_subdivision under arbitrary meshes: it refuses them with a message, or gives triangles
-// with valid indices and weights that sum to 1. A libFuzzer target, as api_fuzzer.cpp.
+// Fuzz target that calls rb_new_subdivision with arbitrary meshes. The function must either reject
+// a mesh with a message, or return triangles with valid indices and weights that sum to 1. Like
+// api_fuzzer.cpp this is a target of libFuzzer.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -19,7 +20,7 @@ namespace {
 }
 
 float numberOf(const uint8_t* bytes) {
-    // Mostly of the size of rooms, sometimes anything.
+    // Mostly a coordinate in the range of rooms, sometimes any float.
     if (bytes[0] < 220) return float(bytes[0]) / 50 + float(bytes[1]) / 5000;
     float value;
     std::memcpy(&value, bytes, sizeof value);
@@ -39,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         value = numberOf(data + at);
         at += 4;
     }
-    // One byte a corner; 255 ends a face.
+    // One byte per corner; 255 ends a face.
     std::vector<int32_t> corners, offsets{0};
     for (; at < size && corners.size() < 64; ++at) {
         if (data[at] < 255)
@@ -47,7 +48,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         else
             offsets.push_back(int32_t(corners.size()));
     }
-    // Edges of 1e30 m would be cut for ever by one of centimetres: what is asked for has a limit.
+    // Bisecting edges of 1e30 m down to centimetres would not end, so max_edge grows with the mesh.
     float longest = 0;
     for (float value : positions)
         if (std::isfinite(value)) longest = std::max(longest, std::abs(value));

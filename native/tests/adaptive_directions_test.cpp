@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// ADAPTIVE directions: weighted means are those of uniform directions whatever was learned.
+// ADAPTIVE directions: weighted means equal those of uniform directions, whatever was learned.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kMostWeight = 1 / 0.3;
 
-// Very uneven: nearly all power flows in a narrow cone, some nowhere.
+// Very uneven power: almost all flows in a narrow cone, and in half of the directions none.
 double unevenPower(const glm::dvec3& d) {
     const double along = glm::dot(d, glm::normalize(glm::dvec3(1, 2, 2)));
     return along < 0 ? 0 : 1000 * std::pow(along, 60) + 0.1;
@@ -22,7 +22,8 @@ double unevenPower(const glm::dvec3& d) {
 
 using Function = std::function<double(const glm::dvec3&)>;
 
-// Runs batches that learn; `visit` sees each bundle.
+// Runs batches of bundles and lets the directions learn the uneven power. Calls `visit` for each
+// bundle.
 void learnUneven(Directions& directions, uint32_t batches, uint32_t perBatch,
                  const std::function<void(const Bundle&)>& visit) {
     for (uint32_t k = 0; k < batches; ++k) {
@@ -43,13 +44,13 @@ TEST(AdaptiveDirections, AreUniformUntilTheyLearn) {
         EXPECT_GE(b.direction.z, 0);
         second += glm::outerProduct(b.direction, b.direction) / double(kCount);
     }
-    // Five standard errors of independent directions, as in
+    // The tolerance is five standard errors of independent directions, as in
     // Directions.LinesAreUniformOverTheSphere.
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(second[i][i], 1.0 / 3, 0.0233);
 }
 
 TEST(AdaptiveDirections, WeightedMeansAreUnbiased) {
-    // Means over the hemisphere, by area.
+    // Functions and their means over the hemisphere, by area.
     const std::vector<std::pair<Function, double>> functions = {
         {[](const glm::dvec3&) { return 1.0; }, 1.0},
         {[](const glm::dvec3& d) { return d.z * d.z; }, 1.0 / 3},
@@ -70,8 +71,8 @@ TEST(AdaptiveDirections, WeightedMeansAreUnbiased) {
                 squares[f] += x * x;
             }
         });
-        // Bundles follow from those before, but each is unbiased given those: their errors are
-        // uncorrelated. Four standard errors, measured.
+        // Bundles depend on the bundles before, but each is unbiased given these, so that their
+        // errors are uncorrelated. The tolerance is four measured standard errors.
         for (size_t f = 0; f < functions.size(); ++f)
             EXPECT_LT(std::abs(sum[f]), 4 * std::sqrt(squares[f])) << "function " << f;
         EXPECT_LT(4 * std::sqrt(squares[1]) / count, 0.03) << "the bound says something";
@@ -114,14 +115,15 @@ TEST(AdaptiveDirections, EstimateTheLearnedPowerWithLessNoise) {
     EXPECT_LT(squares[1], 0.3 * squares[0]);
 }
 
-// Two squares of 1 m that face each other 1 m apart: what a bundle carries from one to the other.
+// The light that a bundle carries between two squares of 1 m that face each other 1 m apart, by
+// direction.
 double betweenSquares(const glm::dvec3& d) {
     const double x = std::abs(d.x / d.z), y = std::abs(d.y / d.z);
     return d.z > 0 ? d.z * std::max(0.0, 1 - x) * std::max(0.0, 1 - y) : 0;
 }
 
-// Over 4000 bundles, those by which they learn included. The ratio is a fifth; 40 seeds tell it to
-// a third of itself.
+// Measured over 4000 bundles, including those that the directions learn from. The ratio of the
+// variances is a fifth; 40 seeds determine it within a third of its value.
 TEST(AdaptiveDirections, HaveLessThanHalfTheVarianceOfRandomOnesOnABroadLobe) {
     double variance[2];
     for (const bool isAdaptive : {false, true}) {
@@ -145,7 +147,7 @@ TEST(AdaptiveDirections, HaveLessThanHalfTheVarianceOfRandomOnesOnABroadLobe) {
 }
 
 TEST(AdaptiveDirections, HalvesLearnByThemselves) {
-    // What the second half learns does not change the first.
+    // What the second half learns does not change the first half.
     Directions alone(DirectionKind::ADAPTIVE, 7), both(DirectionKind::ADAPTIVE, 7);
     for (int k = 0; k < 50; ++k) {
         const std::vector<Bundle> a = alone.next(8), b = both.next(8);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What the C border refuses, by code and by a message that names the argument or the object.
+// Input that the C interface rejects, with the error code and a message that names the argument or
+// the object.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -100,7 +101,7 @@ TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
     expectInvalid(rb_set_bake_int(bake, nullptr, 1), "setting");
     expectInvalid(rb_set_bake_string(bake, "solver", nullptr), "solver");
     EXPECT_EQ(id, 77);
-    // A missing name is an empty one, a missing back is as the front.
+    // A missing name counts as an empty one; without a back, both sides are as the front.
     EXPECT_EQ(rb_add_material(scene, nullptr, &grey, nullptr, 1, RB_NO_IMAGE, &id), RB_ERROR_NONE);
     EXPECT_EQ(id, 0);
 }
@@ -118,7 +119,7 @@ TEST_F(Api, LightThatIsTooBrightIsRefusedByName) {
     expectInvalid(rb_set_world(scene, bright), "world");
     expectInvalid(rb_set_world_image(scene, 1, 1, bright), "world");
     EXPECT_EQ(id, 77);
-    // What counts of a panel is its power.
+    // The limit applies to radiance times area, so that a small panel may be brighter.
     EXPECT_EQ(rb_add_area_light(scene, "panel", kOne, small, y, bright, RB_AREA_RECTANGLE, &id),
               RB_ERROR_NONE);
 }
@@ -277,7 +278,7 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     expectInvalid(rb_set_result_corners(scene, box, noCorners, 2), "77777");
 }
 
-// Adds "fog" with what is wrong on one side and in the opacity of it.
+// Adds the material "fog" with a wrong side or a wrong opacity.
 class ApiMaterial : public Api {
   protected:
     rb_error add(const rb_surface& side, rb_side wrong = RB_SIDE_FRONT, float opacity = 1,
@@ -310,7 +311,8 @@ TEST_F(ApiMaterial, SurfacesOfAnotherSizeAreRefusedByName) {
     }
 }
 
-// The bits of NAN are no number, no image and in no enumeration: wherever they are, that is refused.
+// NAN is no valid value of any member: neither as a number nor, by its bits, as an image or an enum
+// value.
 TEST_F(ApiMaterial, EveryMemberOfASurfaceIsCheckedByName) {
     const float bad = NAN;
     constexpr size_t kEnd = offsetof(rb_surface, diffuse) + sizeof(rb_diffuse);

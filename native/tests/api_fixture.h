@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A scene and a bake behind the C border, for the tests of it.
+// A scene and a bake behind the C interface, for the tests of the interface.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ inline std::string message() { return rb_get_error_message(); }
 
 inline void setAll(float (&rgb)[3], float value) { std::fill_n(rgb, 3, value); }
 
-// A grey side, by its reflectance and its emission in W/m^2.
+// Returns a grey surface with the given reflectance and emission, W/m^2.
 inline rb_surface surface(float reflectance = 0.5f, float emission = 0) {
     rb_surface made;
     EXPECT_EQ(rb_init_surface(&made, sizeof made), RB_ERROR_NONE) << message();
@@ -32,7 +32,7 @@ inline rb_surface surface(float reflectance = 0.5f, float emission = 0) {
     return made;
 }
 
-// Checks the code, and that the message names what is concerned.
+// Checks the error code, and that the message contains `named`.
 inline void expectFailure(rb_error found, rb_error wanted, const std::string& named) {
     EXPECT_EQ(found, wanted) << named;
     EXPECT_NE(message().find(named), std::string::npos)
@@ -43,7 +43,8 @@ inline void expectInvalid(rb_error found, const std::string& named) {
     expectFailure(found, RB_ERROR_INVALID_ARGUMENT, named);
 }
 
-// A furnace of exitance 2 in a scene and a quick bake, released at the end.
+// A test with a scene and a bake of coarse patches, which are released at the end. addFurnace()
+// adds a furnace whose exact exitance is 2 W/m^2.
 class Api : public ::testing::Test {
   protected:
     void SetUp() override {

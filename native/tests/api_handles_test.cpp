@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Handles that were released, are of another kind or were never given, and calls from several
-// threads with the same one: an error or nothing, never a crash.
+// Handles that were released, belong to another kind or never existed, and calls from several
+// threads with one handle. The result is an error or nothing, never a crash.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -64,7 +64,7 @@ TEST_F(ApiHandles, OfAnotherKindOrNeverGivenTheyAreRefused) {
     EXPECT_EQ(rb_set_bake_int(bake, "seed", 1), RB_ERROR_NONE) << message();
 }
 
-// What a progress function does once, in the middle of a bake.
+// An action that a progress function runs once, in the middle of a bake.
 struct Intrusion {
     const std::function<void()> act;
     bool isDone = false;
@@ -115,7 +115,8 @@ TEST_F(ApiHandles, OneReleasedDuringABakeGoesAfterIt) {
 }
 
 TEST_F(ApiHandles, ManyThreadsMakeUseAndReleaseThem) {
-    // All of the same bake, which one of them has for a moment, and each of its own.
+    // All threads use one common bake, which only one of them can use at a time, and each uses a
+    // bake of its own.
     std::atomic<int> refused{0}, wrong{0};
     std::vector<std::thread> threads;
     for (int t = 0; t < 4; ++t)

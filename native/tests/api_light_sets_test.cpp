@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Light sets through the C border.
+// Light sets through the C interface.
 #include <gtest/gtest.h>
 
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The description of the settings through the C border: it agrees with what a bake accepts and has,
-// and with the table in docs/c_api.md.
+// The description of the settings in the C interface agrees with what a bake accepts and holds, and
+// with the table in docs/c_api.md.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -33,7 +33,7 @@ std::vector<rb_setting_info> allSettings() {
     return all;
 }
 
-// A bake with the default settings.
+// A test with a bake that has default settings.
 class ApiSettings : public ::testing::Test {
   protected:
     void SetUp() override { ASSERT_EQ(rb_new_bake(&bake), RB_ERROR_NONE); }
@@ -138,7 +138,8 @@ std::string text(const rb_setting_info& info, double value) {
     return digits;
 }
 
-// Type, range and unit, or the names, as a cell of a table.
+// Returns the cell of the table that lists type, range and unit of a number, or the names of a
+// choice.
 std::string valuesOf(const rb_setting_info& info) {
     if (info.type == RB_SETTING_CHOICE) {
         std::string names;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The C border, through the shared library alone.
+// The C interface, called through the shared library only.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -116,7 +116,7 @@ TEST_F(Api, ReflectanceOfOneIsClampedAndTheMaterialNamed) {
     EXPECT_NE(warnings.find("glow"), std::string::npos) << warnings;
     EXPECT_NE(warnings.find("0.999"), std::string::npos) << warnings;
     const std::vector<float> rgb = cornerLight(0);
-    // E / (1 - rho): a thousand times the emission at 0.999, and the third channel as it was.
+    // E / (1 - rho): a thousand times the emission at 0.999. The third channel is unchanged.
     for (size_t c = 0; c < 72; c += 3) {
         EXPECT_NEAR(rgb[c] * 3.14159265f, 1000, 5);
         EXPECT_NEAR(rgb[c + 1] * 3.14159265f, 1000, 5);
@@ -125,7 +125,7 @@ TEST_F(Api, ReflectanceOfOneIsClampedAndTheMaterialNamed) {
 }
 
 TEST_F(Api, ImagesAndCornerColoursGiveReflectance) {
-    // Black base, half from an image of constant 0.6 and half from corner colours of 0.4: rho =
+    // A black base, plus half of an image of constant 0.6 and half of corner colours of 0.4: rho =
     // 0.5.
     const std::vector<float> pixels(4 * 2 * 3, 0.6f), uvs(48, 0.3f), colors(72, 0.4f);
     rb_surface painted = surface(0, 1);
@@ -202,7 +202,7 @@ TEST_F(Api, TheCallersMemoryIsNotKept) {
 
 struct Watched {
     double cancelAt;
-    double done = 0;  // of all stages, each counted as a fifth
+    double done = 0;  // over all stages, each of which counts as a fifth
     bool cancelled = false;
     std::thread::id thread;
 };
@@ -237,7 +237,8 @@ TEST_F(Api, ABakeCanBeCancelledAnywhereAndUsedAgain) {
     EXPECT_EQ(rb_get_corner_error(bake, instance, error.data(), 24), RB_ERROR_NONE);
     for (float value : error) EXPECT_NEAR(value, 0, 1e-5) << "in a furnace";
     expectFurnace(instance);
-    // Without a function again; and the old result stays when a later run is cancelled.
+    // Run again without a progress function. Then the old result stays when a later run is
+    // cancelled.
     ASSERT_EQ(rb_set_bake_progress(bake, nullptr, nullptr), RB_ERROR_NONE);
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE);
     Watched late{0.5, 0, false, std::this_thread::get_id()};
@@ -254,7 +255,7 @@ TEST_F(Api, MessagesBelongToTheirThread) {
         EXPECT_NE(message(), "");
     }).join();
     EXPECT_NE(message().find("here"), std::string::npos);
-    // A success does not clear it.
+    // A successful call does not clear the message.
     EXPECT_EQ(rb_set_bake_int(bake, "seed", 1), RB_ERROR_NONE);
     EXPECT_NE(message().find("here"), std::string::npos);
 }

@@ -18,7 +18,7 @@ struct Corner {
     glm::vec3 position, value;
 };
 
-// Averages of light(centroid), a function of the position on a mesh.
+// Returns the averages of a light that is a function light(centroid) of the position on a mesh.
 std::vector<Corner> averages(const Mesh& given, float patchSize,
                              const std::function<float(glm::vec3)>& light,
                              const std::function<float(glm::vec3)>& exposure) {
@@ -57,8 +57,8 @@ TEST(AreaAverage, ConstantLightStaysConstant) {
             EXPECT_NEAR(corner.value.x, 3, 1e-5f);
 }
 
-// The mean of x over the hat function of a vertex is x inside; at the border of faces of width h,
-// with the weights 1 - x / h on one side only, it is h / 3 further in.
+// The mean of x over the hat function of a vertex is x inside the plane. At the border of faces of
+// width h the weight is 1 - x / h on one side only, so the mean lies h / 3 further inwards.
 TEST(AreaAverage, LinearLightIsTheHatsMean) {
     const float h = 0.5f;
     for (const Corner& corner : averages(
@@ -86,7 +86,8 @@ TEST(AreaAverage, IsASettingOfABake) {
     bake.settings.reconstruction = Reconstruction::AREA_AVERAGE;
     bake.run(litRoom());
     leastSquares.run(litRoom());
-    // The same light, blurred differently over one face per wall.
+    // The light is the same, but the two reconstructions blur it differently over walls of one face
+    // each.
     const double d = noise(everything(bake), everything(leastSquares));
     EXPECT_GT(d, 0.01);
     EXPECT_LT(d, 0.6);

@@ -116,8 +116,8 @@ TEST(Limits, MinBundlesIsKept) {
     }
 }
 
-// Beyond the memory limit bundles are used once and forgotten: less precise than keeping them, but
-// converging on the same solution.
+// Beyond the memory limit bundles are used once and then discarded. The result is less precise than
+// if they were kept, but converges to the same solution.
 TEST(Limits, BeyondTheMemoryLimitBundlesStillHelp) {
     const Scene scene = litRoom(0.8f);
     auto bakeWith = [&](float megabytes, int bundleCount, int threads = 0) {
@@ -137,7 +137,7 @@ TEST(Limits, BeyondTheMemoryLimitBundlesStillHelp) {
     const double error = noise(everything(*many), everything(*reference));
     const double stated = reportOf(*many)["estimated_error"];
     EXPECT_LT(error, 0.5 * noise(everything(*few), everything(*reference)));
-    // The stated error of a pair of halves scatters by a factor of 2.
+    // The stated error comes from a single pair of halves and scatters by a factor of 2.
     EXPECT_LT(error, 2 * stated);
     EXPECT_LT(stated, 0.02);
     EXPECT_LT(difference(everything(*bakeWith(1, 256, 1)), everything(*bakeWith(1, 256, 2))), 1e-5);

@@ -41,7 +41,7 @@ TEST(Relighting, GivesWhatAFreshBakeGives) {
 }
 
 TEST(Relighting, ShootsAgainOnlyWhereLightsChanged) {
-    // Without emission, whose being a source depends on reflectances.
+    // Without emission, because reflectances decide whether emission becomes a source.
     auto room = [](float reflectance, double power) {
         Scene scene = roomWithBoxes(reflectance);
         scene.addLight(pointLight({1, 1, 2}, glm::dvec3(power)));
@@ -81,7 +81,8 @@ TEST(Relighting, ScalesWhatEachLightBrought) {
         float third;
         bool isScaled;
     };
-    // Colours change, one goes out and comes back, one takes over and is shot again.
+    // Colours change, a lamp goes out and comes back, and a lamp that becomes dominant is gathered
+    // again.
     const Case cases[] = {
         {{1, 1, 1}, {8, 8, 8}, 60, false},    {{1, 0.3, 0.1}, {8, 8, 8}, 60, true},
         {{0.6, 0.6, 1}, {9, 5, 8}, 80, true}, {{0, 0, 0}, {8, 8, 8}, 60, true},
@@ -100,7 +101,7 @@ TEST(Relighting, ScalesWhatEachLightBrought) {
             EXPECT_LT(int(report["shadow_rays"]), int(reportOf(fresh)["shadow_rays"]) / 4);
         }
         const double stated = reportOf(fresh)["estimated_error"];
-        // Both have the noise that they state; that of the lines is the same.
+        // Both bakes have the noise that they state. They share the noise of the lines.
         EXPECT_LT(noise(everything(again), everything(fresh)), stated) << c.first.x;
         EXPECT_NEAR(report["estimated_error"], stated, 0.2 * stated);
         const Json energy = reportOf(fresh)["energy"];
@@ -127,7 +128,7 @@ TEST(Relighting, OneLightIsExactlyScaled) {
 }
 
 TEST(Relighting, TheSameSceneNeedsNoMoreBundles) {
-    // However many looks at the noise its first bake took.
+    // The number of bundles is independent of how many looks at the noise the first bake took.
     for (float target : {0.03f, 0.02f, 0.014f, 0.01f}) {
         Bake bake;
         bake.settings.minBundles = 8;
@@ -138,9 +139,10 @@ TEST(Relighting, TheSameSceneNeedsNoMoreBundles) {
         bake.run(litRoom());
         const Json second = reportOf(bake);
         EXPECT_EQ(second["bundles"], first["bundles"]) << target;
-        // To the last bit: what is baked again for another output fits the first.
+        // Equal to the last bit: a second bake for another output matches the first.
         EXPECT_EQ(everything(bake), light) << target;
-        // Solved from elsewhere, to a hundredth of the target or so.
+        // The solve starts from another solution, which changes the error by about a hundredth of
+        // the target.
         EXPECT_NEAR(second["estimated_error"], first["estimated_error"], 0.01 * target) << target;
     }
 }
@@ -212,10 +214,10 @@ TEST(Cancel, AnyStageCanBeCancelledAndRunAgain) {
         }
 }
 
-// Cancels at one call and tells what the process has computed since then, in seconds of its
-// threads.
+// Cancels at one call and measures the processor time that the process has spent since then, in
+// seconds of all its threads.
 struct CancelAndCount {
-    int call = 0, calls = 0;  // from 0; the calls so far
+    int call = 0, calls = 0;  // index of the call, from 0; calls so far
     double at = NAN;
     rb_stage stage = RB_STAGE_PATCHES;
 
@@ -233,8 +235,8 @@ struct CancelAndCount {
     }
 };
 
-// Land of 6400 faces, or RAYBUNDLE_CANCEL_FACES. The calls come every 20 ms, and where a stage
-// reports by itself: so a cancel comes anywhere.
+// Terrain of 6400 faces, or of RAYBUNDLE_CANCEL_FACES. The progress function is called every 20 ms
+// and when a stage reports, so that a cancel may come at any point.
 TEST(Cancel, ComesAnywhereAndSoon) {
     Scene scene;
     scene.worldRadiance = glm::vec3(0.5f);
@@ -261,7 +263,7 @@ TEST(Cancel, ComesAnywhereAndSoon) {
         bake.settings.skipGeometry = 0;
         try {
             bake.run(scene);
-            // How many calls there are is a matter of time.
+            // The number of calls depends on the time that the bake takes.
             EXPECT_LE(cancel.calls, cancel.call + 1);
         } catch (const Error& error) {
             EXPECT_EQ(error.code, RB_ERROR_CANCELLED);
@@ -280,9 +282,9 @@ TEST(Cancel, ComesAnywhereAndSoon) {
     EXPECT_LT(difference(cornerLight(bake, 0, RB_OUTPUT_LIGHTING), light), 1e-5);
 }
 
-// Cancels at one call of the callback.
+// Cancels at one call of the progress function.
 struct CancelAtCall {
-    int call = 0, calls = 0;  // from 0; the calls so far
+    int call = 0, calls = 0;  // index of the call, from 0; calls so far
 };
 
 bool cancelAtCall(void* user, rb_stage, double) {
@@ -290,8 +292,9 @@ bool cancelAtCall(void* user, rb_stage, double) {
     return at.calls++ != at.call;
 }
 
-// At each call in turn: the results of the bake before stay, and the next bake, which goes on with
-// what is left, is right. Solved from elsewhere, to 1e-5 (kMostTolerance in bake.cpp).
+// Cancels at each call in turn. The results of the bake before remain, and the next bake, which
+// uses what is left, is right. Its solve starts from another solution, which allows a difference of
+// 1e-5 (kMostTolerance in bundle_solve.cpp).
 void cancelAtEachCall(const Scene& before, const Scene& scene, const Settings& settings) {
     Bake fresh, bake;
     fresh.settings = bake.settings = settings;
@@ -303,7 +306,7 @@ void cancelAtEachCall(const Scene& before, const Scene& scene, const Settings& s
         const std::vector<glm::vec3> light = everything(bake);
         const std::string json = bake.reportJson();
         bake.progress = Progress(cancelAtCall, &at);
-        bake.settings.skipGeometry = 0;  // all of it, not a relighting
+        bake.settings.skipGeometry = 0;  // do the whole work, not a relighting
         at.calls = 0;
         bool isCancelled = false;
         try {

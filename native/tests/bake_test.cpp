@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The whole bake: exact answers, energy, and that nothing but the scene and the settings matters.
+// The whole bake: exact answers, energy, and that only the scene and the settings affect the
+// result.
 #include "bake/bake.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,8 @@ namespace {
 
 using namespace test;
 
-// coveredFace: of each instance but the first, a face that lies against another surface; -1: none.
+// Bakes a furnace and expects a radiance of 1 / pi everywhere. `coveredFace` is a face of each
+// instance but the first that lies against another surface; -1 if there is none.
 void expectFurnace(const Scene& scene, double tolerance, int32_t coveredFace = -1) {
     Bake bake;
     bake.run(scene);
@@ -32,7 +34,7 @@ void expectFurnace(const Scene& scene, double tolerance, int32_t coveredFace = -
                      ++k)
                     for (int c = 0; c < 3; ++c) {
                         const double value = double(light[size_t(k)][c]) * kPi;
-                        // Nothing reaches a face that is wholly covered.
+                        // No light reaches a face that is fully covered.
                         if (i > 0 && f == coveredFace) {
                             if (output == RB_OUTPUT_LIGHTING) {
                                 EXPECT_EQ(value, 0);
@@ -98,7 +100,8 @@ TEST(BakeEnergy, IsBalancedInClosedScenes) {
         if (kind == 0) scene.addLight(pointLight({2.2, 1.7, 2}, {3, 2, 1}));
         if (kind == 1)
             scene.addLight(areaLight({2, 1.6, 2.6}, {0.3, 0, 0}, {0, -0.3, 0}, {5, 4, 3}));
-        if (kind == 2)  // an emissive panel 2 cm below the ceiling
+        // An emissive panel 2 cm below the ceiling.
+        if (kind == 2)
             place(scene, rectangle("lamp", {1.5f, 1.2f, 2.78f}, {0, 0.6f, 0}, {0.6f, 0, 0}),
                   grey("lamp", 0, 40));
         for (const bool isFixed : {false, true}) {
@@ -121,7 +124,7 @@ TEST(BakeEnergy, IsBalancedUnderTheSky) {
     place(scene, box("house", {-0.5f, -0.5f, 0.01f}, {0.5f, 0.5f, 1}, false), grey("", 0.8f));
     scene.worldRadiance = {0.5f, 0.7f, 1};
     for (const float target : {0.0f, 0.05f, 0.02f, 0.01f}) {
-        Bake bake;  // at the defaults first
+        Bake bake;  // the first bake has default settings
         if (target > 0) {
             bake.settings.patchSize = 0.1f;
             bake.settings.targetError = target;
@@ -130,7 +133,7 @@ TEST(BakeEnergy, IsBalancedUnderTheSky) {
         const Json report = reportOf(bake);
         EXPECT_TRUE(target == 0 || skips(report, SkippedWork::RAYED_SIDES)) << target;
         EXPECT_LT(report["energy"]["balance_error"].get<double>(), 1e-3) << target;
-        // The roof sees nothing but the sky: neither lines nor rays err there.
+        // The roof sees only the sky, where neither lines nor rays have errors.
         const std::vector<glm::vec3> light = cornerLight(bake, 1, RB_OUTPUT_LIGHTING);
         double roof = 0;
         for (const glm::vec3& corner : light) roof = std::max(roof, double(corner.z));
@@ -138,9 +141,9 @@ TEST(BakeEnergy, IsBalancedUnderTheSky) {
     }
 }
 
-// What no line met gets in the balance what others of its object get: the power that the world
-// sends does not depend on how many patches lines meet. A ball in the sun, whose light is not asked
-// for.
+// Sides that no line met count in the balance with the mean of other sides of their object. The
+// power that the world sends then does not depend on how many patches lines meet. The scene is a
+// ball in the sun whose light is not part of the result.
 TEST(BakeEnergy, HasNoHoleWhereNoLineMetAnything) {
     Scene scene;
     place(scene, icosphere("ball", 1, 5, false), grey("ball", 0.8f),
@@ -157,7 +160,8 @@ TEST(BakeEnergy, HasNoHoleWhereNoLineMetAnything) {
         *report = reportOf(bake);
     }
     EXPECT_LT(few["lines"].get<double>(), 2 * few["patches"].get<double>());
-    // Both 0.5 %, where they are 0.14 and 0.01; where what no line met got nothing, 1.8 and 4.7 %.
+    // The tolerance is 0.5 %; the errors are 0.14 and 0.01 %. They would be 1.8 and 4.7 % if sides
+    // that no line met counted with no light.
     EXPECT_LT(few["energy"]["balance_error"].get<double>(), 5e-3);
     const double sent = many["energy"]["emitted"];
     EXPECT_NEAR(few["energy"]["emitted"].get<double>(), sent, 5e-3 * sent);
@@ -175,7 +179,8 @@ TEST(BakeOutputs, AreParts) {
                    combined = cornerLight(bake, i, RB_OUTPUT_COMBINED);
         for (size_t c = 0; c < lighting.size(); ++c) {
             ASSERT_LT(glm::distance(lighting[c], direct[c] + indirect[c]), 1e-5f);
-            // One grey on everything; reconstructions are linear up to what is cut below zero.
+            // All surfaces have one grey. The reconstruction is linear except where it cuts off
+            // negative values.
             ASSERT_LT(glm::distance(combined[c], 0.6f * lighting[c]),
                       0.02f * glm::length(lighting[c]) + 1e-4f);
         }
@@ -221,12 +226,12 @@ TEST(BakeOutputs, TheBackIsBakedWhereItIsAskedFor) {
     Bake bake;
     setQuick(bake);
     bake.run(scene);
-    // All of 4 pi W stay inside: mean irradiance 4 pi / area / (1 - rho).
+    // All of the 4 pi W stay inside: the mean irradiance is 4 pi / area / (1 - rho).
     double mean = 0;
     for (const glm::vec3& v : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
         mean += double(v.x) * kPi / 24;
     EXPECT_NEAR(mean, 4 * kPi / 24 / 0.5, 0.2) << "at the corners it is darker than in the mean";
-    // Six faces are too few for its light, which is said; nothing else is.
+    // Six faces are too few for this light, which the bake warns of. There is no other warning.
     const Json report = reportOf(bake);
     for (const Json& warning : report["warnings"])
         EXPECT_TRUE(mentions(warning, "too coarse")) << warning;
@@ -253,13 +258,13 @@ TEST(BakeSameness, AnotherSeedDiffersByTheNoise) {
     }
     const double error = reportOf(one)["estimated_error"];
     EXPECT_GT(error, 0);
-    // That of all patches; what is shown of it meets the target.
+    // This is the noise on all patches. The noise of what is shown meets the target.
     EXPECT_LE(error, 0.03);
     EXPECT_LE(reportOf(one)["error"]["noise"].get<double>(), 0.02);
     const double found = noise(everything(one), everything(two));
     EXPECT_GT(found, 0);
-    // Two bakes differ by sqrt(2) of the error of one; corners lie at the patches' borders, where
-    // least squares extrapolates and doubles the noise of the patches.
+    // Two bakes differ by sqrt(2) times the error of one. Corners lie at the borders of patches,
+    // where least squares extrapolates and doubles the noise of the patches.
     EXPECT_LT(found, 4 * error);
 }
 
@@ -270,12 +275,12 @@ TEST(BakeSameness, ARigidMotionDiffersByTheNoise) {
     for (Instance& instance : moved.instances) instance.transform = motion * instance.transform;
     still.addLight(pointLight({2.2, 1.7, 2}, {3, 2, 1}));
     moved.addLight(pointLight(glm::dvec3(motion * glm::dvec4(2.2, 1.7, 2, 1)), {3, 2, 1}));
-    // 64 bundles have about 3 % of noise at the corners.
+    // 64 bundles leave about 3 % of noise at the corners.
     EXPECT_LT(noise(bakeQuick(still), bakeQuick(moved)), 0.1);
 }
 
-// What light may be off is a share of the light that is shown: a bright yard around a room would
-// leave that as noisy as the yard is.
+// The allowed error is a share of the light that is shown. If it were a share of all light, a
+// bright yard around a room would leave the room as noisy as the yard.
 TEST(Bake, TheSunOnTheOutsideOfARoomChangesNothingInside) {
     Bake dim, bright;
     for (Bake* bake : {&dim, &bright}) {
@@ -283,11 +288,12 @@ TEST(Bake, TheSunOnTheOutsideOfARoomChangesNothingInside) {
         scene.addLight(
             sunLight(glm::normalize(glm::dvec3(1, 2, 3)), glm::dvec3(bake == &bright ? 1000 : 1)));
         setQuick(*bake);
-        // Else a lamp beside the bright sun takes fewer samples at first.
+        // Otherwise a lamp beside the bright sun takes fewer samples at first.
         bake->settings.skipWeak = false;
         bake->run(scene);
     }
-    // The same samples, and solves to 1e-5 of the light on all fronts, which are inside.
+    // The samples are the same, and the solve is exact to 1e-5 of the light on all fronts, which
+    // are inside.
     for (size_t side = 0; side < dim.patches().sideCount(); side += 2) {
         const float light = dim.patchIrradiance().all(side).x;
         EXPECT_NEAR(bright.patchIrradiance().all(side).x, light, 1e-3f * light);

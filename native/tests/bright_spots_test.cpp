@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Light that is reflected close to a lamp: gathered, against what very many bundles bring.
+// Light that is reflected close to a lamp: the gathered light equals that of very many bundles.
 #include "first_shot/bright_spots.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,8 @@ namespace {
 
 using namespace test;
 
-// A closed room with a lamp before one of its walls; isRough: which send light by direction.
+// A closed room with a lamp in front of one of its walls. If `isRough`, the walls reflect light
+// depending on its direction.
 Scene roomWithLampAtWall(double distance, bool isRough = false) {
     Scene scene;
     Material paint = grey("", 0.6f);
@@ -33,7 +34,7 @@ Scene roomWithLampAtWall(double distance, bool isRough = false) {
 
 size_t spotsOf(const Bake& bake) { return skippedCount(reportOf(bake), SkippedWork::BRIGHT_SPOTS); }
 
-// Mean irradiance of the fronts of all patches but those of the wall at the lamp.
+// Returns the mean irradiance on the fronts of all patches but those of the wall at the lamp.
 double lightOfOthers(const Bake& bake) {
     const Patches& patches = bake.patches();
     const Irradiance& found = bake.patchIrradiance();
@@ -59,19 +60,19 @@ TEST_P(BrightSpots, GiveTheLightOfVeryManyBundles) {
     EXPECT_GT(spotsOf(gathered), 0u);
     EXPECT_LT(reportOf(gathered)["bundles"], 1000);
     EXPECT_LT(reportOf(gathered)["energy"]["balance_error"], 2e-3);
-    // At this target the bundles that are spared are too few for spots.
+    // With this target too few bundles would be saved for bright spots to pay.
     bundled.settings.targetError = 1;
     bundled.settings.minBundles = bundled.settings.maxBundles = 16384;
     bundled.settings.skipBundles = 0;
     bundled.run(scene);
     EXPECT_EQ(spotsOf(bundled), 0u);
-    // One patch has most of the light: 16,384 bundles meet it 33,000 times, 0.6 % of noise by
-    // random lines; the gathered light has 1 % on each of many patches.
+    // One patch has most of the light. 16,384 bundles meet it 33,000 times, which leaves 0.6 % of
+    // noise with random lines. The gathered light has 1 % on each of many patches.
     EXPECT_NEAR(lightOfOthers(gathered) / lightOfOthers(bundled), 1, 0.01);
 }
 
 TEST_P(BrightSpots, LeaveNoNoiseToTheRoom) {
-    // On the opposite half of the room, where corners are lit by the spot alone.
+    // Compares the opposite half of the room, whose corners are lit only by the bright spot.
     std::vector<glm::vec3> light[2];
     for (int seed = 0; seed < 2; ++seed) {
         Bake bake;
@@ -84,13 +85,13 @@ TEST_P(BrightSpots, LeaveNoNoiseToTheRoom) {
             if (patches.point(side / 2, glm::vec2(0.5f)).y > 0)
                 light[seed].push_back(bake.patchIrradiance().indirect[side]);
     }
-    // Two bakes differ by sqrt(2) of the noise, which is the target on parts of objects; on single
-    // patches it is up to twice that.
+    // Two bakes differ by sqrt(2) of the noise. The noise is the target on parts of objects, and up
+    // to twice that on single patches.
     EXPECT_LT(noise(light[0], light[1]), 2 * std::sqrt(2.0) * 0.02);
 }
 
-// Bars a millimetre before the bright wall, as a fork on a lit table: all that their sides get
-// comes from between them.
+// Bars a millimetre in front of the bright wall, like a fork on a lit table. All light on their
+// sides comes from between the bars.
 TEST_P(BrightSpots, LightSmallThingsBesideThem) {
     std::vector<glm::vec3> light[2];
     for (int seed = 0; seed < 2; ++seed) {
@@ -112,8 +113,8 @@ TEST_P(BrightSpots, LightSmallThingsBesideThem) {
             if (patches.parentAt(side).instance > 0 && std::abs(patches.normal(side).x) > 0.9f)
                 light[seed].push_back(found.direct[side] + found.indirect[side]);
     }
-    // Two bakes differ by sqrt(2) of the noise. Measured 0.006, and 0.017 where walls are rough:
-    // these have no closed form to compare samples with.
+    // Two bakes differ by sqrt(2) of the noise. The measured difference is 0.006, and 0.017 for
+    // rough walls, which have no closed form to compare samples with.
     EXPECT_LT(noise(light[0], light[1]), 0.02);
 }
 
@@ -124,8 +125,8 @@ TEST_P(BrightSpots, AreNoneWhereALampIsFarFromWalls) {
     EXPECT_EQ(spotsOf(bake), 0u);
 }
 
-// Something dark far below, of 16 times the area of the room, leaves the same spots and the same
-// light.
+// A dark object far below, of 16 times the area of the room, changes neither the bright spots nor
+// the light.
 TEST_P(BrightSpots, AreTheSameWithSomethingDarkFarAway) {
     for (const double distance : {0.01, 1.0}) {
         Bake bakes[2];

@@ -18,7 +18,7 @@ using namespace test;
 Bundle alongZ(glm::vec2 shift) { return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, shift, 0, 0}; }
 
 TEST(FragmentLists, AStackExchangesBetweenNeighboursInOrderOfDepth) {
-    // Not in the order of depth; the one in the middle looks down.
+    // The instances are not added in the order of depth. The middle one faces down.
     Scene scene;
     place(scene, rectangle("top", {0, 0, 2}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
     place(scene, rectangle("bottom", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
@@ -54,21 +54,22 @@ TEST(FragmentLists, NoLineLeavesAClosedScene) {
         for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 9).next(200)) {
             BundleLines lines;
             projector.project(bundle, lines);
-            // A line that enters closed surfaces leaves them: their crossings are even in number.
+            // A line that enters closed surfaces also leaves them, so the number of its crossings
+            // is even.
             ASSERT_EQ(lines.sky.size(), 2 * lines.lines);
             ASSERT_EQ((exchangedLines(lines) + lines.lines) % 2, 0u);
             if (scene != &room) {
                 ASSERT_EQ(exchangedLines(lines), lines.lines) << "two crossings";
             }
             all += lines.lines;
-            // It comes in through the back of a wall and goes out through one.
+            // The line enters through the back of a wall and leaves through the back of another.
             for (uint32_t side : lines.sky) open += side % 2 == 0;
-            // Between, fronts see fronts and backs see backs.
+            // Between them fronts see fronts, and backs see backs.
             for (const Exchange& e : lines.exchanges)
                 disordered += e.i % 2 != e.j % 2 ? e.lines : 0;
         }
-        // Where a line passes an edge closer than rounding, a micrometre, the order of the edge's
-        // two faces is not known: some lines in a million.
+        // If a line passes an edge within a rounding error, a micrometre, the order of the two
+        // faces at the edge is undefined. This affects a few lines in a million.
         EXPECT_LE(double(open), 2e-6 * double(all)) << "an inner side sees the sky";
         EXPECT_LE(double(disordered), 5e-6 * double(all)) << "the order of depth is wrong";
     }
@@ -82,14 +83,14 @@ TEST(FragmentLists, ClosedScenesSeenAlongTheirAxesAreWatertight) {
     for (int k = 0; k < 20; ++k) {
         BundleLines lines;
         projector.project(alongZ({uniform(random), uniform(random)}), lines);
-        // Walls are seen edge-on: they may give no line or a chain of them, but never an open end.
+        // Walls are seen edge-on. They may give no line or a chain of lines, but never an open end.
         EXPECT_NEAR(double(lines.lines), 1e4, 300);
         for (uint32_t side : lines.sky) EXPECT_EQ(side % 2, 1u);
     }
 }
 
-// A square whose inside is cut at random points, three triangles for one, so that only the four
-// edges of its border are those of the uncut square.
+// A square whose inside is divided at random points, three triangles for one, so that only the four
+// edges of its border remain those of the original square.
 Mesh cutSquare(int rounds) {
     std::mt19937 random(17);
     std::uniform_real_distribution<float> uniform(0.05f, 1);
@@ -116,7 +117,7 @@ TEST(FragmentLists, CommonEdgesNeitherDoubleNorMissAPixel) {
     place(uncut, rectangle("square", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
     place(cut, cutSquare(6), grey("", 0.5f));
     const Patches one = subdivide(uncut, 10, kMany);
-    // With small patches long triangles are bisected too; their neighbours may not be.
+    // With small patches long triangles are bisected too. Their neighbours may not be.
     for (float size : {10.0f, 0.05f}) {
         const Patches many = subdivide(cut, size, kMany);
         ASSERT_EQ(many.degenerateFaces, 0u);
@@ -128,8 +129,8 @@ TEST(FragmentLists, CommonEdgesNeitherDoubleNorMissAPixel) {
             EXPECT_TRUE(found.exchanges.empty() && found.touching.empty())
                 << "a pixel is taken twice, patch size " << size;
             const double difference = double(found.lines) - double(wanted.lines);
-            // The middle of a bisected edge is rounded, and lies 1e-7 m off its neighbour's whole
-            // edge or the border of the square: with pixels of 3 mm that may turn one line.
+            // The midpoint of a bisected edge is rounded and lies 1e-7 m off its neighbour's whole
+            // edge or the border of the square. With pixels of 3 mm this may change one line.
             EXPECT_LE(std::abs(difference), size < 1 ? 1 : 0)
                 << "a pixel is missed, patch size " << size;
         }

@@ -14,7 +14,8 @@ namespace {
 
 using namespace test;
 
-// The room with two boxes and a ball of small faces that only occludes; it glows as the room does.
+// The room with two boxes, and a ball of small faces that only occludes. The ball emits as much as
+// the room.
 Scene roomWithBall(int subdivisions, float reflectance, float emission = 0, float gloss = 0) {
     Scene scene = roomWithBoxes(reflectance, emission);
     Material paint = grey("ball", reflectance, emission, emission);
@@ -34,7 +35,7 @@ TEST(Clusters, AreNoneWhereAllIsShown) {
     EXPECT_EQ(&clusters.patches(), &patches);
     EXPECT_EQ(clusters.sideOf(7), 7u);
     EXPECT_EQ(clusters.memberCount(), 0u);
-    // Nor where the faces are as large as tiles.
+    // There are none either if the faces are as large as tiles.
     const Patches coarse = subdivide(roomWithBall(1, 0.5f), 0.4f, kMany);
     EXPECT_TRUE(Clusters(coarse, shownBut(coarse, 3)).isNone());
 }
@@ -56,7 +57,8 @@ TEST(Clusters, AreOfNearPatchesThatFaceAlike) {
         EXPECT_LT(glm::distance(joined.point(own / 2, {0.3f, 0.3f}),
                                 patches.point(side / 2, {0.3f, 0.3f})),
                   patches.islandAt(side).size);
-        // What a ray meets is found by its parent.
+        // A ray finds the patch that it meets from its parent, so the patches of the clusters must
+        // be consistent with the parents.
         const Parent& parent = joined.parents[patches.parentOf[side / 2]];
         EXPECT_EQ(
             parent.firstPatch + side / 2 - patches.parents[patches.parentOf[side / 2]].firstPatch,
@@ -99,7 +101,7 @@ TEST(Clusters, HaveTheMeansOfTheirPatches) {
     EXPECT_TRUE(clusters.mean(std::vector<float>()).empty());
 }
 
-// However many faces the ball has, the work is that of its light.
+// The work depends on the light of the ball, not on the number of its faces.
 TEST(Clusters, AreAsManyHoweverManyFacesThereAre) {
     double patches[2], rays[2], bundles[2];
     for (int k : {0, 1}) {
@@ -130,14 +132,15 @@ TEST(Clusters, LeaveAFurnaceExact) {
     bake.run(roomWithBall(5, 0.5f, 0.5f));
     ASSERT_TRUE(skips(reportOf(bake), SkippedWork::CLUSTERED_PATCHES));
     expectFurnace(bake);
-    // Some of the ball's clusters and most of the room's patches meet few lines, and local rays.
+    // Some of the ball's clusters and most of the room's patches meet few lines, and gather with
+    // local rays.
     bake.settings.minBundles = bake.settings.maxBundles = 2;
     bake.run(roomWithBall(5, 0.5f, 0.5f));
     expectFurnace(bake);
 }
 
-// With light of a lamp, gloss that sends it by direction, lines beyond the memory limit, light
-// sets.
+// With the light of a lamp, gloss that depends on the direction, lines beyond the memory limit, and
+// light sets.
 TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
     for (const float gloss : {0.0f, 0.3f})
         for (const float megabytes : {4096.0f, 0.5f}) {
@@ -162,7 +165,7 @@ TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
                 light[on] = everything(bake);
                 stated[on] = report["estimated_error"];
                 balance[on] = report["energy"]["balance_error"];
-                // Lines are balanced only while they are kept.
+                // Energy is balanced exactly only while the lines are kept.
                 EXPECT_LT(std::abs(balance[on]), megabytes < 1 ? 4e-3 : 1e-3) << on << gloss;
             }
             EXPECT_LT(noise(light[1], light[0]), 2 * std::hypot(stated[0], stated[1]))
@@ -186,7 +189,7 @@ TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
     EXPECT_LT(difference(cornerLight(again, 3, RB_OUTPUT_LIGHTING),
                          cornerLight(fresh, 3, RB_OUTPUT_LIGHTING)),
               1e-5);
-    // Other paint is none of that.
+    // Another paint does not change the clusters.
     Scene painted = roomWithBall(4, 0.3f);
     painted.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
     again.run(hidden);
@@ -196,8 +199,8 @@ TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
 }
 
-// Of clusters of backs, whose fronts are shown, one side gathers for all: another one where faces
-// got another material, of which each cluster has one.
+// Each cluster of backs, whose fronts are shown, has a side that gathers for all. A cluster has one
+// material, so if faces get another material, other sides must gather.
 TEST(Clusters, OfOtherMaterialsGatherAnew) {
     Scene before = roomWithBall(4, 0.5f, 0, 0.3f);
     before.instances[3].role = RB_ROLE_BAKE;
@@ -215,7 +218,7 @@ TEST(Clusters, OfOtherMaterialsGatherAnew) {
     EXPECT_TRUE(skips(reportOf(again), SkippedWork::UNCHANGED_GEOMETRY));
     fresh.run(after);
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
-    // Nor does a bake without clusters go on with what one with them kept.
+    // A bake without clusters does not use what a bake with clusters has kept.
     Bake single;
     setQuick(single);
     again.settings.skipClusters = single.settings.skipClusters = 0;

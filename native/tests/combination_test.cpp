@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Which methods work together, tried one by one, and the tables of them in docs/method.md.
+// Which methods work together, tested one by one, and the tables of them in docs/method.md.
 #include "job/combination.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 
 using namespace test;
 
-// Why a combination is refused, or "".
+// Returns why a combination is rejected, or "" if it is accepted.
 std::string refusal(const Settings& settings, size_t lightSetCount = 0) {
     try {
         checkCombination(settings, lightSetCount);
@@ -29,7 +29,7 @@ std::string refusal(const Settings& settings, size_t lightSetCount = 0) {
     }
 }
 
-// Calls visit(settings) for every combination of the choices that decide about lines and light.
+// Calls visit(settings) for every combination of the choices that affect lines and light.
 void forEachCombination(const std::function<void(const Settings&)>& visit) {
     Settings settings;
     for (const auto& solver : kSolvers)
@@ -46,7 +46,7 @@ void forEachCombination(const std::function<void(const Settings&)>& visit) {
                     }
 }
 
-// What a solver works with in some combination.
+// The methods that a solver works with in some combination.
 struct Partners {
     std::set<FirstShotKind> firstShots;
     std::set<DirectionKind> directions;
@@ -73,7 +73,7 @@ Partners partnersOf(Solver solver) {
     return partners;
 }
 
-// As a cell of a table.
+// Returns the values as a cell of a table.
 template <class Choice>
 std::string listed(const std::set<Choice>& values) {
     if (values.size() == std::size(rowsOf(Choice{}))) return "all";

@@ -27,7 +27,7 @@ double meshArea(const ConformingSubdivision& s) {
     return sum;
 }
 
-// Area, edge lengths, winding, weights: what holds for every input.
+// Checks area, edge lengths, winding and weights, which must be right for every input.
 void expectGoodSubdivision(const Mesh& mesh, const ConformingSubdivision& s, double maxEdge,
                            double area) {
     EXPECT_NEAR(meshArea(s), area, 1e-5 * area) << mesh.name;
@@ -62,7 +62,7 @@ void expectGoodSubdivision(const Mesh& mesh, const ConformingSubdivision& s, dou
     }
 }
 
-// How many triangles use each edge, by both vertices.
+// Returns the number of triangles at each edge, by the pair of its vertices.
 std::map<std::pair<int32_t, int32_t>, int> edgeUse(const ConformingSubdivision& s) {
     std::map<std::pair<int32_t, int32_t>, int> use;
     for (const auto& t : s.triangles)
@@ -103,7 +103,7 @@ TEST(ConformingSubdivision, ConcaveFacesKeepTheirArea) {
 }
 
 TEST(ConformingSubdivision, NonManifoldMeshesSurvive) {
-    // Three faces at one edge; two that turn against each other; two triangles joined at one
+    // Three faces at one edge, two faces with opposite winding, and two triangles joined at one
     // vertex.
     const Mesh book = polygons("book",
                                {{0, 0, 0},
@@ -152,7 +152,7 @@ TEST(ConformingSubdivision, AnyMeshOfSliversIsCutToFiniteTriangles) {
     std::mt19937 random(5);
     std::uniform_real_distribution<float> place(0, 1);
     for (int round = 0; round < 200; ++round) {
-        // Triangles between few points of a line, doubled points and the corners of a square.
+        // Triangles between points on a line, doubled points and the corners of a square.
         std::vector<glm::vec3> vertices{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
         for (int k = 0; k < 8; ++k) vertices.push_back({place(random), 0, 0});
         for (int k = 0; k < 4; ++k)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Cuts beside narrow gaps: where they are, and the light in a gap against its exact value.
+// Cuts beside narrow gaps: which tiles are cut, and the light in a gap against its exact value.
 #include "refinement/contacts.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace test;
 
-// Ground of 10 x 10 patches of 0.1 m; a board of 0.3 x 0.3 m over its middle.
+// Ground of 10 x 10 patches of 0.1 m, with a board of 0.3 x 0.3 m over its centre.
 Scene groundUnderBoard(float gap) {
     Scene scene;
     place(scene, rectangle("ground", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
@@ -32,7 +32,7 @@ Cuts cutsOf(const Scene& scene, size_t most = kMany) {
 }
 
 TEST(ContactCuts, AreWhereAGapIsCoveredInPart) {
-    // The board covers 2 x 2 tiles of the ground wholly and half of the 12 around them.
+    // The board covers 2 x 2 tiles of the ground fully, and half of the 12 tiles around them.
     const Cuts cuts = cutsOf(groundUnderBoard(0.02f));
     ASSERT_EQ(cuts.levels.size(), 109u);
     for (int y = 0; y < 10; ++y)
@@ -62,14 +62,15 @@ TEST(ContactCuts, KeepWithinMaximumPatches) {
 }
 
 TEST(ContactCuts, TheUndersideOfABoardGetsTheLightThatIsInTheGap) {
-    // Black board, under a sun at its zenith: what it gets comes from the ground beside its shadow.
+    // A black board under a sun at the zenith. Its underside gets light only from the ground beside
+    // its shadow.
     Scene scene = groundUnderBoard(0.02f);
     scene.mesh(1).faceMaterials[0] = scene.addMaterial(grey("black", 0));
     scene.addLight(sunLight({0, 0, 1}, {4, 4, 4}));
     const glm::dvec3 ground[4] = {{-0.5, -0.5, 0}, {0.5, -0.5, 0}, {0.5, 0.5, 0}, {-0.5, 0.5, 0}};
     const glm::dvec3 shadow[4] = {
         {-0.15, -0.15, 0}, {0.15, -0.15, 0}, {0.15, 0.15, 0}, {-0.15, 0.15, 0}};
-    double exact = 0;  // mean over the underside, by the midpoint rule
+    double exact = 0;  // mean irradiance on the underside, by the midpoint rule
     constexpr int kCells = 200;
     for (int i = 0; i < kCells * kCells; ++i) {
         const glm::dvec3 point(0.3 * ((i % kCells + 0.5) / kCells - 0.5),
@@ -95,9 +96,11 @@ TEST(ContactCuts, TheUndersideOfABoardGetsTheLightThatIsInTheGap) {
         }
         found[contacts] = light / area;
     }
-    // Without cuts a quarter or half of each tile around the shadow lights the gap under it.
+    // Without cuts a quarter or a half of each tile around the shadow lights the gap under the
+    // tile.
     EXPECT_GT(found[0], 1.5 * exact);
-    // A step of light within patches of 0.6 gaps; noise is 1 % of the mean.
+    // The tolerance covers a step of light within patches of 0.6 gaps. The noise is 1 % of the
+    // mean.
     EXPECT_NEAR(found[1], exact, 0.1 * exact);
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Walls that go through floors or stand on them: patches lie on one side of each, and so does the
-// light at corners. The answer is exact: a sealed room under a sky is dark inside.
+// Walls that pass through floors or stand on them: each patch lies on one side of every wall, and
+// so does the light at corners. The exact answer is known: a sealed room under a sky is dark
+// inside.
 #include "patches/crossings.h"
 
 #include <gtest/gtest.h>
@@ -20,15 +21,15 @@ namespace {
 
 using namespace test;
 
-// A room of 5 x 5 m within a floor of 8 x 8 m, of planes that are larger than it and go through
-// each other, all white and under a sky of radiance 1.
+// A room of 5 x 5 m within a floor of 8 x 8 m. Its planes are larger than the room and pass through
+// each other. All are white and under a sky of radiance 1 W/(m^2 sr).
 struct SealedRoom {
     const char* name = "";
     int floorCells = 16, wallCells = 12;
-    double turn = 0;          // of the walls, about the vertical
+    double turn = 0;          // rotation of the walls about the vertical, radians
     bool isStanding = false;  // walls end at the floor, at each other and at the ceiling
     float thickness = 0;      // of the walls, m; 0: planes
-    glm::dmat4 pose{1.0};     // of everything
+    glm::dmat4 pose{1.0};     // transform of the whole scene
 };
 
 glm::dmat4 turned(double angle) { return glm::rotate(glm::dmat4(1), angle, glm::dvec3(0, 0, 1)); }
@@ -77,7 +78,8 @@ std::vector<SealedRoom> sealedRooms() {
             {"thick, standing and turned", 16, 12, 0.37, true, 0.1f}};
 }
 
-// Of a corner of the floor, in metres of the room from its middle, along its walls.
+// Returns the distance of a corner of the floor from the centre of the room, measured along the
+// walls, m.
 double fromMiddle(const SealedRoom& room, const glm::dvec3& corner) {
     const glm::dvec3 p = glm::dvec3(glm::inverse(turned(room.turn)) * glm::dvec4(corner, 1));
     return std::max(std::abs(p.x), std::abs(p.y));
@@ -87,7 +89,7 @@ TEST(Crossings, ASealedRoomIsDarkInside) {
     for (const SealedRoom& room : sealedRooms())
         for (Reconstruction reconstruction :
              {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE}) {
-            // Both where the walls lie between the edges of the floor.
+            // Both reconstructions where the walls lie between the edges of the floor.
             if (reconstruction == Reconstruction::AREA_AVERAGE &&
                 (room.turn == 0 || room.pose != glm::dmat4(1) || room.wallCells > 12))
                 continue;
@@ -103,7 +105,8 @@ TEST(Crossings, ASealedRoomIsDarkInside) {
             double least = INFINITY, most = 0;
             size_t inside = 0;
             for (size_t f = 0; f < mesh.faceCount(); ++f) {
-                // Faces on a wall's line belong to the side that their middle is on.
+                // A face that a wall crosses belongs to the side of the wall on which its centre
+                // lies.
                 glm::dvec3 middle(0.0);
                 for (int k = 0; k < 4; ++k)
                     middle +=
@@ -124,7 +127,7 @@ TEST(Crossings, ASealedRoomIsDarkInside) {
             }
             EXPECT_EQ(inside > 0, room.floorCells > 1);
             EXPECT_LT(most, 1e-3);
-            // A wall takes half of the sky; inside of the ends of thick ones it is dark.
+            // A wall hides half of the sky. The floor below the ends of thick walls is dark.
             if (room.thickness == 0) {
                 EXPECT_GT(least, 0.45);
             }
@@ -151,7 +154,8 @@ TEST(Crossings, PatchesLieOnOneSideAndCoverTheFace) {
                 least = std::min(least, away);
                 most = std::max(most, away);
             }
-            // Less than that share of a patch of up to half a metre is not cut off.
+            // A wall that leaves less than this share of a patch of up to half a metre does not cut
+            // it.
             const double wall = 2.5 - double(room.thickness) / 2;
             ASSERT_FALSE(least < wall - 0.02 && most > wall + 0.02) << least << " to " << most;
         }
@@ -176,16 +180,15 @@ TEST(Crossings, WhatAPatchCountsAtCornersIsWhole) {
                 EXPECT_GE(weight, -1e-4f);
                 sum += weight;
             }
-            // Of all corners, or of none where the patch has a wall all around.
+            // The weights of a patch sum to 1, or to 0 if the patch is surrounded by walls.
             EXPECT_TRUE(std::abs(sum - 1) < 1e-4f || sum == 0) << sum;
         }
     }
     EXPECT_GT(parted, 8u);
 }
 
-// In a white furnace everything that is seen has an irradiance of 1. A box covers a corner of the
-// floor, and what lies under it or inside of it, where it is dark, has no say in the light of that
-// corner.
+// In a white furnace everything that is seen has an irradiance of 1 W/m^2. A box covers a corner of
+// the floor. The dark floor under the box, or inside it, must not affect the light at that corner.
 TEST(Crossings, ACornerUnderABoxHasTheLightOfWhatIsSeen) {
     for (float low : {0.0f, -0.1f})
         for (double turn : {0.0, 0.3})
@@ -240,7 +243,8 @@ TEST(Crossings, AThousandLeavesThatCrossAreWhole) {
     }
     place(scene, polygons("leaves", vertices, faces), grey("green", 0.5f));
     EXPECT_EQ(subdivide(scene, 1, kMany).count(), 1000u);
-    // Large beside patches, they are cut, up to a limit, and a line says so.
+    // Faces that are large compared with the patches are cut, but only up to a limit, and a warning
+    // states that not all were cut.
     const Patches cut = subdivide(scene, 0.05f, kMany);
     EXPECT_LT(cut.parents.size(), 60000u);
 }

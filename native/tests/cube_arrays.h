@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A unit cube with its fronts inside, as rb_add_mesh takes it.
+// A unit cube with its fronts inside, in the arrays of rb_add_mesh.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Random degenerate meshes against clean ones of the same shape: fillers of T-junctions from a
-// hundredth of their edge down to nothing, T-junctions without fillers, needles, doubled faces,
-// faces without area, split edges; turned by the object's matrix or in the mesh. The light is that
-// of the clean mesh within its stated error, and takes no more than twice its patches, bundles and
-// shadow rays.
+// Random degenerate meshes against clean meshes of the same shape. The faults are fillers of
+// T-junctions with a height from a hundredth of their edge down to nothing, T-junctions without
+// fillers, needles, doubled faces, faces without area, and split edges. The mesh is rotated by the
+// object's matrix or by its vertices. The light must equal that of the clean mesh within its stated
+// error, with at most twice its patches, bundles and shadow rays.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,7 @@ namespace {
 
 using namespace test;
 
-// Of CI; RAYBUNDLE_DEGENERATE_MESHES asks for others.
+// Number of meshes in the automatic tests. RAYBUNDLE_DEGENERATE_MESHES sets another number.
 constexpr int kMeshes = 9;
 
 struct Polygons {
@@ -82,7 +82,8 @@ class Spoiler {
         return sum;
     }
 
-    // A vertex on the first edge of a face that what lies beyond does not have, a little inside.
+    // Adds a vertex on the first edge of a face, a little inside the face. The neighbouring face
+    // does not have this vertex.
     void addJunction(size_t f, bool isFilled) {
         std::vector<int32_t>& face = out.faces[f];
         const int32_t a = face[0], b = face[1];
@@ -93,7 +94,7 @@ class Spoiler {
         face.insert(face.begin() + 1, v);
         if (isFilled) out.faces.push_back({a, b, v});
     }
-    // A face is cut beside a corner.
+    // Cuts a needle off a face, beside a corner.
     void cutNeedle(size_t f) {
         std::vector<int32_t> face = out.faces[f];
         const double share = std::pow(10.0, -3 - 5 * uniform());
@@ -133,7 +134,7 @@ struct Result {
 
 enum class Topology { KEEP, SUBDIVIDE };
 
-// The light of faces that look the same way at each vertex of a clean face, in the mean.
+// Adds the light at each vertex of a clean face: the mean over the faces with the same normal.
 void addLight(const Mesh& clean, const Mesh& mesh, const std::vector<glm::vec3>& corners,
               std::vector<double>& light) {
     auto normalOf = [](const Mesh& m, size_t f) {
@@ -171,7 +172,7 @@ Mesh meshOf(const Polygons& polygons_) {
     return polygons("mesh", polygons_.vertices, polygons_.faces);
 }
 
-// A floor under a box, lit by a lamp and a sky. clean: the floor and the box.
+// Bakes a floor under a box, lit by a lamp and a sky. `clean` holds the floor and the box.
 Result bakeMeshes(const std::vector<Mesh>& clean, std::vector<Mesh> meshes,
                   Reconstruction reconstruction, const glm::dmat4& turn, bool inMeshes) {
     Scene scene;
@@ -206,7 +207,7 @@ Result bakeMeshes(const std::vector<Mesh>& clean, std::vector<Mesh> meshes,
     return result;
 }
 
-// As topology SUBDIVIDE does.
+// Subdivides a mesh as the topology SUBDIVIDE does.
 Mesh subdivided(const Mesh& mesh) {
     const ConformingSubdivision fine = subdivideConforming(mesh, 0.7f);
     std::vector<std::vector<int32_t>> faces;

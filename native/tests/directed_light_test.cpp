@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Where surfaces that are not Lambert's send light: what the walls of a black room get from its
-// floor, and what goes up and down between its floor and a white ceiling, against the models as
-// they are published.
+// The directions in which surfaces that are not Lambert's send light: the light that the walls of a
+// black room get from its floor, and the light that passes between its floor and a white ceiling,
+// against the published models.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,11 +21,11 @@ namespace {
 using namespace test;
 
 // -------------------------------------------------------------------------------------------------
-// A black unit cube whose floor a sun lights, which nothing stops
+// A black unit cube. A sun that nothing blocks lights its floor.
 // -------------------------------------------------------------------------------------------------
 
 constexpr double kSunCosine = 0.6;
-// Of the floor: what it mirrors is as much for light from everywhere as from above.
+// Of the floor. It mirrors light from all directions as much as light along the normal.
 constexpr float kMirrored = 0.3f, kReflected = 0.5f, kRoughness = 0.6f;
 
 Scene studio(bool isBurley = false) {
@@ -45,14 +45,15 @@ Scene studio(bool isBurley = false) {
     place(scene, rectangle("right", {0, 0, 0}, {0, 0, 1}, {1, 0, 0}), black);
     place(scene, rectangle("left", {0, 1, 0}, {1, 0, 0}, {0, 0, 1}), black);
     place(scene, rectangle("ceiling", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}), black);
-    // From behind, so that it is mirrored ahead.
+    // The sun shines from behind, so that its light is mirrored forwards.
     Light sun = sunLight({-std::sqrt(1 - kSunCosine * kSunCosine), 0, kSunCosine}, glm::dvec3(1));
     sun.castsShadows = false;
     scene.addLight(sun);
     return scene;
 }
 
-// The floor's exitance towards a direction over its reflectance and irradiance.
+// Returns the floor's exitance towards a direction, relative to its reflectance times its
+// irradiance.
 std::function<double(const glm::dvec3&)> sentBy(bool isBurley) {
     const glm::dvec3 in(-std::sqrt(1 - kSunCosine * kSunCosine), 0, kSunCosine);
     const Bsdf bsdf = isBurley ? burley(1) : ggx(kRoughness, 1);
@@ -60,7 +61,8 @@ std::function<double(const glm::dvec3&)> sentBy(bool isBurley) {
     return [=](const glm::dvec3& out) { return 1 - share + share * kPi * bsdf(in, out) / mean; };
 }
 
-// Distance to the wall of the cube in which a ray from inside ends, and the wall (axis, upper).
+// Returns the wall of the cube (axis, and whether it is the upper one) in which a ray from inside
+// ends.
 std::pair<int, bool> wallAhead(const glm::dvec3& point, const glm::dvec3& direction) {
     int wall = 0;
     double nearest = INFINITY;
@@ -77,7 +79,7 @@ std::pair<int, bool> wallAhead(const glm::dvec3& point, const glm::dvec3& direct
 class Studio : public testing::TestWithParam<bool> {};
 
 TEST_P(Studio, GoesWhereTheModelSendsIt) {
-    // Of the instances after the floor: what reaches the wall of the floor's light.
+    // The share of the floor's light that reaches the wall of each instance after the floor.
     constexpr int kPoints = 24, kDirections = 96;
     std::array<double, 6> expected{};
     const auto sent = sentBy(GetParam());
@@ -102,12 +104,12 @@ TEST_P(Studio, GoesWhereTheModelSendsIt) {
         found[patches.parentAt(side).instance] +=
             double(patches.area[side / 2] * bake.patchIrradiance().indirect[side].x);
     for (size_t instance = 1; instance < 6; ++instance)
-        // Of all that the floor reflects. The noise of a wall is 0.2 %; patches send from their
-        // middles.
+        // Relative to all light that the floor reflects. The noise on a wall is 0.2 %. In addition,
+        // patches send their light from their centres.
         EXPECT_NEAR(found[instance] / (double(kReflected) * kSunCosine), expected[instance], 0.005)
             << instance;
     EXPECT_NEAR(expected[1] + expected[2] + expected[3] + expected[4] + expected[5], 1, 0.003);
-    // As by Lambert's law the two would get the same.
+    // By Lambert's law the two walls would get equal light.
     EXPECT_GT(std::abs(expected[1] - expected[2]), GetParam() ? 0.015 : 0.25);
     EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 2e-3);
 }
@@ -143,17 +145,17 @@ TEST_P(Studio, IsGatheredAtPointsToo) {
             worst = std::max(worst, std::abs(double(found[corner].x) - expected));
         }
     }
-    // Final gather has a noise of 0.3 % of the mean light (kNoiseShare of the target), sources
-    // included, which is a tenth of that.
+    // The noise of the final gather is 0.3 % of the mean light (kNoiseShare of the target). This
+    // mean includes the direct light, of which the indirect light is a tenth.
     EXPECT_LT(worst, 0.04 * most);
 }
 
 INSTANTIATE_TEST_SUITE_P(, Studio, testing::Bool(),
                          [](const auto& model) { return model.param ? "Burley" : "Gloss"; });
 
-// The same cube: a sun shines from below at its ceiling alone, which is white, as nothing stops it.
+// The cube again. A sun from below, which nothing blocks, lights only the ceiling, which is white.
 struct UpAndDown {
-    double ceiling = 0, floor = 0;  // indirect irradiance, mean
+    double ceiling = 0, floor = 0;  // mean indirect irradiance, W/m^2
 };
 
 UpAndDown upAndDown(double whiteness, double reflectance, double share, const Bsdf& bsdf) {
@@ -163,8 +165,8 @@ UpAndDown upAndDown(double whiteness, double reflectance, double share, const Bs
         return glm::dvec3(double(ceiling % kEdge - floor % kEdge) / kEdge,
                           double(ceiling / kEdge - floor / kEdge) / kEdge, 1);
     };
-    // Scaled, since that of opposite faces of a cube is known, and by so many cells 0.3 % too
-    // large.
+    // The form factors are scaled, because that of opposite faces of a cube is known and the sum
+    // over these cells is 0.3 % too large.
     double scale = 1;
     auto factor = [&](const glm::dvec3& d) {
         return scale * kArea / (kPi * std::pow(glm::dot(d, d), 2));
@@ -173,7 +175,7 @@ UpAndDown upAndDown(double whiteness, double reflectance, double share, const Bs
     for (int f = 0; f < kCount; ++f)
         for (int c = 0; c < kCount; ++c) all += kArea * factor(way(f, c));
     scale = 0.199825 / all;
-    // Of each direction the mean is that of its cosine, by a table.
+    // The mean exitance depends only on the cosine of the direction, and is taken from a table.
     std::vector<double> means;
     for (int i = 0; i <= 100; ++i) {
         double sum = 0;
@@ -182,7 +184,7 @@ UpAndDown upAndDown(double whiteness, double reflectance, double share, const Bs
         });
         means.push_back(sum);
     }
-    // From the ceiling over the floor to the ceiling.
+    // Form factors from the ceiling over the floor to the ceiling.
     std::vector<double> back(kCount * kCount);
     for (int f = 0; f < kCount; ++f)
         for (int from = 0; from < kCount; ++from) {
@@ -246,22 +248,23 @@ TEST_P(Studio, SendsOnWhatOthersSentIt) {
     const UpAndDown expected = upAndDown(double(kWhiteness), double(kReflected), share, bsdf);
     const UpAndDown ofLambert = upAndDown(double(kWhiteness), double(kReflected), 0, bsdf);
     const double bent = expected.ceiling - ofLambert.ceiling;
-    // The ceiling's light is little, and the few lines that stand for all give each seed 0.7 % of
-    // noise there: the tolerance is three times that of the mean. Cells of directions are 0.2 %
-    // (gloss) and 0.8 % (Burley) off with all lines.
+    // The ceiling gets little light, and each seed has 0.7 % of noise there from the few lines that
+    // represent all. The tolerance is three times the noise of the mean. With all lines the cells
+    // of directions are 0.2 % (gloss) and 0.8 % (Burley) off.
     EXPECT_NEAR(found.floor, expected.floor, 0.005 * expected.floor);
     EXPECT_NEAR(found.ceiling, expected.ceiling, 0.012 * expected.ceiling);
     EXPECT_GT(std::abs(bent), 0.03 * expected.ceiling);
 }
 
-// Without its wall ahead, by an even sky: the share of the floor's light that goes to the wall
-// behind. At each angle it mirrors as much more than in the mean as GGX does, and of the rest less.
+// Returns the share of the floor's light that goes to the wall behind, in the cube without its
+// front wall under a uniform sky. At each angle the floor mirrors more or less than its mean as GGX
+// does, and reflects the remainder diffusely.
 double skyToWallBehind(double share, const Bsdf& bsdf) {
     constexpr int kPoints = 12, kDirections = 32;
     std::vector<glm::dvec3> directions;
     std::vector<double> shares, means;
     forCosine(kDirections, [&](const glm::dvec3& direction, double part) {
-        // Those of one angle follow each other.
+        // Directions of equal angle follow each other.
         const bool isNew = directions.empty() || direction.z != directions.back().z;
         means.push_back(isNew ? moments(bsdf, direction).x : means.back());
         directions.push_back(direction);
@@ -312,9 +315,9 @@ TEST_P(Studio, SendsOnAnEvenSky) {
     const Bsdf bsdf = GetParam() ? burley(1) : ggx(kRoughness, 1);
     const double share = GetParam() ? 1 : double(kMirrored / kReflected);
     const double expected = skyToWallBehind(share, bsdf);
-    // The noise of each seed is 0.8 %, of the lines that stand for all. Patches of 0.1 m and cells
-    // of directions are 1.8 % off with all lines, patches of 0.05 m 0.3 %; cells do not tell
-    // Burley's rise at grazing angles: 0.003.
+    // Each seed has 0.8 % of noise from the lines that represent all. With all lines, patches of
+    // 0.1 m and cells of directions are 1.8 % off, patches of 0.05 m 0.3 %. The cells do not
+    // resolve the rise of Burley's model at grazing angles: 0.003.
     EXPECT_NEAR(toWall / reflected, expected, 0.005);
     EXPECT_GT(std::abs(expected - skyToWallBehind(0, bsdf)), GetParam() ? 0.005 : 0.05);
 }
@@ -342,8 +345,8 @@ TEST(DirectedLight, IsTheSameAfterLightsAndPaintWereChanged) {
     EXPECT_GT(difference(everything(again), everything(fresh)), 1e-2);
 }
 
-// Nothing is brighter than the sky that lights it: slits between glossy boards that reflect all
-// light, as far as a scene lets them.
+// No surface is brighter than the sky that lights it. The scene consists of slits between glossy
+// boards that reflect all light, as far as a scene allows.
 TEST(GlossyBoards, GetNoMoreThanTheSky) {
     Scene scene;
     Material paint = grey("paint", 1);
@@ -363,8 +366,8 @@ TEST(GlossyBoards, GetNoMoreThanTheSky) {
         for (int32_t k = 0; k < 5; ++k)
             for (const glm::vec3& light : cornerLight(bake, k, RB_OUTPUT_LIGHTING))
                 most = std::max(most, double(light.x));
-        // What is fitted to corners may be above what it is fitted to; light by direction that
-        // makes power made this 2.2 and 2.6.
+        // Values fitted to corners may exceed the light that they are fitted to. A bug by which
+        // directed light created power made this 2.2 and 2.6.
         EXPECT_LT(most, 1.05);
     }
 }

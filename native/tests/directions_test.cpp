@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What every sequence of directions has to keep.
+// Properties that every sequence of directions must have.
 #include "bundles/directions.h"
 
 #include <gtest/gtest.h>
@@ -37,9 +37,9 @@ TEST(Directions, LinesAreUniformOverTheSphere) {
                 rightSecond += b.weight * r * r / double(kCount);
                 shift += glm::dvec2(b.shift) / double(kCount);
             }
-            // Five standard errors of independent directions: sqrt(4/45) of x^2, sqrt(16/225) of
-            // x^4 and sqrt(1/12) of a shift, over sqrt(4096). A low-discrepancy set is at least ten
-            // times better in the directions; rolls and shifts are random in both.
+            // The tolerance is five standard errors of independent directions: sqrt(4/45) of x^2,
+            // sqrt(16/225) of x^4 and sqrt(1/12) of a shift, over sqrt(4096). A low-discrepancy set
+            // is at least ten times better in the directions. Rolls and shifts are random in both.
             const double better = kind.isIndependent ? 1.0 : 0.1;
             for (int i = 0; i < 3; ++i) {
                 for (int j = 0; j < 3; ++j)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Tables of the pages in docs/ that the library itself can make, so that they cannot go stale.
+// Compares tables in docs/ with those that the library makes, so that the pages stay up to date.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 
 namespace raybundle::test {
 
-// Expects that a page in docs/ has a table, line by line; if not, prints what is to be put there.
+// Expects that a page in docs/ contains a table, line by line. If not, prints the table.
 inline void expectOnPage(const std::string& page, const std::string& table) {
     std::ifstream file(RAYBUNDLE_DOCS "/" + page);
     ASSERT_TRUE(file) << "docs/" << page;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Faces that lie on others, and faces without area: the light of a scene without them, and theirs
-// is that of what they lie on.
+// Faces that lie on other faces, and faces without area. The rest of the scene has the light of a
+// scene without them, and they have the light of the faces that they lie on.
 #include "patches/doubled_faces.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 
 using namespace test;
 
-// The faces of a mesh once more, their vertices moved by up to `off` metres.
+// Returns a mesh with each face twice. The vertices of the copies are moved by up to `off` metres.
 Mesh twice(const Mesh& mesh, float off) {
     Mesh both = mesh;
     std::mt19937 random(3);
@@ -34,7 +34,7 @@ Mesh twice(const Mesh& mesh, float off) {
     return both;
 }
 
-// A table under a lamp, over a floor.
+// A table under a lamp, above a floor.
 Scene tableScene(const Mesh& table, const glm::dmat4& transform = glm::dmat4(1)) {
     Scene scene;
     place(scene, grid("floor", {-3, -3, 0}, {6, 0, 0}, {0, 6, 0}, 12, 12), grey("", 0.5f));
@@ -62,7 +62,7 @@ TEST(DoubledFaces, BothHaveTheLightOfOne) {
     }
 }
 
-// Whichever of many stands for the others, none is left dark.
+// None of many copies is left dark, whichever of them stands for the others.
 TEST(DoubledFaces, ManyCopiesHaveTheLightOfOne) {
     const std::vector<glm::vec3> one = lightOf(tableScene(kTable), 1);
     Scene scene = tableScene(twice(kTable, 1e-6f));
@@ -80,7 +80,7 @@ TEST(DoubledFaces, ManyCopiesHaveTheLightOfOne) {
 
 TEST(DoubledFaces, AnObjectOnAnotherHasItsLightAlsoTurnedAndMirrored) {
     const std::vector<glm::vec3> one = lightOf(tableScene(kTable), 1);
-    // A quarter turn, and a mirror image: the same place, other corners.
+    // A quarter turn and a mirror image, which take the same place with other corners.
     for (const glm::dmat4& turn : {glm::rotate(glm::dmat4(1), kPi / 2, glm::dvec3(0, 0, 1)),
                                    glm::scale(glm::dmat4(1), glm::dvec3(-1, 1, 1))}) {
         Scene scene = tableScene(kTable);
@@ -135,7 +135,7 @@ TEST(DoubledFaces, ABakeThatGoesOnWithTheLastOneFindsThemAnew) {
     for (size_t c = 0; c < fresh.size(); ++c) EXPECT_EQ(again[c], fresh[c]);
 }
 
-// A face of no area along a border: what is shown at its vertices is the mean of their other
+// A face without area along a border. The light shown at its vertices is the mean of their other
 // corners.
 TEST(DoubledFaces, FacesWithoutAreaDoNotDarkenTheirVertices) {
     std::vector<std::vector<int32_t>> faces{{0, 1, 2, 3}};

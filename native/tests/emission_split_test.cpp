@@ -17,8 +17,8 @@ using namespace test;
 
 constexpr float kReflectance = 0.5f, kEmission = 0.5f;
 
-// A closed unit cube of which both sides of all faces emit, looked at from within: the irradiance
-// there is kEmission / (1 - kReflectance) = 1, and what leaves its outside does not come back.
+// A closed unit cube whose faces emit on both sides, seen from inside. The irradiance inside is
+// kEmission / (1 - kReflectance) = 1 W/m^2. The light that leaves the outside does not return.
 Scene glowingCube(bool inward) {
     Scene scene;
     place(scene, box("cube", glm::vec3(0), glm::vec3(1), inward),
@@ -35,8 +35,8 @@ struct Case {
     }
 };
 
-// Of the 12 n^2 sides, 512 at equal steps are of one parity at n = 16 and 32, and of both at the
-// others.
+// Of the 12 n^2 sides, 512 at equal steps are all fronts or all backs for n = 16 and 32, and both
+// kinds for the other n.
 std::vector<Case> cases() {
     std::vector<Case> all;
     for (const int along : {1, 2, 5, 7, 8, 16, 31, 32})

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What is covered in part has on the rest of it the light that it has beside.
+// The exposed part of a side that is partly covered has the light of the surface beside it.
 #include "visibility/exposed_share.h"
 
 #include <gtest/gtest.h>
@@ -19,8 +19,8 @@ namespace {
 
 using namespace test;
 
-// Black legs that stand on a floor of patches of 25 cm: each covers most of one, and is too narrow
-// for it to be cut.
+// Black legs that stand on a floor with patches of 25 cm. Each leg covers most of a patch and is
+// too narrow to cut it.
 constexpr int kLegs = 4;
 constexpr float kWidth = 0.2f;
 
@@ -57,8 +57,8 @@ TEST_P(CoveredInPart, HasTheLightThatItHasBeside) {
     double most = 0;
     for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
         most = std::max(most, std::abs(double(light.x) - 1));
-    // 256 points tell the share of half a side to about 1 %. By the lines of these bundles alone
-    // the light was up to 15 % off.
+    // 256 points determine the share of half a side within about 1 %. By the lines of these bundles
+    // alone the light was up to 15 % off.
     EXPECT_LT(most, 0.03);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The first shot EXTENDED: nothing is lost or counted twice on the way to the bundles, and light
+// The first shot EXTENDED: no power is lost or counted twice on the way to the bundles, and light
 // that begins in one place is spread.
 #include <gtest/gtest.h>
 
@@ -16,14 +16,14 @@ namespace {
 
 using namespace test;
 
-// A room whose lamp shines at the ceiling from below: little of the room sees it.
+// A room whose lamp shines upwards at the ceiling. Little of the room sees the lamp.
 Scene lampToTheCeiling(float reflectance) {
     Scene scene = roomWithBoxes(reflectance);
     scene.addLight(areaLight({2, 1.6, 2.4}, {0.3, 0, 0}, {0, 0.3, 0}, {5, 4, 3}));
     return scene;
 }
 
-// Absorbed power of a bake and its mean exitance but for emission, by patch sides; channel 0.
+// The absorbed power of a bake, W, and its reflected power, by patch sides; channel 0.
 struct Totals {
     double absorbed = 0, reflected = 0;
 };
@@ -41,7 +41,7 @@ Totals totalsOf(const Bake& bake) {
     return totals;
 }
 
-// Relative RMS difference of the light on the sides of two bakes of one scene, by area.
+// Returns the relative RMS difference of the light on the sides in two bakes of one scene, by area.
 double distanceOf(const Bake& a, const Bake& b) {
     double squares = 0, signal = 0;
     for (size_t side = 0; side < a.patches().sideCount(); ++side) {
@@ -58,7 +58,7 @@ double distanceOf(const Bake& a, const Bake& b) {
 }
 
 TEST(LocalToGlobalRatio, GivesTheExamplesOfTheThesis) {
-    // Section 3.4; given with two decimals.
+    // The examples of section 3.4, which are given with two decimals.
     EXPECT_NEAR(localToGlobalRatio(2.1, 0.577, 0.7, 0.073), 0.41, 0.005);
     EXPECT_NEAR(localToGlobalRatio(2.1, 0.577, 0.577, 1), 1.06, 0.005);
     EXPECT_NEAR(localToGlobalRatio(2.1, 0.577, 0.65, 0.67), 0.85, 0.005);
@@ -79,7 +79,7 @@ TEST(ExtendedFirstShot, LosesNoPowerInAClosedRoom) {
         for (int c = 0; c < 3; ++c)
             EXPECT_NEAR(absorbed[c] + left[c], power[c], 1e-5 * power[c]) << reflectance;
         EXPECT_NEAR(shot.escaped.x, 0, 1e-5 * power.x);
-        // The sources' light is that of SHOOT with the same lines.
+        // The light of the sources equals that of SHOOT with the same lines.
         EXPECT_EQ(shot.irradiance, room.shoot(FirstShotKind::SHOOT, 20000).irradiance);
     }
 }
@@ -97,11 +97,11 @@ TEST(ExtendedFirstShot, SpreadsTheLightOfALampThatShinesAtTheCeiling) {
         brightest = std::max(brightest, double(shot.unshot[side].x));
         brightestBefore = std::max(brightestBefore, 0.6 * double(shot.irradiance[side].x));
     }
-    // All but the corners below and behind the boxes.
+    // Everything but the corners below and behind the boxes.
     EXPECT_LT(lit, 0.5 * area);
     EXPECT_GT(reached, 0.9 * area);
-    // No more than the threshold (eq. 3.2; only fronts are lit, and both sides reflect), and a line
-    // that came in the last round.
+    // No side keeps more than the threshold (eq. 3.2; only fronts are lit, and both sides reflect)
+    // plus one line that arrived in the last round.
     const double power = kPi * 0.36 * 5;
     const double threshold = 0.6 * power / (patches.totalArea * 0.4);
     double smallest = INFINITY;
@@ -130,15 +130,15 @@ TEST(ExtendedFirstShot, GivesTheLightOfThePlainBake) {
             Bake plain, extended;
             setQuick(plain, 256);
             setQuick(extended, 256);
-            plain.settings.contacts = 0;  // the same patches for both
+            plain.settings.contacts = 0;  // to have the same patches in both
             extended.settings.firstShot = FirstShotKind::EXTENDED;
             extended.settings.localRays = 1 << 18;
             plain.run(scene);
             extended.run(scene);
             const double stated = std::hypot(reportOf(plain)["estimated_error"].get<double>(),
                                              reportOf(extended)["estimated_error"].get<double>());
-            // The statement is good to some ten per cent: two halves, and lines' noise from pooled
-            // counts.
+            // The stated error is accurate to some ten per cent: it has only two halves, and the
+            // noise of lines follows from pooled counts.
             EXPECT_LT(distanceOf(extended, plain), 1.5 * stated) << up << ", gap " << gap;
             EXPECT_LT(stated, 0.06);
             const Totals a = totalsOf(plain), b = totalsOf(extended);
@@ -147,8 +147,9 @@ TEST(ExtendedFirstShot, GivesTheLightOfThePlainBake) {
 }
 
 TEST(ExtendedFirstShot, CountsNothingTwiceInAFurnaceWithAStrongLamp) {
-    // Emission 0.5 of all walls, left to the bundles, and a lamp of as much power and more: in a
-    // closed room of one reflectance all reflected light is rho / (1 - rho) times the emitted.
+    // All walls emit 0.5 W/m^2, which is left to the bundles, and a lamp emits as much power and
+    // more. In a closed room of one reflectance the reflected light in all is rho / (1 - rho) times
+    // the emitted light.
     Scene scene = roomWithBoxes(0.5f, 0.5f);
     const double watts = 4 * kPi * 20;
     scene.addLight(pointLight({2.2, 1.7, 2}, glm::dvec3(20)));
@@ -160,7 +161,7 @@ TEST(ExtendedFirstShot, CountsNothingTwiceInAFurnaceWithAStrongLamp) {
     double walls = 0;
     for (float area : bake.patches().area) walls += 0.5 * double(area);
     const Totals totals = totalsOf(bake);
-    // The boxes' insides and the room's outside are dark.
+    // The insides of the boxes and the outside of the room are dark.
     EXPECT_NEAR(totals.reflected, watts + walls, 2e-3 * (watts + walls));
     EXPECT_NEAR(totals.absorbed, watts + walls, 2e-3 * (watts + walls));
     EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 2e-3);
@@ -204,8 +205,8 @@ TEST(ExtendedFirstShot, OfABakeDoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(ExtendedFirstShot, IsUnbiasedFromSeedToSeed) {
-    // Few local lines, so that errors of the rounds would show; each run against the gathered first
-    // shot with the same bundles.
+    // Few local lines, so that errors of the rounds would show. Each run is compared with a
+    // gathered first shot and the same bundles.
     const Scene scene = lampToTheCeiling(0.6f);
     constexpr int kSeeds = 60;
     Bake bakes[2];
@@ -215,7 +216,7 @@ TEST(ExtendedFirstShot, IsUnbiasedFromSeedToSeed) {
             Bake& bake = bakes[k];
             setQuick(bake);
             bake.settings.patchSize = 0.8f;
-            bake.settings.contacts = 0;  // the same patches for both
+            bake.settings.contacts = 0;  // to have the same patches in both
             bake.settings.targetError = 0.005f;
             bake.settings.seed = seed;
             bake.settings.firstShot = k ? FirstShotKind::EXTENDED : FirstShotKind::GATHER;
@@ -245,7 +246,8 @@ TEST(ExtendedFirstShot, IsUnbiasedFromSeedToSeed) {
         bias += area * first[i];
         light += area * mean[i];
     }
-    // 1 is expected; sides share the noise of what lights them all, so that it may vary by a half.
+    // The expected value is 1. It may vary by a half, because sides share the noise of the light
+    // that reaches all of them.
     EXPECT_LT(chi / sides, 1.5);
     EXPECT_LT(std::abs(bias), 2e-3 * light);
     RecordProperty("chi_square_per_side", std::to_string(chi / sides));

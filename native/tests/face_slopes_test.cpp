@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Least squares over faces of one patch: the slope of direct light against closed forms.
+// Least squares over faces of one patch: the slope of the direct light against closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +14,8 @@ namespace {
 
 using namespace test;
 
-// A flat face of one patch, which is 4 m wide at most, with a lamp above.
+// Returns the light at the corners of a flat face of one patch, at most 4 m wide, with a lamp
+// above.
 std::vector<glm::vec3> directOnOneFace(const Scene& scene, Reconstruction reconstruction,
                                        rb_output output = RB_OUTPUT_DIRECT) {
     Bake bake;
@@ -48,14 +49,14 @@ TEST(FaceSlopes, AreThoseOfAPointLight) {
         flatMean += double(flat[k].x) / 4;
         slopedMean += double(sloped[k].x) / 4;
     }
-    // The mean over the face stays, and is not that of the corners.
+    // The mean over the face is kept. It differs from the mean over the corners.
     EXPECT_NEAR(slopedMean, flatMean, 1e-5 * mean);
     const double share = std::min(1.0, flatMean / mean);
     for (size_t k = 0; k < 4; ++k) {
         EXPECT_NEAR(double(sloped[k].x), flatMean + share * (exact[k] - mean), 1e-4 * mean);
         EXPECT_NEAR(double(flat[k].x), flatMean, 1e-5 * mean);
     }
-    // Its colour with it.
+    // The outputs that include colour have the slope too.
     const auto combined = directOnOneFace(scene, Reconstruction::LEAST_SQUARES, RB_OUTPUT_COMBINED);
     for (size_t k = 0; k < 4; ++k) EXPECT_NEAR(combined[k].x, 0.5f * sloped[k].x, 1e-5);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Final gather at corners, against closed forms of light that faces of the mesh are too large for.
+// Final gather at corners, against closed forms of light that varies too fast for the faces of the
+// mesh.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,8 +25,9 @@ void bakePoint(Bake& bake, const Scene& scene, bool gathers = true) {
     bake.run(scene);
 }
 
-// The largest difference from an exact irradiance at the corners of the first instance, over that
-// or over its RMS where it is darker; corners where `exact` is not a number aside.
+// Returns the largest difference from an exact irradiance at the corners of the first instance,
+// relative to this irradiance, or to its RMS where it is darker. Corners where `exact` returns NaN
+// are left out.
 template <class Exact>
 double worstCorner(const Scene& scene, const Bake& bake, const Exact& exact) {
     const Mesh& mesh = scene.meshes[0];
@@ -45,7 +47,8 @@ double worstCorner(const Scene& scene, const Bake& bake, const Exact& exact) {
     return worst;
 }
 
-// A black ground of 4 x 4 faces of 1 m under a white sky; a black board is 0.1 m over one of them.
+// A black ground of 4 x 4 faces of 1 m under a white sky. A black board is 0.1 m above one of the
+// faces.
 Scene groundUnderBoard() {
     Scene scene;
     place(scene, grid("ground", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("", 0));
@@ -65,11 +68,12 @@ TEST(FinalGather, CornersUnderABoardSeeTheSkyAroundIt) {
     Bake gathered, interpolated;
     bakePoint(gathered, scene);
     bakePoint(interpolated, scene, false);
-    // Of the target three quarters are noise, one standard error of each of 64 corners; receivers
-    // lie 7 mm inside their face, in four directions around a vertex, and light changes over 0.1 m.
+    // The noise takes three quarters of the target, one standard error of each of 64 corners. The
+    // receivers lie 7 mm inside their faces, in four directions around a vertex, and the light
+    // changes over 0.1 m.
     EXPECT_LT(worstCorner(scene, gathered, skyIrradiance),
               4 * 0.75 * double(kGatherTarget) + 0.007);
-    // Else the test would say nothing.
+    // Otherwise the test would prove nothing.
     EXPECT_GT(worstCorner(scene, interpolated, skyIrradiance), 0.1);
 }
 
@@ -81,24 +85,24 @@ TEST(FinalGather, CornersBesideAWallSeeWhatItReflects) {
           glm::dmat4(1), RB_ROLE_OCCLUDE);
     scene.addLight(sunLight({-1, 0, 0}, {4, 4, 4}));
     const auto exact = [](const glm::vec3& at) {
-        // The ends of the wall's foot, where light jumps.
+        // At the ends of the wall's foot the light is discontinuous.
         if (at.x == 2 && std::abs(at.y) == 1) return std::nan("");
         const glm::dvec3 wall[4] = {{2, -1, 0}, {2, 1, 0}, {2, 1, 0.5}, {2, -1, 0.5}};
-        // Where the receivers of the corners at the wall are.
+        // The position of the receivers of the corners at the wall.
         const glm::dvec3 point(std::min(at.x, 1.995f), at.y, 0);
         return 2 / kPi * polygonIrradiance(point, {0, 0, 1}, wall, 4);
     };
     Bake gathered, interpolated;
     bakePoint(gathered, scene);
     bakePoint(interpolated, scene, false);
-    // Where corners are left to interpolation it is off by the target around them, RMS: at the
-    // corner itself it may be thrice that.
+    // Interpolated corners are off by the target in the RMS over the corners around them; a single
+    // corner may be off by three times that.
     EXPECT_LT(worstCorner(scene, gathered, exact), (4 * 0.75 + 3) * double(kGatherTarget));
     EXPECT_GT(worstCorner(scene, interpolated, exact), 0.1);
 }
 
 TEST(FinalGather, CornersOverANarrowGapSeeTheLightInIt) {
-    // A black board of 0.1 m, 1 cm over white ground of one patch, under a sun at its zenith: its
+    // A black board of 0.1 m, 1 cm above white ground of one patch, under a sun at the zenith. Its
     // underside sees the lit ground beside its shadow.
     Scene scene;
     place(scene, rectangle("board", {-0.05f, -0.05f, 0.01f}, {0, 0.1f, 0}, {0.1f, 0, 0}),
@@ -109,7 +113,7 @@ TEST(FinalGather, CornersOverANarrowGapSeeTheLightInIt) {
         const glm::dvec3 lit[4] = {{-0.5, -0.5, 0}, {0.5, -0.5, 0}, {0.5, 0.5, 0}, {-0.5, 0.5, 0}};
         const glm::dvec3 shadow[4] = {
             {-0.05, -0.05, 0}, {0.05, -0.05, 0}, {0.05, 0.05, 0}, {-0.05, 0.05, 0}};
-        // Where the receivers are, 1 % of the way to the middle.
+        // The position of the receivers, 1 % of the way towards the centre.
         const glm::dvec3 point(0.99 * at.x, 0.99 * at.y, 0.01), down(0, 0, -1);
         return 2 / kPi *
                (polygonIrradiance(point, down, lit, 4) - polygonIrradiance(point, down, shadow, 4));
@@ -125,7 +129,8 @@ TEST(FinalGather, CornersOverANarrowGapSeeTheLightInIt) {
 }
 
 TEST(FinalGather, LeavesSmoothLightAlone) {
-    // In a furnace nothing changes; the report says how many corners were left.
+    // In a furnace the light does not change, and the report counts the corners that were
+    // interpolated.
     const Scene scene = roomWithBoxes(0.5f, 0.5f, 0.1f);
     Bake bake;
     bakePoint(bake, scene);

@@ -18,7 +18,7 @@ namespace {
 
 using namespace test;
 
-// A black surface far below everything, to give a scene its size.
+// Adds a black surface far below all others, to enlarge the scene.
 void placeGround(Scene& scene) {
     place(scene, rectangle("ground", {-20, -20, -5}, {40, 0, 0}, {0, 40, 0}), grey("", 0));
 }
@@ -29,14 +29,14 @@ TEST(EmissiveMesh, ShinesFromTheSidesThatEmit) {
         placeReceiver(scene, {0, 0, 0});
         placeReceiver(scene, {0, 0, 2}, {0, 1, 0}, {1, 0, 0});  // above, facing down
         place(scene,
-              rectangle("lamp", {-0.1f, -0.1f, 1}, {0, 0.2f, 0}, {0.2f, 0, 0}),  // front looks down
+              rectangle("lamp", {-0.1f, -0.1f, 1}, {0, 0.2f, 0}, {0.2f, 0, 0}),  // front faces down
               grey("lamp", 0, 600, backEmission));
         placeGround(scene);
         const GatheredShot shot = gatherFinely(scene);
         const glm::dvec3 lamp[4] = {{-0.1, -0.1, 1}, {0.1, -0.1, 1}, {0.1, 0.1, 1}, {-0.1, 0.1, 1}};
         const double below = polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
-        // Rays start 4e-6 of the ground's 28 m above the receiver, 0.1 mm of a metre: 2e-4 more
-        // light.
+        // Rays start 4e-6 of the ground's 28 m above the receiver, 0.1 mm in a metre, which gives
+        // 2e-4 more light.
         EXPECT_NEAR(shot.front(0), 600 * below, 5e-4 * 600 * below);
         EXPECT_NEAR(shot.front(1), backEmission * below, 5e-4 * backEmission * below);
         const double power = 0.04 * (600.0 + backEmission);
@@ -46,7 +46,7 @@ TEST(EmissiveMesh, ShinesFromTheSidesThatEmit) {
 
 TEST(EmissiveMesh, PowerToASquareFollowsTheFormFactor) {
     Scene scene;
-    // A patch for each face: patches of 0.1 m would be a hundred and sixty thousand on the ground.
+    // One patch per face: patches of 0.1 m would be a hundred and sixty thousand on the ground.
     place(scene, grid("floor", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 10, 10), grey("", 0.5f));
     place(scene, rectangle("lamp", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}), grey("lamp", 0, 50));
     placeGround(scene);
@@ -56,7 +56,8 @@ TEST(EmissiveMesh, PowerToASquareFollowsTheFormFactor) {
         if (shot.patches.parents[shot.patches.parentOf[p]].instance == 0)
             power += double(shot.patches.area[p]) * shot.light.irradiance[2 * p].x;
     const double exact = 50 * parallelRectangles(1, 1, 1);
-    // The floor's hundred patches are wholly lit: closed forms at stratified points.
+    // The hundred patches of the floor are fully lit, so that closed forms at stratified points are
+    // used.
     EXPECT_NEAR(power, exact, 1e-3 * exact);
 }
 
@@ -71,8 +72,8 @@ TEST(EmissiveMesh, ManyFacesWithoutAClosedFormGiveTheSame) {
 }
 
 TEST(EmissiveMesh, TrianglesEmitUniformly) {
-    // Two triangles that fill a square, too many to have a closed form, over a receiver off the
-    // middle.
+    // Triangles that fill a square and are too many for a closed form, over a receiver off the
+    // centre.
     Scene scene;
     placeReceiver(scene, {0.9f, 0.1f, 0});
     std::vector<glm::vec3> v;
@@ -100,7 +101,7 @@ TEST(FirstShot, LeavesDimEmissionToTheBundles) {
     }
 }
 
-// Half of the surfaces emit, but four lines of five pass the emitter by.
+// Half of the surfaces emit, but four of five lines miss the emitter.
 TEST(FirstShot, GathersDimEmissionThatLinesSeldomMeet) {
     Scene scene;
     place(scene, rectangle("receiver", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.8f));
@@ -108,7 +109,8 @@ TEST(FirstShot, GathersDimEmissionThatLinesSeldomMeet) {
     const ShotScene shots(scene, 0.05f);
     const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0);
     for (const glm::vec3& left : shot.emission) EXPECT_EQ(left, glm::vec3(0));
-    // In closed form: the error is that of the quadrature over the patches.
+    // The light comes from a closed form, so that the error is that of the quadrature over the
+    // patches.
     EXPECT_NEAR(meanLight(shots.patches, shot, 0).value, parallelRectangles(1, 1, 1), 1e-4);
 }
 
@@ -125,7 +127,7 @@ TEST(FirstShot, PowerIsConservedInAClosedRoom) {
                 double(shot.patches.area[side / 2]) * glm::dvec3(shot.light.irradiance[side]);
         const double exact = isArea ? kPi * 0.64 : 4 * kPi;
         EXPECT_NEAR(shot.light.emitted.x, exact, 1e-5 * exact);
-        // Some thousand patches whose errors of 1 % at most are independent.
+        // Some thousand patches with independent errors of at most 1 %.
         EXPECT_NEAR(gathered.x, exact, 2e-3 * exact);
         EXPECT_NEAR(gathered.y, 2 * exact, 4e-3 * exact);
         EXPECT_NEAR(gathered.z, 3 * exact, 6e-3 * exact);
@@ -146,7 +148,7 @@ TEST(FirstShot, LightsWithoutStrengthOrSizeDoNoHarm) {
     placeReceiver(scene);
     scene.addLight(pointLight({0, 0, 1}, glm::dvec3(0)));
     scene.addLight(areaLight({0, 0, 1}, {1, 0, 0}, {2, 0, 0}, glm::dvec3(1)));
-    scene.addLight(pointLight({0, 0, 0}, glm::dvec3(1)));  // on the receiver itself
+    scene.addLight(pointLight({0, 0, 0}, glm::dvec3(1)));  // at the position of the receiver
     const GatheredShot shot = gatherFinely(scene);
     EXPECT_TRUE(std::isfinite(shot.front()) && std::isfinite(shot.back()));
 }
@@ -160,7 +162,8 @@ TEST(FirstShot, TheSameSeedGivesTheSameLight) {
 }
 
 TEST(GatheredMesh, ALampAgainstTheCeilingLightsTheCeilingAroundIt) {
-    // Its top lies on the ceiling and covers part of it; its four sides shine along it.
+    // The top of the lamp lies on the ceiling and covers a part of it. Its four sides shine along
+    // the ceiling.
     Scene scene;
     place(scene, rectangle("ceiling", {-2, 2, 0}, {4, 0, 0}, {0, -4, 0}), grey("", 0.5f));
     place(scene, box("lamp", {-0.33f, -0.33f, -0.2f}, {0.33f, 0.33f, 0}, false), grey("", 0, 30));
@@ -171,7 +174,7 @@ TEST(GatheredMesh, ALampAgainstTheCeilingLightsTheCeilingAroundIt) {
     for (uint32_t k = 0; k < shot.patches.parents[0].patchCount(); ++k) {
         const double area = double(shot.patches.area[k]);
         found += area * double(shot.light.irradiance[2 * k].x);
-        // Midpoint rule of Lambert's formula outside the lamp; under it nothing arrives.
+        // Midpoint rule of Lambert's formula outside the lamp. No light arrives under the lamp.
         constexpr int kSteps = 16;
         double sum = 0;
         for (int i = 0; i < kSteps * kSteps; ++i) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The thesis' estimators of form factors against closed forms: unbiased, with the variance that
-// theory gives, and an error that falls with the square root of the lines.
+// The thesis' estimators of form factors against closed forms: they are unbiased, have the variance
+// that theory gives, and their error falls with the square root of the number of lines.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,13 +30,13 @@ struct Pair {
     std::unique_ptr<Visibility> visibility;
 };
 
-// Unit squares that face each other at distance 1.
+// Unit squares that face each other at a distance of 1.
 Pair parallelSquares() {
     return {rectangle("low", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}),
             rectangle("high", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}), parallelRectangles(1, 1, 1)};
 }
 
-// Mean and variance of single estimates over some seeds.
+// Mean and variance of single estimates over several seeds.
 struct Moments {
     double mean = 0, variance = 0;
 };
@@ -64,8 +64,9 @@ TEST(FormFactorEstimators, AreUnbiased) {
     };
     for (const Pair& pair : pairs)
         for (const FormFactorEstimator& estimator : formFactorEstimators()) {
-            // Lines of a bundle share a direction, so that the ratio has a bias of the order of
-            // one over the bundles: as many as there are lines elsewhere.
+            // The lines of a bundle share a direction, so the ratio has a bias of the order of one
+            // over the number of bundles. There are as many bundles here as lines for the other
+            // estimators.
             const uint32_t lines = estimator.name == "bundles" ? 25600 : 1024;
             constexpr uint32_t kSeeds = 60;
             const Moments m = momentsOf(pair, estimator, lines, kSeeds);
@@ -75,8 +76,8 @@ TEST(FormFactorEstimators, AreUnbiased) {
 }
 
 TEST(FormFactorEstimators, OccludersCount) {
-    // A screen half-way up hides a part of the squares from each other: all estimators must see
-    // the same rest.
+    // A screen half-way between the squares hides a part of them from each other. All estimators
+    // must see the same remainder.
     Scene scene;
     place(scene, rectangle("low", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
     place(scene, rectangle("high", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}), grey("", 0));
@@ -92,13 +93,14 @@ TEST(FormFactorEstimators, OccludersCount) {
     }
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
     EXPECT_LT(*high, 0.75 * parallelRectangles(1, 1, 1));
-    // Of a share of 0.1 by 40000 lines, of which a fifth meets the square: 3 % each at most.
+    // A form factor of 0.1 by 40000 lines, of which a fifth meets the square: at most 3 % of error
+    // each.
     EXPECT_LT(*high - *low, 0.1 * *high);
 }
 
 TEST(FormFactorEstimators, HaveTheirTheoreticalVariances) {
-    // With r the distance of two points, both cosines are 1 / r. Points' differences (u, v) have
-    // the density (1 - |u|) (1 - |v|).
+    // With r the distance of two points, both cosines are 1 / r. The difference (u, v) of the
+    // points has the density (1 - |u|) (1 - |v|).
     double area = 0, hemisphere = 0, exact = 0;
     constexpr int kSteps = 400;
     for (int i = 0; i < kSteps; ++i)
@@ -108,22 +110,22 @@ TEST(FormFactorEstimators, HaveTheirTheoreticalVariances) {
             const double r2 = 1 + u * u + v * v, kernel = 1 / (kPi * r2 * r2);
             exact += weight * kernel;
             area += weight * kernel * kernel;
-            // pi cos sin against the cosine's density.
+            // pi cos sin, relative to the density of the cosine.
             hemisphere += weight * kernel * kPi * std::sqrt(1 / r2) * std::sqrt(1 - 1 / r2);
         }
     const Pair pair = parallelSquares();
     ASSERT_NEAR(exact, pair.exact, 1e-5);
     const double f2 = pair.exact * pair.exact;
     const double theory[3] = {area - f2, hemisphere - f2, pair.exact - f2};
-    // The lowest is that of the area, for these squares: the points' integrand varies by a factor
-    // of 9 only. Next comes the cosine; the uniform hemisphere is last, by 5 %.
+    // For these squares the estimator by area has the least variance, because its integrand varies
+    // only by a factor of 9. The cosine follows; the uniform hemisphere is last, by 5 %.
     EXPECT_LT(theory[0], theory[2]);
     EXPECT_LT(theory[2], theory[1]);
     double found[3];
     for (size_t k = 0; k < 3; ++k) {
         constexpr uint32_t kLines = 16, kSeeds = 20000;
         found[k] = kLines * momentsOf(pair, formFactorEstimators()[k], kLines, kSeeds).variance;
-        // Of 20000 estimates: sqrt(2 / 20000) = 1 % of standard error.
+        // The standard error of the variance of 20000 estimates is sqrt(2 / 20000) = 1 %.
         EXPECT_NEAR(found[k], theory[k], 4 * 0.01 * theory[k]) << formFactorEstimators()[k].name;
         RecordProperty(formFactorEstimators()[k].name, std::to_string(found[k]));
     }
@@ -147,9 +149,10 @@ TEST(FormFactorEstimators, ErrorFallsWithTheSquareRootOfTheLines) {
             ++count;
         }
         const double slope = (count * sxy - sx * sy) / (count * sxx - sx * sx);
-        // The logarithm of each error is known to 1 / sqrt(2 * 31) = 0.127, the slope over these 7
-        // to 0.127 / (ln 2 sqrt 28) = 0.035. The first two points of the bundles, of two and four
-        // bundles, stand outside their asymptote: they get twice the room.
+        // The logarithm of each error is known within 1 / sqrt(2 * 31) = 0.127, the slope over
+        // these 7 points within 0.127 / (ln 2 sqrt 28) = 0.035. The first two points of the
+        // bundles, with two and four bundles, lie off the asymptote; the bundles get twice the
+        // tolerance.
         EXPECT_NEAR(slope, -0.5, (estimator.name == "bundles" ? 6 : 3) * 0.035) << estimator.name;
         RecordProperty(estimator.name, std::to_string(slope));
     }

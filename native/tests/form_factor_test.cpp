@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Form factors by line counts and by Lambert's formula against closed forms.
+// Form factors by line counts and by Lambert's formula, against closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,12 +17,12 @@ using namespace test;
 constexpr uint32_t kManyBundles = 4096;
 
 // One standard error of a form factor from as many independent lines as there are bundles, with the
-// factor 4/3 that the cosine's weight costs. All lines of a bundle share a
-// direction, so more of them do not help; but the low-discrepancy directions do, by far more than a
-// factor of 4, so that one such standard error is a safe bound.
+// factor 4/3 for the cosine's weight. All lines of a bundle share a direction, so that more lines
+// per bundle do not help. The low-discrepancy directions reduce the error by far more than a factor
+// of 4, so that one such standard error is a safe bound.
 double bound(double f) { return std::sqrt(4.0 / 3 * f * (1 - f) / kManyBundles); }
 
-// Form factor between two meshes, both ways by reciprocity.
+// Checks the form factor between two meshes in both directions, by reciprocity.
 void expectFormFactor(const Mesh& from, const Mesh& to, double areaRatio, double exact,
                       double discretisation = 0) {
     for (float patchSize : {10.0f, 0.25f}) {
@@ -90,7 +90,8 @@ TEST(FormFactor, CoaxialDisks) {
         up.push_back(k);
         down.insert(down.begin(), k);
     }
-    // A regular 48-gon has 0.3 % less area than its circle, and its form factor is less by as much.
+    // A regular 48-gon has 0.3 % less area than its circle, and its form factor is smaller by about
+    // as much.
     expectFormFactor(polygons("low", low, {up}), polygons("high", high, {down}), 1,
                      coaxialDisks(1, 1, 1), 0.004);
 }
@@ -113,7 +114,7 @@ TEST(FormFactor, RowsOfAClosedSceneSumToOne) {
 }
 
 const glm::dvec3 kUp(0, 0, 1);
-constexpr double kLambert = 1e-6;  // its angles are those of single precision
+constexpr double kLambert = 1e-6;  // relative to angles in single precision
 
 double irradianceFrom(const std::vector<glm::dvec3>& polygon, const glm::dvec3& normal = kUp,
                       const glm::dvec3& point = glm::dvec3(0)) {
@@ -139,7 +140,8 @@ TEST(PolygonIrradiance, AFarPolygonGivesItsSolidAngleTimesTheCosine) {
     const glm::dvec3 u = size * glm::normalize(glm::cross(towards, glm::dvec3(1, 0, 0)));
     const glm::dvec3 v = glm::cross(towards, u), p = distance * towards;
     const double exact = size * size * towards.z / (distance * distance);
-    // A steradian of 2.5e-7 is the sum of angles a thousand times as large, which nearly cancel.
+    // The solid angle of 2.5e-7 sr is the sum of angles a thousand times as large, which nearly
+    // cancel.
     EXPECT_NEAR(irradianceFrom({p, p + u, p + u + v, p + v}), exact, 2 * size / distance * exact);
 }
 
@@ -150,7 +152,7 @@ TEST(PolygonIrradiance, APolygonIsCutAtTheHorizon) {
     EXPECT_NEAR(irradianceFrom({{-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}}, wall), half,
                 kLambert);
     EXPECT_EQ(irradianceFrom({{-3, -1, 1}, {-1, -1, 1}, {-1, 1, 1}, {-3, 1, 1}}, wall), 0);
-    // A triangle whose one corner is above, and one whose two are.
+    // A triangle with one corner above the horizon, and one with two corners above.
     EXPECT_NEAR(irradianceFrom({{-1, 0, 1}, {1, 0, 1}, {-1, 1, 1}}, wall),
                 irradianceFrom({{0, 0, 1}, {1, 0, 1}, {0, 0.5, 1}}, wall), kLambert);
     EXPECT_NEAR(irradianceFrom({{1, 0, 1}, {-1, 0, 1}, {1, 1, 1}}, wall),
@@ -173,7 +175,7 @@ TEST(PolygonIrradiance, TheWallsOfACubeFillTheHemisphere) {
 }
 
 TEST(PolygonIrradiance, NoPolygonGivesALightThatIsNotANumber) {
-    // The receiver on a corner, on an edge, in the plane, and a polygon without area.
+    // A receiver on a corner, on an edge and in the plane, and a polygon without area.
     const std::vector<glm::dvec3> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     for (glm::dvec3 point :
          {glm::dvec3(0, 0, 0), glm::dvec3(0.5, 0, 0), glm::dvec3(0.5, 0.5, 0), glm::dvec3(2, 2, 0)})

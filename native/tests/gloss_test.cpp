@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Reflectance that is not diffuse: it carries light on, leaves outputs with colour alone, and is
-// more where the light of the sources comes in at grazing angles. And what outputs show of light by
-// its angle.
+// Reflectance that is not diffuse: it carries light to other surfaces, does not appear in outputs
+// with colour, and is larger for light of the sources at grazing angles. The tests also cover what
+// outputs show of light depending on its angle.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,7 @@ TEST(Gloss, IsNoPartOfWhatLeaves) {
     for (float opacity : {1.0f, 0.5f})
         for (Reconstruction reconstruction :
              {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT}) {
-            // A furnace: the exitance of the room is 1.
+            // A furnace: the exitance of the room is 1 W/m^2.
             Scene scene = closedCube(0.6f, 0.4f);
             Material shell = grey("shell", 0.3f * opacity, 0.7f * opacity);
             shell.opacity = opacity;
@@ -43,7 +43,7 @@ TEST(Gloss, IsNoPartOfWhatLeaves) {
         }
 }
 
-// A floor under a sun whose light passes the black board above it.
+// A floor under a sun whose light passes the black board above the floor.
 Scene boardOverFloor(double cosine, float grazing) {
     Scene scene;
     Material white = grey("white", 0.5f);
@@ -73,7 +73,8 @@ TEST(Gloss, MoreIsReflectedAtGrazingAngles) {
     }
 }
 
-// Of no shader; with terms that none has alone.
+// Returns the material with an arbitrary dependence of the shown light on the angle, with all
+// terms.
 Material shownByAngle(Material material) {
     MaterialSide& front = material.sides[0];
     front.shownFromAbove = {0.8f, 0.9f, 1.0f};
@@ -111,7 +112,7 @@ TEST(ShownByAngle, OfTheSunIsExact) {
 TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
     for (Reconstruction reconstruction :
          {Reconstruction::LEAST_SQUARES, Reconstruction::AREA_AVERAGE, Reconstruction::POINT}) {
-        // A furnace: the irradiance is 1.
+        // A furnace: the irradiance is 1 W/m^2.
         Scene scene = closedCube(0.6f, 0.4f);
         for (Material& material : scene.materials) material = shownByAngle(material);
         Bake bake;
@@ -132,9 +133,9 @@ TEST(ShownByAngle, OfLightFromEverywhereIsExact) {
     }
 }
 
-// A lamp 2 cm above a patch of 20 cm: its light comes at all angles, and most of it from few of the
-// points where it is looked at. The closed form alone would have no error. Over 64 seeds the RMS of
-// the difference is good to 10 %.
+// A lamp 2 cm above a patch of 20 cm. Its light arrives at all angles, and most of it at few of the
+// sampled points. The closed form alone would have no error. Over 64 seeds the RMS difference is
+// accurate to 10 %.
 TEST(ShownByAngle, TheStatedErrorHasThatOfTheAngles) {
     Scene scene;
     Material white = grey("white", 0.5f);

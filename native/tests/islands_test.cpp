@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What is far away, and how surfaces are cut into meshes, change nothing: patches, lines and light.
+// Distant objects, and the way in which surfaces are divided into meshes, affect neither patches,
+// lines nor light.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +21,7 @@ namespace {
 
 using namespace test;
 
-// Each face with vertices of its own.
+// Returns the mesh with separate vertices for each face.
 Mesh split(const Mesh& mesh) {
     std::vector<glm::vec3> vertices;
     std::vector<std::vector<int32_t>> faces;
@@ -34,7 +35,7 @@ Mesh split(const Mesh& mesh) {
     return polygons(mesh.name, std::move(vertices), faces);
 }
 
-// The scene with its meshes split; separate: and each face an instance.
+// Returns the scene with split meshes; if `separate`, each face is also an instance of its own.
 Scene cutApart(const Scene& scene, bool separate) {
     Scene result;
     result.lights = scene.lights;
@@ -83,7 +84,8 @@ TEST(Welding, SplitEdgesAndSeparateFacesLeaveThePatchesAsTheyAre) {
         const auto pairsOf = [](const Patches& patches) {
             return neighbouringTiles(patches, 0, uint32_t(patches.parents.size())).size();
         };
-        // Where the sides of the two boxes lie in one plane, they go on when they are cut apart.
+        // Where the sides of the two boxes lie in one plane, they continue each other if they are
+        // cut apart.
         EXPECT_GE(pairsOf(cut), pairsOf(whole));
         EXPECT_LE(pairsOf(cut), pairsOf(whole) + 4 * 16);
         EXPECT_EQ(cut.sheets.joined, whole.sheets.joined);
@@ -101,7 +103,7 @@ TEST(Welding, BoxesThatStandAgainstEachOtherStayTwo) {
 }
 
 TEST(Welding, RoundingOfTransformsDoesNotMatter) {
-    // Two halves of a strip, one moved by its matrix, a kilometre away.
+    // Two halves of a strip, one of which is moved by its matrix, a kilometre away.
     Scene scene;
     const Material material = grey("", 0.5f);
     place(scene, rectangle("left", {1000.1f, 0, 0}, {1, 0, 0}, {0, 1, 0}), material);
@@ -159,8 +161,9 @@ TEST(PatchSizes, AnotherThingFarAwayDoesNotMatter) {
                     EXPECT_EQ(sizes.size[s], alone.size[s]);
                     EXPECT_EQ(sizes.island[s], 0u);
                 }
-                // And it costs a quarter more at most, for what sees nothing of itself; what is
-                // vast beside the room, so that lines can be dense enough for both, thrice.
+                // The other object adds at most a quarter to the patches if it does not see itself.
+                // One that is huge compared with the room may triple them, so that lines can be
+                // dense enough for both.
                 EXPECT_LE(patchesOf(sizes, both), (size > 100 ? 3 : 1.25) * count + 6);
             }
 }
@@ -185,7 +188,7 @@ TEST(PatchSizes, ACopyHasTheSameSizes) {
     for (size_t s = 0; s < 3; ++s) {
         EXPECT_NEAR(sizes.size[s], alone.size[s], 1e-9);
         EXPECT_NEAR(sizes.size[s + 3], alone.size[s], 1e-9);
-        // The one at the origin is the first.
+        // The copy at the origin belongs to the first island.
         EXPECT_EQ(sizes.island[s], 0u);
     }
 }
@@ -237,7 +240,7 @@ TEST(Islands, LinesAreThoseOfTheWholePlane) {
     FragmentLists apart(patches, 0.1f), together(one, 0.1f);
     Directions directions(DirectionKind::LOW_DISCREPANCY, 1);
     std::vector<Bundle> bundles = directions.next(64);
-    // Along the two boxes, where one is behind the other.
+    // One bundle along the two boxes, one of which is behind the other.
     bundles[0].direction = glm::dvec3(1, 0, 0);
     bundles[0].right = glm::dvec3(0, 1, 0);
     bundles[0].up = glm::dvec3(0, 0, 1);
@@ -279,7 +282,8 @@ TEST(Islands, ARoomHasItsLightWhateverIsFarAway) {
         EXPECT_LE(int(with["bundles"]), 2 * int(report["bundles"])) << far.name;
         EXPECT_LE(double(with["patches"]), 1.3 * double(report["patches"]) + 100) << far.name;
         EXPECT_LT(std::abs(double(with["energy"]["balance_error"])), 5e-3) << far.name;
-        // Two bakes at 2 % noise with other lines: three times as much, of independent ones.
+        // Two bakes with 2 % of noise and different lines: three times the noise of independent
+        // ones.
         EXPECT_LT(noise(everything(bake), light), 0.06) << far.name;
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What lamps give without occluders, against closed forms.
+// The light of lamps without occluders, against closed forms.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -74,7 +74,7 @@ TEST(PointLight, ADiskFacesItsReceiver) {
     light.radius = 1;
     light.pointShape = RB_POINT_DISK;
     scene.addLight(light);
-    // Radiance I / (pi r^2) over a coaxial disk: I / (r^2 + h^2).
+    // Radiance I / (pi r^2) over a coaxial disk: the irradiance is I / (r^2 + h^2).
     EXPECT_NEAR(gatherFinely(scene).front(), 3.0 / 5, kSampled * 3 / 5);
 }
 
@@ -133,8 +133,8 @@ TEST(SunLight, AWideSunOnTheHorizonIsHalfSeen) {
     placeReceiver(scene);
     const double half = 0.3;
     scene.addLight(sunLight({1, 0, 0}, glm::dvec3(1), 2 * half));
-    // Radiance 1 / (pi sin^2 half); the integral of sin^2(theta) sin(phi) over the upper half of
-    // the disk.
+    // The radiance is 1 / (pi sin^2 half). It is integrated over the upper half of the disk with
+    // the factor sin^2(theta) sin(phi).
     const double exact =
         (half - 0.5 * std::sin(2 * half)) / (kPi * std::sin(half) * std::sin(half));
     const GatheredShot shot = gatherFinely(scene);
@@ -146,7 +146,8 @@ TEST(AreaLight, ARectangleHasLambertsClosedForm) {
     Scene scene;
     placeReceiver(scene);
     placeReceiver(scene, {1.5f, 0.7f, 0});
-    placeReceiver(scene, {1.5f, 0, 1}, {0, 0, 1}, {0, 1, 0});  // upright, facing the light in part
+    // Upright, partly facing the light.
+    placeReceiver(scene, {1.5f, 0, 1}, {0, 0, 1}, {0, 1, 0});
     scene.addLight(areaLight({0, 0, 1.2}, {0.5, 0, 0}, {0, -0.8, 0}, glm::dvec3(7)));
     const GatheredShot shot = gatherFinely(scene);
     const glm::dvec3 lamp[4] = {
@@ -156,11 +157,12 @@ TEST(AreaLight, ARectangleHasLambertsClosedForm) {
     const double upright = 7 * polygonIrradiance({1.5, 0, 1}, {-1, 0, 0}, lamp, 4);
     EXPECT_NEAR(shot.front(0), below, kExact * below);
     EXPECT_NEAR(shot.front(1), beside, kExact * beside);
-    // At 0.2 m below the lamp's plane 2 mm matter more.
+    // At 0.2 m below the lamp's plane the size of 2 mm matters more.
     EXPECT_NEAR(shot.front(2), upright, 10 * kExact * upright);
 }
 
-// Of a lamp as large as it is near few samples see much of its rim, from where little comes.
+// A lamp is about as large as it is near. Few samples reach its rim, which gives little of its
+// light.
 TEST(AreaLight, ALargeOneNearByShinesFromWhereItIs) {
     constexpr int kCells = 60, kSteps = 40;
     constexpr double kWidth = 3, kHeight = 0.98, kLamp = 1.5;
@@ -174,7 +176,7 @@ TEST(AreaLight, ALargeOneNearByShinesFromWhereItIs) {
                kCells),
           rough);
     const GatheredShot shot = gatherFinely(scene);
-    // Means over all light of 1 - c and its square, by its angles and by its directions.
+    // Means over all light of 1 - c and of its square, from `angles` and from `directions`.
     glm::dvec2 expected(0.0), angles(0.0), directions(0.0);
     for (uint32_t p = 0; p < shot.patches.count(); ++p) {
         const glm::dvec3 point(shot.patches.point(p, glm::vec2(0.5f)));
@@ -201,8 +203,9 @@ TEST(AreaLight, ALargeOneNearByShinesFromWhereItIs) {
                 here * double(incoming.weight) / Incoming::kCount * glm::dvec2(rest, rest * rest);
         }
     }
-    // Uncorrected both are 4 and 6 % too grazing. Of the angles' error 1.2 and 1.5 % are left, for
-    // what is corrected falls with the square of the samples only; the directions have noise alone.
+    // Without correction both would be 4 and 6 % too grazing. Of the error of `angles` 1.2 and 1.5
+    // % remain, because the corrected bias falls only with the square of the number of samples.
+    // `directions` have noise alone.
     for (int k = 0; k < 2; ++k) {
         EXPECT_NEAR(angles[k] / expected[k], 1, 0.02) << k;
         EXPECT_NEAR(directions[k] / expected[k], 1, 0.02) << k;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Spread of area lights, lights without shadows, and what instances are to light.
+// Spread of area lights, lights without shadows, and the visibility of instances.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,8 @@ const double kSpreads[] = {0.02, 0.3, 1.0, 2.0, 3.0, kPi};
 constexpr FirstShotKind kShots[] = {FirstShotKind::GATHER, FirstShotKind::SHOOT,
                                     FirstShotKind::EXTENDED};
 
-// Integral of a function of the angle over the half space, per steradian of the projected one.
+// Returns the integral of a function of the angle over the half space, weighted by the cosine and
+// divided by pi.
 template <class Function>
 double overHalfSpace(double most, const Function& function) {
     constexpr int kSteps = 20000;
@@ -39,7 +40,7 @@ TEST(AreaSpread, KeepsThePower) {
         const AreaSpread s(spread);
         const double mean = overHalfSpace(
             0.5 * spread, [&](double t) { return double(s.factor(float(std::cos(t)))); });
-        // The cosine in float is coarse beside a narrow spread.
+        // The cosine in float is coarse for a narrow spread.
         EXPECT_NEAR(mean, 1, spread < 0.1 ? 3e-3 : 1e-4) << "spread " << spread;
         if (spread < 3) {
             EXPECT_EQ(s.factor(float(std::cos(0.51 * spread))), 0) << "spread " << spread;
@@ -53,7 +54,7 @@ TEST(AreaSpread, DrawsDirectionsByItsFactor) {
     constexpr int kDraws = 20000;
     for (double spread : kSpreads) {
         const AreaSpread s(spread);
-        // The mean of the angle's square over its largest value.
+        // Mean of the squared angle, relative to the square of the largest angle.
         auto square = [&](double t) { return std::pow(t / (0.5 * spread), 2); };
         const double exact = overHalfSpace(0.5 * spread, [&](double t) {
             return double(s.factor(float(std::cos(t)))) * square(t);
@@ -71,14 +72,14 @@ TEST(AreaSpread, DrawsDirectionsByItsFactor) {
             mean += d / double(kDraws);
         }
         const double error = std::sqrt((second - first * first) / kDraws);
-        // 0.3 %: the cosine in float beside a narrow spread, as above.
+        // The 0.3 % are for the cosine in float, as above.
         EXPECT_NEAR(first, exact, kSigmas * error + 0.003 * exact) << "spread " << spread;
         EXPECT_NEAR(glm::dot(glm::normalize(mean), glm::dvec3(normal)), 1, 1e-3);
     }
 }
 
-// Irradiance at a point of the plane z = 0, facing up, from an area light with a spread; by brute
-// force.
+// Returns the irradiance at a point of the plane z = 0, facing up, from an area light with a
+// spread, by direct summation.
 double exactSpread(const Light& light, const glm::dvec3& point) {
     constexpr int kSteps = 1500;
     const AreaSpread s(light.spread);
@@ -148,7 +149,7 @@ TEST(AreaLight, WithASpreadIsTheSameGatheredAndShot) {
     }
 }
 
-// A ground and a roof above it that is not there for some light, under a lamp.
+// A ground under a lamp, with a roof between them that does not block some kinds of light.
 struct Roofed {
     Scene scene;
 
@@ -183,13 +184,13 @@ TEST(DirectLight, PassesWhatDoesNotStopIt) {
             const FirstShot shot =
                 firstShot(kind, {light, patches, direct, settings, Progress(), 100, &exchange});
             const Mean onGround = meanLight(patches, shot, 0), onRoof = meanLight(patches, shot, 1);
-            // At most 1 % of noise where shot, half of it where gathered.
+            // At most 1 % of noise if the light is shot, half of it if gathered.
             EXPECT_NEAR(onGround.value, ground, kSigmas * onGround.error + 0.005 * ground)
                 << choiceName(kind);
             EXPECT_NEAR(onRoof.value, roof, kSigmas * onRoof.error + 0.005 * roof)
                 << choiceName(kind);
             EXPECT_EQ(meanLight(patches, shot, 0, 1).value, 0) << choiceName(kind) << ": the back";
-            // What arrives without being stopped counts as emitted, and all that is left escapes.
+            // Light that arrives unstopped counts as emitted; all remaining light escapes.
             const double arrived = arriving(patches, shot).x;
             EXPECT_NEAR(shot.emitted.x, arrived + shot.escaped.x, 0.03 * arrived)
                 << choiceName(kind);
@@ -212,10 +213,11 @@ TEST(Exchange, PassesAnInstanceThatTakesNoPart) {
     Bake bake;
     setQuick(bake);
     bake.run(furnaceWithBox(0, true, false));
-    // A black box would darken it.
+    // A black box that took part would darken the furnace.
     for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_COMBINED))
         EXPECT_NEAR(light.x * kPi, 2, 1e-4);
-    // All of its surroundings have the same exitance, and it gets the same from each side.
+    // All surfaces around the box have the same exitance, so the box gets the same light from all
+    // sides.
     for (const glm::vec3& light : cornerLight(bake, 1, RB_OUTPUT_LIGHTING))
         EXPECT_NEAR(light.x * kPi, 2, 1e-3);
     EXPECT_LT(double(reportOf(bake)["energy"]["balance_error"]), 1e-3);
@@ -226,7 +228,8 @@ TEST(Exchange, PassesAnInstanceThatTakesNoPart) {
 }
 
 TEST(Exchange, StopsDirectLightOnlyIfItIsToldTo) {
-    // A lamp over a floor; the roof between them is absent for one kind of light or the other.
+    // A lamp above a floor. The roof between them is absent either for direct light or for the
+    // exchange.
     Bake bake;
     setQuick(bake, 256);
     for (bool stopsDirect : {false, true}) {
@@ -237,8 +240,8 @@ TEST(Exchange, StopsDirectLightOnlyIfItIsToldTo) {
         double direct = 0;
         for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_DIRECT))
             direct += double(light.x) / 4;
-        // The world shines in where the roof takes no part, the lamp where it stops no direct
-        // light.
+        // The world shines in if the roof takes no part in the exchange, the lamp if the roof does
+        // not stop direct light.
         if (stopsDirect)
             EXPECT_NEAR(direct, 0.1, 1e-3);
         else
@@ -257,7 +260,7 @@ TEST(Exchange, SaysWhereItIsNotExact) {
     bake.run(furnaceWithBox(0.5f, true, false));
     EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "inside"));
     EXPECT_TRUE(mentions(reportOf(bake)["warnings"], "LINE_REUSE"));
-    // The furnace itself is right: 20 % of noise is more than these few walks have.
+    // The furnace itself is right. The tolerance of 20 % is more than the noise of these few walks.
     for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_COMBINED))
         EXPECT_NEAR(light.x * kPi, 2, 0.4);
 }

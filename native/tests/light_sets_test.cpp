@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Light sets: several groups of lights baked from one trace. Each is what a bake without the other
-// lights gives, and the light of all is their sum.
+// Light sets: several groups of lights baked from one trace. The light of each set equals that of a
+// bake without the other lights, and the light of all sources is their sum.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,17 +18,17 @@ namespace {
 
 using namespace test;
 
-// Both bakes solve the same system, each to a relative residual of at most 2e-4, from other first
-// guesses. At a mean reflectance of 0.6 the light may differ 1 / (1 - 0.6) times as much.
+// Both bakes solve the same system with a relative residual of at most 2e-4, from different first
+// guesses. At a mean reflectance of 0.6 the light may differ by 1 / (1 - 0.6) times as much.
 constexpr double kSolverTolerance = 5e-4;
-// Only rounding in float.
+// Float rounding only.
 constexpr double kRounding = 1e-6;
 
 constexpr int32_t kInstances = 4;
 
-// A court under the sky with a box in it and a red panel before a wall, a lamp, and a spot.
-// Everything shines that is `lit`; with `isSplit` panel and lamp are one set, sky and point light
-// another, and the sun belongs to none.
+// A court under the sky with a box, a red panel in front of a wall, a lamp and a spot. The lights
+// selected by `lit` shine. With `isSplit` panel and lamp form one set, sky and point light another,
+// and the sun belongs to no set.
 struct Lit {
     bool first = true, second = true, rest = true;
 };
@@ -69,7 +69,7 @@ std::unique_ptr<Bake> baked(const Scene& scene,
     return bake;
 }
 
-// All outputs of all corners, by all lights or by a set.
+// Returns all outputs at all corners, by all lights or by one set.
 std::vector<glm::vec3> light(const Bake& bake, int32_t set = kNoLightSet) {
     std::vector<glm::vec3> all;
     for (int32_t i = 0; i < kInstances; ++i)
@@ -87,8 +87,8 @@ std::vector<glm::vec3> sum(std::vector<glm::vec3> a, const std::vector<glm::vec3
     return a;
 }
 
-// Both sets of a court, of which the light in none is `rest`, are those of courts with their lights
-// alone, from the same lines.
+// Expects that both sets of a court equal courts with only the lights of the set, from the same
+// lines. `rest` selects the lights that belong to no set.
 void expectSetsAsAlone(Reconstruction reconstruction, bool rest) {
     SCOPED_TRACE(choiceName(reconstruction));
     const auto together = baked(court({true, true, rest}, true), reconstruction);
@@ -122,8 +122,8 @@ TEST(LightSets, AllLightIsTheSumOfTheSetsAndOfWhatIsInNone) {
               kRounding);
 }
 
-// Without sets the shadow rays of the same lights are others, in places fewer: the noise of direct
-// light, which target_error bounds, is another.
+// Without sets the shadow rays of the same lights are different, and fewer in places. The noise of
+// the direct light, which target_error bounds, then differs.
 TEST(LightSets, AllLightIsThatOfABakeWithoutSets) {
     const auto split = baked(court({}, true)), whole = baked(court());
     EXPECT_LT(noise(light(*split), light(*whole)), 0.5 * double(split->settings.targetError));
@@ -159,7 +159,7 @@ TEST(LightSets, KeepTheirLinesWhenALampChanges) {
     std::vector<glm::vec3> wanted = cold;
     for (glm::vec3& v : wanted) v *= glm::vec3(2, 0.5f, 0);
     EXPECT_LT(difference(light(*bake, 1), wanted), 2 * kSolverTolerance);
-    // Other sets on the same lines.
+    // Other sets, with the same lines.
     scene.lights[1].lightSet = kNoLightSet;
     scene.lightSets.pop_back();
     scene.worldLightSet = kNoLightSet;
@@ -169,7 +169,7 @@ TEST(LightSets, KeepTheirLinesWhenALampChanges) {
     EXPECT_THROW(bake->setLight(1, 0), Error);
 }
 
-// The same bundles are used once and forgotten in all bakes.
+// All these bakes use the same bundles once and then discard them.
 TEST(LightSets, ShareTheLinesBeyondTheMemoryLimit) {
     const auto together = baked(court({}, true), Reconstruction::LEAST_SQUARES, 1, 512);
     const auto second = baked(court({false, true, false}), Reconstruction::LEAST_SQUARES, 1, 512);

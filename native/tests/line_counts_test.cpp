@@ -28,7 +28,8 @@ bool sameCounts(const LineCounts& a, const LineCounts& b) {
 }
 
 // Checks E[m_i] = n A_i / (2 s^2). The standard deviation of m_i is at most that of as many
-// independent lines (Poisson); four of them also hold for the worst of a thousand patches.
+// independent lines (Poisson). The tolerance of four standard deviations also holds for the worst
+// of a thousand patches.
 void expectCrofton(const Patches& patches, const LineCounts& counts, uint32_t count,
                    float pixelSize) {
     double squares = 0;
@@ -113,8 +114,8 @@ TEST(LineCounts, TheNumberOfThreadsDoesNotMatter) {
 }
 
 TEST(Touching, TheFloorUnderABoxIsCoveredAndNothingElseIs) {
-    for (double height :
-         {0.0, 1e-7, -1e-7, 1e-6, -1e-6}) {  // exactly on the floor, or by rounding not
+    // Exactly on the floor, or off it by a rounding error.
+    for (double height : {0.0, 1e-7, -1e-7, 1e-6, -1e-6}) {
         SCOPED_TRACE("height " + std::to_string(1e9 * height) + " nm");
         Scene scene;
         place(scene, rectangle("floor", {0, 0, 0}, {4, 0, 0}, {0, 4, 0}), grey("", 0.5f));
@@ -134,11 +135,12 @@ TEST(Touching, TheFloorUnderABoxIsCoveredAndNothingElseIs) {
             worstBack = std::max(worstBack, 1 - exposed[2 * p + 1]);
             covered += under;
         }
-        // Lines exactly through a common border may fall on either side: 1 %.
+        // Lines exactly through a common border may meet either side: 1 %.
         EXPECT_LT(worst, 0.01f);
         EXPECT_LT(worstBack, 0.01f);
         EXPECT_EQ(covered, 16u);
-        // What is covered meets nothing but its cover: no light leaks in.
+        // A covered side exchanges lines only with the surface that covers it, so no light leaks
+        // in.
         double leak = 0;
         for (uint32_t i = 0; i < counts.sideCount(); i += 2) {
             if (exposed[i] > 0.5f) continue;

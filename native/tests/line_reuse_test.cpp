@@ -22,7 +22,7 @@ using Field = std::vector<glm::vec3>;
 
 constexpr float kTolerance = 1e-6f;  // of the solver
 
-// Patches and their lines, with light that a test may set side by side.
+// Patches and their lines, with light that a test can set.
 struct System {
     System(const Scene& scene, float patchSize, float pixelSize, uint32_t bundleCount,
            uint32_t seed = 1)
@@ -38,8 +38,8 @@ struct System {
     }
     LineReuse solver() const { return {patches, counts, shot, world, exposed}; }
 
-    // Calls body(side, m_i) for all fronts that a line met, with the lines as the solver weights
-    // them.
+    // Calls body(side, m_i) for all fronts that a line met, with the lines as weighted by the
+    // solver.
     template <class Body>
     void forFronts(const Body& body) const {
         const std::vector<double> lines = weightedLines();
@@ -66,7 +66,7 @@ struct System {
     FirstShot shot;
     Field reflected;
     glm::vec3 world{0.0f};
-    std::vector<float> exposed;  // as the counts have it
+    std::vector<float> exposed;  // per side, from the counts
 };
 
 glm::vec3 randomColour(std::mt19937& random, float low, float high) {
@@ -123,7 +123,7 @@ TEST(Furnace, IsExactUnderAWorldAsBrightAsTheSurfaces) {
         system.world = glm::vec3(float(1 / kPi));
         const Irradiance h = system.solve();
         system.forFronts([&](uint32_t i, double) {
-            // A patch has as many lines on its back.
+            // The back of a patch is met by as many lines as its front.
             ASSERT_LT(largest(total(h, i) - 1.0f), 1e-5f);
             ASSERT_LT(largest(total(h, i + 1) - 1.0f), 1e-5f);
         });
@@ -164,14 +164,14 @@ TEST(Furnace, StarvedSidesKeepTheirFirstShot) {
 }
 
 TEST(Furnace, StarvedSidesThatAreCoveredStayDark) {
-    // Boxes that stand on the floor of a glowing room, all of whose sides gather.
+    // Boxes that stand on the floor of a glowing room. All sides gather with local rays.
     System system(roomWithBoxes(0.7f, 0.3f, 0), 0.1f, 0.2f, 2);
     Irradiance h = system.solve();
     system.solver().gatherStarvedSides({Visibility(system.patches), nullptr, 1000, 1},
                                        std::vector<bool>(system.patches.sideCount(), true),
                                        system.reflected, h);
     size_t bottoms = 0;
-    // Of a hundred rays that start on the very edge of a contact one may slip through.
+    // One of a hundred rays that start on the very edge of a contact may slip through.
     for (uint32_t i = 0; i < system.patches.sideCount(); i += 2) {
         const Parent& parent = system.patches.parents[system.patches.parentOf[i / 2]];
         const bool isBottom = parent.instance > 0 && parent.normal.z < -0.5f;
@@ -222,7 +222,8 @@ TEST(MeanRadiosity, TheMaximumPrincipleHolds) {
     });
 }
 
-// Relative RMS error of the irradiance inside a sphere, which is the same everywhere.
+// Returns the relative RMS error of the irradiance inside a sphere, where the exact value is
+// uniform.
 double sphereError(int levels) {
     Scene scene;
     place(scene, icosphere("ball", 1, levels, true), grey("", 0.5f));
@@ -248,8 +249,9 @@ double sphereError(int levels) {
 }
 
 TEST(SphereInterior, ConvergesToTheClosedForm) {
-    // Facets miss the closed form by the square of their edge: 2 % for the icosahedron, a sixteenth
-    // of it after two levels. There noise takes over, half a per cent at 1024 bundles.
+    // Facets differ from the closed form by the square of their edge: 2 % for the icosahedron, a
+    // sixteenth of this after two levels. There the noise dominates, half a per cent at 1024
+    // bundles.
     const double coarse = sphereError(0), fine = sphereError(2);
     EXPECT_LT(fine, 0.5 * coarse);
     EXPECT_LT(fine, 0.01);
@@ -263,8 +265,8 @@ TEST(Cube, OnePatchPerFaceHasItsClosedForm) {
     for (uint32_t i = 0; i < 12; i += 2) {
         const bool opposite = i > 0 && system.patches.normal(i) == -system.patches.normal(0);
         const double exact = i == 0 ? 1.0909090981 : opposite ? 0.1817458261 : 0.1818362689;
-        // A form factor's standard error would be 3.6 % from as many random lines
-        // (form_factor_test); the low-discrepancy set of 4096 bundles is more than ten times
+        // The standard error of a form factor from as many random lines would be 3.6 %
+        // (form_factor_test). The low-discrepancy set of 4096 bundles is more than ten times
         // better.
         EXPECT_NEAR(system.exitance(h, i).x, exact, (i == 0 ? 0.001 : 0.01) * exact)
             << "side " << i;
@@ -281,10 +283,10 @@ TEST(InfinitePlates, ApproachTheirClosedForm) {
     for (uint32_t p = 0; p < system.patches.count(); ++p) {
         const glm::vec3 at = system.patches.point(p, {0.5f, 0.5f});
         if (std::max(std::abs(at.x), std::abs(at.y)) > 3)
-            continue;  // in the middle, 17 heights from the border
+            continue;  // only the centre, 17 heights from the border
         const bool isLow = system.patches.parents[system.patches.parentOf[p]].instance == 0;
-        // The border takes (1/17)^2 of a bounce's light; the rest is noise of patches of 64 lines
-        // each.
+        // The border takes (1/17)^2 of the light of a bounce. The rest is noise of patches with 64
+        // lines each.
         const double exact = isLow ? low : high;
         EXPECT_NEAR(system.exitance(h, 2 * p).x, exact, 0.02 * exact);
     }
@@ -327,7 +329,7 @@ TEST(LineReuse, IsLinearInTheEmission) {
 }
 
 TEST(LineReuse, LightIsReciprocal) {
-    // Swap the lamp and the receiver: m_i H_i is the same both ways for equal emission.
+    // Swap lamp and receiver: for equal emission m_i H_i is the same in both directions.
     System system(roomWithBoxes(0.6f), 0.5f, 0.1f, 32);
     const uint32_t a = 2, b = uint32_t(system.patches.sideCount()) - 40;
     auto lightFromTo = [&](uint32_t from, uint32_t to) {
@@ -379,7 +381,7 @@ TEST(LineReuse, LinesThatLeaveTheSceneTakeTheirLightAway) {
     place(scene, rectangle("high", {0, 0, 1}, {0, 1, 0}, {1, 0, 0}), grey("", 0));
     System system(scene, 10, 0.05f, 4096);
     const Irradiance h = system.solve();
-    // Bound as in form_factor_test.
+    // The tolerance is that of form_factor_test.
     EXPECT_NEAR(h.direct[2].x, parallelRectangles(1, 1, 1), 0.0072);
     const double sky =
         (system.counts.sky[0][0] + system.counts.sky[0][1]) / linesOf(system.counts, 0);
@@ -404,7 +406,7 @@ TEST(LineReuse, HighReflectanceConverges) {
     System system(roomWithBoxes(0.999f, 0.001f), 0.3f, 0.1f, 64);
     const Irradiance h = system.solve();
     system.forFronts([&](uint32_t i, double) {
-        // The relative residual of 1e-6 grows by up to 1 / (1 - rho) in the solution.
+        // The relative residual of 1e-6 may grow by up to 1 / (1 - rho) in the solution.
         ASSERT_LT(largest(system.exitance(h, i) - 1.0f), 1e-3f);
     });
 }

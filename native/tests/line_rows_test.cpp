@@ -9,7 +9,7 @@
 namespace raybundle {
 namespace {
 
-// Lines of row i by the other side.
+// Returns the number of lines in row i by the other side.
 std::map<uint32_t, uint64_t> row(const LineRows& rows, uint32_t i) {
     std::map<uint32_t, uint64_t> result;
     for (const uint32_t* e = rows.first(i); e < rows.last(i); ++e)
@@ -17,7 +17,7 @@ std::map<uint32_t, uint64_t> row(const LineRows& rows, uint32_t i) {
     return result;
 }
 
-// `pairs` exchanges of one line between `sides` sides.
+// Returns a bundle with `pairs` exchanges of one line between `sides` sides.
 BundleLines everyPair(uint32_t sides, uint32_t pairs) {
     BundleLines bundle;
     for (uint32_t k = 0; k < pairs; ++k) {
@@ -44,16 +44,16 @@ TEST(LineRows, BothEndsHaveTheLines) {
 TEST(LineRows, AnyNumberOfLinesIsKept) {
     BundleLines bundle;
     bundle.exchanges = {{0, 1, 1000000}};
-    bundle.densities = {{64, 1, 0, 0}};  // lines of a coarse view
+    bundle.densities = {{64, 1, 0, 0}};  // a line of a coarse view counts as 64
     LineRows rows(2);
     EXPECT_EQ(rows.append({&bundle})[0], 64000000u);
     EXPECT_EQ(row(rows, 0)[1], 64000000u);
-    for (int k = 0; k < 8; ++k) rows.append({&bundle});  // some of them joined
+    for (int k = 0; k < 8; ++k) rows.append({&bundle});  // some additions are joined
     EXPECT_EQ(row(rows, 1)[0], 9 * 64000000u);
 }
 
 TEST(LineRows, RepeatedPairsAreJoined) {
-    // 20 x 19 / 2 pairs and no more, however many lines.
+    // There are 20 x 19 / 2 pairs, whatever the number of lines.
     LineRows rows(20);
     const BundleLines bundle = everyPair(20, 380);
     for (int k = 0; k < 100; ++k) rows.append({&bundle});
@@ -64,7 +64,8 @@ TEST(LineRows, RepeatedPairsAreJoined) {
 }
 
 TEST(LineRows, RepeatedPairsAreJoinedWhereOneSideOfAllPatchesSeesNothing) {
-    // Of 256 sides those of one parity exchange 20 lines each with others of it, again and again.
+    // Of 256 sides those of one parity exchange 20 lines each with other sides of this parity,
+    // repeatedly.
     for (const uint32_t parity : {0u, 1u}) {
         LineRows rows(256);
         BundleLines bundle;
@@ -75,8 +76,9 @@ TEST(LineRows, RepeatedPairsAreJoinedWhereOneSideOfAllPatchesSeesNothing) {
     }
 }
 
-// Some lines of a row of 400 sides with one line each and one with 200: all are as often met as
-// others, and the many lines count each time for what they are, to within a step.
+// Some lines represent all lines of a row that has 400 sides with one line each and one side with
+// 200. All lines are met equally often, and the 200 lines count with their number each time, within
+// one step.
 TEST(LineRows, SomeLinesStandForAll) {
     constexpr uint32_t kOthers = 400, kMany = 200, kEnough = 60, kTimes = 2000;
     BundleLines bundle;
@@ -104,7 +106,8 @@ TEST(LineRows, SomeLinesStandForAll) {
         EXPECT_NEAR(ofMany, kMany, kStep);
     }
     EXPECT_NEAR(sum[1], kMany, 0.05 * kStep);
-    // Each is met by one in ten, with ten lines: in the mean over 2000 times 1 +- 0.07.
+    // Each line is met once in ten times and then counts ten: over 2000 times the mean is 1 +-
+    // 0.07.
     for (uint32_t side = 2; side < sum.size(); ++side) EXPECT_NEAR(sum[side], 1, 0.3) << side;
 
     double exact = 0;

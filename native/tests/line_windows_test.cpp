@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Lines whose density follows the detail have the expected counts of uniform ones.
+// Lines whose density follows the detail have the expected counts of uniform lines.
 #include "bundles/line_windows.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ using namespace test;
 
 constexpr float kPixel = 0.5f;
 
-// A closed hall of 10 m with a small ball and a pair of small boxes in it.
+// A closed hall of 10 m with a small ball and a pair of small boxes.
 Scene hallWithSmallThings(float reflectance, float emission = 0) {
     Scene scene;
     const Material material = grey("", reflectance, emission);
@@ -34,7 +34,7 @@ Scene hallWithSmallThings(float reflectance, float emission = 0) {
     return scene;
 }
 
-// Windows that overlap and are nested, one around each of the small things.
+// Windows that overlap and are nested, one around each of the small objects.
 std::vector<LineWindow> smallWindows() {
     return {{{-0.4f, -0.4f, -0.4f}, {1.3f, 0.4f, 0.4f}, 2},
             {{-0.25f, -0.25f, -0.25f}, {0.25f, 0.25f, 0.25f}, 4},
@@ -69,13 +69,13 @@ TEST(LineWindows, CountsFollowTheAreasInsideAndOutside) {
         ASSERT_EQ(counts.total[2 * p], counts.total[2 * p + 1]) << "a line has two ends";
         const double wanted = kCount * double(patches.area[p]) / (2 * kFinest * kFinest);
         const double lines = counts.linesMet(2 * p);
-        // Of single patches: four standard deviations of as many independent lines.
+        // Single patches: four standard deviations of as many independent lines.
         EXPECT_NEAR(linesOf(counts, 2 * p) / wanted, 1, 4 / std::sqrt(lines)) << "patch " << p;
         const bool isHall = patches.parents[patches.parentOf[p]].instance == 0;
         (isHall ? large : small) += linesOf(counts, 2 * p);
         (isHall ? largeWanted : smallWanted) += wanted;
     }
-    // Of all together: 60,000 and 800,000 lines, and far less than their independent noise.
+    // All patches together: 60,000 and 800,000 lines, with far less noise than independent lines.
     EXPECT_NEAR(small / smallWanted, 1, 0.005);
     EXPECT_NEAR(large / largeWanted, 1, 0.001);
 }
@@ -103,7 +103,7 @@ TEST(LineWindows, ExchangesHaveTheMeanOfUniformLines) {
                 squares[i][j] += lines[i][j] * lines[i][j];
             }
     }
-    // Uniform lines as fine as the finest window: hardly any noise.
+    // Uniform lines as dense as in the finest window, with hardly any noise.
     const uint32_t kCount = 512;
     const auto uniform = betweenInstances(trace(patches, float(kFinest), {}, kCount, 99).counts);
     for (uint32_t i = 0; i < 4; ++i)
@@ -129,8 +129,8 @@ TEST(LineWindows, CountsAreSymmetricAndAddUp) {
     }
 }
 
-// A wall of 10 m with 10^8 lines a bundle, in windows of half the pixels four times as many: of
-// each half, half of the bundles, 2^32 can be counted.
+// A wall of 10 m with 10^8 lines per bundle, or four times as many in windows with pixels of half
+// the edge. Each half of the bundles can count up to 2^32 lines.
 TEST(LineWindows, NoMoreBundlesAreTracedThanCanBeCounted) {
     Scene scene;
     place(scene, rectangle("wall", {0, 0, 0}, {10, 0, 0}, {0, 10, 0}), grey("", 0.5f));
@@ -214,7 +214,7 @@ TEST(LineWindows, SmallThingsHaveLessNoiseThanOfAsManyUniformLines) {
         FirstShot shot;
         shot.irradiance.assign(patches.sideCount(), glm::vec3(0));
         shot.emission.assign(patches.sideCount(), glm::vec3(0));
-        for (uint32_t i = 0; i < patches.sideCount(); i += 2)  // one wall shines
+        for (uint32_t i = 0; i < patches.sideCount(); i += 2)  // one wall emits
             if (patches.parents[patches.parentOf[i / 2]].face == 0 &&
                 patches.parents[patches.parentOf[i / 2]].instance == 0)
                 shot.emission[i] = glm::vec3(1);
@@ -230,7 +230,7 @@ TEST(LineWindows, SmallThingsHaveLessNoiseThanOfAsManyUniformLines) {
     };
     const LineDensity density = densityByDetail(patches, {0.5f}, 2, {0.001f});
     const Traced dense = trace(patches, density.pixelSize, density.windows, 128);
-    // Uniform lines with as many lines: finer pixels everywhere.
+    // Uniform lines with as many lines in all, which means finer pixels everywhere.
     const float finer =
         density.pixelSize *
         std::sqrt(float(trace(patches, density.pixelSize, {}, 128).lines) / float(dense.lines));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Single lobes against the models as they are published.
+// Single lobes against the published models.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ void expectModel(const Lobe& lobe, const Bsdf& bsdf, const glm::dvec3& in, doubl
 
 TEST(Lobe, IsTheModelOverItsMean) {
     const glm::vec3 normal(0, 0, 1);
-    // The mean of gloss is by a table, which is good to 5 % at grazing angles.
+    // The mean of gloss comes from a table that is accurate to 5 % at grazing angles.
     constexpr double kTolerance = 0.05;
     for (double roughness : {0.5, 0.7, 1.0}) {
         const Bsdf several = severalFacets(roughness);
@@ -53,7 +53,7 @@ TEST(Lobe, IsTheModelOverItsMean) {
 
 TEST(Lobe, OfClothIsTheModelOverItsMean) {
     const glm::vec3 normal(0, 0, 1);
-    constexpr double kTolerance = 0.02;  // the mean is by 128 points
+    constexpr double kTolerance = 0.02;  // the mean is computed from 128 points
     for (double cosine : {0.95, 0.6, 0.2})
         for (double roughness : {0.5, 0.8, 1.0}) {
             SCOPED_TRACE(std::to_string(cosine) + " " + std::to_string(roughness));
@@ -68,7 +68,8 @@ TEST(Lobe, OfClothIsTheModelOverItsMean) {
         }
 }
 
-// What goes towards an angle comes from everywhere as the albedo there says.
+// By reciprocity, the light that comes from all directions and leaves at an angle has the albedo of
+// that angle.
 TEST(Lobe, MicrofibersSendTheirAlbedo) {
     for (double cosine : {0.9, 0.5, 0.2})
         for (double roughness : {0.3, 0.65, 1.0}) {
@@ -117,7 +118,8 @@ TEST(Lobe, FindsF0ByHowTheReflectanceRises) {
                     everywhere += 2 * cosine / kCosines * moments(bsdf, inclined(cosine), kSteps).x;
                 }
                 const double ratio = moments(bsdf, inclined(1), kSteps).x / everywhere;
-                // The table is good to 1 %, and the ratio says ever less the more is mirrored.
+                // The table is accurate to 1 %, and the ratio determines f0 less well the more is
+                // mirrored.
                 EXPECT_NEAR(double(Lobe::f0Of(float(ratio), masking, float(roughness))), f0,
                             0.1 * f0)
                     << roughness << " " << f0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The light of emissive meshes: its closed form against the sum over their faces, its samples
-// against the closed form, and what must not change when a scene is turned.
+// The light of emissive meshes: its closed form against the sum over the faces, its samples against
+// the closed form, and properties that must not change when a scene is rotated.
 #include "lights/mesh_source.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ using namespace test;
 const glm::dmat4 kTurn =
     glm::rotate(glm::rotate(glm::dmat4(1), 0.4, {1, 0.3, 0.2}), 1.1, {0, 0.5, 1});
 
-// The cells of a grid of 12 x 9, turned in space, that are in no hole.
+// A grid of 12 x 9 cells, rotated in space. With `withHoles` some cells are left out.
 Mesh turnedGrid(bool withHoles) {
     Mesh whole = grid("lamp", {0.3f, -0.2f, 1}, {0.9f, 0.3f, 0.2f}, {-0.2f, 0.7f, 0.3f}, 12, 9);
     std::vector<std::vector<int32_t>> faces;
@@ -41,7 +41,7 @@ Mesh turnedGrid(bool withHoles) {
     return polygons("lamp", whole.vertices, faces);
 }
 
-// A ring of square section.
+// A ring with a square cross-section.
 Mesh ring(const std::string& name, float radius, float width, int steps) {
     std::vector<glm::vec3> vertices;
     std::vector<std::vector<int32_t>> faces;
@@ -58,7 +58,7 @@ Mesh ring(const std::string& name, float radius, float width, int steps) {
     return polygons(name, vertices, faces);
 }
 
-// A ring of round section.
+// A ring with a round cross-section.
 Mesh tyre(float radius, float width, int around, int across) {
     std::vector<glm::vec3> vertices;
     std::vector<std::vector<int32_t>> faces;
@@ -75,7 +75,7 @@ Mesh tyre(float radius, float width, int around, int across) {
     return polygons("tyre", vertices, faces);
 }
 
-// Without common vertices.
+// Returns the mesh with separate vertices for each corner.
 Mesh split(const Mesh& mesh) {
     Mesh result = mesh;
     result.vertices.clear();
@@ -139,7 +139,8 @@ TEST(MeshSource, HasTheClosedFormOfTheSumOverItsFaces) {
             cut += above > 0 && above < corners;
             const auto front = fronts.irradiance(point, up), back = backs.irradiance(point, up);
             ASSERT_TRUE(front && back) << lamp.name;
-            // Angles are of float precision: of the sum's terms, of which some are as large as 5.
+            // Angles have float precision, relative to the terms of the sum, some of which are as
+            // large as 5.
             EXPECT_NEAR(double(front->x + back->x), exact, 1e-5 + 1e-5 * exact)
                 << lamp.name << ", " << k;
         }
@@ -147,8 +148,8 @@ TEST(MeshSource, HasTheClosedFormOfTheSumOverItsFaces) {
     }
 }
 
-// Of each patch side another colour, some of them black: the sum over all patches but for what the
-// expansion of clusters leaves out.
+// Each patch side has another emission, and some are black. The closed form is the sum over all
+// patches, except for what the expansion of clusters leaves out.
 TEST(MeshSource, HasNearlyTheClosedFormWhereItsEmissionVaries) {
     for (const Lamp& lamp : lamps()) {
         Scene scene;
@@ -186,8 +187,8 @@ TEST(MeshSource, HasNearlyTheClosedFormWhereItsEmissionVaries) {
     }
 }
 
-// Close to a surface of many faces most of its light is that of the nearest ones: a tenth of a
-// face's width over it, looking along it, down, or a little up.
+// Most of the light close to a surface of many faces comes from the nearest faces. The receivers
+// are a tenth of a face's width above the surface and face along it, down, or slightly upwards.
 TEST(MeshSource, SamplesFindTheNearestOfManyFaces) {
     constexpr uint32_t kSamples = 64;
     constexpr int kPoints = 200;
@@ -212,13 +213,13 @@ TEST(MeshSource, SamplesFindTheNearestOfManyFaces) {
             }
             squares += std::pow(sum / double(source.irradiance(point, up)->x) - 1, 2) / kPoints;
         }
-        // Measured 0.09 and 0.12; where halves of the grid were chosen by their spheres, 1.1 and
-        // 2.1.
+        // Measured 0.09 and 0.12. When halves of the grid were chosen by their bounding spheres, it
+        // was 1.1 and 2.1.
         EXPECT_LT(std::sqrt(squares), 0.2);
     }
 }
 
-// The mean of many samples is the closed form, wherever the receiver is.
+// The mean of many samples is the closed form, at any position of the receiver.
 TEST(MeshSource, SamplesHaveTheExpectationOfTheClosedForm) {
     constexpr uint32_t kSamples = 1 << 14;
     for (const Lamp& lamp : lamps()) {
@@ -246,8 +247,8 @@ TEST(MeshSource, SamplesHaveTheExpectationOfTheClosedForm) {
     }
 }
 
-// Every lamp gives the same light with its faces in another order: stratification along their list
-// meets no pattern of theirs.
+// A lamp gives the same light with its faces in another order: stratification along the list of
+// faces must not interfere with a pattern of the list.
 TEST(MeshSource, TheOrderOfItsFacesDoesNotMatter) {
     std::mt19937 random(3);
     Mesh mesh = ring("ring", 0.6f, 0.05f, 48);
@@ -264,18 +265,20 @@ TEST(MeshSource, TheOrderOfItsFacesDoesNotMatter) {
         const ShotScene shots(scene);
         light[k] = meanLight(shots.patches, shots.shoot(FirstShotKind::GATHER, 0), 1).value;
     }
-    // The rings hide 0.2 % of themselves from the floor, and samples tell how much to 2 %.
+    // The rings hide 0.2 % of themselves from the floor, and the samples estimate this share within
+    // 2 %.
     EXPECT_NEAR(light[0] / light[1], 1, 2e-3);
 }
 
-// Turned, the faces of a plane lie in it but for a rounding error, and none lights another.
+// If a scene is rotated, the faces of a plane lie in it only up to rounding errors. None of them
+// may light another.
 TEST(MeshSource, WhatIsConvexDoesNotLightItself) {
     for (const Lamp& lamp : lamps()) {
         if (lamp.name == "a ring" || lamp.name == "a tyre") continue;
         for (const double shift : {0.0, 300.0}) {
             Scene scene;
             place(scene, lamp.mesh, grey("lamp", 0.8f, 5), kTurn);
-            // Something far off makes the coordinates large and their roundings too.
+            // A distant object makes the coordinates, and their rounding errors, large.
             if (shift > 0)
                 place(scene, rectangle("far", {0, 0, float(-shift)}, {1, 0, 0}, {0, 1, 0}),
                       grey("far", 0));
@@ -289,15 +292,16 @@ TEST(MeshSource, WhatIsConvexDoesNotLightItself) {
     }
 }
 
-// From inside a closed lamp its whole hemisphere is the lamp, turned or not.
+// For a receiver inside a closed lamp the lamp fills the whole hemisphere, rotated or not.
 TEST(MeshSource, FillsTheHemisphereInsideOfItself) {
     for (const Lamp& lamp : lamps()) {
         if (lamp.name.substr(0, 7) == "a plane") continue;
         for (bool isTurned : {false, true}) {
             Scene scene;
             place(scene, lamp.mesh, grey("lamp", 0.5f, 5, 5), isTurned ? kTurn : glm::dmat4(1));
-            scene.instances.back().side = RB_SIDE_BACK;  // or it would be left out
-            // Beside much that is dark it is a source.
+            // The back has the result; otherwise the emission inside is left out.
+            scene.instances.back().side = RB_SIDE_BACK;
+            // A large dark surface makes the emission bright enough to be a source.
             place(scene, rectangle("floor", {-5, -5, -2}, {10, 0, 0}, {0, 10, 0}), grey("", 0));
             const ShotScene shots(scene, 0.1f);
             const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0, 0, 0.01f);
@@ -307,7 +311,7 @@ TEST(MeshSource, FillsTheHemisphereInsideOfItself) {
     }
 }
 
-// Receivers that are told to get nothing do get nothing, at any of their points; and so is a
+// Receivers that are out of sight of a source get no light at any of their points. This includes a
 // ceiling closely behind a panel, however wide its patches are.
 TEST(MeshSource, WhatIsOutOfItsSightGetsNothing) {
     std::mt19937 random(5);
@@ -351,14 +355,15 @@ TEST(MeshSource, WhatIsOutOfItsSightGetsNothing) {
             EXPECT_TRUE(isHidden || instance != first) << side;
             if (instance > first) hidden += isHidden;
         }
-        // About half of all lie behind the plane or face away.
+        // About half of all receivers lie behind the plane or face away.
         EXPECT_GT(hidden, 150u);
         EXPECT_LT(hidden, 350u);
     }
 }
 
-// A part of a wall emits, and the vertices are off by a millionth of its size, more than its plane
-// is thick beside the lamp's own size: neither lamp nor wall gets light of it.
+// A part of a wall emits. The vertices are off by a millionth of the wall's size, which is more
+// than the thickness of the plane for the lamp's own size. Neither lamp nor wall may get light of
+// the lamp.
 TEST(MeshSource, APartOfAWallThatIsPlaneButForRoundingLightsNothingOfIt) {
     std::mt19937 random(4);
     std::uniform_real_distribution<float> off(-5e-6f, 5e-6f);
@@ -377,15 +382,16 @@ TEST(MeshSource, APartOfAWallThatIsPlaneButForRoundingLightsNothingOfIt) {
         const FirstShot shot = shots.shoot(FirstShotKind::GATHER, 0);
         for (uint32_t side = 0; side < shots.patches.sideCount(); ++side) {
             if (shots.patches.parentAt(side).instance != 0) continue;
-            // Beside the lamp's edge the wall may look at it under a hundred thousandth of a turn.
+            // Beside the lamp's edge the wall may face the lamp at an angle of a hundred thousandth
+            // of a turn.
             EXPECT_LT(shot.irradiance[side].x, 0.02f) << k;
         }
         EXPECT_GT(meanLight(shots.patches, shot, 1).value, 0.1);
     }
 }
 
-// An area lamp in the plane of a turned ceiling gives it nothing, and the floor what it gives it
-// where nothing is turned.
+// An area lamp in the plane of a rotated ceiling gives the ceiling no light, and gives the floor
+// the same light as in the scene that is not rotated.
 TEST(AreaLight, InThePlaneOfATurnedCeilingLightsTheFloorAlone) {
     float floor[2];
     for (int k = 0; k < 2; ++k) {

@@ -22,7 +22,7 @@ struct MultipathBake : Bake {
         settings.solver = solver;
         settings.directions = directions;
         settings.patchSize = patchSize;
-        settings.contacts = 0;  // the same patches for all solvers
+        settings.contacts = 0;  // to have the same patches for all solvers
         settings.minBundles = settings.maxBundles = bundleCount;
         settings.targetError = 1e-5f;
         settings.seed = seed;
@@ -31,7 +31,7 @@ struct MultipathBake : Bake {
     double statedError() const { return reportOf(*this)["estimated_error"]; }
 };
 
-// Relative RMS difference of the irradiance on all fronts, weighted by area.
+// Returns the relative RMS difference of the irradiance on all fronts, weighted by area.
 double fieldError(const Bake& bake, const Bake& reference) {
     const Patches& patches = bake.patches();
     double difference = 0, signal = 0;
@@ -51,8 +51,8 @@ TEST(Multipath, ConvergesToTheSolutionOfLineReuseWithinTheStatedError) {
                                   DirectionKind::LOW_DISCREPANCY);
     for (int bundles : {64, 256, 1024}) {
         const MultipathBake bake(scene, bundles, 1, 0.3f);
-        // The stated error is that of one pair of halves, whose patches share their directions: a
-        // factor of 2 either way is within its scatter.
+        // The stated error comes from one pair of halves, whose patches share their directions. It
+        // scatters by a factor of 2 in both directions.
         EXPECT_LT(fieldError(bake, reference), 2 * bake.statedError()) << bundles;
         EXPECT_LT(bake.statedError(), 1.6 / std::sqrt(bundles));
     }
@@ -65,7 +65,7 @@ TEST(Multipath, AFurnaceIsRightWithinTheStatedError) {
     double squares = 0, area = 0;
     for (size_t i = 0; i < patches.sideCount(); i += 2) {
         const glm::vec3 h = bake.patchIrradiance().direct[i] + bake.patchIrradiance().indirect[i];
-        if (h.x == 0) continue;  // wholly covered: the bottoms of the boxes
+        if (h.x == 0) continue;  // fully covered: the bottoms of the boxes
         squares += double(patches.area[i / 2]) * double(h.x - 1) * double(h.x - 1);
         area += double(patches.area[i / 2]);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Noise where it is seen: that of each object, relative to its own light.
+// Noise of what is shown: the noise of each object, relative to its own light.
 #include "stated_error/noisy_parts.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,8 @@ using namespace test;
 
 constexpr int kSmallThings = 4;
 
-// A room with a lamp, behind a screen that keeps its light from one half, and small boxes in both.
+// A room with a lamp behind a screen that keeps the light from one half of the room, with small
+// boxes in both halves.
 Scene roomOfSmallThings() {
     Scene scene;
     place(scene, box("room", glm::vec3(0), glm::vec3(4, 2, 2), true), grey("walls", 0.6f));
@@ -35,8 +36,8 @@ Scene roomOfSmallThings() {
     return scene;
 }
 
-// Of the corners of an object, the RMS of the difference relative to the light there, where that is
-// more than a twentieth of the mean.
+// Returns the RMS difference of the light at the corners of an object, relative to the light there.
+// Corners with less than a twentieth of the mean light are left out.
 double differenceOf(int32_t instance, const Bake& bake, const Bake& reference) {
     const std::vector<glm::vec3> found = cornerLight(bake, instance, RB_OUTPUT_LIGHTING);
     const std::vector<glm::vec3> right = cornerLight(reference, instance, RB_OUTPUT_LIGHTING);
@@ -66,7 +67,7 @@ TEST(NoisyParts, SmallAndDarkThingsAreAsCleanAsWalls) {
     EXPECT_GT(sidesWithRays(bake), 0u);
     const int bundles = reportOf(bake)["bundles"];
     EXPECT_LT(bundles, 4096);
-    // As many bundles without rays.
+    // As many bundles, but without extra rays.
     Bake lines;
     lines.settings.minBundles = lines.settings.maxBundles = bundles;
     lines.run(scene);
@@ -76,10 +77,10 @@ TEST(NoisyParts, SmallAndDarkThingsAreAsCleanAsWalls) {
         most = std::max(most, differenceOf(instance, bake, reference));
         mostOfLines = std::max(mostOfLines, differenceOf(instance, lines, reference));
     }
-    // The target, and as much again: the noise of a part is known to a third, and that of a box's
-    // 24 corners, one bake's, differs as much from bake to bake.
+    // Twice the target: the noise of a part is known within a third, and the noise at a box's 24
+    // corners differs by as much from bake to bake.
     EXPECT_LT(most, 2 * 0.02);
-    // What is dark gains most: half of its noise, measured at seeds 0 to 4.
+    // Dark objects gain most: half of their noise, measured with seeds 0 to 4.
     EXPECT_LT(most, 0.75 * mostOfLines);
 }
 
@@ -98,7 +99,8 @@ TEST(NoisyParts, StatedNoiseIsThatWithRays) {
     const double stated = std::hypot(reportOf(one)["error"]["noise"].get<double>(),
                                      reportOf(two)["error"]["noise"].get<double>()) /
                           std::sqrt(2.0);
-    // One pair of bakes, whose bundles err alike on whole walls; all corners weigh the same here.
+    // One pair of bakes, whose bundles have correlated errors on whole walls. All corners have
+    // equal weight here.
     EXPECT_LT(found, 2.5 * stated);
     EXPECT_GT(found, stated / 2.5);
 }
@@ -107,7 +109,7 @@ TEST(NoisyParts, StatedNoiseOfAnObjectIsThatAtItsCorners) {
     const Scene scene = roomOfSmallThings();
     constexpr int kSeeds = 8;
     const size_t objects = scene.instances.size();
-    std::vector<std::vector<std::vector<glm::vec3>>> light(kSeeds);  // of each object
+    std::vector<std::vector<std::vector<glm::vec3>>> light(kSeeds);  // per seed and object
     std::vector<std::vector<double>> stated(kSeeds);
     for (int seed = 0; seed < kSeeds; ++seed) {
         Bake bake;
@@ -131,15 +133,17 @@ TEST(NoisyParts, StatedNoiseOfAnObjectIsThatAtItsCorners) {
             allFound += found;
         }
     }
-    // native/bench/calibration asks for 0.95 of all objects. Here each has a face a side, of which
-    // the halves give a few samples, all low in one bake of the eight: measured 43 of 48.
+    // native/bench/calibration requires 0.95 of all objects. Here each object has one face per
+    // side, for which the halves give few samples, and all of these are low in one bake of eight:
+    // measured 43 of 48.
     EXPECT_GE(covered, int(0.9 * kSeeds * double(objects)));
-    // Corners of few faces are stated on the safe side (measured: 2.1 times what they have).
+    // The noise at corners of few faces is stated on the safe side (measured: 2.1 times the true
+    // noise).
     EXPECT_LT(allStated, 2.5 * allFound);
 }
 
 TEST(NoisyParts, RaysFollowFromTheLightAlone) {
-    // The same light has the same rays, whatever was baked before.
+    // The same light needs the same rays, whatever was baked before.
     Scene scene = roomOfSmallThings();
     Bake fresh, again;
     again.run(scene);
@@ -147,7 +151,7 @@ TEST(NoisyParts, RaysFollowFromTheLightAlone) {
     again.run(scene);
     fresh.run(scene);
     EXPECT_GT(sidesWithRays(fresh), 0u);
-    // The halves are solved to their tolerance from where the bake before left them, so that a side
+    // The halves are solved to their tolerance from the solution of the bake before, so that a side
     // may cast two rays of some hundred more or less.
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-3);
 }

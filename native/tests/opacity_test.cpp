@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Surfaces that let light through, and emission that varies over a surface.
+// Surfaces that let light pass straight through, and emission that varies over a surface.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ Material veil(float opacity, float reflectance = 0) {
     return material;
 }
 
-// A plate of 2 m at a height over the floor.
+// Adds a plate of 2 m at a height above the floor.
 void placePlate(Scene& scene, const Material& material, float z = 0.5f) {
     place(scene, rectangle("plate", {-1, -1, z}, {2, 0, 0}, {0, 2, 0}), material, glm::dmat4(1),
           RB_ROLE_OCCLUDE);
@@ -36,8 +36,8 @@ Scene floorUnderSun() {
     return scene;
 }
 
-// All is in equilibrium with exitance 1, whatever the opacity of the inner shell: of the light that
-// meets it one part passes, one is reflected, and the rest is replaced by emission.
+// The exitance is 1 W/m^2 everywhere, whatever the opacity of the inner shell: of the light that
+// meets the shell one part passes, one is reflected, and the rest is replaced by emission.
 Scene furnaceWithShell(float opacity) {
     Scene scene = closedCube(0.6f, 0.4f);
     Material shell = veil(opacity, 0.3f * opacity);
@@ -51,7 +51,8 @@ void expectFurnace(Bake& bake, const std::string& what, double tolerance = 1e-4)
     for (int32_t instance : {0, 1})
         for (const glm::vec3& light : cornerLight(bake, instance, RB_OUTPUT_LIGHTING))
             EXPECT_NEAR(double(light.x) * kPi, 1, tolerance) << what << ", instance " << instance;
-    // The shell sends what it reflects and emits; half of the light is not its own.
+    // The shell sends the light that it reflects and emits. Half of the light passes through it and
+    // is not its own.
     for (const glm::vec3& light : cornerLight(bake, 1, RB_OUTPUT_COMBINED))
         EXPECT_NEAR(double(light.x) * kPi, 0.5, tolerance) << what;
 }
@@ -95,15 +96,16 @@ TEST(Opacity, PlatesMultiply) {
     const double exact = 0.5 * 0.8 * 3 / std::sqrt(1.05);
     EXPECT_NEAR(meanLight(shot.patches, shot.shoot(FirstShotKind::GATHER, 0), 0).value, exact,
                 1e-5 * exact);
-    // By rays that a plate stops or not: the standard error of 40,000 lines is known.
+    // SHOOT uses rays that a plate stops or lets pass. The standard error of 40,000 lines that
+    // arrive is known.
     const Mean shotMean = meanLight(shot.patches, shot.shoot(FirstShotKind::SHOOT, 400000), 0);
     EXPECT_NEAR(shotMean.value, exact, 4 * shotMean.error);
     EXPECT_LT(shotMean.error, 0.02 * exact);
 }
 
 TEST(Opacity, ABlackVeilTakesItsShareOfTheSky) {
-    // Every line from the floor to the sky crosses the dome once. 64 bundles of default lines count
-    // hits by chance: about 1e5 lines of the floor leave a standard error of 0.3 %.
+    // Every line from the floor to the sky crosses the dome once. The number of hits is random:
+    // about 1e5 lines of the floor in 64 bundles of default lines leave a standard error of 0.3 %.
     for (DirectionKind directions : {DirectionKind::LOW_DISCREPANCY, DirectionKind::RANDOM}) {
         Scene scene;
         place(scene, rectangle("floor", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
@@ -131,12 +133,12 @@ TEST(Opacity, SingleLinesPassAsOften) {
         visibility.lineHits({0.00004 * k - 0.2, 0.01, 0}, {0, 0, 1}, hits);
         met += int(hits.size());
     }
-    // Binomial: standard deviation 43.
+    // Binomial distribution: the standard deviation is 43.
     EXPECT_NEAR(met, 2500, 4 * 43);
 }
 
 TEST(Opacity, AnImageIsAveragedOverPatches) {
-    // Two by one pixels, white and black, over a plate: in between, bilinear.
+    // An image of two by one pixels, white and black, over a plate. It is interpolated bilinearly.
     Scene scene;
     Mesh mesh = rectangle("leaf", {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
     for (int32_t v : mesh.cornerVertices) mesh.uvs.push_back(glm::vec2(mesh.vertices[size_t(v)]));
@@ -147,12 +149,12 @@ TEST(Opacity, AnImageIsAveragedOverPatches) {
     const Patches patches = subdivide(scene, 0.25f, 1000);
     ASSERT_EQ(patches.count(), 16u);
     EXPECT_FLOAT_EQ(patches.opacity[0], 0.8f);
-    // Three quarters of the way down the ramp from 1/4 to 3/4, the mean of its last half is 1/4.
+    // Three quarters of the way along the ramp from 1/4 to 3/4. The mean of its last half is 1/4.
     EXPECT_NEAR(patches.opacity[2], 0.8 * 0.25, 1e-3);
-    // A patch's own reflectance is that of its opaque share, its area that share.
+    // The reflectance and the area of a patch are those of its opaque share.
     EXPECT_NEAR(patches.reflectance[0].x, 0.2 / 0.8, 1e-6);
     EXPECT_NEAR(patches.area[0], 0.8 / 16, 1e-6);
-    // It reflects, so some of it is met.
+    // The patch reflects, so that some lines must meet it.
     EXPECT_GT(patches.opacity[3], 0);
 }
 
@@ -170,12 +172,12 @@ TEST(Opacity, ALaterBakeSeesItsChange) {
     }
 }
 
-// A lamp of 1 m with a checker of pixels, its front down, 2 m over the floor.
+// A lamp of 1 m with a checker of pixels, its front facing down, 2 m above the floor.
 Scene floorUnderChecker(int pixels, const glm::vec3& bright) {
     Scene scene;
     place(scene, rectangle("floor", {-0.001f, -0.001f, 0}, {0.002f, 0, 0}, {0, 0.002f, 0}),
           grey("", 0.5f));
-    // A black surface far below, so that the mean exitance is small and the lamp a source.
+    // A black surface far below makes the mean exitance small, so that the lamp becomes a source.
     place(scene, rectangle("ground", {-10, -10, -10}, {20, 0, 0}, {0, 20, 0}), grey("", 0),
           glm::dmat4(1), RB_ROLE_OCCLUDE);
     Mesh mesh = rectangle("lamp", {-0.5f, -0.5f, 2}, {0, 1, 0}, {1, 0, 0});
@@ -194,20 +196,21 @@ Scene floorUnderChecker(int pixels, const glm::vec3& bright) {
 }
 
 TEST(VaryingEmission, ACheckerShinesAsItsMean) {
-    // Pixels of 1/16 m on patches of 1/8 m: each has the mean.
+    // Pixels of 1/16 m on patches of 1/8 m, so that each patch has the mean.
     const Scene scene = floorUnderChecker(16, {600, 300, 100});
     const ShotScene shot(scene, 0.125f);
     const glm::dvec3 lamp[4] = {{-0.5, -0.5, 2}, {0.5, -0.5, 2}, {0.5, 0.5, 2}, {-0.5, 0.5, 2}};
     const double exact = 300 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
     const FirstShot light = shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
-    // At most 256 stratified samples: half a per cent of noise.
+    // At most 256 stratified samples, which leave half a per cent of noise.
     EXPECT_NEAR(meanLight(shot.patches, light, 0).value, exact, 0.01 * exact);
     EXPECT_NEAR(light.emitted.x, 300, 0.1);
     EXPECT_NEAR(light.emitted.z, 50, 0.05);
 }
 
 TEST(VaryingEmission, OfARegularCheckerHalfEscapesFromTwoSides) {
-    // As many rays as pairs of a bright and a dark patch. What goes down meets the ground.
+    // The number of rays equals the number of pairs of a bright and a dark patch. Rays that go down
+    // meet the ground.
     constexpr int kAlong = 256, kAcross = 128;
     Scene scene;
     place(scene, rectangle("ground", {-100, -100, -0.01f}, {200, 0, 0}, {0, 200, 0}), grey("", 0),
@@ -230,7 +233,7 @@ TEST(VaryingEmission, OfARegularCheckerHalfEscapesFromTwoSides) {
     const Visibility visibility(patches);
     for (uint32_t seed = 0; seed < 8; ++seed) {
         const DirectLight light(scene, patches, visibility, seed);
-        // Fronts and backs are sources of their own, of equal power.
+        // Fronts and backs are separate sources of equal power.
         const std::vector<PowerShares> shares = light.powerShares();
         ASSERT_EQ(shares.size(), 2u);
         EXPECT_NEAR(shares[0].escaped.x, 1, 1e-6) << seed;
@@ -239,19 +242,19 @@ TEST(VaryingEmission, OfARegularCheckerHalfEscapesFromTwoSides) {
 }
 
 TEST(VaryingEmission, EachPatchShinesByItself) {
-    // Two patches, one bright and one black, with an image that is constant over each.
+    // Two patches, one bright and one black. The image is constant over each of them.
     Scene scene = floorUnderChecker(2, {600, 600, 600});
     scene.images[0] = {"half", 8, 1, RB_IMAGE_EXTEND, std::vector<glm::vec3>(8, glm::vec3(0.0f))};
     for (size_t x = 0; x < 4; ++x) scene.images[0].pixels[x] = glm::vec3(1.0f);
     const ShotScene shot(scene, 0.5f);
     // The bilinear edge between the halves is a pixel wide and gives each half an eighth of the
-    // ramp; the mean over all is a half.
+    // ramp. The mean over all is a half.
     glm::dvec3 sum(0.0);
     for (uint32_t p = 0; p < shot.patches.count(); ++p)
         sum += double(shot.patches.area[p]) * glm::dvec3(shot.patches.emission[2 * p]);
     EXPECT_NEAR(sum.x, 300, 1);
-    // Seen from a point under the lamp's centre, each half gives half; with the bright half alone
-    // the light comes from one side.
+    // At a point under the lamp's centre each half gives half of the light. With the bright half
+    // alone all light comes from one side.
     const glm::dvec3 lamp[4] = {{-0.5, -0.5, 2}, {0, -0.5, 2}, {0, 0.5, 2}, {-0.5, 0.5, 2}};
     const double exact = 600 * polygonIrradiance({0, 0, 0}, {0, 0, 1}, lamp, 4) / kPi;
     EXPECT_NEAR(meanLight(shot.patches, shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f), 0).value,
@@ -269,7 +272,7 @@ TEST(VaryingEmission, ShotAndGatheredLightHaveTheSameColours) {
     const FirstShot gathered = shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f);
     const FirstShot sent = shot.shoot(FirstShotKind::SHOOT, 400000);
     const glm::dvec3 a = arriving(shot.patches, gathered), b = arriving(shot.patches, sent);
-    // Both have noise of some tenths of a per cent.
+    // Both have some tenths of a per cent of noise.
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(b[c], a[c], 0.02 * a[c]) << "channel " << c;
 }
 
@@ -284,13 +287,13 @@ TEST(VaryingEmission, SidesOfOtherColoursAreShotInTheirColours) {
     const ShotScene shot(scene, 0.5f);
     const glm::dvec3 a = arriving(shot.patches, shot.shoot(FirstShotKind::GATHER, 0, 0, 0.002f));
     const glm::dvec3 b = arriving(shot.patches, shot.shoot(FirstShotKind::SHOOT, 400000));
-    // Red gets 4 % of the lines: noise of half a per cent.
+    // Red gets 4 % of the lines, which leaves half a per cent of noise.
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(b[c], a[c], 0.02 * a[c]) << "channel " << c;
 }
 
 TEST(VaryingEmission, CornerColoursShineInBundles) {
-    // A closed box whose faces emit 1 on average by their corners, and reflect nothing: the mean
-    // light is that of a uniform one by reciprocity.
+    // A closed box of reflectance 0.5 that emits 0.5 W/m^2 in the mean, varying over the corners.
+    // By reciprocity the mean light is that of uniform emission.
     Scene scene;
     Mesh mesh = box("box", {0, 0, 0}, {1, 1, 1}, true);
     for (int32_t v : mesh.cornerVertices)
@@ -304,7 +307,7 @@ TEST(VaryingEmission, CornerColoursShineInBundles) {
     double mean = 0;
     for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
         mean += double(light.x) / 24;
-    // B = E + rho H in the mean: E = 1/2, so H = 1. Noise of 64 bundles is below 1 %.
+    // In the mean B = E + rho H with E = 1/2, so H = 1 W/m^2. The noise of 64 bundles is below 1 %.
     EXPECT_NEAR(mean * kPi, 1, 0.02);
 }
 

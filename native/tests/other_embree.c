@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  *
- * A library with the names of Embree's functions, as another version of it would be: whoever calls
- * one of them ends. To be loaded before the library under test. */
+ * A library that exports the names of Embree's functions, like another version of Embree. Each
+ * function ends the process. It is loaded before the library under test, which must not call it. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -10,8 +10,8 @@ static void end(const char* name) {
     abort();
 }
 
-#define FUNCTION(name)  \
-    void name(void);    \
+#define FUNCTION(name) \
+    void name(void);   \
     void name(void) { end(#name); }
 
 FUNCTION(rtcNewDevice)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What receivers beside each other see of the world: samples by it have the right mean, and a room
-// with a window gets its light from few of them.
+// What neighbouring receivers see of the world: samples that follow it have the right mean, and a
+// room with a window gets its light from few samples.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,7 +51,8 @@ TEST(Outlook, SamplesBySeenPartsHaveTheMeanOfAllOthers) {
 }
 
 TEST(Outlook, ReceiversBesideEachOtherShareWhatTheySee) {
-    // Those on the left see part 0 of three, those on the right part 1; nobody ever looked at 2.
+    // The receivers on the left see part 0 of three, those on the right part 1. No sample goes to
+    // part 2.
     Scene scene;
     place(scene, rectangle("left", {-2, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
     place(scene, rectangle("right", {2, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
@@ -83,8 +84,8 @@ TEST(Outlook, ReceiversBesideEachOtherShareWhatTheySee) {
     }
 }
 
-// A room of 4 x 4 x 3 m whose wall at x = 2 has a window of 1 x 1 m, in a constant world that is an
-// image.
+// A room of 4 x 4 x 3 m whose wall at x = 2 has a window of 1 x 1 m. The world is constant, but
+// given as an image.
 TEST(Outlook, ARoomGetsTheSkyOfItsWindow) {
     Scene scene;
     const Material matt = grey("", 0.5f);
@@ -127,13 +128,13 @@ TEST(Outlook, ARoomGetsTheSkyOfItsWindow) {
             ++sides;
         }
     }
-    // Errors of some 2000 sides are independent: in the mean of four seeds 0.1 % is left. Sides
-    // that miss the window with all their samples, whose stated error has that, lack half a percent
-    // (at target 0.01 a fifth, at 0.005 nothing).
+    // The errors of some 2000 sides are independent, so that 0.1 % remains in the mean of four
+    // seeds. Half a per cent of the light is missing on sides whose samples all miss the window,
+    // which the stated error includes (at target 0.01 a fifth of this, at 0.005 nothing).
     EXPECT_NEAR(found / exact, 1, 0.01);
-    // The error that a side may have is a share of the light outside, which is 60 times as bright:
-    // 1.4 % of that, from 250 rays beside those of the outside. Rays that do not know of the window
-    // need 30 times as many, for one in 50 to 200 gets there.
+    // The error allowed on a side is a share of the light outside, which is 60 times as bright: 1.4
+    // % of it, from 250 rays in addition to those of the outside. Rays that do not follow the
+    // window need 30 times as many, since only one in 50 to 200 gets there.
     EXPECT_LT(std::sqrt(errors / squares), 0.12);
     EXPECT_LT(rays / double(sides), 500);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The painter's orders against the exact order of depth.
+// The depth orders of the painter against the exact order.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 
 using namespace test;
 
-// Lines without the order in which a projector found them.
+// The lines of a bundle, independent of the order in which a projector found them.
 struct Merged {
     std::map<std::pair<uint32_t, uint32_t>, uint32_t> exchanges;
     std::vector<uint32_t> sky, touching;
@@ -56,7 +56,7 @@ class PaintedScene {
     const ProjectorInput input;
 };
 
-// Boxes and balls of triangles, turned at random, none near another.
+// Boxes and balls of triangles, rotated at random, at a distance from each other.
 Scene separatedSolids() {
     Scene scene;
     std::mt19937_64 random(3);
@@ -130,12 +130,13 @@ TEST(Painter, IsRightButForAFewLinesWherePatchesAreSmall) {
             all += exchangedLines(found);
         }
     }
-    // Surfaces here are apart by a patch or more; the thesis calls the error negligible too.
+    // Surfaces are a patch or more apart here. The thesis calls the error negligible too.
     EXPECT_LT(double(disordered), 1e-3 * double(all));
 }
 
 TEST(Painter, IsWrongWhereALongPatchReachesBehindASmallOne) {
-    // The direction meets the slope first, at height 1 to 1.5; but its centroid is at height 5.
+    // The lines meet the slope first, at a height of 1 to 1.5, but its centroid is at a height of
+    // 5.
     Scene scene;
     place(scene, rectangle("slope", {0, 0, 0}, {10, 0, 10}, {0, 1, 0}), grey("", 0.5f));
     place(scene, rectangle("small", {1, 0.25f, 3}, {0.5f, 0, 0}, {0, 0.5f, 0}), grey("", 0.5f));
@@ -143,7 +144,7 @@ TEST(Painter, IsWrongWhereALongPatchReachesBehindASmallOne) {
     const Bundle upwards{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.3, 0.7}, 0, 0};
     const BundleLines centroid = projection.along(ProjectorKind::PAINTER, upwards);
     const BundleLines newell = projection.along(ProjectorKind::PAINTER_NEWELL, upwards);
-    constexpr uint32_t kSlope = 0, kSmall = 2;  // their fronts, which look up
+    constexpr uint32_t kSlope = 0, kSmall = 2;  // their fronts, which face up
     EXPECT_EQ(centroid.disordered, 100u) << "all lines through the small patch";
     EXPECT_EQ(Merged(centroid).exchanges.count({kSlope + 1, kSmall}), 1u);
     EXPECT_EQ(newell.disordered, 0u);
@@ -151,7 +152,7 @@ TEST(Painter, IsWrongWhereALongPatchReachesBehindASmallOne) {
     EXPECT_EQ(Merged(newell).exchanges.at({kSlope, kSmall + 1}), 100u);
 }
 
-// Each bar lies over the next at one end and under the last at the other.
+// Each of the three bars lies over the next at one end and under the previous one at the other.
 Scene interlockedBars() {
     Scene scene;
     for (int k = 0; k < 3; ++k) {
@@ -165,7 +166,7 @@ Scene interlockedBars() {
 
 TEST(PainterNewell, CountsTheCyclesOfInterlockedClosedObjects) {
     const PaintedScene whole(interlockedBars(), 100, 0.02f), cut(interlockedBars(), 0.3f, 0.02f);
-    // Near the axis of the three bars, along which they form a ring.
+    // A direction near the axis of the three bars. Along this axis they form a ring.
     const glm::dvec3 direction = glm::normalize(glm::dvec3(0.05, 0.03, 1));
     const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), direction));
     const Bundle bundle{right, glm::cross(direction, right), direction, {0.4, 0.6}, 0, 0};
@@ -207,8 +208,8 @@ TEST(PainterNewell, CountsIntersectingPatchesAsACycle) {
 }
 
 TEST(PainterNewell, OrdersPatchesThatCutEachOthersPlanesApart) {
-    // Neither lies on one side of the other's plane, but they do not meet: the lower one turns up
-    // at its end, beside the upper one's turned down.
+    // Neither patch lies on one side of the other's plane, but they do not intersect: the lower one
+    // turns up at its end, beside the upper one, which turns down.
     Scene scene;
     place(scene, rectangle("low", {-2, -0.5f, -1}, {4, 0, 1.6f}, {0, 1, 0}), grey("", 0.5f));
     place(scene, rectangle("high", {-0.4f, -3, 1.4f}, {0.8f, 0, 0}, {0, 6, -2.2f}), grey("", 0.5f));
@@ -222,9 +223,9 @@ TEST(PainterNewell, OrdersPatchesThatCutEachOthersPlanesApart) {
 }
 
 struct FurnaceError {
-    double worst;   // of all corners
+    double worst;   // largest error of all corners
     double mean;    // root mean square over the area
-    double stated;  // by the bake
+    double stated;  // error stated by the bake
 };
 
 FurnaceError furnace(const Scene& scene, ProjectorKind projector, bool boxesStand) {
@@ -234,11 +235,12 @@ FurnaceError furnace(const Scene& scene, ProjectorKind projector, bool boxesStan
     bake.run(scene);
     double worst = 0, squares = 0, area = 0;
     for (const Cell& cell : bake.patches().cells) {
-        // Nothing reaches the bottom of a standing box.
+        // No light reaches the bottom of a standing box.
         if (boxesStand && cell.instance > 0 && cell.face == 0) continue;
         const std::vector<glm::vec3> light =
             cornerLight(bake, int32_t(cell.instance), RB_OUTPUT_LIGHTING);
-        const double cellArea = double(glm::length(glm::cross(cell.a, cell.b)));  // all are quads
+        // All cells are quads.
+        const double cellArea = double(glm::length(glm::cross(cell.a, cell.b)));
         area += cellArea;
         for (int32_t corner : cell.corner) {
             const double error = std::abs(double(light[size_t(corner)].x) * kPi - 1);
@@ -264,8 +266,8 @@ TEST(PainterFurnace, IsExactInTheOrderOfCentroidsWherePatchesAreFarApart) {
 }
 
 TEST(PainterFurnace, StatesTheErrorOfTheOrderOfCentroidsWherePatchesAreClose) {
-    // With patches of 0.25 m the dark inside of a box 0.1 m above the floor sees the room now and
-    // then; where it stands on the floor, at half of the lines.
+    // With patches of 0.25 m some lines let the dark inside of a box see the room if the box is 0.1
+    // m above the floor, and half of the lines do if it stands on the floor.
     for (float gap : {0.1f, 0.0f}) {
         const FurnaceError error =
             furnace(roomWithBoxes(0.5f, 0.5f, gap), ProjectorKind::PAINTER, gap == 0);

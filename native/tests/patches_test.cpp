@@ -117,7 +117,8 @@ TEST(Patches, PatchAtClampsToTheParent) {
 }
 
 TEST(Patches, PatchAtFindsThePatchOfAPointInTheWorld) {
-    // A skewed sliver, a long strip and a plain triangle: parents whose float coordinates are hard.
+    // A skewed sliver, a long strip and a plain triangle: parents on which float coordinates are
+    // inaccurate.
     const Mesh mesh = polygons("hard",
                                {{0, 0, 0},
                                 {1, 0, 0},
@@ -166,7 +167,7 @@ TEST(Patches, MaxPatchesIsAnUpperBound) {
     EXPECT_EQ(fewest.count(), fewest.parents.size()) << "a parent keeps one patch";
 }
 
-// The shadow of a dense prop on a ground of one face is lost if that is one patch.
+// If a ground of one face were one patch, the shadow of a dense object on it would be lost.
 TEST(Patches, SmallFacesLeavePatchesToALargeOne) {
     Scene scene;
     place(scene, grid("prop", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, 50, 50), grey("grey", 0.5f));
@@ -243,7 +244,7 @@ TEST(PatchSize, TinyGroupsInAVastSceneGetTheirOwn) {
         surface.faces = 6;
         return surface;
     };
-    // A plain, a house with a chair in it, another house 200 m off, and a tree of 3 m by itself.
+    // A plain, a house with a chair in it, another house 200 m away, and a separate tree of 3 m.
     std::vector<Surface> objects(1);
     objects[0].extent.add({-500, -500, 0});
     objects[0].extent.add({500, 500, 0});
@@ -334,9 +335,9 @@ TEST(Reflectance, ALinearRampOfCornerColoursIsExactOnTriangles) {
 }
 
 TEST(Subdivide, PiecesThatRoundingKeepsAsLongAreNotCutForEver) {
-    // Pairs of triangles some tens of roundings long, 1 km apart: floats there are 6e-5 m apart.
-    // Each pair is a scene of its own: together they would go through each other, and be cut for
-    // that too.
+    // Pairs of triangles a few tens of rounding steps long, 1 km apart. Floats there are 6e-5 m
+    // apart. Each pair is its own scene, since several pairs would intersect and be cut for this
+    // reason too.
     std::mt19937 random(1);
     std::uniform_real_distribution<float> at(0, 4e-3f), thin(0, 2e-4f);
     size_t parents = 0, count = 0;
@@ -357,13 +358,13 @@ TEST(Subdivide, PiecesThatRoundingKeepsAsLongAreNotCutForEver) {
         count += patches.vertices.size();
     }
     EXPECT_GT(parents, 1000u);
-    // A triangle of 100 roundings has some hundred pieces at most.
+    // A triangle of 100 rounding steps has at most some hundred pieces.
     EXPECT_LT(parents, 200'000u);
     EXPECT_LT(count, 200'000u);
 }
 
 TEST(Subdivide, CutsNoFurtherThanNumbersReach) {
-    // 6e8 m from the centre neighbouring numbers are 64 m apart: what is a few of them long cannot
+    // 6e8 m from the centre neighbouring floats are 64 m apart. An edge of a few such steps cannot
     // be halved down to a patch of 1 m.
     const float far = 6e8f, step = 256;
     for (const float length : {8.0f, 40.0f, 80.0f}) {
@@ -381,7 +382,8 @@ TEST(Subdivide, CutsNoFurtherThanNumbersReach) {
 }
 
 TEST(Subdivide, ANeedleIsCutIntoAsManyPiecesAsItIsLong) {
-    // 100 m long, 1 mm wide: with the short edge first, second, last, and with a blunt corner.
+    // Needles 100 m long and 1 mm wide: with the short edge first, second and last, and with a
+    // blunt corner.
     const std::vector<std::vector<glm::vec3>> needles = {
         {{0, 0, 0}, {0, 1e-3f, 0}, {-100, 0, 0}},
         {{-100, 0, 0}, {0, 0, 0}, {0, 1e-3f, 0}},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// PLANE and PLANES against the exact lists: the same expected lines, pair by pair.
+// PLANE and PLANES against the exact lists: the expected lines of each pair are equal.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 
 using namespace test;
 
-// A projector of the table with its settings.
+// A projector of the table, with its settings.
 struct Kind {
     ProjectorKind row;
     int planeCount;
@@ -36,7 +36,7 @@ std::string nameOf(const Kind& kind) {
            " placement " + std::to_string(int(kind.placement));
 }
 
-// Patches of a scene and projectors over them.
+// Patches of a scene and projectors for them.
 struct Scenery {
     Scenery(const Scene& scene, float patchSize, float pixelSize)
         : patches(subdivide(scene, patchSize, kMany)), visibility(patches), pixelSize(pixelSize) {}
@@ -77,10 +77,10 @@ Groups countGroups(Projector& projector, const Bundle& bundle, size_t groups, co
     return counts;
 }
 
-// Expects that a projector finds the same lines in each group as the lists, on average over
-// bundles. Both project the same bundles, so that only what the planes make random differs; the
-// bound is four of its standard errors, measured over the bundles, which must themselves be small
-// (`most`, of the group's mean) for the test to say something.
+// Expects that a projector finds on average as many lines in each group as the lists. Both project
+// the same bundles, so that only the random choices of the planes differ. The tolerance is four
+// standard errors, measured over the bundles. The standard errors must be below `most`, relative to
+// the mean of the group, for the test to be significant.
 void expectSameLines(const Scenery& scenery, const Kind& kind, uint32_t bundleCount, size_t groups,
                      const Group& group, double most) {
     const auto exact = scenery.lists(), found = scenery.projector(kind);
@@ -125,8 +125,8 @@ TEST(Planes, TwoPlatesExchangeAsInTheListsAndSeeTheSky) {
 
 TEST(Planes, BoxesInARoomExchangeAsInTheLists) {
     const Scenery scenery(roomWithBoxes(0.5f), 0.4f, 0.08f);
-    // Parts whose gaps do not go down to zero, as those of walls with a common edge do: the weights
-    // of such pairs have no variance to state a confidence with.
+    // Only parts whose gaps do not go down to zero. The gaps of walls with a common edge do, and
+    // the weights of such pairs have no finite variance and thus no confidence interval.
     auto group = [&](uint32_t i, uint32_t j) {
         if (j == kSky) return scenery.instanceOf(i) == 0 && i % 2 == 1 ? 0 : -1;
         const uint32_t a = scenery.instanceOf(i), b = scenery.instanceOf(j);
@@ -137,7 +137,7 @@ TEST(Planes, BoxesInARoomExchangeAsInTheLists) {
         }
         return a == b ? -1 : 1 + int(a + b);
     };
-    // One plane seldom comes between the boxes.
+    // One plane seldom lies between the boxes.
     for (const Kind& kind : kKinds)
         expectSameLines(scenery, kind, 800, 5, group, kind.planeCount == 1 ? 0.25 : 0.1);
 }
@@ -154,11 +154,12 @@ TEST(Planes, TheFormFactorOfTwoPlatesIsItsClosedForm) {
             projector->project(bundle, traced.back().lines);
         }
         counts.add(traced);
-        // Whether the one plane lies between the plates, and so all lines of a bundle come or stay
-        // away: a standard error of 1.8 % by 2000 bundles for PLANE, less for more planes. Three.
+        // If the single plane lies between the plates, all lines of a bundle are found, else none:
+        // the standard error with 2000 bundles is 1.8 % for PLANE, less for more planes. The
+        // tolerance is three standard errors.
         EXPECT_NEAR(formFactor(scenery.patches, counts, 0, 1), wanted, 0.055 * wanted)
             << nameOf(kind);
-        // Crofton, m_i = n A / (2 s^2).
+        // Crofton: m_i = n A / (2 s^2).
         double lines = 0;
         for (uint32_t side = 0; side < scenery.patches.sideCount(); ++side)
             lines += linesOf(counts, side);
@@ -178,7 +179,7 @@ void expectEqual(const BundleLines& a, const BundleLines& b) {
 }
 
 TEST(Planes, CoherenceChangesNothing) {
-    for (float gap : {0.1f, 0.0f}) {  // standing boxes too: surfaces that coincide
+    for (float gap : {0.1f, 0.0f}) {  // the standing boxes have surfaces that coincide
         const Scenery scenery(roomWithBoxes(0.5f, 0, gap), 0.3f, 0.06f);
         for (PlanePlacement placement : {PlanePlacement::SYSTEMATIC, PlanePlacement::STRATIFIED,
                                          PlanePlacement::CLOSE_DISTANCE})
@@ -212,8 +213,8 @@ TEST(Planes, LinesThatMeetTheSceneAreThoseOfTheLists) {
 }
 
 TEST(Planes, NothingShinesBetweenSurfacesThatTouch) {
-    // Boxes that stand on the floor: their undersides and what they cover exchange nothing, and the
-    // room's light does not leak into them.
+    // Boxes that stand on the floor. Their bottoms and the covered floor exchange nothing, and no
+    // light of the room leaks between them.
     const Scenery scenery(roomWithBoxes(0.5f, 0, 0), 0.3f, 0.05f);
     for (const Kind& kind :
          {kKinds[0], kKinds[2], Kind{ProjectorKind::PLANES, 40, PlanePlacement::SYSTEMATIC},
@@ -233,8 +234,8 @@ TEST(Planes, NothingShinesBetweenSurfacesThatTouch) {
                 }
             }
         }
-        // As in FragmentLists.NoLineLeavesAClosedScene: within rounding of an edge the order of its
-        // two faces is not known.
+        // As in FragmentLists.NoLineLeavesAClosedScene: within a rounding error of an edge the
+        // order of its two faces is undefined.
         EXPECT_LE(double(leaks), 5e-6 * double(all)) << nameOf(kind);
     }
 }
@@ -257,7 +258,8 @@ TEST(Planes, OneFlatSurfaceSeesOnlyTheSky) {
             front += double(fronts) / kBundles;
             back += double(lines.sky.size() - size_t(fronts)) / kBundles;
         }
-        // Either side is found by half of the planes at least, as two lines: four standard errors.
+        // Each side is found by at least half of the planes, with two lines. The tolerance is four
+        // standard errors.
         EXPECT_NEAR(front, 100, 400 / std::sqrt(kBundles)) << nameOf(kind);
         EXPECT_NEAR(back, 100, 400 / std::sqrt(kBundles)) << nameOf(kind);
     }
@@ -297,8 +299,8 @@ TEST(Planes, FurnacesAreExact) {
     for (const Kind& kind : kKinds) {
         const Scene scene = roomWithBoxes(0.5f, 0.5f);
         Bake bake;
-        // So many that lines of both halves meet all sides. (The solver stops at a share of the
-        // stated error, to which sides add that no line of a half met.)
+        // Enough bundles for lines of both halves to meet all sides. (The solver stops at a share
+        // of the stated error, and a side that no line of a half met adds to this error.)
         setQuick(bake, 512);
         bake.settings.contacts = 0;
         bake.settings.projector = kind.row;

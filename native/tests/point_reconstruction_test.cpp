@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// POINT: the light at the corners themselves, against closed forms at them.
+// POINT: the light at the corners, against closed forms.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace {
 
 using namespace test;
 
-// Receivers lie 1 % of the way to their face's centre inside: 0.7 % of an edge. The light changes
-// by less than its own size over an edge here.
+// Receivers lie 1 % of the way from the corner to the centre of its face: 0.7 % of an edge. In
+// these scenes the light changes by less than its own value over an edge.
 constexpr double kReceiverOffset = 0.01;
 
 struct PointBake : Bake {
@@ -29,7 +29,8 @@ struct PointBake : Bake {
     }
 };
 
-// Position and LIGHTING * pi of each corner of the first instance, which is not transformed.
+// Calls check(position, corner, LIGHTING * pi) for each corner of the first instance, which has no
+// transform.
 template <class Check>
 void forEachCorner(const Scene& scene, const Bake& bake, const Check& check) {
     const Mesh& mesh = scene.meshes[0];
@@ -38,7 +39,7 @@ void forEachCorner(const Scene& scene, const Bake& bake, const Check& check) {
         check(mesh.vertices[size_t(mesh.cornerVertices[c])], c, double(light[c].x) * kPi);
 }
 
-// A ground of 4 x 4 faces of 1 m below a square lamp of 1 m, 1 m above its centre.
+// A ground of 4 x 4 faces of 1 m below a square lamp of 1 m, which is 1 m above the centre.
 Scene groundBelowLamp(float reflectance = 0) {
     Scene scene;
     place(scene, grid("ground", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 4, 4), grey("", reflectance));
@@ -52,8 +53,8 @@ double lampIrradiance(const glm::vec3& point) {
 }
 
 TEST(PointReconstruction, SmallBoxesInVastScenesHaveNoDarkEdges) {
-    // Rays start behind their surface by more than the corners' receivers lie inside it: behind the
-    // next face of the box, which they must not meet.
+    // Rays start further behind their surface than the receivers of the corners lie inside it. They
+    // start behind the next face of the box, which they must not meet.
     Scene scene;
     place(scene, box("box", {0, 0, 1}, {0.1f, 0.1f, 1.1f}, false), grey("", 0));
     place(scene, rectangle("plain", {-1000, -1000, 0}, {2000, 0, 0}, {0, 2000, 0}), grey("", 0),
@@ -71,16 +72,17 @@ TEST(PointReconstruction, SmallBoxesInVastScenesHaveNoDarkEdges) {
     });
 }
 
-// At a corner of one of two plates that face each other very near, the other hides a quarter of
-// what is around: the configuration factor from a point to a rectangle above its corner, seen from
-// nearby.
+// At a corner of one of two plates that face each other very closely, the other plate hides a
+// quarter of the surroundings: the form factor from a point to a rectangle above its corner at a
+// small distance.
 TEST(PointReconstruction, CornersBesideANarrowGapSeeOut) {
     Scene scene;
     place(scene, rectangle("plate", {0, 0, 0}, {0.2f, 0, 0}, {0, 0.2f, 0}), grey("", 0));
     place(scene, rectangle("other", {0, 0, 0.001f}, {0, 0.2f, 0}, {0.2f, 0, 0}), grey("", 0),
           glm::dmat4(1), RB_ROLE_OCCLUDE);
     scene.worldRadiance = glm::vec3(float(1 / kPi));
-    // The receivers lie inside by 1/32 of the gap, which hides 3 % more; the final gather's noise.
+    // The receivers lie inside by 1/32 of the gap, which hides 3 % more. The final gather adds
+    // noise.
     forEachCorner(scene, PointBake(scene), [](const glm::vec3&, size_t c, double found) {
         EXPECT_NEAR(found, 0.75, 0.04) << "corner " << c;
     });
@@ -119,14 +121,14 @@ TEST(PointReconstruction, SmoothCornersUseTheirShadingNormal) {
     scene.addLight(sunLight(sun, {2, 2, 2}));
     forEachCorner(scene, PointBake(scene), [&](const glm::vec3& at, size_t, double found) {
         const float cosine = glm::dot(glm::normalize(at), sun);
-        // Nearer to the terminator some of the flat faces around the corner face away.
+        // Closer to the terminator some of the flat faces around the corner face away from the sun.
         if (std::abs(cosine) < 0.3f) return;
         EXPECT_NEAR(found, 2 * std::max(0.0f, cosine), 1e-4);
     });
 }
 
 TEST(PointReconstruction, CoveredCornersKeepTheLeastSquares) {
-    // A box on the middle of the ground covers the faces around the centre vertex.
+    // A box on the centre of the ground covers the faces around the centre vertex.
     Scene scene = groundBelowLamp(0.5f);
     place(scene, box("box", {-1, -1, 0}, {1, 1, 0.25f}, false), grey("", 0.5f));
     const PointBake point(scene);
@@ -158,7 +160,7 @@ TEST(PointReconstruction, ACornerUnderASmallBoxIsNotBlack) {
 
 TEST(CornerReceivers, EachCornerOfEveryShapeHasOneInsideItsFace) {
     // A quad that is no parallelogram, a concave pentagon and a sliver, far from the origin,
-    // mirrored, baked on the back.
+    // mirrored, and baked on the back.
     Scene scene;
     const Mesh mesh = polygons(
         "shapes", {{0, 0, 0}, {3, 0, 0}, {2, 1, 0}, {0, 1, 0}, {1, 0.5f, 2}, {30, 0.01f, 0}},

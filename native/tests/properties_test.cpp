@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Properties that hold for whatever scene: RapidCheck makes rooms with boxes at random and shrinks
-// those that fail. Most compare two bakes with different lines: what they may differ by is a
-// multiple of what two seeds differ by.
+// Properties that hold for any scene. RapidCheck makes random rooms with boxes and simplifies those
+// that fail. Most tests compare two bakes with different lines and allow a multiple of the
+// difference between two seeds.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -20,17 +20,17 @@ namespace {
 
 using namespace test;
 
-// Each case is two or three bakes. The same ones in every run; for others, and more of them:
-// RC_PARAMS="max_success=200" raybundle_tests --gtest_filter='Properties*'. Read by RapidCheck
-// before the first.
+// Each case is two or three bakes. Every run has the same cases. For other and more cases:
+// RC_PARAMS="max_success=200" raybundle_tests --gtest_filter='Properties*'. RapidCheck reads the
+// variable before the first test.
 const bool areFew = setenv("RC_PARAMS", "seed=1 max_success=20 max_size=20", 0) == 0;
 
 constexpr int kBundles = 128;
-// Differences of bakes are random with a mean square as that of two seeds; those over about a
-// hundred corners, some of them alike, scatter by a third of it.
+// Differences of bakes are random, with the mean square of that of two seeds. Differences over
+// about a hundred corners, some of which are correlated, scatter by a third.
 constexpr double kSeeds = 2.5;
 
-// In hundredths, so that shrinking leads to simple numbers.
+// In hundredths, so that RapidCheck arrives at simple numbers.
 struct BoxSpec {
     std::array<int, 3> centre, size;
     int turn, reflectance;
@@ -69,8 +69,8 @@ rc::Gen<RoomSpec> rooms() {
         rc::gen::set(&RoomSpec::reflectance, rc::gen::inRange(0, 90)));
 }
 
-// A closed room of 2 m with boxes, which may lie in each other, and two lamps at the ceiling: the
-// first two instances. order: of the boxes.
+// A closed room of 2 m with boxes, which may overlap, and two lamps at the ceiling, which are the
+// first two instances. `isReversed` reverses the order of the boxes.
 Scene sceneOf(const RoomSpec& room, float first, float second, const glm::dmat4& motion,
               bool isReversed = false) {
     Scene scene;
@@ -93,7 +93,7 @@ Scene sceneOf(const RoomSpec& room, float first, float second, const glm::dmat4&
     return scene;
 }
 
-// Irradiance of the patches' sides, instance by instance in the order of sceneOf.
+// Returns the irradiance on the sides of the patches, instance by instance in the order of sceneOf.
 std::vector<glm::vec3> lightOn(const Scene& scene, int seed, float patchSize = 0.2f) {
     Bake bake;
     bake.settings.patchSize = patchSize;
@@ -107,24 +107,25 @@ std::vector<glm::vec3> lightOn(const Scene& scene, int seed, float patchSize = 0
     return light;
 }
 
-// Of the target error.
+// A quarter of the target error.
 constexpr double kQuarter = 0.005;
 
-// By what two seeds differ, and a quarter of the target: where hardly anything reflects, two seeds
-// may be alike by chance.
+// Returns the allowed difference: a multiple of that of two seeds, and a quarter of the target,
+// because two seeds may agree by chance if the surfaces reflect almost nothing.
 double allowed(const Scene& scene, const std::vector<glm::vec3>& light) {
     return kSeeds * noise(lightOn(scene, 77), light) + kQuarter;
 }
 
-// A second look, with kLooks seeds of each, where the first finds too large a difference. What two
-// seeds differ by says little where a single patch has most of the noise, such as one that is
-// buried but for a sliver, or one number is compared: of three normal numbers, two are by chance
-// over 2.5 times as far apart as the third from one of them in 22 % of all cases (as in `allowed`),
-// and two are over 2.5 times as far apart as both together from two more in 2.6 % (as in
-// reciprocity). Here the difference of the means, which has the mean square `variance`, is compared
-// with it. With 14 degrees of freedom it is over kDeviations times as large once in 5000 second
-// looks; and that is 2.5 standard deviations of a bake, where the first look allows 3.5, root mean
-// square. first, second: (seed) -> light; share: of the light, that is allowed besides.
+// Makes a second test, with kLooks seeds of each, if the first finds too large a difference. The
+// difference of two seeds is not significant if a single patch has most of the noise, such as a
+// patch that is buried except for a sliver, or if a single number is compared. Of three normal
+// numbers, two are by chance over 2.5 times as far apart as the third is from one of them in 22 %
+// of all cases (as in `allowed`), and two are over 2.5 times as far apart as both together are from
+// two more in 2.6 % (as in reciprocity). This function compares the difference of the means with
+// its standard deviation, of mean square `variance`. With 14 degrees of freedom the difference is
+// over kDeviations times as large in one of 5000 second tests. This is 2.5 standard deviations of a
+// bake, while the first test allows 3.5 in the root mean square. first(seed) and second(seed)
+// return light; `share` is the share of the light that is allowed in addition.
 constexpr int kLooks = 8;
 constexpr double kDeviations = 5;
 
@@ -140,7 +141,7 @@ bool agreeInTheMean(const First& first, const Second& second, double share) {
                 squares[i] += glm::dvec3(light[i]) * glm::dvec3(light[i]);
             }
         }
-        // Of the mean of the looks.
+        // Returns the variance of the mean.
         glm::dvec3 variance(size_t i) const {
             return glm::max(glm::dvec3(0.0), squares[i] - values[i] * values[i] / double(kLooks)) /
                    double(kLooks * (kLooks - 1));
@@ -172,7 +173,7 @@ RC_GTEST_PROP(Properties, TwiceTheEmissionIsTwiceTheLight, ()) {
     const RoomSpec room = *rooms();
     const std::vector<glm::vec3> once = lightOn(sceneOf(room, 10, 3, kStill), 0);
     const std::vector<glm::vec3> twice = lightOn(sceneOf(room, 20, 6, kStill), 0);
-    // The same lines and rays.
+    // Both bakes have the same lines and rays.
     RC_ASSERT(noise(twice, scaled(once, 2)) < 1e-4);
 }
 
@@ -210,7 +211,7 @@ RC_GTEST_PROP(Properties, SizeChangesNothing, ()) {
     const std::vector<glm::vec3> one = lightOn(sceneOf(room, 10, 3, kStill), 0);
     const std::vector<glm::vec3> other =
         lightOn(sceneOf(room, 10, 3, glm::scale(kStill, glm::dvec3(size))), 0, 0.2f * float(size));
-    // The same lines and rays, but for those that rounding moves over an edge.
+    // Both bakes have the same lines and rays, except those that rounding moves over an edge.
     RC_ASSERT(noise(other, one) < 0.01);
 }
 
@@ -229,7 +230,8 @@ RC_GTEST_PROP(Properties, TheOrderOfObjectsChangesNothing, ()) {
 }
 
 RC_GTEST_PROP(Properties, WhatOneLampGivesAnotherSurfaceItGetsFromIt, ()) {
-    // Transport is symmetric: unit exitance of A brings B the power that that of B brings A.
+    // Transport is symmetric: unit exitance of A brings B the power that unit exitance of B brings
+    // A.
     const RoomSpec room = *rooms();
     auto received = [&](bool isFirst, int seed) {
         Bake bake;
@@ -244,8 +246,8 @@ RC_GTEST_PROP(Properties, WhatOneLampGivesAnotherSurfaceItGetsFromIt, ()) {
         return power;
     };
     const double there = received(true, 0), back = received(false, 0);
-    // Lamps do not see each other: what they get was reflected. With walls of 5 % that is next to
-    // nothing beside what the lamps' own light leaves in rounding.
+    // The lamps do not see each other and get only reflected light. With walls of 5 % reflectance
+    // this is almost nothing compared with the rounding errors of the lamps' own light.
     const double seeds =
         std::abs(received(true, 77) - there) + std::abs(received(false, 77) - back);
     constexpr double kShare = 0.05;
@@ -259,7 +261,7 @@ RC_GTEST_PROP(Properties, WhatOneLampGivesAnotherSurfaceItGetsFromIt, ()) {
 }
 
 RC_GTEST_PROP(Properties, AFurnaceOfAnyShapeIsExact, ()) {
-    // A ball whose vertices are pulled in and out: closed, in places concave.
+    // A closed ball whose vertices are moved in and out, so that it is concave in places.
     const std::vector<int> pulls =
         *rc::gen::container<std::vector<int>>(42, rc::gen::inRange(-30, 30));
     const float reflectance = 0.01f * float(*rc::gen::inRange(0, 98));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Random walks against closed forms, of their mean and of their variance.
+// Random walks against closed forms of their mean and of their variance.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ void setWalks(Bake& bake, int bundleCount) {
     bake.settings.directions = DirectionKind::RANDOM;
 }
 
-// A cube with one patch per face of which one shines, and walks whose results are gathered.
+// A cube with one patch per face, one of which emits. The walks gather their results.
 struct Cube : TransportScene {
     explicit Cube(float pixelSize) : TransportScene(closedCube(0.5f), 10, pixelSize) {
         shot.emission[0] = glm::vec3(1);
@@ -52,9 +52,9 @@ TEST(RandomWalk, TheMeanIsExactOnABakedCube) {
 }
 
 TEST(RandomWalk, TheVariancesAreThoseOfTheory) {
-    // Sbert's formulas for the reflected radiosity b of a patch of area A with reflectance rho,
-    // after N walks from power Phi; zeta = [(I - RF)^-1]_ii - 1. Survivals at a patch are geometric
-    // like visits, but rho times as many.
+    // Sbert's formulas for the variance of the reflected radiosity b of a patch of area A with
+    // reflectance rho, after N walks from power Phi; zeta = [(I - RF)^-1]_ii - 1. The number of
+    // survivals at a patch is geometric like that of visits, but rho times as large.
     //   absorption  [rho / (1 - rho) Phi / A b - b^2] / N
     //   collision   [rho (1 + 2 zeta) Phi / A b - b^2] / N
     //   survival    [    (1 + 2 zeta) Phi / A b - b^2] / N
@@ -86,15 +86,17 @@ TEST(RandomWalk, TheVariancesAreThoseOfTheory) {
             const double exact = (factor * b - b * b) / walks;
             std::printf("[ figures  ] %-10s face %d: variance %.4g, theory %.4g, ratio %.3f\n",
                         row.name, k, found[k], exact, found[k] / exact);
-            // The variance of 4096 runs has a standard error of sqrt(2 / 4095) = 2.2 %: 10 % are
-            // 4.5 of them, one failure in 10^5.
+            // The variance of 4096 runs has a standard error of sqrt(2 / 4095) = 2.2 %. The
+            // tolerance of 10 % is 4.5 standard errors, which fails by chance once in 10^5
+            // comparisons.
             EXPECT_NEAR(found[k] / exact, 1, 0.1) << row.name << ", face " << k;
         }
     }
 }
 
 TEST(RandomWalk, ColoursAreUnbiased) {
-    // Red is black, green 0.5 and blue 0.8 everywhere; the same emission.
+    // The reflectance is 0 in red, 0.5 in green and 0.8 in blue everywhere. The emission is the
+    // same for all estimators.
     Cube cube(0.1f);
     for (glm::vec3& rho : cube.patches.reflectance) rho = {0, 0.5f, 0.8f};
     cube.shot.emission[0] = {1, 2, 0.5f};
@@ -103,14 +105,15 @@ TEST(RandomWalk, ColoursAreUnbiased) {
         const auto walk = cube.make(Solver::RANDOM_WALK, 1);
         walk->advance(1000, Progress());
         const Irradiance h = walk->irradiance(Half::BOTH, 0);
-        // Mean irradiance of all faces: E / (6 (1 - rho)), and it is E / 6 straight.
+        // The mean irradiance of all faces is E / (6 (1 - rho)), of which the direct light is E /
+        // 6.
         glm::dvec3 direct(0.0), all(0.0);
         for (uint32_t i = 0; i < 12; i += 2) {
             direct += glm::dvec3(h.direct[i]) / 6.0;
             all += glm::dvec3(h.direct[i] + h.indirect[i]) / 6.0;
         }
-        // 236 000 walks: a standard error of 0.2 to 0.9 % (SURVIVAL in blue and direct light by
-        // ABSORPTION are the worst).
+        // 236 000 walks have a standard error of 0.2 to 0.9 % (the worst are SURVIVAL in blue and
+        // the direct light by ABSORPTION).
         for (int c = 0; c < 3; ++c) {
             const double e = double(cube.shot.emission[0][c]) / 6;
             EXPECT_NEAR(direct[c], e, 0.02 * e) << row.name << ", channel " << c;
@@ -146,7 +149,8 @@ TEST(RandomWalk, AConvexObjectGetsAllTheWorldsLight) {
     const Irradiance h = walk->irradiance(Half::BOTH, 0);
     const std::vector<float> open = walk->openShare();
     for (uint32_t i = 0; i < ball.patches.sideCount(); i += 2) {
-        // 250 000 walks, 60 % of which hit one of 20 faces: 1.2 % each; four times that.
+        // 250 000 walks, 60 % of which hit one of 20 faces: 1.2 % each. The tolerance is four times
+        // that.
         for (int c = 0; c < 3; ++c)
             EXPECT_NEAR(h.direct[i][c] / (float(kPi) * ball.world[c]), 1, 0.05);
         EXPECT_EQ(h.indirect[i], glm::vec3(0));
@@ -166,7 +170,7 @@ TEST(RandomWalk, ABakedFurnaceHasTheStatedError) {
         Irradiance exact = bake.patchIrradiance();
         for (size_t i = 0; i < exact.direct.size(); ++i) {
             const bool isReached = exact.direct[i] != glm::vec3(0);
-            // Where the boxes stand, nothing reaches their bottoms.
+            // No light reaches the bottoms of the boxes, which stand on the floor.
             exact.direct[i] = glm::vec3(isReached ? 1 : 0);
             exact.indirect[i] = glm::vec3(0);
         }
@@ -178,15 +182,15 @@ TEST(RandomWalk, ABakedFurnaceHasTheStatedError) {
         EXPECT_LT(energy["balance_error"].get<double>(), 0.01) << energy;
         EXPECT_EQ(energy["escaped"].get<double>(), 0) << "the room is closed";
     }
-    // Many patches with independent noise: the stated error is right to a few per cent. Partly
-    // covered patches add what the share of them that is covered is off.
+    // Many patches have independent noise, so that the stated error is right within a few per cent.
+    // On partly covered patches the error of the covered share is added.
     EXPECT_NEAR(std::sqrt(found / stated), 1, 0.2);
 }
 
 TEST(RandomWalk, AgreesWithLineReuse) {
     Bake reference, bake;
     setQuick(reference, 4096);
-    reference.settings.contacts = 0;  // the same patches for both solvers
+    reference.settings.contacts = 0;  // to have the same patches for both solvers
     reference.run(litRoom());
     setWalks(bake, 256);
     for (const auto& row : kEstimators) {
@@ -195,10 +199,11 @@ TEST(RandomWalk, AgreesWithLineReuse) {
         const double stated = reportOf(bake)["estimated_error"];
         const double found =
             frontNoise(bake.patches(), bake.patchIrradiance(), reference.patchIrradiance());
-        // The reference has 0.2 % of noise, and both have that of the gathered light in common.
+        // The reference has 0.2 % of noise. Both have the noise of the gathered light in common.
         EXPECT_LT(found, 1.3 * stated) << row.name;
         EXPECT_GT(found, 0.7 * stated) << row.name;
-        // What is alike on all patches: less than the noise by the root of their number (1000).
+        // The error common to all patches is smaller than the noise by the root of their number
+        // (1000).
         double sum = 0, exact = 0;
         for (size_t i = 0; i < bake.patches().sideCount(); i += 2) {
             const double area = double(bake.patches().area[i / 2]);
@@ -220,7 +225,7 @@ TEST(RandomWalk, EnergyIsBalancedUnderTheSky) {
     bake.run(scene);
     const Json energy = reportOf(bake)["energy"];
     EXPECT_GT(energy["escaped"].get<double>(), 0);
-    // A million walks; the share of each patch that is open has noise of its own.
+    // A million walks. The open share of each patch has noise too.
     EXPECT_LT(energy["balance_error"].get<double>(), 0.01) << energy;
 }
 

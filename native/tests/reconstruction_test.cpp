@@ -16,9 +16,9 @@ namespace {
 
 using namespace test;
 
-constexpr float kRegularization = 0.02f;  // the default
+constexpr float kRegularization = 0.02f;  // stronger than the default
 
-// One mesh, cut, with the light of each patch given by a function of its centroid in the world.
+// A subdivided mesh. The light of each patch is a function of its centroid in world space.
 class Surface {
   public:
     explicit Surface(Mesh mesh, float patchSize, const Material& material = grey("", 0.5f)) {
@@ -32,7 +32,7 @@ class Surface {
         return mesh().vertices[size_t(mesh().cornerVertices[corner])];
     }
 
-    // Value of each corner, reconstructed from light(centroid, normal) on every front.
+    // Returns the value at each corner, reconstructed from light(centroid, normal) on every front.
     std::vector<glm::vec3> reconstruct(const std::function<glm::vec3(glm::vec3, glm::vec3)>& light,
                                        float regularization = kRegularization) const {
         std::vector<glm::vec3> field(patches.sideCount(), glm::vec3(0));
@@ -69,7 +69,7 @@ class Surface {
     }
 };
 
-// The same grid with every quad cut in two, diagonals in both ways.
+// Returns the grid with every quad divided in two, with diagonals in both directions.
 Mesh triangulated(const Mesh& quads) {
     std::vector<std::vector<int32_t>> faces;
     for (size_t f = 0; f < quads.faceCount(); ++f) {
@@ -155,10 +155,10 @@ TEST(Reconstruction, CornersOfASmoothVertexAgree) {
         float& of = first[size_t(ball.cornerVertices[c])];
         if (of < 0) of = found[c].x;
         ASSERT_EQ(found[c].x, of) << "corners of one smooth vertex share a value";
-        // Light is linear in space, the facets are flat: off by the facets' sagitta, 0.02.
+        // The light is linear in space, but the facets are flat and off by their sagitta, 0.02.
         ASSERT_NEAR(found[c].x, 2 + smooth.position(c).z, 0.04);
     }
-    // Without normals facets are flat-shaded, and their corners are independent.
+    // Without shading normals facets are flat-shaded, and their corners are independent.
     ball.cornerNormals.clear();
     const Surface flat(ball, 0.05f);
     const SmoothRegions regions =
@@ -167,8 +167,8 @@ TEST(Reconstruction, CornersOfASmoothVertexAgree) {
 }
 
 TEST(Reconstruction, ASharpEdgeAmongSmoothOnesSplitsItsVerticesOnly) {
-    // A roof over a ridge along x: normals smooth at the end where they agree, sharp where they do
-    // not.
+    // A roof over a ridge along x. The edge is smooth at the end where the normals agree, and sharp
+    // where they do not.
     Mesh roof =
         polygons("roof", {{0, -1, 0}, {1, -1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 0}, {1, 1, 0}},
                  {{0, 1, 3, 2}, {2, 3, 5, 4}});
@@ -186,7 +186,7 @@ TEST(Reconstruction, ASharpEdgeAmongSmoothOnesSplitsItsVerticesOnly) {
 }
 
 TEST(Reconstruction, NonManifoldAndTurnedNeighboursAreNotJoined) {
-    // Three coplanar-looking fins on one edge, and two faces that turn against each other.
+    // Three fins at one edge that look coplanar, and two faces with opposite winding.
     const Mesh fins = polygons(
         "fins",
         {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {1, 0, 1}, {-1, 0, 0}, {-1, 0, 1}, {0, 1, 0}, {0, 1, 1}},
@@ -227,13 +227,13 @@ TEST(Reconstruction, CoveredPatchesDoNotCount) {
     const std::vector<glm::vec3> found = surface.reconstruct(field, kRegularization);
     for (size_t c = 0; c < found.size(); ++c) {
         EXPECT_TRUE(std::isfinite(found[c].x));
-        // The vertex in the middle is covered all around; nobody sees its value.
+        // The vertex in the centre is covered all around, and its value is not visible.
         const bool isSeen = glm::distance(surface.position(c), {1, 0.5f, 0}) > 0.1f;
         EXPECT_NEAR(isSeen ? found[c].x : 1, 1, 0.01) << "a dark contact leaks out";
     }
 }
 
-// The integral over all patches of what is interpolated between the corners, W.
+// Returns the integral over all patches of the light interpolated between the corners, W.
 glm::dvec3 integral(const Surface& surface, const std::vector<glm::vec3>& corners) {
     glm::dvec3 sum(0.0);
     for (uint32_t p = 0; p < surface.patches.count(); ++p) {
@@ -255,8 +255,8 @@ glm::dvec3 integral(const Surface& surface, const std::function<glm::vec3(uint32
     return sum;
 }
 
-// As the light of a lamp close to a wall: one patch, or faces here and there, among dark ones, next
-// to even light and random light.
+// Light like that of a lamp close to a wall: a single bright patch, or some bright faces, among
+// dark ones; beside even and random light.
 std::vector<glm::vec3> hotSpots(const Surface& surface) {
     std::mt19937 random(3);
     std::uniform_real_distribution<float> uniform(0, 1);
@@ -301,9 +301,9 @@ TEST(Reconstruction, TheMeanIsKeptWhateverTheLight) {
 }
 
 TEST(Reconstruction, FacesWithoutHeightChangeNothing) {
-    // A grid of 12 x 12 whose odd columns are cut in two, and the thin triangles that fill the
-    // T-junctions: the light is that of triangles of 1e-2 of the edge, up to a tenth of its step,
-    // since the faces beside them are cut in another way.
+    // A grid of 12 x 12 whose odd columns are divided in two, with thin triangles that fill the
+    // T-junctions. The light equals that with triangles of a height of 1e-2 of the edge, within a
+    // tenth of its step, because the faces beside them are divided in another way.
     auto floorOf = [](float ratio) {
         Mesh mesh = floorWithSlivers(12, ratio);
         mesh.cornerNormals.assign(mesh.cornerVertices.size(), glm::vec3(0, 0, 1));
@@ -331,9 +331,10 @@ TEST(Reconstruction, FacesWithoutHeightChangeNothing) {
     }
 }
 
-// Exposure is measured by lines, and where it is a little other, so is the light at corners: bounds
-// by what is half covered, or nearly open, came and went. Beside light of 1 to 2, a row of patches
-// is dark or brighter, and is exposed by a hundredth more from step to step.
+// Exposure is measured by lines, and the light at corners must change continuously with it. Bounds
+// from patches that are half covered, or nearly open, used to appear and disappear. Beside light of
+// 1 to 2 W/m^2 a row of patches is dark or brighter; its exposed share grows by a hundredth per
+// step.
 TEST(Reconstruction, CornersFollowExposure) {
     for (const float rowLight : {0.0f, 3.0f}) {
         Surface surface(grid("floor", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 2, 2), 0.125f);
@@ -356,7 +357,7 @@ TEST(Reconstruction, CornersFollowExposure) {
                 most = std::max(most, std::abs(now[c].x - before[c].x));
             before = now;
         }
-        // Measured 0.16; 0.47 and 0.38 when what was half covered had no say.
+        // Measured 0.16. It was 0.47 and 0.38 when half-covered patches were ignored.
         EXPECT_LT(most, 0.25f) << "row of " << rowLight;
     }
 }

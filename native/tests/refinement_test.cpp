@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Cut tiles as patches, and which tiles refinement cuts.
+// Cut tiles as patches, and the tiles that refinement cuts.
 #include "refinement/refinement.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ namespace {
 
 using namespace test;
 
-// Levels 0 to 5 in no order.
+// Returns levels 0 to 5 in random order.
 std::vector<uint8_t> mixedLevels(size_t tiles) {
     std::mt19937 random(1);
     std::vector<uint8_t> levels(tiles);
@@ -74,7 +74,7 @@ TEST(CutTiles, AreasAreConserved) {
     }
 }
 
-// Without gaps: the patch that a point of a parent gets holds the point.
+// The patches have no gaps: each point of a parent lies in the patch that is found for it.
 TEST(CutTiles, EveryPointLiesInItsPatch) {
     const Patches patches = cutShapes(0.4f);
     std::mt19937 random(2);
@@ -95,7 +95,7 @@ TEST(CutTiles, EveryPointLiesInItsPatch) {
         }
 }
 
-// As LineCounts.LinesOfAPatchFollowItsAreaAtAnySize, by the same bound.
+// As LineCounts.LinesOfAPatchFollowItsAreaAtAnySize, with the same tolerance.
 TEST(CutTiles, LinesFollowTheArea) {
     Scene scene;
     place(scene, icosphere("ball", 1, 2, true), grey("", 0.5f));
@@ -112,7 +112,7 @@ TEST(CutTiles, LinesFollowTheArea) {
     }
 }
 
-// The cuts after a first shot to this target.
+// Returns the cuts after a coarse first shot with this target error.
 Cuts cutsOf(const Scene& scene, const Patches& patches, size_t most = kMany,
             float targetError = 0.02f) {
     const Visibility visibility(patches);
@@ -130,7 +130,7 @@ Cuts cutsOf(const Scene& scene, const Patches& patches, size_t most = kMany,
     return worthwhileCuts(scene, patches, shots, most, targetError);
 }
 
-// A plane of 4 m under a lamp 3 m above it, perhaps with a blocker between.
+// A plane of 4 m under a lamp 3 m above it, with a blocker between them if `hasBlocker`.
 Scene litPlane(bool hasBlocker) {
     Scene scene;
     place(scene, rectangle("plane", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}), grey("", 0.5f));
@@ -144,8 +144,8 @@ TEST(Refinement, CutsTheShadowEdgeOfABlockerAndNothingElse) {
     const Scene scene = litPlane(true);
     const Patches patches = subdivide(scene, 0.2f, kMany);
     const std::vector<uint8_t> levels = cutsOf(scene, patches, kMany, 0.005f).levels;
-    // The shadow of the blocker, two thirds of the way to the lamp away, is 1.5 m wide; its edge is
-    // as wide as half the lamp, 0.1 m, to both sides.
+    // The blocker is at a third of the height of the lamp. Its shadow is 1.5 m wide, and the edge
+    // extends by half the lamp, 0.1 m, to both sides.
     constexpr float kEdge = 0.75f, kWidth = 0.1f, kTile = 0.2f;
     for (uint32_t tile = 0; tile < patches.count(); ++tile) {
         if (patches.parents[patches.parentOf[tile]].instance != 0) continue;
@@ -208,7 +208,7 @@ void bakeRefined(Bake& bake, const Scene& scene, int threads = 0) {
     bake.settings.refine = 1;
     bake.settings.contacts = 0;
     bake.settings.threads = threads;
-    // The bundles are given; a low target makes cuts worth it.
+    // The number of bundles is fixed. A low target makes cuts pay.
     bake.settings.targetError = 0.003f;
     bake.run(scene);
 }
@@ -276,7 +276,7 @@ TEST(Tiles, AreThePatchesOfAnUncutSubdivision) {
         EXPECT_NEAR(tiles.patches().area[tile], uncut.area[tile], 1e-5f * uncut.area[tile]);
         EXPECT_EQ(tiles.patches().point(tile, {0.3f, 0.4f}), uncut.point(tile, {0.3f, 0.4f}));
     }
-    // A linear function of the place: its mean over a tile is that in the middle.
+    // A linear function of the position: its mean over a tile is the value at the centre.
     std::vector<float> values, areas, errors(cut.sideCount(), 0.5f);
     for (uint32_t side = 0; side < cut.sideCount(); ++side) {
         const bool isTriangle = cut.parentAt(side).isTriangle;
@@ -291,12 +291,12 @@ TEST(Tiles, AreThePatchesOfAnUncutSubdivision) {
         const glm::vec3 at = uncut.point(side / 2, glm::vec2(isTriangle ? 1.0f / 3 : 0.5f));
         EXPECT_NEAR(mean[side], 1 + at.x + 2 * at.y + float(side % 2), 1e-4f);
         EXPECT_NEAR(sum[side], uncut.area[side / 2], 1e-4f * sum[side]);
-        // Of 4^level independent errors.
+        // The mean of 4^level independent errors.
         EXPECT_NEAR(error[side], std::ldexp(0.5f, -tiles.level(side / 2)), 1e-4f);
     }
 }
 
-// Where the sources are weak beside the light of the surfaces nothing is worth a cut.
+// If the light of the sources is weak compared with that of the surfaces, no cut pays.
 TEST(RefinedBake, AFurnaceWithAFaintLampIsLeftAsItIs) {
     Scene scene = roomWithBoxes(0.5f, 0.5f);
     scene.addLight(pointLight({0.5, 0.5, 2}, glm::vec3(1e-6f)));
@@ -312,7 +312,7 @@ TEST(RefinedBake, KeepsTheEnergy) {
     bakeRefined(bake, litRoom());
     EXPECT_FALSE(reportOf(bake)["refined"].empty());
     const double error = reportOf(bake)["energy"]["balance_error"];
-    // That of the first shot's shadow rays: a few per mille at these patches.
+    // The error is that of the shadow rays in the first shot: a few per mille with these patches.
     EXPECT_LT(error, 0.01);
 }
 
@@ -361,7 +361,7 @@ TEST(RefinedBake, RelightingKeepsThePatches) {
     EXPECT_TRUE(skips(reportOf(bake), SkippedWork::UNCHANGED_GEOMETRY));
 }
 
-// The painter's patches and those that are drawn one by one are the same as the rasteriser's.
+// The patches of the painter, and patches that are drawn one by one, equal those of the rasteriser.
 TEST(RefinedBake, ProjectorsThatDrawPatchesAgree) {
     const Scene scene = litRoom();
     Bake exact;
@@ -376,7 +376,7 @@ TEST(RefinedBake, ProjectorsThatDrawPatchesAgree) {
         bake.settings.targetError = 0.003f;
         bake.settings.projector = projector;
         bake.run(scene);
-        // The noise of 512 bundles is 1 % in either.
+        // The noise of 512 bundles is 1 % in both.
         EXPECT_LT(noise(everything(bake), everything(exact)), 0.03) << choiceName(projector);
     }
 }

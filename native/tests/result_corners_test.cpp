@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Results at some corners alone (rb_set_result_corners): their light is as where all have one, for
-// less work.
+// Results at some corners only (rb_set_result_corners). Their light equals that in a bake with
+// results at all corners, for less work.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ using namespace test;
 
 constexpr int32_t kBall = 0;
 
-// A ball of small faces above a ground under a sun and a sky with clouds.
+// A ball of small faces above a ground, under a sun and a sky with clouds.
 Scene ballInTheOpen(int subdivisions = 3, rb_role ofGround = RB_ROLE_BAKE) {
     Scene scene;
     place(scene, icosphere("ball", 0.5f, subdivisions, false), grey("ball", 0.6f),
@@ -33,7 +33,7 @@ Scene ballInTheOpen(int subdivisions = 3, rb_role ofGround = RB_ROLE_BAKE) {
     return scene;
 }
 
-// One corner of every 16th vertex, as if the faces had been cut in sixteen.
+// Returns one corner of every 16th vertex, as if each face had been divided into sixteen.
 std::vector<int32_t> someCorners(const Mesh& mesh) {
     std::vector<int32_t> corners;
     std::vector<bool> isDone(mesh.vertices.size());
@@ -62,7 +62,8 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
         bake->settings.reconstruction = GetParam();
         bake->settings.maxPatches = 4000;
     }
-    // Without the rays of noisy sides, which only those have whose own light is shown.
+    // Without the extra rays of noisy sides, which are cast only from sides whose own light is
+    // shown.
     const bool isOfPatches = GetParam() == Reconstruction::LEAST_SQUARES;
     for (Bake* bake : {&whole, &part})
         if (isOfPatches) bake->settings.maxBundles = bake->settings.minBundles;
@@ -75,8 +76,8 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
     part.run(scene);
 
     const std::vector<glm::vec3> right = lightAt(fine, corners);
-    // 40 vertices: their RMS varies by a ninth; one of two is 1.5 times the other once in 200
-    // pairs.
+    // The RMS over 40 vertices varies by a ninth. One of two RMS values is 1.5 times the other in
+    // one of 200 pairs.
     const double ofPart = noise(lightAt(part, corners), right),
                  ofWhole = noise(lightAt(whole, corners), right);
     std::printf("[ figures  ] %s: noise %.4f, of all %.4f\n", choiceName(GetParam()), ofPart,
@@ -84,8 +85,9 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
     EXPECT_LT(ofPart, 1.5 * ofWhole + 0.01);
     const Json less = reportOf(part), more = reportOf(whole);
     const double fewer = less["shadow_rays"].get<double>() / more["shadow_rays"].get<double>();
-    // Of least squares all have the light of patches, and so few gather theirs: for as many rays,
-    // but to less than half the noise. Rays count by the square of that.
+    // With LEAST_SQUARES the bake with all results has the light of patches, while these few
+    // corners gather their light: with as many rays, but less than half the noise. Rays count by
+    // the square of the noise.
     if (isOfPatches)
         EXPECT_LT(fewer * std::pow(ofPart / ofWhole, 2), 0.7);
     else
@@ -100,7 +102,8 @@ INSTANTIATE_TEST_SUITE_P(Of, ResultCorners,
                                          Reconstruction::AREA_AVERAGE),
                          [](const auto& test) { return choiceName(test.param); });
 
-// One corner of each vertex of a ball with 80 faces, which finer ones have as their first vertices.
+// Returns one corner of each vertex of a ball with 80 faces. These are the first vertices of finer
+// balls.
 std::vector<int32_t> cornersOfCoarseBall(const Mesh& mesh) {
     constexpr size_t kVertices = 42;
     std::vector<int32_t> corners(kVertices, -1);
@@ -110,7 +113,7 @@ std::vector<int32_t> cornersOfCoarseBall(const Mesh& mesh) {
     return corners;
 }
 
-// A ball that is subdivided so often, with results at the vertices that it had before.
+// A ball that is subdivided `subdivisions` times, with results at the vertices of the coarse ball.
 struct SubdividedBall {
     explicit SubdividedBall(int subdivisions, float target = 0.02f, int seed = 0) {
         Scene scene = ballInTheOpen(subdivisions, RB_ROLE_OCCLUDE);
@@ -126,8 +129,8 @@ struct SubdividedBall {
 };
 
 TEST(ResultCorners, OfAFinerMeshAreAsRightForNoMoreBundles) {
-    // Chords of the coarser ball, of 1280 faces, are 1 % of its radius inside the finer one, of
-    // 20,480.
+    // Chords of the coarser ball, of 1280 faces, lie 1 % of its radius inside the finer ball of
+    // 20,480 faces.
     constexpr double kShape = 0.01;
     const SubdividedBall right(5, 0.004f, 1), coarse(3), fine(5);
     EXPECT_LT(noise(coarse.light, right.light), 0.02 + kShape);
@@ -158,8 +161,8 @@ TEST(ResultCorners, StateTheNoiseOfWhatTheyGather) {
     }
     const double found = std::sqrt(squares / signal);
     std::printf("[ figures  ] stated %.4f, found %.4f\n", stated, found);
-    // What is stated is a bound: beside edges of shadows it is as large as the noise, in light as
-    // smooth as here samples converge faster.
+    // The stated noise is an upper bound. At shadow edges it is as large as the noise, but samples
+    // of smooth light like this converge faster.
     EXPECT_LT(found, stated);
     EXPECT_LT(stated, 0.03);
 }
@@ -178,7 +181,8 @@ TEST(ResultCorners, OfAFurnaceAreExact) {
 }
 
 TEST(ResultCorners, CountAloneInTheStatedError) {
-    // The far half of a ground with a shadow's edge across the near one is as even as can be.
+    // One half of the ground has a shadow edge. The other, distant half is lit as evenly as
+    // possible.
     Scene scene;
     place(scene, grid("ground", {-8, -1, 0}, {16, 0, 0}, {0, 2, 0}, 16, 2), grey("ground", 0.5f));
     place(scene, box("post", {-7, -0.2f, 0.3f}, {-6.6f, 0.2f, 1}, false), grey("post", 0.5f),
@@ -210,7 +214,7 @@ TEST(ResultCorners, MayBeNone) {
 }
 
 TEST(ResultCorners, AreOfTheFaceThatStandsForItsDouble) {
-    // Two squares in one place, of which the second is asked for.
+    // Two squares in the same place. The second one has the result.
     Scene scene;
     place(scene, rectangle("below", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
     const int32_t asked =

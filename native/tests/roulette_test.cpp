@@ -20,7 +20,8 @@ namespace {
 
 using namespace test;
 
-// Where lines meet a patch: each fragment is once the far end of a line and once the near one.
+// Returns the number of fragments of a bundle. Each fragment is once the far end of a line and once
+// the near end.
 double fragmentCount(const BundleLines& lines) {
     return 0.5 * double(2 * exchangedLines(lines) + lines.sky.size() + lines.touching.size());
 }
@@ -34,7 +35,7 @@ class RouletteScene {
         SmallPatches kind, ProjectorKind projector = ProjectorKind::FRAGMENT_LISTS) const {
         return makeProjector(projector, {patches, visibility, pixelSize, kind});
     }
-    // Crofton: of the fragments of n bundles.
+    // Returns the expected number of fragments in n bundles, by Crofton's formula.
     double expectedFragments(uint32_t n) const {
         return n * patches.totalArea / (2 * double(pixelSize) * double(pixelSize));
     }
@@ -54,7 +55,7 @@ class RouletteScene {
     const float pixelSize;
 };
 
-// Rectangles a x b, turned at random, a metre apart.
+// Rectangles a x b, rotated at random, a metre apart.
 Scene scattered(int count, float a, float b) {
     Scene scene;
     std::mt19937_64 random(5);
@@ -83,17 +84,17 @@ TEST(PolygonFiller, MakesPolygonsAtLeastAPixelWideAndHigh) {
         EXPECT_EQ(fill({6, 0}, {0, 0.1}), 6u) << "a lying sliver";
         EXPECT_EQ(fill({0, 6}, {0.1, 0}), 6u) << "a standing sliver";
         EXPECT_EQ(fill({20, 0}, {0, 20}), 400u) << "a square has its area";
-        // Of both extents, rows and columns, each has a pixel.
+        // Each row and each column within the extent of the polygon has a pixel.
         EXPECT_GE(fill({8, 3}, {0.03, 0.01}), 8u);
         EXPECT_GE(fill({3, -8}, {0.03, 0.01}), 8u);
-        // A large polygon has its area but for its border.
+        // A large polygon has its area, except at its border.
         EXPECT_NEAR(double(fill({40, 9}, {-9, 40})), 41.0 * 41.0, 40);
     }
 }
 
 TEST(Roulette, LinesOfSmallPatchesAreUnbiased) {
-    // Squares of a fifth of a pixel's edge, and slivers of six edges by a twentieth: their area is
-    // less than a pixel's.
+    // Squares of a fifth of a pixel's edge, and slivers of six pixel edges by a twentieth. Their
+    // area is less than that of a pixel.
     const float pixel = 0.05f;
     const struct {
         const char* name;
@@ -105,8 +106,8 @@ TEST(Roulette, LinesOfSmallPatchesAreUnbiased) {
         const RouletteScene projection(c.scene, 10, pixel);
         const double expected = projection.expectedFragments(c.bundles);
         EXPECT_GT(expected, 4000);
-        // A patch is drawn or not, so that the variance is no more than the mean; that of the
-        // directions is a twentieth of it at most. Four standard errors.
+        // A patch is drawn or not, so the variance is at most the mean. The variance of the
+        // directions is at most a twentieth of it. The tolerance is four standard errors.
         const double tolerance = 4 * std::sqrt(1.05 * expected);
         for (SmallPatches kind : {SmallPatches::ROULETTE, SmallPatches::CENTRE_SAMPLING}) {
             EXPECT_NEAR(projection.fragments(kind, c.bundles), expected, tolerance)
@@ -126,8 +127,9 @@ TEST(Roulette, ThinPatchesOfMoreThanAPixelGetTooManyLines) {
 }
 
 TEST(Roulette, ClosedSurfacesOfSmallPatchesLeak) {
-    // Patches of a sixteenth of a pixel at most. A pixel holds the centroids of 1 / p patches, each
-    // drawn with probability p: none is drawn with probability (1 - p)^(1/p), 0.356 to 1/e.
+    // Patches of at most a sixteenth of a pixel. A pixel holds the centroids of 1 / p patches, each
+    // drawn with the probability p. The probability that none is drawn is (1 - p)^(1/p), which is
+    // 0.356 to 1/e.
     const RouletteScene projection(closedCube(0.5f), 0.01f, 0.04f);
     const auto exact = projection.projector(SmallPatches::CENTRE_SAMPLING);
     const auto roulette = projection.projector(SmallPatches::ROULETTE);
@@ -145,11 +147,11 @@ TEST(Roulette, ClosedSurfacesOfSmallPatchesLeak) {
         EXPECT_LE(leaking.disordered, exchangedLines(leaking));
         EXPECT_GT(leaking.disordered, 0u);
     }
-    // A line meets the cube if one of its two walls is drawn: 1 - 0.36^2. Pixels at the silhouette
-    // and draws scatter by a percent.
+    // A line meets the cube if at least one of its two walls is drawn: 1 - 0.36^2. Pixels at the
+    // silhouette, and the draws, scatter by a per cent.
     EXPECT_NEAR(met / crossed, 0.87, 0.02);
-    // If one wall only, its inner side sees the sky: 2 * 0.36 * 0.64 of 0.87 lines. Where several
-    // patches of a wall are drawn on a pixel their order makes no difference to that.
+    // If only one wall is drawn, its inner side sees the sky: 2 * 0.36 * 0.64 of 0.87 lines. The
+    // order of several patches of a wall that are drawn on one pixel does not matter here.
     EXPECT_NEAR(inside / all, 0.5 * 2 * 0.36 * 0.64 / 0.87, 0.03);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Shadows of gathered light, and the error that is stated there.
+// Shadows in gathered light, and the error that is stated there.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,8 +21,8 @@ namespace {
 using namespace test;
 
 TEST(Shadows, UmbraIsBlackAndFullLightIsExact) {
-    // Lamp of 0.4 m at 2 m, blocker of 1 m at 1 m: on the floor the umbra is 1.6 m wide and the
-    // penumbra ends at 1.2 m from the centre.
+    // A lamp of 0.4 m at 2 m, a blocker of 1 m at 1 m: on the floor the umbra is 1.6 m wide, and
+    // the penumbra ends 1.2 m from the centre.
     Scene scene, open;
     for (Scene* s : {&scene, &open}) {
         place(*s, rectangle("floor", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}), grey("", 0.5f));
@@ -40,7 +40,8 @@ TEST(Shadows, UmbraIsBlackAndFullLightIsExact) {
             EXPECT_EQ(found, 0) << "umbra at " << at.x << ", " << at.y;
             ++dark;
         } else if (reach > 1.25) {
-            // Means of the closed form at the same points of the patch up to the points' rounding.
+            // Means of the closed form at the same points of the patch, except for rounding of the
+            // points.
             EXPECT_NEAR(found, free, 1e-3f * free) << "full light at " << at.x << ", " << at.y;
             ++full;
         } else {
@@ -53,9 +54,9 @@ TEST(Shadows, UmbraIsBlackAndFullLightIsExact) {
     EXPECT_GT(half, 50);
 }
 
-// The shadow of a plate a little wider than a patch covers a corner of some patches, which all
-// samples of those may miss. Over 256 shots of 64 places of it true and stated error are means over
-// some 2000 patches in its edge, good to about 3 %.
+// The shadow of a plate a little wider than a patch covers a corner of some patches. All samples of
+// these patches may miss it. Over 256 shots with the plate in 64 places, true and stated error are
+// means over some 2000 patches at the edge, accurate to about 3 %.
 TEST(Shadows, TheStatedErrorCoversCornersThatAllSamplesMiss) {
     constexpr float kPatch = 0.5f, kPlate = 0.6f;
     constexpr int kShots = 256;
@@ -91,7 +92,7 @@ TEST(Shadows, TheStatedErrorCoversCornersThatAllSamplesMiss) {
                 std::sqrt(found / stated));
 }
 
-// A floor of 1 m under a slit in a plate, behind which there is a lamp 1 m wide.
+// A floor of 1 m under a slit in a plate, with a lamp of 1 m above the plate.
 Scene floorUnderSlit(float width) {
     Scene scene;
     place(scene, rectangle("floor", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0));
@@ -101,32 +102,34 @@ Scene floorUnderSlit(float width) {
     return scene;
 }
 
-// Of a lamp 1 m wide that is seen through a slit of 20 cm, by a floor that nothing else lights,
-// low targets need thousands of samples.
+// A floor that is lit only by a lamp of 1 m through a slit of 20 cm. Low targets need thousands of
+// samples.
 TEST(Shadows, ErrorsFollowTheTargetBehindASlit) {
     const ShotScene shots(floorUnderSlit(0.2f), 0.25f);
     auto floor = [&](float target, int seed) {
-        std::vector<glm::vec3> light = shots.shoot(FirstShotKind::GATHER, 0, seed, target).irradiance;
+        std::vector<glm::vec3> light =
+            shots.shoot(FirstShotKind::GATHER, 0, seed, target).irradiance;
         light.resize(32);  // both sides of its patches
         return light;
     };
     const std::vector<glm::vec3> right = floor(0.0005f, 1);
     double errors[2];
     for (int k = 0; k < 2; ++k) errors[k] = noise(floor(k ? 0.002f : 0.02f, 0), right);
-    // Measured 0.016 and 0.0034: the lit halves are brighter, which allows the floor more than the
-    // target. With 256 samples at most it had 0.018 at both.
+    // Measured 0.016 and 0.0034. The lit halves are brighter, which allows the floor more than the
+    // target. When at most 256 samples were taken, both were 0.018.
     EXPECT_LT(errors[0], 0.02);
     EXPECT_LT(errors[1], 0.3 * errors[0]);
 }
 
-// Of a lamp 1 m wide that is seen through a slit of 1 cm 16 patches get 2 %: nearly three of four
-// miss that with their first 16 samples, and learn of it from their neighbours. All miss it with
-// 0.98 to the power of 128, in 8 % of the shots: then it is dark.
+// 16 patches see 2 % of a lamp of 1 m through a slit of 1 cm. Nearly three quarters of them miss
+// this with their first 16 samples and learn of it from their neighbours. All patches miss it with
+// the probability 0.98^128, in 8 % of the shots; the result is then dark.
 TEST(Shadows, LightThroughANarrowSlitIsFound) {
     for (const bool hasSky : {false, true}) {
         Scene scene = floorUnderSlit(0.01f);
         scene.lights.front().strength = {10, 0, 0};
-        // The floor sees it around the plates, and all of it gathers again for that in any case.
+        // The floor sees the sky around the plates, and therefore all of the floor gathers again in
+        // any case.
         if (hasSky) {
             scene.worldImage.width = 4;
             scene.worldImage.height = 2;
@@ -142,14 +145,15 @@ TEST(Shadows, LightThroughANarrowSlitIsFound) {
             dark += found == 0;
         }
         EXPECT_LE(dark, 4);
-        // Measured 0.85 of the patches, 0.98 with the sky; 0.45 when only those beside a patch that
-        // found it at once learnt of it, and 0.84 with the sky when what gathers for that did not.
+        // Measured: 0.85 of the patches, 0.98 with the sky. It was 0.45 when only the neighbours of
+        // a patch that found the slit at once learnt of it, and 0.84 with the sky when receivers
+        // that gathered again for the sky did not learn of it.
         EXPECT_GT(lit, (hasSky ? 0.92 : 0.75) * 16 * (20 - dark));
     }
 }
 
-// A lamp of which there are 64 in one place, as strong together as one: their errors add up, and
-// all of them together keep to what the light may have.
+// 64 lamps in one place are together as strong as one lamp. Their errors add up, and all of them
+// together keep to the error allowed for the light.
 TEST(Shadows, ErrorsOfManyLampsAddUp) {
     constexpr float kTarget = 0.005f;
     auto shot = [](int lamps, float target) {
@@ -163,7 +167,7 @@ TEST(Shadows, ErrorsOfManyLampsAddUp) {
         return ShotScene(scene, 0.2f).shoot(FirstShotKind::GATHER, 0, 1, target).irradiance;
     };
     const double found = noise(shot(64, kTarget), shot(1, 0.0002f));
-    // Measured 0.0029, and 0.0051 when each was allowed as much as one.
+    // Measured 0.0029. It was 0.0051 when each lamp was allowed as much error as a single one.
     EXPECT_LT(found, kDirectShare * kTarget);
 }
 

@@ -25,7 +25,7 @@ Patches patchesOf(Mesh mesh, float patchSize) {
     return subdivide(scene, patchSize, kMany);
 }
 
-// Starts each face at another of its corners, as subdivided meshes do.
+// Starts each face at a random corner, as in subdivided meshes.
 Mesh turned(Mesh mesh, uint32_t seed) {
     std::mt19937 random(seed);
     for (size_t f = 0; f < mesh.faceCount(); ++f) {
@@ -36,7 +36,7 @@ Mesh turned(Mesh mesh, uint32_t seed) {
     return mesh;
 }
 
-// Drops faces, for holes.
+// Returns the mesh without the faces for which isDropped(face) is true.
 template <class Drop>
 Mesh without(const Mesh& mesh, const Drop& isDropped) {
     std::vector<std::vector<int32_t>> faces;
@@ -47,7 +47,8 @@ Mesh without(const Mesh& mesh, const Drop& isDropped) {
     return polygons(mesh.name, mesh.vertices, faces);
 }
 
-// Every patch is in one sheet or belongs to one loose parent, and the sheets know where they are.
+// Checks that every patch is in one sheet or in one loose parent, and that the sheets have the
+// right positions.
 void expectWhole(const Patches& patches) {
     std::vector<int> found(patches.count(), 0);
     for (uint32_t parent : patches.sheets.loose)
@@ -66,7 +67,7 @@ void expectWhole(const Patches& patches) {
                 ++found[patch];
                 const glm::vec3 point = sheet.origin + s * sheet.a + t * sheet.b;
                 ASSERT_EQ(patches.patchAt(patches.parentOf[patch], point), patch);
-                // And inside of it: patchAt clamps.
+                // The point lies inside the patch; patchAt alone would clamp an outside point.
                 const glm::vec3 middle = patches.point(patch, {0.5f, 0.5f});
                 const float reach = glm::length(sheet.a) / float(sheet.columns) +
                                     glm::length(sheet.b) / float(sheet.rows);
@@ -77,7 +78,7 @@ void expectWhole(const Patches& patches) {
                 const Parent& parent = patches.parents[sheet.parts[k].parent];
                 for (uint32_t p = 0; p < parent.patchCount(); ++p) {
                     ++found[parent.firstPatch + p];
-                    // Where the sheet has the middle of the patch, it has the patch.
+                    // The sheet returns the patch at the centre of the patch.
                     const glm::vec2 middle(parent.isTriangle ? 1.0f / 3 : 0.5f);
                     const glm::dvec3 d(parent.position(parent.pointOn(p, middle)) - sheet.origin);
                     const glm::dvec3 a(sheet.a), b(sheet.b), n = glm::cross(a, b);
@@ -94,7 +95,7 @@ void expectWhole(const Patches& patches) {
 }
 
 TEST(Sheets, AGridIsOne) {
-    // 7 x 5 faces of 2 x 3 patches, in a plane at an angle.
+    // 7 x 5 faces of 2 x 3 patches, in an inclined plane.
     const Mesh mesh = grid("grid", {1, 2, 3}, {1.3f, 0.2f, 0.4f}, {-0.3f, 1.5f, 0.2f}, 7, 5);
     for (uint32_t seed : {1u, 2u, 3u}) {
         const Patches patches = patchesOf(turned(mesh, seed), 0.1f);
@@ -118,7 +119,7 @@ TEST(Sheets, HolesAndCornersAreLeftOut) {
 }
 
 TEST(Sheets, FacesOfSeveralSizesAreSeveral) {
-    // Columns of two widths: two sheets, each of its own patches.
+    // Columns of two widths form two sheets, each with its own patches.
     std::vector<glm::vec3> vertices;
     std::vector<std::vector<int32_t>> faces;
     const float x[] = {0, 1, 2, 3, 3.5f, 4, 4.5f};
@@ -142,7 +143,7 @@ TEST(Sheets, BentSurfacesAreNone) {
     EXPECT_EQ(strips.sheets.sheets.size(), 16u) << "only along the axis it is straight";
     expectWhole(strips);
 
-    // Bent so little that neighbours are alike, and yet more in all than counts as touching.
+    // Bent so little that neighbours are congruent, but in all by more than the touch distance.
     Mesh sagging = grid("sagging", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 32, 1);
     for (glm::vec3& v : sagging.vertices) v.z = 2e-5f * std::sin(3.14159265f * v.x);
     const Patches sagged = patchesOf(sagging, 0.1f);
@@ -155,7 +156,7 @@ TEST(Sheets, BentSurfacesAreNone) {
 }
 
 TEST(Sheets, WhatTouchesItselfIsNotProjectedTwice) {
-    // Two faces on either side of the same edge in the same place, and both windings.
+    // Two faces in the same place at one edge, with both windings.
     const std::vector<glm::vec3> v{{0, 0, 0}, {1, 0, 0}, {2, 0, 0},
                                    {0, 1, 0}, {1, 1, 0}, {2, 1, 0}};
     const Patches patches =
@@ -163,8 +164,8 @@ TEST(Sheets, WhatTouchesItselfIsNotProjectedTwice) {
     expectWhole(patches);
 }
 
-// A closed room whose walls are grids with common vertices along their edges, and a box of grids
-// in it.
+// A closed room whose walls are grids with common vertices at the edges, and a box of grids in the
+// room.
 Scene roomOfGrids() {
     auto cube = [](const std::string& name, float size, int n, bool inward) {
         std::map<std::array<int, 3>, int32_t> numbers;
@@ -201,8 +202,8 @@ Scene roomOfGrids() {
     return scene;
 }
 
-// Two objects beside each other whose vertices are off by rounding errors: of those at the common
-// edge some are one and some are not.
+// Two neighbouring objects whose vertices have rounding errors. Some of the vertices at the common
+// edge are welded and some are not.
 TEST(Sheets, PartlyWeldedObjectsHaveClosedOutlines) {
     std::mt19937 random(5);
     std::uniform_real_distribution<float> off(-1e-6f, 1e-6f);
@@ -223,7 +224,7 @@ TEST(Sheets, PartlyWeldedObjectsHaveClosedOutlines) {
     EXPECT_GT(joined, 0u);
 }
 
-// Bundles through the sheets and through the parents by themselves.
+// Expects that bundles through the sheets equal bundles through the separate parents.
 void expectSameBundles(const Patches& patches) {
     Patches single = patches;
     single.sheets = withoutSheets(single);
@@ -244,8 +245,8 @@ void expectSameBundles(const Patches& patches) {
         for (const Exchange& e : b.exchanges) balance[{e.i, e.j}] -= int(e.lines);
         for (const auto& [pair, lines] : balance) different += uint64_t(std::abs(lines));
     }
-    // Where a line meets the border of two patches within rounding (1e-6 of a patch), it may count
-    // for the other one.
+    // A line that meets the border of two patches within rounding (1e-6 of a patch) may count for
+    // either patch.
     EXPECT_LT(double(different), 1e-4 * double(all));
 }
 
@@ -255,8 +256,8 @@ TEST(Sheets, BundlesAreTheSame) {
     expectSameBundles(patches);
 }
 
-// The faces of a floor that a box stands on are cut along its outline, and some tiles are cut; it
-// is one sheet all the same.
+// The faces of a floor below a box are cut along the outline of the box, and some tiles are cut.
+// The floor remains one sheet.
 TEST(Sheets, WhatWallsAndLightCutStaysOne) {
     Scene scene = roomOfGrids();
     const Patches room = subdivide(scene, 0.08f, kMany);

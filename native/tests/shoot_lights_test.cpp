@@ -15,7 +15,7 @@ namespace {
 
 using namespace test;
 
-// A square of 2 m around the origin that faces up, under a light of unit strength.
+// A square of 2 m around the origin, facing up, under the given light.
 Scene underLight(const Light& light) {
     Scene scene;
     place(scene, rectangle("square", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0.5f));
@@ -33,8 +33,8 @@ double meanOverSquare(const std::function<double(const glm::dvec3&)>& irradiance
     return mean;
 }
 
-// `smallest`: the part of the exact value that the standard error must not pass, so that the test
-// says something.
+// Expects the mean light on the square to equal `exact`. The standard error must be below
+// `smallest` times the exact value, so that the test is significant.
 void expectMean(const Scene& scene, double exact, uint32_t side = 0, double smallest = 0.01) {
     const ShotScene room(scene);
     const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 17);
@@ -63,7 +63,8 @@ TEST(ShootPointLight, ADiskFacesItsReceivers) {
         Light light = pointLight(kLamp, glm::dvec3(1));
         light.radius = radius;
         light.pointShape = RB_POINT_DISK;
-        // Wholly above the horizon it gives what its centre gives, less by d^2 / (d^2 + r^2).
+        // If the disk is fully above the horizon, its light is that of its centre, smaller by d^2 /
+        // (d^2 + r^2).
         expectMean(underLight(light), meanOverSquare([&](const glm::dvec3& p) {
                        const glm::dvec3 d = kLamp - p;
                        const double d2 = glm::dot(d, d);
@@ -73,7 +74,7 @@ TEST(ShootPointLight, ADiskFacesItsReceivers) {
 }
 
 TEST(ShootPointLight, ADiskBehindAnObstacleGivesWhatIsGathered) {
-    // The obstacle is nearer than many receivers' lines pass the disk.
+    // The obstacle is closer than the points at which the lines of many receivers pass the disk.
     Light light = pointLight({0, 0, 1}, glm::dvec3(1));
     light.radius = 0.4;
     light.pointShape = RB_POINT_DISK;
@@ -99,7 +100,7 @@ TEST(ShootSpotLight, TheConeCutsBlendsAndDims) {
         light.coneAngle = kind == 3 ? 3.5 : 1.2;
         light.coneBlend = kind == 0 ? 0 : 0.6;
         light.coneDims = kind >= 2;
-        // Tilted, and deformed to an ellipse.
+        // The cone is tilted, and deformed to an ellipse.
         const glm::dvec3 axis = glm::normalize(glm::dvec3(0.3, 0.1, 1));
         const glm::dvec3 x = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), axis));
         light.worldToCone = glm::transpose(glm::dmat3(x, glm::cross(axis, x), axis));
@@ -152,7 +153,7 @@ TEST(ShootAreaLight, AnEllipseGivesWhatIsGathered) {
         areaLight({0.3, 0, 0.8}, {0, 0.6, 0}, {0.4, 0, 0}, glm::dvec3(7), RB_AREA_ELLIPSE)));
     const Mean exact = meanLight(room.patches, room.shoot(FirstShotKind::GATHER, 0, 0, 0.0002f), 0);
     const Mean mean = meanLight(room.patches, room.shoot(FirstShotKind::SHOOT, 1 << 17), 0);
-    // Of at most 256 samples.
+    // The gathered light has the error of at most 256 samples.
     EXPECT_NEAR(mean.value, exact.value, kSigmas * mean.error + 0.01 * exact.value);
 }
 
@@ -169,7 +170,7 @@ TEST(ShootAreaLight, InTheCeilingNothingHitsTheCeiling) {
 }
 
 TEST(ShootEmissiveMesh, ShinesFromTheSidesThatEmit) {
-    // Lamp between two squares, in the middle; a large ground keeps the mean exitance low.
+    // The lamp is half-way between two squares. A large ground keeps the mean exitance low.
     for (float backEmission : {0.0f, 500.0f}) {
         Scene scene;
         place(scene, rectangle("below", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}), grey("", 0.5f));
@@ -197,7 +198,7 @@ TEST(ShootEmissiveMesh, ALampThatLiesAgainstTheCeilingKeepsOutOfIt) {
     const ShotScene room(scene, 0.25f);
     const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 1 << 18),
                     gathered = room.shoot(FirstShotKind::GATHER, 0);
-    // The covered top's light goes nowhere; what the other five faces give arrives, but for the
+    // The light of the covered top is lost. The light of the other five faces arrives, except on
     // lines that start at an edge of the lamp and meet its inside.
     const double power = 60 * (1 + 4 * 0.05);
     EXPECT_NEAR(shot.emitted.x, power, 0.01 * power);
@@ -216,7 +217,7 @@ TEST(ShootEmissiveMesh, ALampThatLiesAgainstTheCeilingKeepsOutOfIt) {
             EXPECT_EQ(shot.irradiance[side], glm::vec3(0)) << "the covered ceiling";
         }
     }
-    // A fifth of 2^18 lines arrives there: 0.4 % of noise.
+    // A fifth of 2^18 lines arrives there, which leaves 0.4 % of noise.
     EXPECT_NEAR(down[0], down[1], 0.02 * down[1]) << "on the floor";
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The first shot SHOOT: allotment of lines, power, and the variance that it states. Every kind of
-// light: shoot_lights_test.cpp.
+// The first shot SHOOT: allotment of lines, power, and the variance that it states.
+// shoot_lights_test.cpp tests every kind of light.
 #include "first_shot/shoot.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ TEST(ShootPower, IsConservedInEachChannel) {
             scene.addLight(areaLight({2, 1.6, 2.79}, {0.4, 0, 0}, {0, -0.4, 0}, {1, 2, 3}));
         else
             scene.addLight(round);
-        // Weak, and of another colour.
+        // A weak lamp of another colour.
         scene.addLight(pointLight({1, 2, 2}, {0.003, 0.001, 0}));
         const ShotScene room(scene, 0.5f);
         const FirstShot shot = room.shoot(FirstShotKind::SHOOT, 10000, kind);
@@ -69,7 +69,7 @@ TEST(ShootPower, IsConservedInEachChannel) {
                                        : 4 * kPi;
         const glm::dvec3 power = one * glm::dvec3(1, 2, 3) + 4 * kPi * glm::dvec3(0.003, 0.001, 0);
         const glm::dvec3 found = arriving(room.patches, shot);
-        // The room is closed and both lamps get lines for sure: exact up to rounding.
+        // The room is closed and both lamps certainly get lines: exact up to rounding.
         for (int c = 0; c < 3; ++c) {
             EXPECT_NEAR(found[c], power[c], 1e-5 * power[c]) << "kind " << kind;
             EXPECT_NEAR(shot.emitted[c], power[c], 1e-5 * power[c]) << "kind " << kind;
@@ -79,7 +79,7 @@ TEST(ShootPower, IsConservedInEachChannel) {
 }
 
 TEST(ShootPower, OfWeakSourcesIsRightInTheMean) {
-    // Each of 64 lamps of another colour gets a line in one of eight runs.
+    // Each of 64 weak lamps of another colour gets a line in one of eight runs.
     Scene scene = roomWithBoxes(0.5f);
     scene.addLight(pointLight({2, 1.6, 2}, glm::dvec3(1, 1, 0)));
     for (int k = 0; k < 64; ++k)
@@ -93,8 +93,8 @@ TEST(ShootPower, OfWeakSourcesIsRightInTheMean) {
         blue += arriving(room.patches, shot).z / kRuns;
         EXPECT_NEAR(arriving(room.patches, shot).x, 4 * kPi, 1e-4);
     }
-    // All lines of weak lamps carry the same, 3.28 / 20 of a watt times 4 pi, and the systematic
-    // allotment varies by one line at most: half a line per run.
+    // All lines of weak lamps carry the same power, 3.28 / 20 of a watt times 4 pi. The systematic
+    // allotment varies by at most one line, half a line per run.
     const double error = 0.5 * 4 * kPi * 3.28 / 20 / std::sqrt(double(kRuns));
     EXPECT_NEAR(blue, weak, kSigmas * error);
 }
@@ -111,16 +111,16 @@ TEST(ShootPower, LeavesAnOpenSceneOrArrives) {
         EXPECT_NEAR(shot.emitted[c], power, 1e-5 * power);
         EXPECT_NEAR(arrived[c] + shot.escaped[c], power, 1e-5 * power);
     }
-    // The ground takes 1 / (4 pi) of its solid angle: four times atan(ab / (c d)).
+    // The solid angle of the ground over 4 pi, from four times atan(ab / (c d)).
     const double share = 4 * std::atan(9 / std::sqrt(1 + 9 + 9.0)) / (4 * kPi);
     EXPECT_NEAR(arrived.x, 4 * kPi * share,
                 kSigmas * 4 * kPi * std::sqrt(share * (1 - share) / (1 << 15)));
 }
 
 TEST(ShootVariance, IsThatOfTheFormula) {
-    // 43 lit sides or more and 1000 runs: the variance pooled over them has a standard error of
-    // sqrt(2 / 43000) = 0.7 %, so that 10 % are beyond chance. The stated errors are held to the
-    // same.
+    // At least 43 lit sides and 1000 runs: the pooled variance has a standard error of sqrt(2 /
+    // 43000) = 0.7 %. The tolerance of 3 % is four of these. The stated errors have the same
+    // tolerance.
     Scene scene = roomWithBoxes(0.5f);
     scene.addLight(areaLight({2, 1.6, 2.6}, {0.3, 0, 0}, {0, -0.3, 0}, glm::dvec3(1)));
     const ShotScene room(scene, 1);
@@ -142,7 +142,8 @@ TEST(ShootVariance, IsThatOfTheFormula) {
     double worst = 0, found = 0, predicted = 0, saying = 0;
     for (size_t i = 0; i < n; ++i) {
         const double area = double(room.patches.area[i / 2]);
-        // Sides with less than a line a run say little, and few shadow rays may miss their light.
+        // Sides with less than a line per run are not significant, and few shadow rays may miss
+        // their light.
         if (first[i] * area / power * kLines < 1) continue;
         ++lit;
         const double h = double(exact.irradiance[i].x);
@@ -151,7 +152,7 @@ TEST(ShootVariance, IsThatOfTheFormula) {
         found += variance / formula;
         saying += stated[i] / formula;
         predicted += 1;
-        // The mean over 1000 runs against the gathered light (0.5 % of its own noise).
+        // The mean over 1000 runs, against the gathered light, which has 0.5 % of noise.
         const double error = std::hypot(std::sqrt(formula / kRuns), 0.005 * h);
         worst = std::max(worst, std::abs(first[i] - h) / error);
     }
@@ -165,7 +166,7 @@ TEST(ShootVariance, IsThatOfTheFormula) {
 TEST(ShootVariance, TheMeanOfManySeedsIsTheGatheredLight) {
     Scene scene = roomWithBoxes(0.5f);
     scene.addLight(areaLight({2, 1.6, 2.6}, {0.3, 0, 0}, {0, -0.3, 0}, glm::dvec3(1)));
-    const ShotScene room(scene);  // whole faces
+    const ShotScene room(scene);  // one patch per face
     constexpr int kSeeds = 200;
     const size_t n = room.patches.sideCount();
     std::vector<double> first(n, 0), second(n, 0);
@@ -194,13 +195,13 @@ TEST(ShootVariance, TheMeanOfManySeedsIsTheGatheredLight) {
         if (first[i] == 0) continue;
         ++lit;
         const double variance = (second[i] - first[i] * first[i]) / (kSeeds - 1);
-        // Some hundred patches a face with 0.5 % of noise each: 0.1 % of the mean at most.
+        // Some hundred patches per face with 0.5 % of noise each: at most 0.1 % in the mean.
         const double error = std::hypot(std::sqrt(variance), 0.001 * mean[i]);
         EXPECT_NEAR(first[i], mean[i], 3 * error) << "side " << i;
         chi += std::pow((first[i] - mean[i]) / error, 2);
     }
     EXPECT_GE(lit, 10);
-    // Of a dozen sides: 1 is expected, and 2.5 passed once in 500 times.
+    // The expected value over a dozen sides is 1. It exceeds 2.5 by chance in one of 500 cases.
     EXPECT_LT(chi / lit, 2.5);
 }
 
@@ -218,7 +219,8 @@ TEST(Shoot, GoesOnToTheTargetError) {
             noise += double(room.patches.area[i / 2]) * glm::dot(d, d);
             signal += double(room.patches.area[i / 2]) * glm::dot(h, h);
         }
-        // Some 300 sides share the error: it is known to 10 %, and the target's share is 0.75.
+        // Some 300 sides contribute to the error, which is therefore known within 10 %. The share
+        // of the target is 0.75.
         const double error = std::sqrt(noise / signal);
         EXPECT_LT(error, double(target));
         EXPECT_GT(error, 0.5 * double(target)) << "lines wasted";
@@ -248,8 +250,8 @@ TEST(Shoot, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(Shoot, OfSurfacesThatCoincideTheFirstGetsTheLight) {
-    // A sheet on the floor, twice, and a floor that is one side of a solid; of other faces each, or
-    // one would stand for all.
+    // Two sheets on a floor that is one side of a solid. The three have different faces, since one
+    // of equal faces would stand for all.
     Scene scene;
     place(scene, box("floor", {-1, -1, -1}, {1, 1, 0}, false), grey("", 0.5f));
     for (int k = 0; k < 2; ++k)

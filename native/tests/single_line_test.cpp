@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Single global lines: Crofton's formulas, and the same expected exchanges as the lists.
+// Single global lines: Crofton's formulas, and the same expected exchanges as the fragment lists.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,8 @@ struct LineScenery {
         input.singleLine = true;
         return makeProjector(ProjectorKind::AUTO, input);
     }
-    // The lines per bundle that stand for the same: one, of this cross-section.
+    // Returns the area that one line per bundle represents: the cross-section of the bounding
+    // sphere.
     double lineArea() const { return kPi * double(patches.radius) * double(patches.radius); }
 
     const Patches patches;
@@ -35,7 +36,8 @@ struct LineScenery {
 };
 
 TEST(LineHits, ALineThroughADiagonalCrossesItOnce) {
-    // Both triangles of a quad, and a plate cut into many quads and triangles with common vertices.
+    // Both triangles of a quad, and a plate divided into many quads and triangles with common
+    // vertices.
     Scene scene;
     place(scene, grid("plate", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 4, 4), grey("", 0));
     for (float patchSize : {10.0f, 0.1f}) {
@@ -69,7 +71,7 @@ TEST(LineHits, AreInOrderOfDepthAndNameTheSideAgainstTheLine) {
     Visibility(patches).lineHits(glm::dvec3(0.5, 0.5, 0.25) - patches.centre, {0, 0, 1}, hits);
     ASSERT_EQ(hits.size(), 3u);
     const double depths[] = {-0.25, 0.75, 1.75};
-    const uint32_t sides[] = {2 + 1, 4, 0 + 1};  // bottom and top look up, the middle down
+    const uint32_t sides[] = {2 + 1, 4, 0 + 1};  // bottom and top face up, the middle one down
     for (size_t k = 0; k < 3; ++k) {
         EXPECT_NEAR(hits[k].depth, depths[k], 1e-6);
         EXPECT_EQ(hits[k].side, sides[k]);
@@ -115,18 +117,19 @@ TEST(SingleLines, CrossAreasAsCroftonSays) {
     for (uint32_t patch = 0; patch < scenery.patches.count(); ++patch)
         areas[instanceOf(2 * patch)] += double(scenery.patches.area[patch]);
     for (size_t i = 0; i < 3; ++i) {
-        // E = n A / (2 pi R^2), two crossings of each convex body a line: four standard errors of
-        // the bodies met.
+        // E = n A / (2 pi R^2), with two crossings of each convex body per line. The tolerance is
+        // four standard errors of the number of bodies met.
         const double wanted = kLines * areas[i] / (2 * scenery.lineArea());
         EXPECT_NEAR(crossings[i], wanted, 4 * 2 * std::sqrt(wanted / 2)) << "instance " << i;
     }
-    // The sphere around the scene is met by all lines, the room in it by half its area a line.
+    // All lines meet the sphere around the scene. A line meets the room in it with a probability
+    // proportional to half the room's area.
     const double wanted = kLines * areas[0] / (4 * scenery.lineArea());
     EXPECT_NEAR(double(met), wanted, 4 * std::sqrt(wanted * (1 - wanted / kLines)));
 }
 
 TEST(SingleLines, ExchangeAsInTheLists) {
-    // Standing boxes: the rules on contacts are the same too.
+    // With standing boxes the rules for contacts are tested too.
     for (float gap : {0.1f, 0.0f}) {
         const LineScenery scenery(roomWithBoxes(0.5f, 0, gap));
         auto groupOf = [&](uint32_t i, uint32_t j) {
@@ -135,7 +138,7 @@ TEST(SingleLines, ExchangeAsInTheLists) {
             };
             return i % 2 || j % 2 ? -1 : int(instanceOf(i) + instanceOf(j));
         };
-        // Per group and line or pixel area, both ways.
+        // Per group, relative to the area of a line or a pixel, in both directions.
         std::array<double, 4> lines{}, wanted{};
         double touching = 0, wantedTouching = 0;
         constexpr uint32_t kLines = 40000, kBundles = 1000;
@@ -158,8 +161,8 @@ TEST(SingleLines, ExchangeAsInTheLists) {
         }
         const double perLine =
             double(kLines) * kPixel * kPixel / (scenery.lineArea() * double(kBundles));
-        // Four standard errors of independent lines; the lists' own is a tenth of it or less. A
-        // line exchanges in one group several times at most twice.
+        // The tolerance is four standard errors of independent lines; that of the lists is at most
+        // a tenth of it. A line exchanges at most twice within one group.
         for (size_t g : {0u, 1u, 2u, 3u})
             EXPECT_NEAR(lines[g], wanted[g] * perLine,
                         4 * std::sqrt(2 * wanted[g] * perLine) + 0.01 * wanted[g] * perLine)
@@ -204,8 +207,8 @@ TEST(SingleLines, GiveTheSameLightAsBundles) {
             }
         return sum / n;
     };
-    // 100 000 lines of which half meet the room: some 50 crossings a side, a noise of some per
-    // cent at each, and less of their mean.
+    // 100 000 lines, half of which meet the room: some 50 crossings per side, which leaves some per
+    // cent of noise on each side and less in the mean.
     EXPECT_NEAR(meanOf(lines) / meanOf(bundles), 1, 0.02);
 }
 

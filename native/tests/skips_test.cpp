@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Every skip, on and off: the report says what was skipped, and the light stays the same.
+// Every skip, switched on and off: the report names the skipped work, and the light stays the same.
 #include "job/skips.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ namespace {
 
 using namespace test;
 
-// The room with one bright lamp and five dim ones, and something that only occludes.
+// The room with one bright lamp, five dim lamps, and an object that only occludes.
 Scene roomOfLamps() {
     Scene scene = litRoom();
     for (int k = 0; k < 5; ++k)
@@ -31,7 +31,7 @@ Scene roomOfLamps() {
     return scene;
 }
 
-// The same with a carpet of many faces.
+// The room of lamps with a carpet of many faces.
 Scene roomWithCarpet() {
     Scene scene = roomOfLamps();
     place(scene, grid("carpet", {0.4f, 0.4f, 0.2f}, {3.0f, 0, 0}, {0, 2.4f, 0}, 12, 10),
@@ -39,7 +39,7 @@ Scene roomWithCarpet() {
     return scene;
 }
 
-// The same with a ball of faces finer than tiles that only occludes.
+// The room of lamps with a ball that only occludes and whose faces are finer than tiles.
 Scene roomWithFineBall() {
     Scene scene = roomOfLamps();
     place(scene, icosphere("ball", 0.3f, 4, false), grey("ball", 0.5f),
@@ -47,7 +47,7 @@ Scene roomWithFineBall() {
     return scene;
 }
 
-// With a lamp that is a ball and emits from both sides, and another in a box of its own.
+// A room with a ball that is a lamp emitting on both sides, and with another lamp in a closed box.
 Scene roomOfBulbs() {
     Scene scene = litRoom();
     place(scene, icosphere("bulb", 0.2f, 1, false), grey("bulb", 0.5f, 20, 20),
@@ -59,8 +59,9 @@ Scene roomOfBulbs() {
 
 struct Case {
     const char* name;
-    SkippedWork work;  // that the report says was skipped
-    // Largest difference over the largest value; 0: within the stated errors of the two bakes.
+    SkippedWork work;  // the skipped work in the report
+    // Largest difference relative to the largest value. 0: within the stated errors of the two
+    // bakes.
     double tolerance;
     std::function<Scene()> scene = roomOfLamps;
     std::function<void(Settings&)> prepare = [](Settings&) {};
@@ -81,7 +82,7 @@ TEST_P(Skip, ChangesNoLight) {
         c.prepare(bake.settings);
         bake.settings.set(std::string("skip.") + c.name, on);
         bake.run(scene);
-        bake.run(scene);  // a second time: geometry is as it was
+        bake.run(scene);  // a second run, with unchanged geometry
         const Json report = reportOf(bake);
         EXPECT_EQ(skips(report, c.work), on == 1) << report["skipped"];
         light[on] = everything(bake);
@@ -94,7 +95,7 @@ TEST_P(Skip, ChangesNoLight) {
     else if (c.tolerance > 0)
         EXPECT_LT(difference(light[1], light[0]), c.tolerance);
     else
-        // The noise at corners is that of patches, and up to twice as much beside contacts.
+        // The noise at corners is that of patches, and up to twice as large beside contacts.
         EXPECT_LT(noise(light[1], light[0]), 2 * std::hypot(stated[0], stated[1]));
 }
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Slivers in a mesh, as booleans leave them and as T-junctions are filled with, cost nothing and
-// change nothing, however thin they are and however the mesh lies: the light, its stated error and
-// the number of bundles are those of a mesh whose slivers are a hundredth of their edge.
+// Slivers in a mesh, as left by boolean modifiers or filled into T-junctions, cost nothing and
+// change nothing, however thin they are and however the mesh is rotated: the light, its stated
+// error and the number of bundles are those of a mesh whose slivers have a height of a hundredth of
+// their edge.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -25,7 +26,8 @@ struct Result {
     double bundles = 0, error = 0, balance = 0;
 };
 
-// A floor of 8 m under a box, lit by a lamp, all turned by a matrix or in the meshes.
+// Bakes a floor of 8 m under a box, lit by a lamp. Everything is rotated, by a matrix or in the
+// meshes.
 Result bakeFloor(Mesh floor, Reconstruction reconstruction, const glm::dmat4& turn, bool inMeshes,
                  int seed = 0) {
     Scene scene;
@@ -88,7 +90,8 @@ TEST(Slivers, SubdividedMeshesHaveNone) {
         return bakeFloor(polygons("floor", cut.vertices, faces), Reconstruction::LEAST_SQUARES,
                          glm::dmat4(1), false, seed);
     };
-    // A single bake ends after one look at the noise or two, with half as many bundles or twice.
+    // A single bake may end after one look at the noise or after two, with half or twice as many
+    // bundles.
     constexpr int kSeeds = 4;
     std::array<Result, kSeeds> wanted;
     double bundlesWanted = 0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Sobol's points: stratified wherever in the sequence, of which the bits of an index beyond the
-// first table are part too.
+// Sobol points are stratified everywhere in the sequence, including indices beyond the first table.
 #include "sampling/sobol.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +25,7 @@ TEST(Sobol, AnyPowerOfTwoOfThemFromAMultipleOnAreStratified) {
         }
 }
 
-// It mirrors the bits of the index, but for the shift of its seed.
+// The first dimension mirrors the bits of the index, apart from the shift by the seed.
 TEST(Sobol, TheFirstDimensionIsVanDerCorputs) {
     const SobolPoints points(3);
     auto bitsOf = [&](uint32_t index) { return uint32_t(points[index].x * 0x1p24f); };

@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-// A ball of small faces that is not asked for, close above a ground in the sun that is.
+// A ball of small faces without a result, close above a sunlit ground that has a result.
 Scene ballOverGround(int subdivisions) {
     Scene scene;
     place(scene, icosphere("ball", 0.5f, subdivisions, false), grey("ball", 0.7f),
@@ -66,9 +66,9 @@ TEST(StandIns, LightWhatIsAroundAsAllWould) {
         return cornerLight(bake, 1, RB_OUTPUT_INDIRECT);
     };
     double rays = 0, manyRays = 0;
-    // Of 1,280 faces, each of which gathers, and of 20,480.
+    // A ball of 1,280 faces, each of which gathers, and one of 20,480.
     const std::vector<glm::vec3> coarse = light(3, rays), fine = light(5, manyRays);
-    // The noise of both is 0.5 %, of all light; the coarse ball has 2 % less area.
+    // The noise of both is 0.5 % of all light. The coarse ball has 2 % less area.
     EXPECT_LT(noise(fine, coarse), 0.03);
     EXPECT_LT(manyRays, 2 * rays);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The stated error and its parts, against closed forms and against many seeds.
+// The stated error and its parts, against closed forms and over many seeds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 
 using namespace test;
 
-// The same grid with every quad cut in two.
+// Returns the grid with every quad divided in two.
 Mesh halved(const Mesh& quads) {
     std::vector<std::vector<int32_t>> faces;
     for (size_t f = 0; f < quads.faceCount(); ++f) {
@@ -31,7 +31,8 @@ Mesh halved(const Mesh& quads) {
 
 using LightAt = std::function<double(glm::dvec3)>;
 
-// Grey light of the sources on a mesh, as patches see it: exact means, to kSteps^2 points each.
+// Grey light of the sources on a mesh, as patches have it: exact means of kSteps^2 points on each
+// patch.
 class LitMesh {
   public:
     LitMesh(Mesh mesh, float patchSize, LightAt at) : at(std::move(at)) {
@@ -47,13 +48,14 @@ class LitMesh {
         }
     }
 
-    // Distance of the light from the best linear function of each patch, RMS over all, per channel.
+    // Returns the distance of the light from the best linear function on each patch, RMS over all
+    // patches, per channel.
     double distanceFromLinear() const {
         double squares = 0;
         for (uint32_t p = 0; p < patches.count(); ++p) {
             double sum = 0, square = 0;
             glm::dvec2 moment(0.0);
-            // Offsets from the middle, which are uncorrelated on a parallelogram.
+            // Offsets from the centre are uncorrelated on a parallelogram.
             forEachPoint(p, [&](glm::dvec2 uv, double light) {
                 sum += light;
                 square += light * light;
@@ -65,7 +67,7 @@ class LitMesh {
         return std::sqrt(std::max(0.0, squares) / double(patches.count()));
     }
 
-    // What surplusOf makes of it, RMS over all patches per channel.
+    // Returns the surplus that surplusOf estimates, RMS over all patches, per channel.
     double surplus() const {
         const std::vector<float> exposed(patches.sideCount(), 1.0f);
         const std::vector<float> noError(patches.sideCount(), 0.0f);
@@ -91,7 +93,7 @@ class LitMesh {
         for (int i = 0; i < kSteps; ++i)
             for (int j = 0; j < kSteps; ++j) {
                 glm::dvec2 uv((i + 0.5) / kSteps, (j + 0.5) / kSteps);
-                // Of a triangle the middle alone: enough for linear light.
+                // For a triangle only the centroid, which suffices for linear light.
                 if (isTriangle) uv = glm::dvec2(1.0 / 3);
                 const glm::dvec3 point =
                     glm::dvec3(patches.point(patch, glm::vec2(uv))) + patches.centre;
@@ -114,7 +116,8 @@ TEST(Surplus, LinearLightHasNone) {
 }
 
 TEST(Surplus, PointLightOverAPlaneIsKnownWithinAFactorOfTwo) {
-    // 0.7 m above the square and off its middle; patches of 0.36, 0.25 and 0.5 of that height.
+    // The light is 0.7 m above the square, off its centre. The patches have edges of 0.18 to 0.71
+    // of this height.
     const LightAt light = [](glm::dvec3 p) {
         const glm::dvec3 d = glm::dvec3(0.3, -0.2, 0.7) - p;
         return d.z / std::pow(glm::length(d), 3);
@@ -134,7 +137,8 @@ TEST(Surplus, PointLightOverAPlaneIsKnownWithinAFactorOfTwo) {
 TEST(Surplus, ShadowEdgesAreKnownWithinAFactorOfTwo) {
     for (float patchSize : {0.0625f, 0.125f, 0.25f}) {
         double truth = 0, found = 0;
-        // The place of the edge on the grid is chance: the mean over some.
+        // The position of the edge relative to the grid is random, so the mean over several
+        // positions is compared.
         for (int k = 0; k < 8; ++k)
             for (double angle : {0.0, 0.3, 0.7}) {
                 const double cosine = std::cos(angle), sine = std::sin(angle);
@@ -167,8 +171,8 @@ TEST(StatedError, IsNothingInAFurnace) {
     }
 }
 
-// A ground below a square lamp of 1 m, 1 m above its centre; nothing reflects, nothing is in the
-// way.
+// A ground below a square lamp of 1 m, 1 m above its centre. Nothing reflects, and nothing blocks
+// the light.
 Scene groundBelowLamp(int faces) {
     Scene scene;
     place(scene, square(faces), grey("", 0));
@@ -176,7 +180,7 @@ Scene groundBelowLamp(int faces) {
     return scene;
 }
 
-// Surface error at a grid of points on each face.
+// Returns the surface error at a grid of points on each face.
 double surfaceError(const Scene& scene, const Bake& bake) {
     const glm::dvec3 lamp[4] = {{-0.5, -0.5, 1}, {0.5, -0.5, 1}, {0.5, 0.5, 1}, {-0.5, 0.5, 1}};
     const Mesh& mesh = scene.meshes[0];
@@ -222,7 +226,7 @@ TEST(StatedError, NamesCoarseObjectsAndTheEdgesTheyNeed) {
     ASSERT_TRUE(mentions(report["warnings"], "object \\\"square\\\"")) << report["warnings"];
     EXPECT_TRUE(mentions(report["warnings"], "SUBDIVIDE"));
     EXPECT_GT(double(report["error"]["mesh"]), 0.05);
-    // 5 % is what it promises for the edges that it names.
+    // The warning promises an error of 5 % with the edges that it names.
     const std::string text = report["warnings"][0];
     const size_t at = text.find("Edges of about ");
     ASSERT_NE(at, std::string::npos) << text;
@@ -233,11 +237,8 @@ TEST(StatedError, NamesCoarseObjectsAndTheEdgesTheyNeed) {
     EXPECT_FALSE(mentions(errorsOf(groundBelowLamp(24), 0.1f)["warnings"], "too coarse"));
 }
 
-// The difference of two halves is small by chance now and then, and bundles stop just then. 5 % of
-// the bakes may be more than a quarter above what they state; if exactly 5 % are, more than 8 of 60
-// come with a probability of 0.3 %.
 TEST(StatedError, NamesTheWorstOfManyCoarseObjects) {
-    // Ten grounds in a row, each below a lamp of its own, brighter from one to the next.
+    // Ten grounds in a row, each below its own lamp. Each lamp is brighter than the one before.
     Scene scene;
     for (int k = 0; k < 10; ++k) {
         const float x = 20.0f * float(k);
@@ -252,12 +253,15 @@ TEST(StatedError, NamesTheWorstOfManyCoarseObjects) {
     EXPECT_TRUE(mentions(warnings, "4 more objects are too coarse"));
 }
 
-// Of the patch sides, and at the corners, which is what is shown.
+// Tests the noise on the patch sides, and at the corners, which is the noise that is shown. A bake
+// states its noise from the difference of two halves. This difference is sometimes small by chance,
+// and the bundles then stop. At most 5 % of the bakes may have more than 1.25 times the noise that
+// they state. If exactly 5 % do, more than 8 of 60 bakes do with a probability of 0.3 %.
 TEST(StatedError, CoversTheNoiseOverManySeeds) {
     constexpr int kSeeds = 60, kMost = 8;
     const Scene scene = litRoom();
     struct Light {
-        std::vector<glm::vec3> ofSides, ofCorners;  // times the root of the area
+        std::vector<glm::vec3> ofSides, ofCorners;  // times the square root of the area
         double stated = 0, shown = 0;
     };
     std::vector<Light> lights(kSeeds);
@@ -266,7 +270,7 @@ TEST(StatedError, CoversTheNoiseOverManySeeds) {
         bake.settings.patchSize = 0.3f;
         bake.settings.minBundles = 16;
         bake.settings.targetError = 0.04f;
-        bake.settings.contacts = 0;  // noise is stated of whole tiles
+        bake.settings.contacts = 0;  // the noise is stated for whole tiles
         bake.settings.seed = seed;
         bake.run(scene);
         const Irradiance& found = bake.patchIrradiance();
@@ -289,14 +293,14 @@ TEST(StatedError, CoversTheNoiseOverManySeeds) {
         light.stated = reportOf(bake)["estimated_error"];
         light.shown = reportOf(bake)["error"]["noise"];
     }
-    // True over stated, of each seed.
+    // The ratio of true to stated noise, per seed.
     auto ratios = [&](std::vector<glm::vec3> Light::*values, double Light::*stated) {
         std::vector<glm::vec3> mean((lights[0].*values).size(), glm::vec3(0.0f));
         for (const Light& light : lights)
             for (size_t i = 0; i < mean.size(); ++i) mean[i] += (light.*values)[i] / float(kSeeds);
         std::vector<double> result;
         for (const Light& light : lights)
-            // Each is a part of the mean.
+            // Each bake is a part of the mean, which reduces its difference from the mean.
             result.push_back(noise(light.*values, mean) / std::sqrt(1 - 1.0 / kSeeds) /
                              (light.*stated));
         return result;
@@ -304,8 +308,9 @@ TEST(StatedError, CoversTheNoiseOverManySeeds) {
     const std::vector<double> ofSides = ratios(&Light::ofSides, &Light::stated);
     EXPECT_LE(std::count_if(ofSides.begin(), ofSides.end(), [](double r) { return r > 1.25; }),
               kMost);
-    // The cells here are whole walls: there are few corners, of which one difference of halves
-    // tells the noise to a half. Root mean square over the seeds it is right.
+    // The cells are whole walls here. One difference of halves at their few corners determines the
+    // noise only within a factor of two. In the root mean square over the seeds the stated noise is
+    // right.
     double squares = 0;
     for (double r : ratios(&Light::ofCorners, &Light::shown)) squares += r * r / kSeeds;
     EXPECT_GT(std::sqrt(squares), 1 / 1.5);
@@ -319,7 +324,7 @@ TEST(StatedError, HasAValuePerCorner) {
     bake.run(scene);
     const InstanceLight& light = bake.instanceLight(0);
     ASSERT_EQ(light.error.size(), scene.meshes[0].cornerCount());
-    // Below the lamp more than at the border.
+    // The error is larger below the lamp than at the border.
     EXPECT_GT(light.error[4 * 5 + 2], 2 * light.error[0]);
     EXPECT_GT(light.error[0], 0);
 }

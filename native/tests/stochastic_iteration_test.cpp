@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Stochastic iteration with both operators against closed forms, and where it must be refused.
+// Stochastic iteration with both operators against closed forms, and cases in which it must be
+// refused.
 #include "transport/stochastic_iteration.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +28,7 @@ void setIteration(Bake& bake, int bundleCount) {
     bake.settings.directions = DirectionKind::RANDOM;
 }
 
-// The message of the refusal, or nothing.
+// Returns the message of the refusal, or "" if the solver is accepted.
 std::string refusal(TransportScene& scene) {
     try {
         scene.make(kSolver, 1);
@@ -43,7 +44,7 @@ struct Operator {
     int linesPerBundle;
     uint32_t bundles;
 };
-// Enough for the start-up to be below the error of a mean over 200 seeds.
+// Enough bundles for the start-up error to be below the error of a mean over 200 seeds.
 constexpr Operator kOperators[] = {{"bundles", 0, 64}, {"single rays", 1, 512}};
 
 TEST(StochasticIteration, TheMeanIsExactOnACube) {
@@ -80,7 +81,7 @@ TEST(StochasticIteration, TheClosedFormOfTheCubeIsThatOfTheOracle) {
 }
 
 TEST(StochasticIteration, TheStartUpIsAsStated) {
-    // After one bundle there is no light but the straight: 1 / 6 of 1 / (6 (1 - rho)).
+    // After one bundle there is only direct light: 1 / 6 of 1 / (6 (1 - rho)).
     TransportScene cube(closedCube(0.5f), 10, 0.1f);
     cube.shot.emission[0] = glm::vec3(1);
     Statistics mean, stated;
@@ -99,7 +100,8 @@ TEST(StochasticIteration, TheStartUpIsAsStated) {
 }
 
 TEST(StochasticIteration, AFurnaceHasTheStatedError) {
-    // The error of a bundle is alike on many patches: few independent values, hence eight seeds.
+    // The error of a bundle is correlated over many patches. There are few independent values, so
+    // eight seeds are used.
     const Scene scene = roomWithBoxes(0.5f, 0.5f);
     double stated = 0, found = 0;
     for (int seed = 0; seed < 8; ++seed) {
@@ -122,7 +124,7 @@ TEST(StochasticIteration, AFurnaceHasTheStatedError) {
 }
 
 TEST(StochasticIteration, CoveredPartsGetNoLight) {
-    // Boxes that stand on the floor: patches of it are partly covered.
+    // Boxes that stand on the floor, so that patches of the floor are partly covered.
     for (int linesPerBundle : {0, 1}) {
         Bake bake;
         setIteration(bake, linesPerBundle ? 2000000 : 1024);
@@ -143,7 +145,7 @@ TEST(StochasticIteration, CoveredPartsGetNoLight) {
         const double found = frontNoise(bake.patches(), bake.patchIrradiance(), exact);
         std::printf("[ figures  ] standing boxes, %s: stated %.4f, found %.4f\n",
                     linesPerBundle ? "single rays" : "bundles", stated, found);
-        // What of a patch is covered is known by lines too, to some per cent.
+        // The covered share of a patch is determined by lines too, within some per cent.
         EXPECT_LT(found, 1.5 * stated);
     }
 }
@@ -151,7 +153,7 @@ TEST(StochasticIteration, CoveredPartsGetNoLight) {
 TEST(StochasticIteration, AgreesWithLineReuse) {
     Bake reference;
     setQuick(reference, 4096);
-    reference.settings.contacts = 0;  // the same patches for both solvers
+    reference.settings.contacts = 0;  // to have the same patches for both solvers
     reference.run(litRoom());
     for (int linesPerBundle : {0, 1}) {
         Bake bake;
@@ -164,7 +166,7 @@ TEST(StochasticIteration, AgreesWithLineReuse) {
         std::printf("[ figures  ] litRoom, %s: stated %.4f, found %.4f\n",
                     linesPerBundle ? "single rays" : "bundles", stated, found);
         EXPECT_LT(found, 0.08);
-        // Bundles: half the difference of two estimates is itself uncertain by half its size.
+        // For bundles the half difference of two estimates is itself uncertain by half its size.
         EXPECT_LT(found, 2 * stated);
         double sum = 0, exact = 0;
         for (size_t i = 0; i < bake.patches().sideCount(); i += 2) {
@@ -188,7 +190,7 @@ TEST(StochasticIteration, EnergyIsBalancedUnderTheSky) {
         bake.run(scene);
         const Json energy = reportOf(bake)["energy"];
         EXPECT_GT(energy["escaped"].get<double>(), 0);
-        // Reflected light and open shares of 2048 directions have 2 % of noise.
+        // Reflected light and open shares by 2048 directions have 2 % of noise.
         EXPECT_LT(energy["balance_error"].get<double>(), 0.03) << energy;
     }
 }
@@ -223,8 +225,8 @@ TEST(StochasticIterationLimit, LargePatchesOfReflectance08Converge) {
         }
     std::printf("[ figures  ] rho 0.8: error %.4f after 64, %.4f after 512, %.4f after 4096\n",
                 std::sqrt(errors[0]), std::sqrt(errors[1]), std::sqrt(errors[2]));
-    // Eight times the bundles: the root of it less noise; the mean square of 40 seeds near the
-    // limit is uncertain by half its size.
+    // Eight times the bundles reduce the error by the root of eight, apart from noise. Close to the
+    // limit the mean square of 40 seeds is uncertain by half its size.
     EXPECT_LT(std::sqrt(errors[2]), 0.5 * std::sqrt(errors[1]));
 }
 
@@ -246,7 +248,7 @@ TEST(StochasticIterationLimit, SubPixelPatchesAreRefused) {
     EXPECT_EQ(refusal(cube), "") << "A / s^2 > 2 rho^2";
 }
 
-// An open sheet of many small squares, which see the room and not each other.
+// An open sheet of many small squares, which see the room but not each other.
 Mesh confetti(int count, float edge) {
     std::vector<glm::vec3> vertices;
     std::vector<std::vector<int32_t>> faces;
@@ -265,7 +267,7 @@ TEST(StochasticIterationLimit, AFewSmallPatchesDoNotSpoilIt) {
     place(scene, confetti(100, 0.005f), grey("", 0.9f));
     TransportScene room(scene, 0.4f, 0.1f);
     EXPECT_EQ(refusal(room), "");
-    // The light on the others is as good as without them.
+    // The light on the other patches is as accurate as without the small ones.
     const auto iteration = room.make(kSolver, 1);
     iteration->advance(2048, Progress());
     const Irradiance h = iteration->irradiance(Half::BOTH, 0);
@@ -279,7 +281,8 @@ TEST(StochasticIterationLimit, AFewSmallPatchesDoNotSpoilIt) {
 }
 
 TEST(StochasticIterationLimit, GrowthIsThatOfTheory) {
-    // Large patches that all see each other alike: 4/3 rho^2; half of them black: half of it.
+    // Large patches that all see each other equally grow by 4/3 rho^2; if half of them are black,
+    // by half of it.
     Scene scene;
     place(scene, icosphere("ball", 1, 1, true), grey("", 0.6f, 1));
     TransportScene ball(scene, 10, 0.02f);

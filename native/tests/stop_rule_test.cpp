@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// When a bake stops adding bundles, and why.
+// When a bake stops adding bundles, and the reason.
 #include "bake/stop_rule.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ constexpr uint32_t kAll = 1u << 24;
 
 TEST(StopRule, BeginsWithTheLeastOrWithWhatWasTraced) {
     Settings settings;
-    settings.minBundles = 63;  // halves are of equal size
+    settings.minBundles = 63;  // rounded up, since halves are of equal size
     EXPECT_EQ(StopRule(settings, kAll, 0).wanted(), 64u);
     EXPECT_EQ(StopRule(settings, kAll, 500).wanted(), 500u);
     settings.maxBundles = 20;
@@ -70,7 +70,7 @@ TEST(StopRule, GoesOnAfterRaysOnlyWhereThatIsWorthIt) {
     StopRule noisy(settings, kAll, 0);
     EXPECT_EQ(noisy.afterRays(64, 6), Stop::NOT_YET);  // more than twice the target is left
     EXPECT_EQ(noisy.excess(), 3);
-    EXPECT_EQ(noisy.afterRays(128, 5), Stop::NOISE_AT_TARGET);  // and hardly less than before
+    EXPECT_EQ(noisy.afterRays(128, 5), Stop::NOISE_AT_TARGET);  // the noise has hardly fallen
     EXPECT_TRUE(noisy.isOutOfReach());
     StopRule hopeless(settings, kAll, 0);
     EXPECT_EQ(hopeless.afterRays(64, 20), Stop::NOISE_AT_TARGET);

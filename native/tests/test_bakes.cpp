@@ -49,7 +49,7 @@ double difference(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>&
             most = std::max(most, std::abs(double(a[i][c]) - double(b[i][c])));
             value = std::max(value, std::abs(double(a[i][c])));
         }
-    return most / value;  // not a number if all is black: no test accepts that
+    return most / value;  // NaN if all values are 0, which no test accepts
 }
 
 double noise(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {

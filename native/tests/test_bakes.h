@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Whole bakes of small rooms and ways to compare them.
+// Bakes of small rooms, and functions that compare bakes.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,27 +16,28 @@ namespace raybundle::test {
 using Json = nlohmann::json;
 
 Json reportOf(const Bake& bake);
-// Whether a part of a report contains a text.
+// Returns whether a part of a report contains a text.
 bool mentions(const Json& part, const std::string& text);
-// Whether a report has a warning, and an entry of skipped work, of this identifier.
+// Return whether a report has a warning, or an entry of skipped work, with this identifier.
 bool warns(const Json& report, WarningId id);
 bool skips(const Json& report, SkippedWork work);
-// How often such work was skipped, by the report.
+// Returns how often this work was skipped, as the report states.
 uint64_t skippedCount(const Json& report, SkippedWork work);
 
+// Returns the output at each corner of an instance, W/(m^2 sr).
 std::vector<glm::vec3> cornerLight(const Bake& bake, int32_t instance, rb_output output);
-// All outputs of all corners of the first three instances, which every room has.
+// Returns all outputs at all corners of the first three instances, which every room has.
 std::vector<glm::vec3> everything(const Bake& bake);
 
-// Largest difference over the largest value.
+// Returns the largest absolute difference, relative to the largest absolute value.
 double difference(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b);
-// Relative RMS difference.
+// Returns the relative RMS difference.
 double noise(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b);
 
-// A room with two boxes and a lamp below the ceiling.
+// Returns a room with two boxes and a lamp below the ceiling.
 Scene litRoom(float reflectance = 0.6f);
 
-// Coarse and quick, with a fixed number of bundles.
+// Sets coarse patches and a fixed number of bundles, for bakes that take little time.
 void setQuick(Bake& bake, int bundleCount = 64);
 std::vector<glm::vec3> bakeQuick(const Scene& scene, int seed = 0, int threads = 0);
 

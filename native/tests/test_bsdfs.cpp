@@ -11,21 +11,23 @@
 namespace raybundle::test {
 namespace {
 
-// Fresnel's law for an index of refraction of 1.5, from 0 at right angles to 1.
+// Returns Fresnel's reflectance for an index of refraction of 1.5, scaled to 0 at normal incidence
+// and 1 at grazing incidence.
 double fresnelEdge(double cosine) {
     const double g = std::sqrt(1.5 * 1.5 - 1 + cosine * cosine), a = (g - cosine) / (g + cosine);
     const double b = ((g + cosine) * cosine - 1) / ((g - cosine) * cosine + 1);
     return (a * a * (1 + b * b) / 2 - 0.04) / 0.96;
 }
 
-// Of white GGX, seen at an angle: by facets as D has them.
+// Returns the albedo of white GGX towards a direction, by sampling facets from the distribution D.
 double ggxAlbedo(double roughness, const glm::dvec3& out) {
     const double a2 = std::pow(roughness, 4);
     constexpr int kSteps = 400;
     double sum = 0;
     for (int i = 0; i < kSteps; ++i)
         for (int j = 0; j < kSteps; ++j) {
-            // Of shares u of the facets the root: grazing views see those that stand upright.
+            // The samples are uniform in the root of the share, because grazing views see the
+            // facets that stand upright.
             const double root = (i + 0.5) / kSteps, u = 1 - root * root;
             const double phi = kPi * (j + 0.5) / kSteps;
             const double z = root / std::sqrt(1 + (a2 - 1) * u), r = std::sqrt(1 - z * z);
@@ -107,7 +109,7 @@ void forCosine(int n, const std::function<void(const glm::dvec3&, double)>& visi
     for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) {
             const double z = (i + 0.5) / n, r = std::sqrt(1 - z * z), phi = 2 * kPi * (j + 0.5) / n;
-            // The midpoint rule has the sum of 2 z / n^2 right.
+            // The midpoint rule makes the sum of 2 z / n^2 exact.
             visit({r * std::cos(phi), r * std::sin(phi), z}, 2 * z / (n * n));
         }
 }
@@ -126,7 +128,7 @@ glm::dvec3 inclined(double cosine) { return {std::sqrt(1 - cosine * cosine), 0, 
 Bsdf severalFacets(double roughness) {
     const Bsdf once = ggx(roughness, 1);
     constexpr int kSteps = 40;
-    std::vector<double> lost;  // by the root of the cosine
+    std::vector<double> lost;  // albedo lost, by the root of the cosine
     for (int i = 0; i <= kSteps; ++i)
         lost.push_back(
             1 / ggxAlbedo(roughness, inclined(std::max(std::pow(double(i) / kSteps, 2), 1e-4))) -

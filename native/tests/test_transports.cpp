@@ -51,7 +51,7 @@ void CubeExitance::expectExact(const std::string& what) const {
 std::array<double, 3> cubeExitance(const std::array<double, 3>& direct) {
     const double opposite = parallelRectangles(1, 1, 1);
     const double beside = perpendicularRectangles(1, 1, 1), rho = 0.5;
-    std::array<double, 3> b{};  // reflected
+    std::array<double, 3> b{};  // reflected exitance
     for (int bounce = 0; bounce < 100; ++bounce)
         b = {rho * (direct[0] + opposite * b[1] + 4 * beside * b[2]),
              rho * (direct[1] + opposite * b[0] + 4 * beside * b[2]),
@@ -81,8 +81,8 @@ void expectExactOnBakedCube(const Settings& settings, int seeds) {
         }
         for (size_t k = 0; k < 3; ++k) faces[k].add(exitance[k]);
     }
-    // The gathered light of a patch as large as a wall is up to 1 % off, alike for every seed; it
-    // is not what is tested here.
+    // The gathered light of a patch as large as a wall is up to 1 % off, equally for every seed.
+    // This error is not what is tested here.
     const double exact[] = {0, parallelRectangles(1, 1, 1), perpendicularRectangles(1, 1, 1)};
     const std::array<double, 3> expected = cubeExitance(direct);
     for (size_t k = 0; k < 3; ++k) {

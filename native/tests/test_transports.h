@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Transports by themselves, with light that a test may set side by side; and means over seeds.
+// Transports without the other stages of a bake, for comparison, and means over seeds.
 #pragma once
 
 #include <array>
@@ -14,11 +14,11 @@
 
 namespace raybundle::test {
 
-// What a transport is made of, without a first shot: all emission is left to the transport.
+// The input of a transport without a first shot: all emission is left to the transport.
 struct TransportScene {
     TransportScene(const Scene& scene, float patchSize, float pixelSize);
 
-    // A transport from here on, with bundles and random numbers of its own.
+    // Makes a transport with its own bundles and random numbers.
     std::unique_ptr<Transport> make(Solver solver, int seed);
 
     Patches patches;
@@ -51,23 +51,23 @@ class Statistics {
     double count = 0, average = 0, squares = 0;
 };
 
-// The cube with one patch per face, reflectance 0.5 and an exitance of 1 emitted by face 0:
-// exitance of that face, the opposite one, and the four between.
+// Exitance in the cube with one patch per face, reflectance 0.5 and an exitance of 1 W/m^2 emitted
+// by face 0: of face 0, of the opposite face, and of each of the four faces between, W/m^2.
 constexpr double kCubeExitance[] = {1.0909090981, 0.1817458261, 0.1818362689};
-// The same for any irradiance of the three straight from the lamp.
+// Returns the exitance of the three kinds of faces for given direct irradiances on them, W/m^2.
 std::array<double, 3> cubeExitance(const std::array<double, 3>& direct);
-// Which of the three the front of a patch is.
+// Returns the kind of face (0 to 2, as in kCubeExitance) of the front of a patch.
 int cubeFace(const Patches& patches, uint32_t patch);
 
-// The exitance of those three faces, by transports with many seeds.
+// The exitance of the three kinds of faces, as found by transports with many seeds.
 class CubeExitance {
   public:
-    // What a transport has found of the light of a first shot.
+    // Adds the exitance that follows from a first shot and the light found by a transport.
     void add(const Patches& patches, const FirstShot& shot, const Irradiance& light);
 
-    // Expects the means to be within three standard errors of kCubeExitance, and these to be small.
-    // Of 200 seeds one comparison in 370 would fail by chance if the seeds were not always the
-    // same. what: is named in messages.
+    // Expects the means to be within three standard errors of kCubeExitance, and the standard
+    // errors to be small. With 200 random seeds one comparison in 370 would fail by chance; the
+    // seeds are fixed. `what` is named in messages.
     void expectExact(const std::string& what) const;
 
   private:
@@ -75,11 +75,11 @@ class CubeExitance {
 };
 
 // Bakes the cube with `seeds` seeds and expects the mean over them to be within three standard
-// errors of the exact exitance. The lamp is bright enough to be gathered: the transport starts from
-// what it lit.
+// errors of the exact exitance. The emission is bright enough to be gathered, so that the transport
+// starts from gathered light.
 void expectExactOnBakedCube(const Settings& settings, int seeds);
 
-// Area-weighted relative RMS difference of the irradiance on the fronts.
+// Returns the relative RMS difference of the irradiance on the fronts, weighted by area.
 double frontNoise(const Patches& patches, const Irradiance& a, const Irradiance& b);
 
 }  // namespace raybundle::test

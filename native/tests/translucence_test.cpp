@@ -20,8 +20,8 @@ Material translucent(float reflectance, float translucence, float emission = 0) 
     return material;
 }
 
-// A cube in a white world of exitance kWorld. From outside it sees nothing else; inside all sides
-// get the same from each other, so that H_in = rho H_in + tau kWorld.
+// A cube in a white world of exitance kWorld, W/m^2. The outside sees only the world. Inside all
+// sides get equal light from each other, so that H_in = rho H_in + tau kWorld.
 constexpr float kWorld = 2;
 
 Scene paperCube(float reflectance, float translucence) {
@@ -32,7 +32,7 @@ Scene paperCube(float reflectance, float translucence) {
     return scene;
 }
 
-// Irradiance, W/m^2, of all corners of an instance.
+// Expects the same irradiance, W/m^2, at all corners of an instance.
 void expectLight(const Bake& bake, int32_t instance, rb_output output, double irradiance,
                  double tolerance) {
     for (const glm::vec3& v : bake.instanceLight(instance).perCorner(output))
@@ -48,14 +48,14 @@ class Translucence : public ::testing::TestWithParam<Reconstruction> {
     Bake bake;
 };
 
-// In a closed furnace every line brings the same light, so that there is no noise but rounding and
-// the residual of the solve.
+// In a closed furnace every line carries the same light, so that there is no noise except rounding
+// and the residual of the solve.
 TEST_P(Translucence, LightInsideAPaperCubeIsThatOfTheClosedForm) {
     for (const auto& [rho, tau] :
          {std::pair(0.5f, 0.3f), std::pair(0.0f, 0.6f), std::pair(0.2f, 0.7f)}) {
         bake.run(paperCube(rho, tau));
         const double inside = tau * kWorld / (1 - rho);
-        // What the front shows is the light of both sides by what it sends of each.
+        // The front shows the light of both sides, weighted by the share that it sends of each.
         const double sent = rho * inside + tau * kWorld;
         expectLight(bake, 0, RB_OUTPUT_LIGHTING, sent / (rho + tau), 1e-3);
         expectLight(bake, 0, RB_OUTPUT_COMBINED, sent, 1e-3);
@@ -64,8 +64,9 @@ TEST_P(Translucence, LightInsideAPaperCubeIsThatOfTheClosedForm) {
     }
 }
 
-// A room cut in two by a wall: what it reflects and passes on together is what the other walls
-// reflect, so that the light is the same everywhere: B = E / (1 - rho).
+// A wall divides a room in two. The share of the light that the wall reflects and lets through
+// together equals the reflectance of the other walls, so that the light is the same everywhere: B =
+// E / (1 - rho).
 TEST_P(Translucence, TwoHalvesOfAFurnaceAreOne) {
     Scene scene = closedCube(0.6f, 1);
     const int32_t wall = place(
@@ -76,7 +77,7 @@ TEST_P(Translucence, TwoHalvesOfAFurnaceAreOne) {
     expectLight(bake, wall, RB_OUTPUT_COMBINED, 2.5, 1e-3);
 }
 
-// The sun from behind: no noise, nothing else in the scene.
+// The sun shines from behind. There is no noise and nothing else in the scene.
 TEST_P(Translucence, ASheetShowsTheSunBehindIt) {
     Scene scene;
     const int32_t sheet =
@@ -88,8 +89,8 @@ TEST_P(Translucence, ASheetShowsTheSunBehindIt) {
     expectLight(bake, sheet, RB_OUTPUT_COMBINED, 0.3 * 4, 1e-4);
 }
 
-// A sheet that reflects nothing over a floor that reflects nothing: what the floor gets is tau
-// times the sun's light times their form factor.
+// A sheet without reflectance above a floor without reflectance. The floor gets tau times the sun's
+// light times their form factor.
 TEST_P(Translucence, AFloorGetsTheSunThroughASheet) {
     Scene scene;
     const int32_t floor =
@@ -108,7 +109,7 @@ TEST_P(Translucence, AFloorGetsTheSunThroughASheet) {
         sum += double(patches.area[side / 2] * bake.patchIrradiance().all(side).x);
         area += double(patches.area[side / 2]);
     }
-    // The stated noise is 0.5 %; the mean over the floor has less.
+    // The stated noise is 0.5 %. The mean over the floor has less.
     const double exact = 0.5 * 4 * parallelRectangles(1, 1, 1);
     EXPECT_NEAR(sum / area, exact, 0.01 * exact);
 }
@@ -118,8 +119,8 @@ INSTANTIATE_TEST_SUITE_P(Reconstructions, Translucence,
                                            Reconstruction::AREA_AVERAGE, Reconstruction::POINT),
                          [](const auto& one) { return std::string(choiceName(one.param)); });
 
-// What goes to and fro through a sheet between mirrors of light takes a thousand passes: right, or
-// said.
+// Light that passes back and forth through a sheet between highly reflecting walls takes a thousand
+// passes. The result must be right, or a warning must say that it is not.
 TEST(TranslucenceOfMaterials, LightThatDoesNotComeToRestIsSaid) {
     for (float rho : {0.6f, 0.9f, 0.99f, 0.999f}) {
         Scene scene = closedCube(rho, 1 - rho);
@@ -143,7 +144,7 @@ TEST(TranslucenceOfMaterials, EnergyIsBalanced) {
                 1e-3 * double(energy["emitted"]));
 }
 
-// Reflectance and translucence together must not make light.
+// Reflectance and translucence together must not create light.
 TEST(TranslucenceOfMaterials, TooMuchIsClamped) {
     Bake bake;
     bake.settings.patchSize = 0.2f;
@@ -152,7 +153,7 @@ TEST(TranslucenceOfMaterials, TooMuchIsClamped) {
     EXPECT_NEAR(inside, 0.199 * kWorld / 0.2, 0.01);
 }
 
-// As in the closed form above.
+// With the closed form of the paper cube, as above.
 TEST(TranslucenceOfMaterials, ACubeStaysExactBeyondTheMemoryLimit) {
     Bake bake;
     bake.settings.patchSize = 0.1f;
@@ -166,7 +167,7 @@ TEST(TranslucenceOfMaterials, ACubeStaysExactBeyondTheMemoryLimit) {
 TEST(TranslucenceOfMaterials, AnExtendedFirstShotGoesThroughToo) {
     Scene scene = paperCube(0.5f, 0.3f);
     scene.worldRadiance = glm::vec3(0.0f);
-    // Shines on five walls from within, and through them out; nothing comes back.
+    // The lamp inside lights the walls and shines out through them. No light returns from outside.
     scene.addLight(pointLight(glm::dvec3(0.5), glm::dvec3(1)));
     Bake bake;
     bake.settings.patchSize = 0.1f;
@@ -195,9 +196,9 @@ TEST(TranslucenceOfMaterials, AnImageVariesIt) {
     EXPECT_NEAR(bake.patchIrradiance().all(0).x, 0.6 * kWorld, 1e-3);
 }
 
-// Half of the light goes straight through: H_in = 0.5 kWorld + rho H_in + tau kWorld, for
-// reflectance and translucence are those of the whole. The noise in the mean over all walls is
-// below 1 %.
+// Half of the light passes straight through: H_in = 0.5 kWorld + rho H_in + tau kWorld, because
+// reflectance and translucence are those of the whole surface. The noise in the mean over all walls
+// is below 1 %.
 TEST(TranslucenceOfMaterials, ItIsThatOfTheWholeSurfaceHolesIncluded) {
     Scene scene = paperCube(0.2f, 0.2f);
     scene.materials[0].opacity = 0.5f;

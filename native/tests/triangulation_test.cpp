@@ -16,7 +16,8 @@ namespace {
 
 using namespace test;
 
-// Triangulates a polygon and checks count, area and that no triangle is turned over.
+// Triangulates a polygon and checks the number of triangles, the area, and that no triangle is
+// turned over.
 void expectGoodTriangulation(const std::vector<glm::dvec3>& points, const std::string& what) {
     const glm::dvec3 whole = vectorArea(points);
     glm::dvec3 sum(0.0);
@@ -70,7 +71,7 @@ TEST(Triangulation, RandomStarShapedPolygonsAreCutWithoutOverlaps) {
         for (int k = 0; k < n; ++k)
             points.push_back(radius(random) *
                              glm::dvec2(std::cos(2 * kPi * k / n), std::sin(2 * kPi * k / n)));
-        if (n == 3 || n == 4)  // too few for the centre to lie inside for certain
+        if (n == 3 || n == 4)  // too few points for the centre to lie inside with certainty
             for (glm::dvec2& p : points) p = glm::normalize(p);
         expectGoodTriangulation(tilted(points), "polygon " + std::to_string(round));
     }

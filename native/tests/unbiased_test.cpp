@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Every stochastic method is right in the mean: over many seeds, in a cube with its exact solution
-// and in a room with two boxes against line reuse on many bundles.
+// Every stochastic method is right in the mean over many seeds: in a cube with an exact solution,
+// and in a room with two boxes against line reuse with many bundles.
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
@@ -18,7 +18,8 @@ namespace {
 
 using namespace test;
 
-// Under sanitizers, which look for other faults, fewer: the tolerances are of the errors found.
+// Fewer bakes under sanitizers, which look for other faults. The tolerances follow from the
+// measured errors.
 #ifdef RAYBUNDLE_FEW_BAKES
 constexpr int kBakes = 20;
 #else
@@ -28,11 +29,12 @@ constexpr int kBakes = 200;
 struct Method {
     std::string name;
     std::vector<std::pair<std::string, std::string>> choices;
-    int bundles = 128;  // where a start-up bias of O(1 / bundles) is below the error of the mean
+    // Enough bundles for a start-up bias of O(1 / bundles) to be below the error of the mean.
+    int bundles = 128;
     int linesPerBundle = 0;
 };
 
-// How the name is printed by a failing test.
+// Prints the name in the message of a failing test.
 void PrintTo(const Method& method, std::ostream* out) { *out << method.name; }
 
 const Method kMethods[] = {
@@ -56,15 +58,15 @@ void setMethod(Bake& bake, const Method& method, float patchSize, int seed) {
     bake.settings.patchSize = patchSize;
     bake.settings.linesPerBundle = method.linesPerBundle;
     bake.settings.minBundles = bake.settings.maxBundles = method.bundles;
-    // Of the direct light. What GATHER leaves of it from seed to seed is far below the noise of the
-    // bundles; with 1e-4 it would take four fifths of the time.
+    // Target of the direct light. The differences of GATHER from seed to seed are far below the
+    // noise of the bundles. A target of 1e-4 would take four fifths of the time.
     bake.settings.targetError = 5e-3f;
     bake.settings.localRays = 4000;
-    bake.settings.threads = 1;  // seeds run side by side
+    bake.settings.threads = 1;  // the seeds run in parallel
     bake.settings.seed = seed;
 }
 
-// Mean irradiance of groups of front sides, of the first channel.
+// Returns the mean irradiance of groups of front sides, first channel, W/m^2.
 template <class GroupOf>
 std::vector<double> groupMeans(const Bake& bake, size_t groups, const GroupOf& groupOf) {
     std::vector<double> light(groups, 0), area(groups, 0);
@@ -79,7 +81,7 @@ std::vector<double> groupMeans(const Bake& bake, size_t groups, const GroupOf& g
     return light;
 }
 
-// Means over seeds of the mean irradiance of groups of sides, of the first channel.
+// Returns the means over the seeds of the mean irradiance of groups of sides, first channel, W/m^2.
 template <class GroupOf>
 std::vector<Statistics> meansOverSeeds(const Scene& scene, const Method& method, float patchSize,
                                        size_t groups, const GroupOf& groupOf) {
@@ -98,10 +100,10 @@ std::vector<Statistics> meansOverSeeds(const Scene& scene, const Method& method,
 
 class Unbiased : public testing::TestWithParam<Method> {};
 
-// Three standard errors: of a hundred such means one in four times one is further off by chance;
-// the seeds are fixed.
+// The tolerance is three standard errors. Of a hundred such means one exceeds it by chance in every
+// fourth series; the seeds are fixed.
 TEST_P(Unbiased, InACube) {
-    // One patch a face, of which the lowest emits 1.
+    // One patch per face. The lowest face emits 1 W/m^2.
     Scene scene = closedCube(0.5f);
     scene.mesh(0).faceMaterials[0] = scene.addMaterial(grey("lit", 0.5f, 1));
     const auto means = meansOverSeeds(
@@ -109,7 +111,8 @@ TEST_P(Unbiased, InACube) {
         [](const Patches& patches, uint32_t i) { return size_t(cubeFace(patches, i / 2)); });
     for (size_t face = 0; face < 3; ++face) {
         const double exact = (kCubeExitance[face] - (face == 0 ? 1 : 0)) / 0.5;
-        // The light straight from the lit face comes by quadrature of its closed form, to 0.05 %.
+        // The direct light of the emitting face comes from a quadrature of its closed form,
+        // accurate to 0.05 %.
         EXPECT_NEAR(means[face].mean(), exact, 3 * means[face].standardError() + 5e-4 * exact)
             << "face " << face;
     }
@@ -125,12 +128,12 @@ TEST_P(Unbiased, InARoomWithTwoBoxes) {
         Bake bake;
         setMethod(bake, {"", {{"directions", "LOW_DISCREPANCY"}}, 16384}, 0.8f, 999);
         bake.settings.targetError = 1e-4f;
-        bake.settings.contacts = 0;  // the same patches for all methods
+        bake.settings.contacts = 0;  // to have the same patches for all methods
         bake.run(scene);
         return groupMeans(bake, objects, objectOf);
     }();
     const auto means = meansOverSeeds(scene, GetParam(), 0.8f, objects, objectOf);
-    // The reference has 0.1 % noise, and its direct light 0.2 %.
+    // The reference has 0.1 % of noise, its direct light 0.2 %.
     for (size_t k = 0; k < objects; ++k)
         EXPECT_NEAR(means[k].mean(), exact[k], 3 * means[k].standardError() + 2e-3 * exact[k])
             << scene.instances[k].name;

@@ -36,8 +36,8 @@ TEST(Visibility, RaysOutOfTheRangeOfNumbersMeetNothingAndAreBlocked) {
         }
 }
 
-// From the floor of a room with a box in it, past the box or into it, and so short that nothing is
-// between: packets of each size give what single rays do, also with kernels for four rays
+// Rays from the floor of a room with a box: past the box, into the box, and so short that nothing
+// is between. Packets of each size give the results of single rays, also with kernels for four rays
 // (Visibility with RAYBUNDLE_EMBREE, in CMakeLists.txt).
 TEST(Visibility, PacketsOfAnySizeSeeWhatSingleRaysSee) {
     Scene scene;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The image of the world: its mapping, closed forms, samples, and that every first shot and every
-// transport gets the same light from it.
+// The image of the world: its mapping, closed forms and samples, and that every first shot and
+// every transport gets the same light from it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,10 +21,10 @@ namespace {
 
 using namespace test;
 
-// The target of 0.2 % is the standard error of a side; five times that is safe.
+// The target of 0.2 % is the standard error of a side. The tolerance is five times that.
 constexpr double kFiveErrors = 0.01;
 
-// As image, from radiance by direction, at the middle of each pixel.
+// Returns an image of a radiance by direction, evaluated at the centre of each pixel.
 WorldImage painted(int width, int height,
                    const std::function<glm::vec3(const glm::dvec3&)>& radiance) {
     WorldImage image{width, height, {}};
@@ -38,7 +38,7 @@ WorldImage painted(int width, int height,
     return image;
 }
 
-// A small bright disk in a sky that is brighter above, on dim ground.
+// A small bright disk in a sky that is brighter at the top, above dim ground.
 glm::vec3 sunAndSky(const glm::dvec3& w) {
     const glm::dvec3 sun = glm::normalize(glm::dvec3(1, -2, 1.5));
     if (glm::dot(w, sun) > std::cos(0.02)) return {3000, 2500, 2000};
@@ -49,13 +49,13 @@ const glm::vec3 kNormals[] = {{0, 0, 1},           {0, 0, -1},       {1, 0, 0},
                               {0.6f, 0, 0.8f},     {0, -0.8f, 0.6f}, {-0.48f, 0.6f, 0.64f},
                               {0.1f, 0.7f, -0.7f}, {0, 1, 0}};
 
-// Irradiance by the whole image on a surface with this normal.
+// Returns the irradiance by the whole image on a surface with this normal, W/m^2.
 glm::vec3 unblocked(const WorldSource& world, const glm::vec3& normal) {
     return *world.irradiance({0, 0, 0}, glm::normalize(normal));
 }
 
 TEST(WorldImage, HasTheMappingOfCycles) {
-    // Middle column: +X; three quarters: -Y; a quarter: +Y; the border: -X; top row: +Z.
+    // The middle column is +X, three quarters -Y, a quarter +Y, the border -X, the top row +Z.
     const struct {
         int x, y;
         glm::vec3 direction;
@@ -72,7 +72,7 @@ TEST(WorldImage, HasTheMappingOfCycles) {
         const WorldSource world(image);
         for (int k = 0; k < 16; ++k) {
             const glm::vec4 u((k % 4 + 0.5f) / 4, (k / 4 + 0.5f) / 4, 0.3f, 0.7f);
-            // A pixel spans 0.1 radians; the directions are those of corners of it.
+            // A pixel spans 0.1 radians. The directions are those of corners of the pixel.
             EXPECT_GT(glm::dot(world.sample({0, 0, 0}, place.direction, {u.x, u.y}).direction,
                                place.direction),
                       std::cos(0.15));
@@ -160,7 +160,7 @@ TEST(WorldImage, ABrightPixelIsASun) {
                     exact = other.shoot(FirstShotKind::GATHER, 0);
     for (size_t side = 0; side < exact.irradiance.size(); ++side)
         for (int c = 0; c < 3; ++c)
-            // The wall's shadow has a soft edge now, far from all receivers.
+            // The wall's shadow has a soft edge here, far from all receivers.
             ASSERT_NEAR(found.irradiance[side][c], exact.irradiance[side][c], 1e-3) << side;
 }
 
@@ -205,7 +205,8 @@ TEST(WorldImage, SamplesFollowTheProductOfLightAndCosine) {
         }
         const double variance = squares - mean * mean;
         EXPECT_NEAR(mean, exact, 4 * std::sqrt(variance / kCount) + 1e-4 * exact);
-        // What remains is that samples follow the sum of the channels, and the horizon's pixels.
+        // The remaining variance has two causes: samples follow the sum of the channels, and the
+        // pixels at the horizon.
         EXPECT_LT(variance, 0.06 * exact * exact) << normal.x << " " << normal.y << " " << normal.z;
         if (glm::dot(glm::dvec3(normal), glm::dvec3(1, -2, 1.5)) > 0.3) {
             EXPECT_LT(variance, 0.002 * (flat - exact * exact));
@@ -254,7 +255,7 @@ TEST(WorldImage, EveryFirstShotBringsTheSame) {
     }
 }
 
-// Mean light of the fronts of the house's corners.
+// Returns the mean of an output over the corners of the house, W/(m^2 sr).
 glm::dvec3 meanOf(const Bake& bake, rb_output output) {
     glm::dvec3 mean(0.0);
     const std::vector<glm::vec3> light = cornerLight(bake, 1, output);
@@ -298,7 +299,7 @@ TEST(WorldImage, EveryTransportCarriesItsLight) {
         bake.settings.directions = DirectionKind::RANDOM;
         bake.run(scene);
         const glm::dvec3 found = meanOf(bake, RB_OUTPUT_COMBINED);
-        // Most of the light is direct; the rest has up to 5 % of noise.
+        // Most of the light is direct. The rest has up to 5 % of noise.
         for (int c = 0; c < 3; ++c)
             EXPECT_NEAR(found[c], exact[c], 0.02 * exact[c]) << choiceName(solver);
         EXPECT_LT(reportOf(bake)["energy"]["balance_error"].get<double>(), 0.02)

@@ -7,8 +7,9 @@
 
 namespace {
 
-// An array, since there may be no memory for more when it is needed: glibc ends the process where
-// it cannot note the destructor of a thread_local string.
+// A plain array instead of a string, because memory may have run out when a message is stored:
+// glibc ends the process if it cannot allocate the record for the destructor of a thread_local
+// string.
 thread_local char lastMessage[2048];
 
 }  // namespace
@@ -17,7 +18,7 @@ namespace raybundle {
 
 rb_error fail(rb_error code, const char* message) noexcept {
     size_t length = std::min(std::strlen(message), sizeof(lastMessage) - 1);
-    // Not in the middle of a character of UTF-8.
+    // Do not cut inside a multi-byte character of UTF-8.
     while (length > 0 && (message[length] & 0xC0) == 0x80) --length;
     std::memcpy(lastMessage, message, length);
     lastMessage[length] = 0;
@@ -25,7 +26,8 @@ rb_error fail(rb_error code, const char* message) noexcept {
 }
 
 void makeRoomForMessage() noexcept {
-    // Of a library that is loaded later glibc allocates a thread's variables at their first use.
+    // glibc allocates the thread-local variables of a library that is loaded at run time when they
+    // are first used. This access allocates them early.
     volatile char& last = lastMessage[sizeof(lastMessage) - 1];
     last = 0;
 }
@@ -51,7 +53,7 @@ void need(const void* pointer, const char* name) {
 
 void needArray(const void* pointer, size_t count, const char* name) {
     if (count > 0) need(pointer, name);
-    // Indices into all arrays must fit 32 bits.
+    // Indices into all arrays must fit into 32 bits.
     if (count > size_t(INT32_MAX))
         throw invalidArgument(std::string(name) + " has too many elements");
 }

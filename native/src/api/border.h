@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What the extern "C" functions share: argument checks, copies, and the one place where exceptions
-// become codes and a message.
+// Shared parts of the extern "C" functions: argument checks, copies of arrays, and the only place
+// where exceptions become an error code and a message.
 #pragma once
 
 #include <cmath>
@@ -18,16 +18,18 @@
 
 namespace raybundle {
 
-// Keeps the message for rb_get_error_message of this thread, its first 2047 bytes, and returns the
-// code. Takes no memory, if makeRoomForMessage() was called in this thread.
+// Stores the first 2047 bytes of `message` as the message that rb_get_error_message returns to the
+// calling thread, and returns `code`. Allocates no memory if makeRoomForMessage() was called in
+// this thread.
 rb_error fail(rb_error code, const char* message) noexcept;
 void makeRoomForMessage() noexcept;
 
-// Throws Error(UNSUPPORTED_HARDWARE) on a processor that lacks what the library was compiled for,
-// where all else would end the process.
+// Throws Error(UNSUPPORTED_HARDWARE) if the processor lacks an instruction set that the library was
+// compiled for. Without this check the first such instruction would end the process.
 void needProcessor();
 
-// Runs the body of an API function; whatever it throws becomes a code and a message.
+// Runs the body of an API function and returns RB_ERROR_NONE. If the body throws, stores the
+// message and returns the error code.
 template <class Body>
 rb_error guarded(const Body& body) noexcept {
     makeRoomForMessage();
@@ -48,7 +50,8 @@ rb_error guarded(const Body& body) noexcept {
 
 using HeldScene = Held<rb_scene, Scene>;
 
-// Each throws Error(INVALID_ARGUMENT) that names the argument.
+// Each of these functions throws Error(INVALID_ARGUMENT) with the name of the argument if its check
+// fails.
 void need(const void* pointer, const char* name);
 void needArray(const void* pointer, size_t count, const char* name);
 void needCount(size_t given, size_t wanted, const char* what);
@@ -64,7 +67,8 @@ std::vector<V> vectors(const float* values, size_t count) {
     return result;
 }
 
-// The arrays of rb_add_mesh, copied; indices are checked later, by Scene::addMesh.
+// Copies the arrays of rb_add_mesh into a Mesh. Throws Error(INVALID_ARGUMENT) if an array is NULL
+// or too long. Scene::addMesh checks the indices.
 Mesh makeMesh(const char* name, const float* vertices, size_t vertexCount,
               const int32_t* cornerVertices, size_t cornerCount, const int32_t* faceOffsets,
               size_t faceCount);

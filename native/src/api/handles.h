@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What callers hold. A handle is a number that is never given twice and no address: one that was
-// released, is of another kind or was never given is told from one that is open, and a call finds
-// out that another one is not done with it.
+// Handles of the C interface. A handle is a number that is used only once, not an address. The
+// library can therefore detect a handle that was released, belongs to another kind or never
+// existed, and a second call on a handle whose first call is still running.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +16,10 @@
 
 namespace raybundle {
 
-// The handle after the last one that was given, of whatever kind.
+// Returns a new handle value. All kinds of handles share one counter.
 uintptr_t nextHandle();
 
-// The open handles (rb_scene, ...) of one kind and what each stands for.
+// The open handles of one kind (rb_scene, rb_bake, ...) and the value that each stands for.
 template <class Handle, class Value>
 class Handles {
   public:
@@ -31,11 +31,11 @@ class Handles {
         return handle;
     }
 
-    // Does nothing with a handle that is not open. One that a call is at work with goes when that
-    // call is done.
+    // Releases a handle. If a call is using the handle, its value is destroyed when that call ends.
+    // Does nothing if the handle is not open.
     static void release(Handle handle) noexcept {
         Handles& all = instance();
-        std::unique_ptr<Value> last;  // goes outside of the lock
+        std::unique_ptr<Value> last;  // destroyed after the lock is released
         const std::lock_guard lock(all.mutex);
         const auto slot = all.slots.find(handle);
         if (slot == all.slots.end()) return;
@@ -43,8 +43,9 @@ class Handles {
         if (!slot->second.isInUse) last = all.remove(slot);
     }
 
-    // Of Held. Throws INVALID_ARGUMENT for a handle that is not open, INVALID_OPERATION for one
-    // that is in use.
+    // Marks a handle as in use and returns its value. Called by Held only. Throws
+    // Error(INVALID_ARGUMENT) if the handle is not open and Error(INVALID_OPERATION) if another
+    // call is using it.
     static Value& take(Handle handle, const char* name) {
         if (!handle) throw invalidArgument(std::string(name) + " must not be NULL");
         Handles& all = instance();
@@ -74,8 +75,8 @@ class Handles {
     };
     using Slots = std::unordered_map<Handle, Slot>;
 
-    // Never destroyed: what the caller did not release must not go when the program ends, after
-    // what it is made of.
+    // The map is never destroyed. Values that the caller did not release would otherwise be
+    // destroyed at the end of the program, possibly after static objects that they depend on.
     static Handles& instance() {
         static Handles* const all = new Handles;
         return *all;
@@ -91,7 +92,7 @@ class Handles {
     Slots slots;
 };
 
-// What a handle stands for, for one call alone.
+// The value of a handle, reserved for one call. The destructor makes the handle available again.
 template <class Handle, class Value>
 class Held {
   public:

@@ -7,7 +7,8 @@ using namespace raybundle;
 
 namespace {
 
-// Reflectance and emission, which every caller knows.
+// Size of the oldest part of rb_surface: size, reflectance and emission, which every caller's
+// header has.
 constexpr size_t kLeastSize = offsetof(rb_surface, translucence);
 
 rb_surface defaultSurface() {
@@ -21,7 +22,8 @@ rb_surface defaultSurface() {
     return surface;
 }
 
-// object: what the message names.
+// Throws Error(INVALID_ARGUMENT) if the struct size is smaller than kLeastSize or larger than this
+// library's struct. `object` names the surface in the message.
 void needSurfaceSize(size_t size, const std::string& object) {
     const std::string given = object + " has a size of " + std::to_string(size) + " bytes";
     if (size < kLeastSize) throw invalidArgument(given + ": rb_init_surface sets it");
@@ -30,11 +32,11 @@ void needSurfaceSize(size_t size, const std::string& object) {
                               " that this library knows: the caller needs a newer one");
 }
 
-// One side of a material out of the struct of the caller, checked but for what Scene::addMaterial
-// checks.
+// Reads one side of a material from the caller's struct. Checks everything that Scene::addMaterial
+// does not check.
 class SideReader {
   public:
-    // object: the material, as messages name it; side: "front" or "back".
+    // `object` names the material in messages; `side` is "front" or "back".
     SideReader(const std::string& object, const std::string& side, const rb_surface* given)
         : object(object), side(side), surface(defaultSurface()) {
         need(given, side.c_str());
@@ -92,7 +94,7 @@ class SideReader {
         return value;
     }
 
-    // The value of an enumeration, 0 to last.
+    // Returns `value` if it lies between 0 and `last`; throws Error(INVALID_ARGUMENT) if not.
     template <class Enum>
     Enum kind(Enum value, Enum last, const char* what) const {
         if (int(value) < 0 || int(value) > int(last))

@@ -47,7 +47,8 @@ rb_error rb_add_mesh(rb_scene scene, const char* name, const float* vertices, si
 
 namespace {
 
-// Copies a value per corner to a mesh. argument, what: the array and a number of it in messages.
+// Copies one value per corner to a mesh. In messages `argument` names the array and `what` one of
+// its numbers.
 template <class V>
 rb_error setCornerValues(rb_scene scene, int32_t mesh, const float* values, size_t count,
                          const char* argument, const char* what, std::vector<V> Mesh::*target) {
@@ -224,7 +225,7 @@ rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread) {
         Light& target = held->light(light);
         if (target.kind != Light::Kind::AREA)
             throw invalidArgument("light \"" + target.name + "\" is not an area light");
-        // In float pi may come out a little larger.
+        // The caller's float value of pi may be rounded up.
         if (!(spread >= 0 && spread <= glm::pi<float>() * 1.000001f))
             throw invalidArgument("light \"" + target.name + "\": spread out of range");
         target.spread = double(spread);

@@ -8,7 +8,7 @@ using namespace raybundle;
 
 namespace {
 
-// Names and help of the values of a choice, as arrays of C.
+// Names and help texts of the values of a choice, as C arrays.
 template <class Choice>
 struct ChoiceTexts {
     static constexpr size_t count = std::size(rowsOf(Choice{}));

@@ -18,7 +18,7 @@ rb_error rb_new_subdivision(const float* vertices, size_t vertex_count,
     return guarded([&] {
         need(subdivision, "subdivision");
         if (!(max_edge > 0)) throw invalidArgument("max_edge must be positive");
-        // A scene checks the mesh as it checks every other.
+        // Scene::addMesh checks the mesh.
         Scene scene;
         const int32_t mesh = scene.addMesh(makeMesh("", vertices, vertex_count, corner_vertices,
                                                     corner_count, face_offsets, face_count));

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// If the source does not know the mean of its closed form over a patch, that is found by Gauss
-// quadrature (degree 3 on a parallelogram, 2 on a triangle), on more parts of the patch where it
-// varies much: beside a source it falls from a finite value at the common edge with an infinite
-// slope.
+// Mean of a closed form over a patch. If the source cannot compute this mean itself, Gauss
+// quadrature does (degree 3 on a parallelogram, 2 on a triangle). The patch is divided into more
+// parts if the closed form varies much over it: beside a source the irradiance falls from a finite
+// value at the common edge with an infinite slope.
 #include "direct_light/closed_mean.h"
 
 #include "patches/patches.h"
@@ -12,19 +12,22 @@
 namespace raybundle {
 namespace {
 
-// A closed form whose largest value is so many times its smallest on a patch takes more points.
+// If the ratio of the largest and the smallest value of the closed form on a patch exceeds this,
+// more points are used.
 constexpr float kSmooth = 1.1f;
 
-// At the points of a quadrature.
+// The mean and the extremes of the closed form at the points of a quadrature, W/m^2.
 struct Quadrature {
     glm::vec3 mean{0.0f};
     glm::vec3 low{INFINITY}, high{0.0f};
 };
 
-// The patch is cut into parts * parts.
+// Evaluates the quadrature on the patch divided into parts * parts. Returns nothing if the source
+// has no closed form.
 std::optional<Quadrature> quadrature(const LightSource& source, const ReceiverPlace& place,
                                      int parts) {
-    // The patch cut into parts is like a parent with that grid.
+    // Parent::pointOn finds the points of a regular grid, so the parts are described as the tiles
+    // of a parent.
     Parent grid;
     grid.isTriangle = place.isTriangle;
     grid.countA = grid.countB = uint16_t(parts);
@@ -62,13 +65,14 @@ std::optional<ClosedMean> closedMean(const LightSource& source, const ReceiverPl
     if (const auto mean = source.meanIrradiance(place)) return exact(mean);
     const auto coarse = quadrature(source, place, 1);
     if (!coarse) return std::nullopt;
-    // The points of the quadrature alone may be alike by symmetry.
+    // By symmetry the points of the quadrature alone may have equal values.
     const auto middle = source.irradiance(place.centroid(), place.normal);
     if (brightest(glm::max(coarse->high, *middle)) <=
         kSmooth * brightest(glm::min(coarse->low, *middle)))
         return exact(coarse->mean);
     const auto fine = quadrature(source, place, 4);
-    // The error falls with the square of the parts, or at a kink with their number.
+    // The error falls with the square of the number of parts along an edge, or at a kink with this
+    // number.
     const float error = brightest(glm::abs(fine->mean - coarse->mean)) / 4;
     if (error <= tolerance) return ClosedMean{fine->mean, error};
     const auto finest = quadrature(source, place, 16);

@@ -9,14 +9,15 @@
 
 namespace raybundle {
 
-// An irradiance, W/m^2, and about how far its brightest channel may be off.
+// An irradiance, W/m^2, and the estimated error of its brightest channel, W/m^2.
 struct ClosedMean {
     glm::vec3 irradiance{0.0f};
     float error = 0;
 };
 
-// What a receiver gets of a source without occluders, in the mean over its patch, by the source's
-// closed form; nothing where the source has none. tolerance: an error that is small enough, W/m^2.
+// Returns the irradiance that a receiver gets from a source without occluders, as the mean over its
+// patch, computed from the source's closed form. Returns nothing if the source has no closed form.
+// `tolerance` is the acceptable error, W/m^2.
 std::optional<ClosedMean> closedMean(const LightSource& source, const ReceiverPlace& place,
                                      float tolerance);
 

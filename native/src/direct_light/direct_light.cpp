@@ -16,18 +16,23 @@
 namespace raybundle {
 namespace {
 
-// Of light that was scaled: a squared relative error that has grown by less than this is as it was.
+// Scaled light is gathered again only if its squared relative error has grown by more than this
+// factor.
 constexpr float kSameError = 1.1f;
-// Receivers that learn together what they see of such a source: at first, and then by more samples.
+// Receivers per cluster that share an outlook on a surrounding source: in the first round, made
+// from the coarse pass, and in the second round, made from more samples.
 constexpr size_t kWideCluster = 128, kNearCluster = 16;
 constexpr float kNearPower = 0.9f;
-// Of more receivers than this what they see is not kept: 130 bytes each, and 2 kB a cluster.
+// Largest number of receivers for which sightings are stored: 130 bytes per receiver and 2 kB per
+// cluster.
 constexpr size_t kMostLookingAround = 1 << 19;
-// What finds a shadow's edge may have neighbours that have missed it too: so many times at most.
+// Largest number of passes. A receiver that finds the edge of a shadow may have neighbours that
+// have missed it too, so each pass may cause another one.
 constexpr int kMostPasses = 16;
-// Points of a source by which its light at the corners of a face is compared: the same for all.
+// Samples per source for comparing its light at the corners of a face. All corners use the same
+// samples.
 constexpr uint32_t kSlopeSamples = 32;
-// For the power balance: rays of all sources together, and of each at least.
+// Rays for the power balance: of all sources together, and of each source at least.
 constexpr uint32_t kPowerRays = 16384, kLeastPowerRays = 1024;
 
 bool showAnyByAngle(const Scene& scene) {
@@ -67,7 +72,8 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const Aims& these,
                               const std::function<Receiver(size_t)>& receiverAt, Seen& seen,
                               const std::function<void(double)>& progress, LightBySource* bySource,
                               std::vector<Sightings>* sightings) const {
-    constexpr size_t kSlice = 1 << 14;  // receivers between two looks at the cancel flag
+    // Receivers between two calls of `progress`, which may cancel.
+    constexpr size_t kSlice = 1 << 14;
     const size_t count = these.receivers.size();
     for (size_t from = 0; from < count; from += kSlice) {
         progress(0.5 * double(from) / double(count));
@@ -124,12 +130,12 @@ std::vector<Gathered> DirectLight::gather(
 
     Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
     const auto outlooks = lookAround(further, results, receiverAt, std::move(sightings));
-    std::vector<Aim> last(neighbours.empty() ? 0 : count);  // of each receiver
+    std::vector<Aim> last(neighbours.empty() ? 0 : count);  // per receiver
     for (int pass = 0; pass < kMostPasses && !further.receivers.empty(); ++pass) {
         gatherThese(
             results, further, receiverAt, seen,
             [&](double done) { progress(pass == 0 ? 0.5 + done : 1.0); }, bySource, nullptr);
-        if (neighbours.empty()) break;  // nobody tells of the edge of a shadow
+        if (neighbours.empty()) break;  // only neighbours can reveal a missed edge of a shadow
         for (size_t k = 0; k < further.receivers.size(); ++k)
             last[further.receivers[k]] = further.aims[k];
         further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
@@ -186,7 +192,8 @@ std::vector<Gathered> DirectLight::scale(const LightBySource& before,
     std::vector<Gathered> results = before.scaled(matches, [&](size_t source, size_t receiver) {
         return isUnpowered(source, receiverAt(receiver).side);
     });
-    // Those that took as many samples as they may did so before.
+    // Receivers that already took as many samples as allowed also have a large error. A further
+    // pass would not reduce it, so the error is compared with the one before.
     const std::vector<Gathered> then = before.asItWas();
     Aims further = aimsAfter(results, patches, receiverAt, {}, targetError);
     further.keep([&](uint32_t k, const Aim&) {
@@ -231,7 +238,8 @@ void DirectLight::unblocked(uint32_t side, const glm::vec3* points, size_t count
                             glm::vec3* light) const {
     const ReceiverPlace place(patches, {side, patches.normal(side), std::nullopt, side});
     std::fill(light, light + count, glm::vec3(0.0f));
-    // The same for all sources, so that sets of them get the same in one bake and in several.
+    // All sources use the same samples, so that several light sets give the same values in one bake
+    // and in separate bakes.
     const SobolPoints samples(hash(seed, side));
     for (const auto& source : sources) {
         if (isOutOfSight(*source, place)) continue;
@@ -274,8 +282,9 @@ std::vector<PowerShares> DirectLight::powerShares() const {
         parallelFor(tbb::blocked_range<uint32_t>(0, rays, 256), [&](const auto& range) {
             for (uint32_t i = range.begin(); i < range.end(); ++i) {
                 glm::vec4 u = points[i];
-                // Of a mesh of 2^n faces all points could lie alike in their faces' shares, as on
-                // their fronts alone.
+                // In a mesh of 2^n faces every Sobol point could lie at the same place of its
+                // face's share of the power, for example on the fronts alone. A random shift within
+                // the step prevents that.
                 u.x = std::min(glm::fract(u.x + float(hash(own, i)) * 0x1p-32f / float(rays)),
                                0.9999999f);
                 const EmittedRay ray = sources[k]->emit(u, patches.radius);

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Light straight from the sources, seen from receivers: patch sides, or points on them. Each
-// gathers the light of each source with stratified shadow rays; where the source has a closed form
-// without occluders, the rays only estimate the share that is visible, so that fully lit and fully
-// dark receivers have no noise.
+// Direct light: the irradiance that receivers (patch sides, or points on them) get straight from
+// the light sources. Each receiver samples each source with stratified shadow rays. If the source
+// has a closed form of the irradiance without occluders, the rays estimate only the visible share
+// of the source. Fully lit and fully dark receivers then have no noise.
 //
 // Sources: Szecsi, Sbert and Szirmay-Kalos, "Combined Correlated and Importance Sampling in Direct
-// Light Source Computation" (2004) for the closed form as a control.
+// Light Source Computation" (2004) for the closed form as a control variate.
 // Differs:
 // - Emission that bundles carry without much noise is no source here
 //   (direct_light/emission_split.h).
-// - Each light set has a DirectLight of its own, which knows nothing of the others: its light is
-//   what a scene with no other lights would have, sample for sample.
+// - Each light set has its own DirectLight, which is independent of the other sets. The light of a
+//   set is the same, sample for sample, as in a scene without other lights.
 #pragma once
 
 #include <array>
@@ -36,59 +36,66 @@
 
 namespace raybundle {
 
-// The light of few samples at each receiver.
+// The result of the coarse pass of a first shot, with few samples at each receiver.
 struct CoarseShot {
-    std::vector<Gathered> gathered;
-    std::vector<bool> seen;  // per source: whether any receiver got its light
-    double bundled = 0;      // about the irradiance that emission left to the bundles makes, W/m^2
+    std::vector<Gathered> gathered;  // per receiver
+    std::vector<bool> seen;          // per source: whether it lights any receiver
+    double bundled = 0;              // estimated irradiance by emission left to the bundles, W/m^2
 };
 
 struct ReceiverPlace;
 
 class DirectLight {
   public:
-    // The light of a set, or what belongs to none. Everything passed must outlive the object.
+    // Prepares the sources of one light set, or with kNoLightSet the sources that belong to no set.
+    // All arguments must outlive the object.
     DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                 uint32_t seed, int32_t lightSet = kNoLightSet, const Skips& skips = {});
 
-    // The light of surfaces that shine by what they reflect: of the sides that are sources in
-    // `reflected`.
+    // Prepares reflecting surfaces as sources: the sides that `reflected` marks as sources emit
+    // what it lists as gathered.
     DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                 uint32_t seed, const Skips& skips, EmissionSplit reflected);
 
-    // Per side: all emission of the set, W/m^2.
+    // Returns the emission of the light set per side, W/m^2.
     const std::vector<glm::vec3>& emission() const { return split->emitted; }
-    // Of emission that is left out, for nobody ever sees it: sides, and power, W.
+    // Return the number of sides, and their power in W, whose emission is left out because no
+    // surface can receive it.
     size_t unseenSides() const { return split->unseen; }
     const glm::dvec3& unseenPower() const { return split->unseenPower; }
 
-    // Per side: emission that is no source here, for the bundles to carry, W/m^2.
+    // Returns the emission per side that is no source here and is left to the bundles, W/m^2.
     const std::vector<glm::vec3>& bundledEmission() const { return split->bundled; }
     const std::vector<std::unique_ptr<LightSource>>& lightSources() const { return sources; }
 
-    // Gathers at `count` receivers to about `targetError` relative standard error each: all
-    // coarsely first, then those again whose error is too large beside the mean light.
-    // Of a source that surrounds them (direct_light/outlook.h) they then sample what is seen there.
-    // `progress` gets the share that is done. coarse: what is known of all receivers, or empty.
-    // neighbours: of receivers that have any half as many samples do at first, and those whose
-    // neighbours disagree with them about a shadow take more. bySource: gets what came from each
-    // source; null, or of `count` receivers, all of which are gathered here.
+    // Gathers the light at `count` receivers with a relative standard error of about `targetError`
+    // each. A coarse pass samples all receivers. Further passes sample those whose error is too
+    // large compared with the mean light. If a source surrounds the receivers, further samples are
+    // concentrated on its visible parts (direct_light/outlook.h).
+    //   progress    receives the finished share, 0 to 1
+    //   coarse      result of the coarse pass at all receivers, or empty to compute it here
+    //   neighbours  pairs of receivers beside each other. A receiver with a neighbour starts with
+    //               half the samples and gets more if its neighbours disagree with it about a
+    //               shadow.
+    //   bySource    receives the light of each source; null, or sized for `count` receivers. It is
+    //               complete only if `coarse` is empty.
     std::vector<Gathered> gather(size_t count, const std::function<Receiver(size_t)>& receiverAt,
                                  float targetError, const std::function<void(double)>& progress,
                                  CoarseShot coarse = {},
                                  const std::vector<ReceiverPair>& neighbours = {},
                                  LightBySource* bySource = nullptr) const;
 
-    // The same by what each source gave with other strengths: only the receivers whose error is too
-    // large beside the light as it is now gather again. matches: of `before` with these sources.
+    // Computes the light of sources whose strengths alone have changed, from the light that each
+    // source gave before. Only receivers whose error is too large compared with the present light
+    // are sampled again. `matches` assigns the sources of `before` to the present ones.
     std::vector<Gathered> scale(const LightBySource& before,
                                 const std::vector<LightBySource::Match>& matches,
                                 const std::function<Receiver(size_t)>& receiverAt,
                                 float targetError,
                                 const std::function<void(double)>& progress) const;
 
-    // The first, coarse pass of that, to begin with: gathers at `these` receivers. neighbours: as
-    // above. sightings: per receiver, to be filled; or null.
+    // Runs the coarse pass of gather() at the receivers `these`. See gather() for `neighbours` and
+    // `bySource`. `sightings`, per receiver, receives where the samples went; may be null.
     void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                        const std::function<Receiver(size_t)>& receiverAt,
                        const std::function<void(double)>& progress,
@@ -96,43 +103,51 @@ class DirectLight {
                        LightBySource* bySource = nullptr,
                        std::vector<Sightings>* sightings = nullptr) const;
 
-    // An unbiased estimate at a point by one sample of each source, W/m^2; index: of the sample.
+    // Returns an unbiased estimate of the irradiance at a receiver from one sample of each source,
+    // W/m^2. `index` is the index of the sample.
     glm::vec3 sample(const Receiver& receiver, uint32_t index) const;
 
-    // What `count` points on a patch side get without occluders, W/m^2: of a source so far away
-    // that it changes by less than a share `even` over the patch, that at its middle.
+    // Computes the irradiance that `count` points on a patch side get if nothing blocks the light,
+    // W/m^2. If a source is so far away that its light changes by less than a share `even` over the
+    // patch, the value at the centre of the patch is used for all points.
     void unblocked(uint32_t side, const glm::vec3* points, size_t count, float even,
                    glm::vec3* light) const;
 
-    // Whether lines that end at the first surface leave out some of the light of a side's sources.
+    // Returns whether the sources give a side light that lines ending at the first surface would
+    // miss, because a source casts no shadow or the side's own instance does not stop direct light.
     bool hasPassingLight(uint32_t side) const;
 
-    // Of each source; 0 where it has no power.
+    // Estimates by rays from each source which share of its power escapes and which is covered. The
+    // shares of a source without power of its own are 0.
     std::vector<PowerShares> powerShares() const;
 
   private:
     class SourceGather;
-    // Without sources.
+    // Creates the object without sources.
     DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                 uint32_t seed, const Skips& skips, std::unique_ptr<const EmissionSplit> split);
 
-    using Seen = std::vector<std::atomic<bool>>;  // per source: whether any receiver got its light
+    using Seen = std::vector<std::atomic<bool>>;  // per source: whether it lights any receiver
 
     void gatherThese(std::vector<Gathered>& results, const Aims& these,
                      const std::function<Receiver(size_t)>& receiverAt, Seen& seen,
                      const std::function<void(double)>& progress, LightBySource* bySource,
                      std::vector<Sightings>* sightings) const;
-    // parts: per source, to be filled; or null. sightings: likewise, of the source with parts.
+    // Gathers at one receiver. `parts`, per source, receives the light of each; may be null.
+    // `sightings` receives where the samples of the source with parts went; may be null.
     Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,
                     Sightings* sightings) const;
-    // Counts what it does in `sum`.
+    // Gathers from one source. Adds the counts of rays and skipped sources to `sum`.
     LightPart gatherFrom(size_t source, const Receiver& receiver, const ReceiverPlace& place,
                          const Aim& aim, Seen& seen, Sightings* sightings, Gathered& sum) const;
-    // Whether the light that a side gets from a source comes on top of the source's power.
+    // Returns whether the light that a side gets from a source is not covered by the source's
+    // power.
     bool isUnpowered(size_t source, uint32_t side) const;
-    const LightSource* surrounding() const;  // the source that has parts, if there is one
-    // Gives the aims of receivers that see little of it their outlooks, which are returned: from
-    // the sightings of all of them, and then from samples by these. Counts the rays in `results`.
+    // Returns the source that surrounds the receivers and has parts; null if there is none.
+    const LightSource* surrounding() const;
+    // Sets the outlooks of receivers that see little of the surrounding source, and returns the
+    // outlooks, which the aims point to. The first outlooks are made from the sightings of the
+    // coarse pass, the second from more samples that follow the first. Adds the rays to `results`.
     std::array<Outlooks, 2> lookAround(Aims& further, std::vector<Gathered>& results,
                                        const std::function<Receiver(size_t)>& receiverAt,
                                        std::vector<Sightings> sightings) const;
@@ -140,8 +155,9 @@ class DirectLight {
               Sightings& sightings, Gathered& sum) const;
     std::vector<float> unblockedWeights(const ReceiverPlace& place) const;
     bool isOutOfSight(const LightSource& source, const ReceiverPlace& place) const;
-    // By a side and the means of the angleTerms of its light: what is shown of more of each term,
-    // by channel, over all that is shown.
+    // Returns, per angle term and channel, how much more of the light a side shows if a term is
+    // larger, relative to all light that it shows. `angles` holds the means of the angleTerms of
+    // its light.
     AngleFactors shownByAngle(uint32_t side, const glm::vec4& angles) const;
 
     const Scene& scene;
@@ -149,8 +165,8 @@ class DirectLight {
     const Visibility& visibility;
     const uint32_t seed;
     const Skips skips;
-    bool showsByAngle;                           // whether any material does
-    std::unique_ptr<const EmissionSplit> split;  // sources refer to it
+    bool showsByAngle;                           // whether any material shows light by its angle
+    std::unique_ptr<const EmissionSplit> split;  // the sources refer to it
     std::vector<std::unique_ptr<LightSource>> sources;
 };
 

@@ -17,10 +17,12 @@ namespace {
 
 // Emission up to this many times the mean exitance that lines meet is left to the bundles.
 constexpr double kBundledEmission = 1.5;
-// Paths by which the light that leaves the scene is estimated: a share of one half to 2 % of all.
+// Number of paths that estimate the light leaving the scene. The standard error of a share of one
+// half is 2 % of all light.
 constexpr uint32_t kPaths = 512;
 
-// The light of a set, as a mean over an island's surfaces, W/m^2. Only orders of magnitude matter.
+// The light of a set, as a mean over the surfaces of an island, W/m^2. Only its order of magnitude
+// matters.
 struct MeanLight {
     double area = 0;     // m^2
     double emitted = 0;  // by surfaces
@@ -28,15 +30,15 @@ struct MeanLight {
     double sky = 0;
     double reflectance = 0;
 
-    // Exitance that lines meet, all bounces included; met: the share of lines from a surface that
-    // meet another one, and not the sky.
+    // Returns the exitance that lines meet, all bounces included. `met` is the share of lines from
+    // a surface that meet another surface and not the sky.
     double exitance(double met) const {
         return (met * (emitted + lamps) + (1 - met) * sky) / std::max(0.05, 1 - met * reflectance);
     }
     double mostExitance() const { return exitance(1) + sky / std::max(0.05, 1 - reflectance); }
 };
 
-// The island that a lamp lies in or nearest to.
+// Returns the island that contains a lamp or is nearest to it.
 size_t islandNear(const Patches& patches, const glm::dvec3& position) {
     auto distance = [&](const Island& island) {
         return glm::distance(glm::dvec3(island.centre), position - patches.centre) -
@@ -48,7 +50,8 @@ size_t islandNear(const Patches& patches, const glm::dvec3& position) {
     return size_t(nearest - patches.islands.begin());
 }
 
-// Per island: what is bright far away does not make dim what is near.
+// Returns the mean light of each island. It is computed per island so that bright distant light
+// does not make nearby emission count as dim.
 std::vector<MeanLight> meanLights(const Scene& scene, const Patches& patches,
                                   const std::vector<glm::vec3>& emission, int32_t lightSet) {
     std::vector<MeanLight> means(patches.islands.size());
@@ -94,20 +97,24 @@ std::vector<MeanLight> meanLights(const Scene& scene, const Patches& patches,
     return means;
 }
 
-// Share of lines from the surfaces that an island's emission lights which meet a surface.
+// Returns the share of lines that meet a surface, among lines from the surfaces that the island's
+// emission lights.
 double metShare(const Patches& patches, const Visibility& visibility,
                 const std::vector<glm::vec3>& emission, uint32_t island, double power,
                 uint32_t seed) {
-    // From the middle of a side: where it starts matters less than that there are few paths.
+    // The path starts at the centroid of the side. With few paths the start point on the side
+    // matters little.
     auto nextHit = [&](uint32_t side, glm::vec2 u) {
         return visibility.firstHit(side, patches.point(side / 2, glm::vec2(1 / 3.0f)),
                                    cosineDirection(patches.normal(side), u));
     };
-    // Sides are in an order, fronts and backs in turns, and so are the points of Sobol's sequence:
-    // equal steps through either could meet fronts alone. A path starts anywhere in its step.
+    // Front and back sides alternate, and Sobol points have a similar regularity: equal steps
+    // through either could select fronts alone. Therefore a path starts at a random position within
+    // its step.
     std::mt19937_64 random(seed);
     uint32_t lit = 0, met = 0, path = 0;
-    double sum = 0, start = uniform(random);  // of all, and of the next path: power / kPaths
+    // Running sum over the sides, and start of the next path, in units of power / kPaths.
+    double sum = 0, start = uniform(random);
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
         throwIfCancelledAt(side);
         if (patches.parentAt(side).island != island) continue;
@@ -148,9 +155,9 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
         }
     }
     const std::vector<MeanLight> means = meanLights(scene, patches, split.emitted, lightSet);
-    std::vector<double> limits;  // per island
+    std::vector<double> limits;  // largest emission left to the bundles, per island
     for (const MeanLight& mean : means) limits.push_back(kBundledEmission * mean.mostExitance());
-    std::vector<bool> isNear(limits.size(), false);  // whether the share of the sky may matter
+    std::vector<bool> isNear(limits.size(), false);  // whether the share of the sky may decide
     for (uint32_t side = 0; side < sides; ++side) {
         throwIfCancelledAt(side);
         const uint32_t island = patches.parentAt(side).island;

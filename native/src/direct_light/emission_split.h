@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Which emission is a source of the first shot, and which is left to the bundles. A line brings the
-// exitance of the surface that it meets: what is not much brighter than the mean of all that lines
-// meet, the darkness beyond an open scene included, adds little noise, and a furnace stays exact.
+// Decides which emission is a source of the first shot and which is left to the bundles. A global
+// line carries the exitance of the surface that it meets. Emission that is not much brighter than
+// the mean of all that lines meet, the darkness outside an open scene included, adds little noise
+// there. Leaving it to the bundles keeps a furnace exact.
 #pragma once
 
 #include <cstdint>
@@ -18,19 +19,21 @@
 
 namespace raybundle {
 
-// Per side, W/m^2.
+// The emission of a light set, per side, W/m^2.
 struct EmissionSplit {
-    std::vector<glm::vec3> emitted;   // all of the light set
-    std::vector<glm::vec3> gathered;  // of sources, of the whole patch
-    std::vector<glm::vec3> bundled;
-    std::vector<bool> isSource;
-    // What sides send towards a direction more than `gathered`, or less; null: nothing.
+    std::vector<glm::vec3> emitted;   // all emission of the light set
+    std::vector<glm::vec3> gathered;  // emission of the sources, for the whole patch area
+    std::vector<glm::vec3> bundled;   // emission that is left to the bundles
+    std::vector<bool> isSource;       // whether the side's emission is gathered
+    // The difference of what sides send towards a direction from `gathered`; null if there is none.
     std::shared_ptr<const DirectedEmission> directed{};
-    // Emission that nobody ever sees is in none of these: its sides, and its power, W.
+    // Number of sides whose emission no surface can receive, and their power, W. The members above
+    // leave this emission out.
     size_t unseen = 0;
     glm::dvec3 unseenPower{0.0};
 };
 
+// Splits the emission of a light set between the first shot and the bundles.
 EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
                             const Visibility& visibility, int32_t lightSet, uint32_t seed,
                             const Skips& skips = {});

@@ -7,7 +7,7 @@ namespace raybundle {
 namespace {
 
 constexpr size_t kMostParts = size_t(1) << 21;  // 104 MB
-// A source whose share of the light becomes so many times what it was would have got more samples.
+// A source whose share of the light has grown by more than this factor would have got more samples.
 constexpr double kMostGrowth = 2;
 
 }  // namespace
@@ -25,7 +25,7 @@ LightBySource::LightBySource(const std::vector<std::unique_ptr<LightSource>>& so
 std::optional<std::vector<LightBySource::Match>> LightBySource::match(
     const std::vector<std::unique_ptr<LightSource>>& now) const {
     if (!isWhole) return std::nullopt;
-    // Each is the first that is like it and not taken.
+    // Each present source is matched with the first free source of equal shape.
     std::vector<Match> matches(shapes.size());
     for (size_t source = 0; source < now.size(); ++source) {
         size_t k = 0;
@@ -40,7 +40,7 @@ std::optional<std::vector<LightBySource::Match>> LightBySource::match(
         }
     }
 
-    // Light of the brightest channel, per source.
+    // Sum over the receivers of the light in the brightest channel, per source.
     std::vector<double> before(matches.size(), 0.0), after(before);
     for (size_t i = 0; i < parts.size(); ++i) {
         const size_t k = i % matches.size();

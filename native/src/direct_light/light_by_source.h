@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What each receiver got from each source. Light is linear in the strengths of its sources: where
-// nothing else changed since the last bake, what a source brought is scaled and not shot again.
+// The light that each receiver got from each source. Light is proportional to the strength of its
+// source. If only strengths changed since the last bake, the light of each source is scaled instead
+// of gathered again.
 //
-// What differs from shooting again: each source has the samples that it needed beside the others
-// as they were. Receivers that need more of them now are found by their error and shot again, for
-// this bake alone; all are where a source has become much more of the light.
+// The number of samples of a source was chosen for the old strengths. Receivers that need more
+// samples with the new strengths are recognised by their error and gathered again, for this bake
+// only. All receivers are gathered again if a source has become a much larger part of the light.
 #pragma once
 
 #include <cstddef>
@@ -20,33 +21,34 @@
 
 namespace raybundle {
 
+// The light of each source at each receiver, kept for relighting.
 class LightBySource {
   public:
-    // At so many receivers; has room for none of it if that would take too much memory.
+    // Reserves memory for `receivers` receivers, or none if that would take too much.
     LightBySource(const std::vector<std::unique_ptr<LightSource>>& sources, size_t receivers);
 
     bool hasRoom() const { return !parts.empty(); }
-    // Of a receiver: an entry a source.
+    // Returns the light of one receiver: one entry per source.
     LightPart* of(size_t receiver) { return parts.data() + receiver * magnitudes.size(); }
 
-    // See DirectLight; in the order of the sources that it was made of.
+    // The result of DirectLight::powerShares, per source in the order of the constructor.
     std::vector<PowerShares> powerShares;
-    // Whether all of it was filled in.
+    // Whether all entries have been filled.
     bool isWhole = false;
 
-    // What has become of a source: which one it is now, and how many times as strong. One that is
-    // gone is dark.
+    // What has become of a source: its index among the present sources, and how many times as
+    // strong it is. Without an index the source is gone and gives no light.
     struct Match {
         std::optional<size_t> source;
         glm::vec3 factor{0.0f};
     };
-    // Of each source; none if anything but strengths differs, or if one has become much more of the
-    // light.
+    // Returns the match of each source. Returns nothing if the sources differ by more than their
+    // strengths, or if a source has become a much larger part of the light.
     std::optional<std::vector<Match>> match(
         const std::vector<std::unique_ptr<LightSource>>& now) const;
 
-    // The light at all receivers. isUnpowered(source, receiver), of sources as they are now: see
-    // Gathered.
+    // Returns the light at all receivers with the present strengths. isUnpowered(source, receiver)
+    // takes the index of a present source; see Gathered::unpowered.
     template <class IsUnpowered>
     std::vector<Gathered> scaled(const std::vector<Match>& matches,
                                  const IsUnpowered& isUnpowered) const {
@@ -62,13 +64,13 @@ class LightBySource {
         return results;
     }
 
-    // Per receiver: all its light as it was, and the variance of that.
+    // Returns the light of each receiver with the old strengths, and its variance.
     std::vector<Gathered> asItWas() const;
 
   private:
     std::vector<uint64_t> shapes;       // per source
-    std::vector<glm::vec3> magnitudes;  // the same
-    std::vector<LightPart> parts;       // receiver by receiver, source by source
+    std::vector<glm::vec3> magnitudes;  // per source
+    std::vector<LightPart> parts;       // entry receiver * (number of sources) + source
 };
 
 }  // namespace raybundle

@@ -11,19 +11,20 @@
 namespace raybundle {
 namespace {
 
-// A step of the normal counts in a cluster's extent as so much of the scene's radius: receivers in
-// a corner of a room see different parts.
+// Weight of the normal in the extent of a cluster, as a length relative to the radius of the
+// island: near the corner of a room receivers with different normals see different parts.
 constexpr float kNormalExtent = 0.5f;
-// What the receivers in a larger cluster around see counts as so many samples of each part.
+// Weight of the visible share of the enclosing larger cluster, in samples per part.
 constexpr float kPriorSamples = 2;
-// So does each sample of a part for those that it touches: what is visible hangs together.
+// Weight of a sample of a neighbouring part, because visible regions are connected.
 constexpr float kBesideShare = 0.3f;
-// Of a part, at least, beside the mean of all: so many times the mean weight are the largest.
+// Least visible share of a part, relative to the mean of all parts. It limits the largest weight of
+// a sample to 1 / kLeastSeen times the mean weight.
 constexpr float kLeastSeen = 0.1f;
 
 using Key = std::array<float, 6>;  // position and scaled normal
 
-// Clusters by halving, and what is seen from each.
+// Forms clusters by halving and computes the outlook of each.
 class Clustering {
   public:
     Clustering(const PartNeighbours& parts, const std::vector<uint32_t>& these,
@@ -38,13 +39,15 @@ class Clustering {
           clusterOf(clusterOf),
           clusters(clusters) {
         std::iota(order.begin(), order.end(), 0u);
-        // More than half of the most receivers are in each.
+        // Each cluster has more than half of clusterSize receivers, which bounds the number of
+        // clusters.
         clusters.resize(order.size() / (clusterSize / 2) + 1);
         if (!order.empty()) split(0, order.size(), {});
     }
 
   private:
-    // around: what is seen in the cluster that this one is half of.
+    // Halves a range of `order` until it is small enough. `around` holds the visible shares of the
+    // cluster that this range is half of.
     void split(size_t first, size_t last, const std::vector<float>& around) {
         Outlook own = look(first, last, around);
         if (last - first <= clusterSize) {
@@ -57,7 +60,7 @@ class Clustering {
         std::nth_element(order.begin() + ptrdiff_t(first), order.begin() + ptrdiff_t(middle),
                          order.begin() + ptrdiff_t(last), [&](uint32_t a, uint32_t b) {
                              const float x = keys[a][axis], y = keys[b][axis];
-                             return x != y ? x < y : a < b;  // the same everywhere
+                             return x != y ? x < y : a < b;  // the same order in every build
                          });
         parallelInvoke([&] { split(first, middle, own.seen); },
                        [&] { split(middle, last, own.seen); });

@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What receivers beside each other see of a source that surrounds them. Indoors the sky is behind
-// a window: of samples in proportion to its radiance few get there, and most of the light's noise
-// and time is their being blocked. The first samples of all receivers around tell which parts of
-// the source are seen from there at all; later ones are taken in proportion to that too.
+// An outlook: which parts of a source that surrounds the scene are visible to a cluster of
+// receivers. Indoors the sky is visible only through a window. Few samples taken in proportion to
+// its radiance get there; the blocked samples cause most of the noise of the light and most of the
+// time. The first samples of all nearby receivers show which parts of the source are visible at
+// all. Later samples are taken in proportion to the visible share too.
 //
 // Sources: Donikian, Walter, Bala, Fernandez and Greenberg, "Accurate Direct Illumination Using
-// Iterative Adaptive Sampling" (2006), who learn distributions over lights for blocks of pixels.
+// Iterative Adaptive Sampling" (2006), which learns distributions over lights for blocks of pixels.
 // Differs:
-// - Blocks are clusters of receivers that are near and face alike, and distributions are over the
-//   parts of one source, each of which keeps a least share: samples stay without bias.
-// - Learnt twice, and then kept: from the coarse shot's samples by wide clusters, and from more
-//   samples by near ones. As counts, so that the number of threads does not matter.
+// - The blocks are clusters of receivers that are near each other and have similar normals. The
+//   distributions are over the parts of one source. Each part keeps a least share, so that the
+//   samples are unbiased.
+// - A distribution is learnt twice and then kept: from the samples of the coarse shot for wide
+//   clusters, and from more samples for near ones. The samples are counted in integers, so that the
+//   number of threads does not matter.
 #pragma once
 
 #include <algorithm>
@@ -26,11 +29,12 @@
 
 namespace raybundle {
 
-// From this share of the samples on a source is seen so well that its closed form, times the share,
-// tells more than samples of what is seen of it.
+// If at least this share of the samples reaches a source, its closed form times the visible share
+// has less error than samples that follow the visible parts.
 constexpr float kWellSeen = 0.5f;
 
-// Where the first samples of a receiver went.
+// The parts of a source that the first samples of one receiver went to, and whether each was
+// visible.
 class Sightings {
   public:
     static constexpr int kMost = 64;
@@ -43,7 +47,7 @@ class Sightings {
         forEach([&](uint32_t, bool isSeen) { seen += isSeen; });
         return seen / float(std::max<uint8_t>(1, count));
     }
-    // Calls visit(part, isSeen) for each.
+    // Calls visit(part, isSeen) for each sample.
     template <class Visit>
     void forEach(const Visit& visit) const {
         for (size_t k = 0; k < count; ++k) visit(uint32_t(parts[k] / 2), parts[k] % 2 == 1);
@@ -54,31 +58,33 @@ class Sightings {
     uint8_t count = 0;
 };
 
-// Of the receivers of a cluster.
+// What a cluster of receivers sees of a source.
 struct Outlook {
-    // Per part of the source: how many samples it should get for its light; above 0. Empty: all
-    // alike.
+    // Per part of the source: the factor of its share of the samples, above 0. Empty if all parts
+    // are sampled alike.
     std::vector<float> seen;
-    float mean = 0;  // share of the samples that were visible
-    size_t receivers = 1;
-    bool isDark = true;  // none was
+    float mean = 0;        // visible share of the samples
+    size_t receivers = 1;  // number of receivers in the cluster
+    bool isDark = true;    // whether no sample was visible
 };
+// The outlooks of all clusters of some receivers.
 
 class Outlooks {
   public:
     Outlooks() = default;
-    // these: receivers, whose sightings are those of the same number. clusterSize: receivers, at
-    // most. power: of the visible share of a part, in what it gets of the samples: 1 where that is
-    // well known; 1/2 has the least variance where samples of a part are seen at random.
+    // Clusters the receivers `these` and learns their outlooks from `sightings`, which is indexed
+    // by receiver. `clusterSize` is the largest number of receivers in a cluster. The visible share
+    // of a part raised to `power` is the factor of its samples: 1 fits a share that is well known;
+    // 1/2 has the least variance if the samples of a part are visible at random.
     Outlooks(const PartNeighbours& parts, const std::vector<uint32_t>& these,
              const std::function<Receiver(size_t)>& receiverAt, const Patches& patches,
              const std::vector<Sightings>& sightings, size_t clusterSize, float power);
 
-    // Of the k-th of these; null without any.
+    // Returns the outlook of receiver these[k]; null if there are no outlooks.
     const Outlook* of(size_t k) const;
 
   private:
-    std::vector<uint32_t> clusterOf;  // per receiver
+    std::vector<uint32_t> clusterOf;  // per index in `these`
     std::vector<Outlook> clusters;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What one receiver gets from the sources: samples of each, until their error is small enough.
+// Light of the sources at one receiver: takes samples of each source until their error is small
+// enough.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -14,36 +15,40 @@
 namespace raybundle {
 namespace {
 
-// Shadow rays per receiver and source for sources of little weight.
+// Samples for sources of little weight, and the number of sources up to which no weights are
+// estimated.
 constexpr int kFewSamples = 4;
 constexpr size_t kFewSources = 4;
-// A source of less than this share of the light that a receiver could get takes few samples, one of
-// less than the second half as many as others.
+// A source that gives less than kSmallShare of the light that a receiver could get takes
+// kFewSamples. A source below kMiddleShare takes half as many samples as others.
 constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
-// What n samples tell nothing of: a part s of a source is missed by all with the probability
-// (1 - s)^n, and then s is wrong; this over n at most, in the mean.
+// n samples all miss a part with the share s of a source with the probability (1 - s)^n; the
+// estimate is then off by s. The mean of this error over all samples is at most kMissed / n.
 constexpr float kMissed = 0.37f;
-// The same beside the edge of a shadow, where most receivers are wholly lit or dark after all; and
-// the root of the probability that one has what its neighbour has. The true error is 0.47 of the
-// stated one in the edge of a plate's shadow, steps of samples included (shadows_test.cpp).
+// kMissedEdge takes the place of kMissed beside the edge of a shadow, where most receivers turn out
+// to be fully lit or fully dark. kAsNeighbour is the square root of the probability that a receiver
+// has the same visible share as its neighbour. In the edge of a plate's shadow the true error is
+// 0.47 of the stated one, the steps of samples included (shadows_test.cpp).
 constexpr float kMissedEdge = 0.2f, kAsNeighbour = 0.5f;
-// Where part of the samples is blocked: stratified samples of a straight edge are alike in all
-// blocks, though they tell its place no better than to this share of one of them.
+// Error of partly blocked samples, in units of the share of one sample. Stratified samples of a
+// straight edge agree in all blocks, although they locate the edge no better than to this fraction
+// of a sample.
 constexpr float kStepOfSamples = 0.6f;
-// A receiver that is in the dark after so many samples of a source that surrounds it stays there.
-// One whose neighbours are too, after fewer.
+// A receiver that is dark after kDarkSamples samples of a source that surrounds it is taken for
+// dark. If its neighbours are dark too, kDarkSamplesOfDark samples suffice.
 constexpr int kDarkSamples = 256, kDarkSamplesOfDark = 64;
 
-// Share of a source that n samples may have missed of which all are blocked, or none, where a
-// neighbour has so much contrast, as a share of the source: as much as that neighbour sees of it,
-// or does not see, with the probability that all miss it.
+// Returns the share of a source that n samples may have missed if all or none of them are blocked
+// and a neighbour has the given contrast, as a share of the source. The neighbour then sees the
+// share `step` of the source, or all but this share; the result includes the probability that all n
+// samples miss it.
 float missedBeside(float contrast, float n) {
     const float half = std::min(contrast, 0.5f);
     const float step = 0.5f * (1 - std::sqrt(1 - 4 * half * half));
     return std::max(kMissedEdge / n, kAsNeighbour * step * std::exp(-0.5f * n * step));
 }
 
-// What a block's angleTerms add to the means of all blocks.
+// Returns by how much the mean angleTerms of all blocks would change with the given block.
 glm::vec4 surplusAngles(const SampleSums& all, const SampleSums& block) {
     const float light = brightest(all.visible);
     return float(kSampleBlocks) * (block.angles - all.angles / light * brightest(block.visible)) /
@@ -52,7 +57,7 @@ glm::vec4 surplusAngles(const SampleSums& all, const SampleSums& block) {
 
 }  // namespace
 
-// Takes the samples of one source at one receiver until their error is small enough.
+// Samples one source at one receiver until the error is small enough.
 class DirectLight::SourceGather {
   public:
     SourceGather(const DirectLight& light, size_t index, const Receiver& receiver,
@@ -75,8 +80,9 @@ class DirectLight::SourceGather {
         if (!light.patches.scattering.empty() && !receiver.point) samples.noteOrigins(&origins);
     }
 
-    // seen: whether any receiver got light of the source. sightings: to be filled; or null.
-    // Counts what it does in `sum`.
+    // Takes the samples and returns the light. `seen` is set if the receiver gets light of the
+    // source. `sightings` receives where the samples went; may be null. Adds the counts of rays to
+    // `sum`.
     LightPart run(std::atomic<bool>& seen, Sightings* sightings, Gathered& sum) {
         if (isInside) ++sum.inside;
         if (hasParts) samples.noteSightings(sightings);
@@ -89,12 +95,13 @@ class DirectLight::SourceGather {
     LightPart takeSamples(std::atomic<bool>& seen, Gathered& sum) {
         const int darkSamples =
             aim.mostGrowth * (outlook && outlook->isDark ? kDarkSamplesOfDark : kDarkSamples);
-        // Inside a solid it is dark, unless a source is in there too: look before taking all
-        // samples.
+        // The inside of a solid is dark unless a source is in there too. A few samples find out
+        // before all are taken.
         int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
         for (;;) {
             take(next);
-            // No sample faced the receiver: few of them may, beside a source of many faces.
+            // No sample faced the receiver. A source of many faces may have few that do, so take
+            // more samples.
             if (brightest(all.open) <= 0 && all.count < mostSamples &&
                 (source.isNarrow || (closed && brightest(*closed) > 0))) {
                 next = 4 * all.count;
@@ -108,7 +115,8 @@ class DirectLight::SourceGather {
                 }
                 return darkPart(missed, sum);
             }
-            // By the first pass alone, so that the order of the receivers does not matter.
+            // Only the first pass, which has an infinite tolerance, sets `seen`, so that the order
+            // of the receivers does not matter.
             if (std::isinf(aim.tolerance)) seen = true;
             const float wanted = measureVariance(missed);
             if (all.count >= aim.samples &&
@@ -119,7 +127,7 @@ class DirectLight::SourceGather {
         }
     }
 
-    // Until there are so many.
+    // Takes samples until there are `count`, and the closed form if it may be needed.
     void take(int count) {
         samples.take(count);
         all = samples.all();
@@ -131,13 +139,13 @@ class DirectLight::SourceGather {
         }
     }
 
-    // By all samples so far.
+    // These functions judge by all samples so far.
     bool isLit() const { return all.visible == all.open; }
     bool isDark() const { return brightest(all.visible) <= 0; }
-    // Irradiance as if nothing blocked it, W/m^2.
+    // Returns the irradiance if nothing blocked the source, W/m^2.
     float open() const { return brightest(all.open) / float(all.count); }
 
-    // The share of the source that all samples may have missed.
+    // Returns the share of the source that all samples may have missed.
     float missedShare() const {
         const float n = float(all.count);
         if (isInside) return 0;
@@ -147,14 +155,15 @@ class DirectLight::SourceGather {
                    : 0;
     }
 
-    // Among receivers that look alike a part that one alone sees is missed there alone, and one
-    // that all see is missed by all their samples: in the mean of squares over so many, what is
-    // missed is less by their number at least.
+    // Variance of the light that samples may have missed, (W/m^2)^2. Receivers with a common
+    // outlook take different samples: a part that only one of them sees is missed only there, and a
+    // part that all of them see is missed only if all of them miss it. The mean square over these
+    // receivers is therefore smaller by at least their number.
     float varianceOfMissed(float missed) const {
         return missed * missed / (outlook ? float(outlook->receivers) : 1.0f);
     }
 
-    // Finds the variance; returns the one that samples are to take below the aim.
+    // Computes `variance` and returns the variance that must fall below the squared tolerance.
     float measureVariance(float missed) {
         const glm::vec3 mean = all.estimate(closed);
         variance = varianceOfMissed(missed);
@@ -204,20 +213,21 @@ class DirectLight::SourceGather {
     const ReceiverPlace& place;
     const Aim& aim;
     const bool hasParts;
-    const Outlook* const outlook;  // on the source; null: not known
-    const bool isGuided;           // by what is seen of its parts
-    const bool isInside;           // of a solid
+    const Outlook* const outlook;  // on the source; null if there is none
+    const bool isGuided;           // whether samples follow the visible parts of the source
+    const bool isInside;           // whether the receiver is the inside of a solid
     const int mostSamples;
     const uint32_t seed;
     SourceSamples samples;
     Origins origins;
-    SampleSums all;                   // so far
+    SampleSums all;                   // sums over all samples so far
     std::optional<glm::vec3> closed;  // the closed form, W/m^2
     float closedError = 0, variance = 0;
 };
 
-// About what each source would give without occluders, to share out the samples: by one sample, or
-// another where that gets nothing. Empty where there are so few sources that it does not pay.
+// Returns about the light that each source would give without occluders, to distribute the samples.
+// It uses one sample of each source, or a second one if the first gets no light. Returns an empty
+// vector if there are too few sources for this to pay.
 std::vector<float> DirectLight::unblockedWeights(const ReceiverPlace& place) const {
     if (sources.size() <= kFewSources || !skips.skipWeak) return {};
     static const glm::vec2 kAt[2] = {{0.25f, 0.25f}, {0.5f, 0.75f}};
@@ -234,7 +244,8 @@ std::vector<float> DirectLight::unblockedWeights(const ReceiverPlace& place) con
 AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) const {
     AngleFactors factors{};
     if (!showsByAngle) return factors;
-    constexpr float kLeastShown = 0.05f;  // less shows too little of the light to be clean
+    // Least shown share: below it a side shows too little of its light to look clean.
+    constexpr float kLeastShown = 0.05f;
     const Parent& parent = patches.parentAt(side);
     const MaterialSide& surface =
         scene.materialOf(parent.instance, size_t(parent.face)).sides[side % 2];
@@ -244,7 +255,7 @@ AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) c
     return factors;
 }
 
-// Each source takes samples until its standard error is below its share of the tolerance.
+// Samples each source until its standard error is below its share of the tolerance.
 Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,
                              Sightings* sightings) const {
     Gathered sum;
@@ -257,8 +268,9 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
             continue;
         const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
         Aim own = aim;
-        // The variance that the receiver may have is shared out by that, or evenly: what is bright
-        // may be hidden. Of few sources seldom more than one has noise.
+        // The variance that the receiver may have is divided among the sources by their weight, but
+        // each gets at least an equal share, because a bright source may be hidden. With few
+        // sources seldom more than one has noise, so that each may have all of the variance.
         if (sources.size() > kFewSources)
             own.tolerance *=
                 std::sqrt(std::max(weights.empty() ? 0 : share, 1 / float(sources.size())));

@@ -63,7 +63,7 @@ void SourceSamples::take(int count) {
     }
 }
 
-// Two blocks become one each, and the other half of them empty.
+// Joins the four blocks into two, and empties the other two.
 void SourceSamples::joinBlocks() {
     for (size_t k = 0; k < kSampleBlocks / 2; ++k) {
         const SampleSums second = sums[2 * k + 1];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Samples of one source at one receiver, each with a shadow ray. They are kept as sums over blocks
-// of consecutive samples, whose differences tell how far their mean is off.
+// Samples of one source at one receiver, each with a shadow ray. The samples are summed in blocks
+// of consecutive samples. The differences between the blocks estimate the error of the mean.
 #pragma once
 
 #include <array>
@@ -21,26 +21,27 @@ namespace raybundle {
 
 constexpr size_t kSampleBlocks = 4;
 
-// Sums over some samples.
+// Sums over samples.
 struct SampleSums {
-    glm::vec3 open{0.0f};     // irradiance as if nothing blocked them, W/m^2
-    glm::vec3 visible{0.0f};  // irradiance by those that nothing blocks, W/m^2
-    glm::vec4 angles{0.0f};   // of these: the brightest channel times angleTerms
+    glm::vec3 open{0.0f};     // irradiance if nothing blocked the samples, W/m^2
+    glm::vec3 visible{0.0f};  // irradiance by the unblocked share, W/m^2
+    glm::vec4 angles{0.0f};   // unblocked light: brightest channel times angleTerms
     int count = 0;
 
     void add(const SampleSums& other);
-    // Mean irradiance: the closed form times the visible share, or without a closed form the plain
-    // mean.
+    // Returns the mean irradiance: the closed form times the visible share, or the plain mean if
+    // there is no closed form.
     glm::vec3 estimate(const std::optional<glm::vec3>& closed) const;
 };
 using SampleBlocks = std::array<SampleSums, kSampleBlocks>;
 
-// Where the light of a source comes from.
+// Collects the directions from which the light of a source comes.
 class Origins {
   public:
-    // random: differs from receiver to receiver.
+    // `random` must differ from receiver to receiver.
     explicit Origins(uint32_t random) : random(random) {}
 
+    // Adds light from a unit direction; `more` is its brightness.
     void add(const glm::vec3& direction, float more);
 
     Incoming incoming;
@@ -50,10 +51,11 @@ class Origins {
     float brightness = 0;
 };
 
+// Takes the samples of one source at one receiver.
 class SourceSamples {
   public:
-    // side: the patch side that the receiver lies on. seed: of the samples, which are those of a
-    // Sobol sequence. References must outlive the object.
+    // `side` is the patch side on which the receiver lies. `seed` scrambles the Sobol sequence of
+    // the samples. The references must outlive the object.
     SourceSamples(const Visibility& visibility, const LightSource& source,
                   const ReceiverPlace& place, uint32_t side, uint32_t seed)
         : visibility(visibility),
@@ -63,31 +65,34 @@ class SourceSamples {
           points(seed),
           choosesPlaces(source.choosesPlaces()) {}
 
-    // From now on in proportion to what is seen of each part of the source (Outlook::seen).
+    // Takes further samples in proportion to what is visible of each part of the source
+    // (Outlook::seen).
     void guideBy(const std::vector<float>& seen) {
         isGuided = true;
         sumOfSeen = source.sumOfSeen(place.normal, seen);
     }
-    // Where samples go and where light comes from is to be noted there.
+    // Set where to record the parts that samples go to, and the directions that the light comes
+    // from.
     void noteSightings(Sightings* to) { sightings = to; }
     void noteOrigins(Origins* to) { origins = to; }
 
-    // Takes the first `count` samples, or doubles those there are until there are so many: powers
-    // of two. Each block has consecutive ones, from a multiple of their number on, so that it is
-    // stratified like all of them: of others the blocks would differ by more than their mean is
-    // off.
+    // Takes samples until there are `count`, a power of two: all at once if there are none yet,
+    // else by doubling their number. Each block consists of consecutive samples and begins at a
+    // multiple of its size, so that it is stratified as well as all samples together. Other blocks
+    // would differ by more than the error of their mean.
     void take(int count);
 
     const SampleBlocks& blocks() const { return sums; }
     SampleSums all() const;
-    // Means of angleTerms over all samples, less what few samples of which some are much brighter
-    // are off in the mean (Quenouille, "Notes on Bias in Estimation", 1956).
+    // Returns the means of angleTerms over all samples. The ratio of two sums is biased if there
+    // are few samples and some of them are much brighter than others; the bias is removed by the
+    // jackknife (Quenouille, "Notes on Bias in Estimation", 1956).
     glm::vec4 meanAngles() const;
-    // Shadow rays so far.
+    // Returns the number of shadow rays so far.
     uint64_t rays() const { return rayCount; }
 
   private:
-    // Samples that wait for their shadow rays, which are traced together.
+    // Samples that wait for their shadow rays, which are traced in packets.
     struct Waiting {
         std::array<ShadowRay, Visibility::kPacket> rays;
         struct Sample {
@@ -110,7 +115,7 @@ class SourceSamples {
     const SobolPoints points;
     const bool choosesPlaces;
     bool isGuided = false;
-    std::vector<float> sumOfSeen;  // if guided: see LightSource::sumOfSeen
+    std::vector<float> sumOfSeen;  // see LightSource::sumOfSeen; empty unless guided
     Sightings* sightings = nullptr;
     Origins* origins = nullptr;
     SampleBlocks sums;

@@ -13,23 +13,27 @@
 namespace raybundle {
 namespace {
 
-// Sides whose exitance is at least so many times the mean of what lines meet may be bright spots.
+// A side may be a bright spot if its exitance is at least this many times the mean exitance that
+// lines meet.
 constexpr double kBright = 3;
-// Together they have at most this share of all area: of large parts lines bring the light better.
+// Largest share of the scene's area that all bright spots may take. Lines carry the light of large
+// areas better.
 constexpr double kMostArea = 0.05;
-// Gathering the light of the bright spots of an object takes about as long as so many bundles (both
-// in proportion to the patches): they are worth it where they spare more. (A laid table's dishes,
-// 48 of them, took longer at a target of 0.2 % than the whole bake without.)
+// Gathering the light of the bright spots of one object takes about as long as this number of
+// bundles (the time of both is proportional to the number of patches). It pays only if it saves
+// more bundles. (The dishes of a laid table, 48 objects, took longer at a target of 0.2 % than the
+// whole bake without bright spots.)
 constexpr double kWorthwhileBundles = 50;
 
-// An island with less light than this share of the brightest one's, by the mean, takes no part:
-// what is left over far below a room does not make its walls bright spots.
+// An island whose mean light is less than this share of that of the brightest island is ignored, so
+// that something dark far below a room does not make the room's walls bright spots.
 constexpr double kDarkIsland = 0.01;
 
-// Points of a side at which is looked whether another surface lies on it.
+// Number of points on a side that are tested for another surface lying on it.
 constexpr uint32_t kLooks = 16;
 
-// Whether nothing lies on a side: what it reflects would come from what is left of it alone.
+// Returns whether nothing lies on a side. If a part of the side were covered, the light would come
+// from the rest alone.
 bool isUncovered(const FirstShotInput& input, const Visibility& exchange, uint32_t side) {
     const glm::vec3 normal = input.patches.normal(side);
     for (uint32_t k = 0; k < kLooks; ++k) {
@@ -41,37 +45,38 @@ bool isUncovered(const FirstShotInput& input, const Visibility& exchange, uint32
     return true;
 }
 
-// The area that a line stands for at a parent, over that outside of all windows.
+// Returns the area that a line stands for at a parent, relative to lines outside all windows.
 double lineShare(const LineDensity& density, uint32_t parent) {
     const int32_t window = density.windowOf.empty() ? -1 : density.windowOf[parent];
     return window < 0 ? 1.0 : std::ldexp(1.0, -2 * density.windows[size_t(window)].level);
 }
 
-// Of the first shot's light, W/m^2.
+// Returns the exitance of a side by reflected light of the first shot, W/m^2.
 glm::vec3 reflected(const Patches& patches, const FirstShot& shot, size_t side) {
     return shotReflectance(patches, shot, side) * shot.irradiance[side];
 }
 
-// What the sides of an island (Patches::islands) send after the first shot.
+// Sums over the sides of an island (Patches::islands) after the first shot.
 struct IslandLight {
-    double power = 0, reflectance = 0, area = 0;  // W, m^2, m^2
+    double power = 0, reflectance = 0, area = 0;  // W, m^2 times reflectance, m^2
 
     double mean() const { return area > 0 ? power / area : 0; }  // W/m^2
 };
 
-// Per side: its reflected light if it is a bright spot, else 0.
+// Returns an emission split whose sources are the bright spots, with their reflected light. It is
+// empty if there are no bright spots, or if gathering does not pay.
 EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchange,
                           const LineDensity& density, const FirstShot& shot) {
     const Patches& patches = input.patches;
     const size_t n = patches.sideCount();
     EmissionSplit spots;
-    std::vector<double> exitance(n, 0.0);  // of the brightest channel, W/m^2
+    std::vector<double> exitance(n, 0.0);  // brightest channel, W/m^2
     std::vector<IslandLight> islands(patches.islands.size());
     for (size_t side = 0; side < n; ++side) {
         const Parent& parent = patches.parentAt(uint32_t(side));
         IslandLight& island = islands[parent.island];
         if (side % 2 == 0) island.area += double(patches.area[side / 2]);
-        // What is inside of a solid, such as the body of a lamp, stays there.
+        // Light inside a solid, such as the body of a lamp, stays there.
         const bool isInside = parent.isSolid && !parent.isInward && side % 2 == 1;
         if (!parent.exchanges || isInside) continue;
         const double area = double(patches.area[side / 2]);
@@ -90,11 +95,11 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
         all.area += island.area;
     }
     if (!(all.area > 0)) return spots;
-    // All bounces included, as far as they stay in the scene.
+    // Includes all bounces that stay in the scene.
     const double mean = all.mean() / std::max(0.05, 1 - all.reflectance / all.area);
     if (!(mean > 0)) return spots;
-    // What sides of any exitance do to the noise of others is in proportion to the square of their
-    // contrast, to their area, and to the area that a line stands for.
+    // The noise that sides cause on others is proportional to the square of their contrast, to
+    // their area, and to the area that a line stands for.
     double inSpots = 0, inRest = 0, areaOfSpots = 0;
     std::set<uint32_t> objects;  // instances with bright spots
     for (size_t side = 0; side < n; ++side) {

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bright spots: few sides that the first shot leaves so much light on that what they reflect is
-// like the light of a lamp. A bulb close to a wall, a spot on a ceiling, sun on the floor of a dark
-// room: few lines of a bundle meet them, and those bring most of the light, so that bundles need
-// very many. Their reflected light is gathered with shadow rays like that of sources, once; the
-// bundles carry the rest.
+// Bright spots: a few sides on which the first shot leaves so much light that they act as lamps,
+// such as a wall close to a bulb, a spot on a ceiling, or sunlight on the floor of a dark room. Few
+// lines of a bundle meet them, but these lines carry most of the light, so that very many bundles
+// would be needed. Their reflected light is gathered once with shadow rays, like the light of
+// sources. The bundles carry the rest.
 //
 // Sources: thesis chapter 3 (extended first shot): what is brighter than the rest is shot once
-// more. Differs:
-// - Gathered where it arrives and not shot, like the light of the sources (first_shot/gather.cpp).
-// - Once, and only where it takes less time than the bundles that would be needed otherwise.
+// more.
+// Differs:
+// - The light is gathered where it arrives and not shot, like that of the sources
+//   (first_shot/gather.cpp).
+// - This is done once, and only if it takes less time than the bundles that would be needed
+//   otherwise.
 #pragma once
 
 #include "bundles/line_windows.h"
@@ -17,11 +20,12 @@
 
 namespace raybundle {
 
-// Gathers the reflected light of bright spots, if there are any: fills indirect and unshot of a
-// shot of GATHER and adds to its errors. exchange: what surfaces that reflect see of each other;
-// density: of the lines to come. Returns how many sides are bright spots. Where light comes out of
-// the other side of surfaces there are none. What surfaces send otherwise than Lambert's do,
-// bundles add.
+// Gathers the reflected light of bright spots, if there are any. Fills `indirect` and `unshot` of a
+// shot of GATHER, and adds to its errors. Returns the number of sides that are bright spots.
+//   exchange  visibility between surfaces that reflect light to each other
+//   density   density of the lines that will be traced
+// There are no bright spots in scenes with translucent or partly transparent surfaces. Bundles add
+// the light that surfaces which are not Lambert's send otherwise than by Lambert's law.
 size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
                          const Visibility& exchange, const LineDensity& density, FirstShot& shot);
 

@@ -15,18 +15,19 @@
 namespace raybundle {
 namespace {
 
-// Directions that are all within the angle of this cosine of their mean are one.
+// Directions within the angle of this cosine of their mean are merged into one.
 constexpr float kSameDirection = 0.97f;
-// Of more sides than this each has one of its directions: 80 bytes a lobe.
+// In a scene of more sides than this each side keeps only one direction, since a lobe takes 80
+// bytes.
 constexpr size_t kManySides = size_t(1) << 18;
-// Less than this share of what arrives makes no difference.
+// Lobes that send less than this share of the arriving light are left out.
 constexpr float kLeastShare = 1e-4f;
 constexpr float kLeastReflectance = 1e-6f;
-// Patches nearer to each other than so many of their widths see each other in many directions,
-// which so many pairs of points tell.
+// Patches nearer to each other than kNear times their widths see each other in many directions.
+// kNearPairs pairs of points represent these.
 constexpr float kNear = 1.5f;
 constexpr uint32_t kNearPairs = 8;
-// Of the noise of all reflected light, what this may add.
+// Noise that directed light may add, relative to the noise of all reflected light.
 constexpr double kNoiseShare = 0.5;
 constexpr size_t kBlock = 256;  // sides per task
 
@@ -174,7 +175,8 @@ glm::vec3 DirectedLight::middleWay(uint32_t side, uint32_t other) const {
     return square > 0 ? way / std::sqrt(square) : patches.normal(side);
 }
 
-// add(weight, way): pairs of points on both patches, each for the lines that join it.
+// Calls add(weight, direction) for pairs of points on both patches. The weight is the density of
+// lines that join the two points.
 template <class Add>
 void DirectedLight::forNearWays(uint32_t side, uint32_t other, uint32_t random,
                                 const Add& add) const {

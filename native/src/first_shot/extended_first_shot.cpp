@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// EXTENDED: after shooting from the sources, the sides that are brighter than the scene will be in
-// the mean shoot what exceeds it, round by round, so that the bundles find light everywhere.
+// EXTENDED: after the sources have shot their light, the sides that are brighter than the expected
+// mean of the scene shoot their excess, in several rounds, so that the bundles find light
+// everywhere.
 //
 // Sources: thesis chapter 3, fig. 3.5, eq. 3.1 and 3.2.
 // Differs:
-// - The loops of fig. 3.5 run once too often (`0..numberOfLines`); lines are allotted
-//   systematically here, and all carry about the same power. A side that gets none keeps its light.
-// - A line carries the three channels of its side: one scalar `powerPerLine` cannot.
-// - All shooting of a round reads what was unshot at its start.
-// - Lines that miss the scene take their power from the shooter; it is not booked as escaped here:
-//   the energy balance counts all reflected light by the share of the lines that leave each side.
-// - What stays unshot is handed to the transport apart from the light that has arrived, so that
+// - The loops of fig. 3.5 run once too often (`0..numberOfLines`). Here lines are allotted
+//   systematically and all carry about the same power. A side that gets no line keeps its light.
+// - A line carries the three channels of its side, which one scalar `powerPerLine` cannot.
+// - All sides that shoot in a round read the unshot power of the start of the round.
+// - Lines that miss the scene take their power from the shooting side. This power is not counted as
+//   escaped here: the energy balance counts all reflected light by the share of the lines that
+//   leave each side.
+// - Unshot light is passed to the transport separately from the light that has arrived, so that
 //   nothing counts twice.
 // - Sources send all their light in the first step.
-// - Eq. 3.2 grows without bound for white scenes, and nothing would exceed it: the mean reflectance
-//   is capped in it.
-// - In eq. 3.1 f is a share of the scene's area, with which the thesis' examples come out; it is
-//   defined there as an area. The lines it gives carry the light of the sources; those of the
-//   rounds have the same power each and come on top.
+// - Eq. 3.2 grows without bound for white scenes, where nothing would exceed it. The mean
+//   reflectance is therefore capped in it.
+// - In eq. 3.1, f is a share of the scene's area, which gives the results of the thesis' examples.
+//   The thesis defines it as an area. The number of lines that the equation gives is for the light
+//   of the sources. The lines of the rounds have the same power each and are added to them.
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
@@ -34,12 +36,13 @@ namespace raybundle {
 namespace {
 
 constexpr int kMaxRounds = 8;
-// With it the threshold is 19 times the light that the sources alone spread over the scene.
+// With this cap the threshold is at most 19 times the mean light that the sources alone distribute
+// over the scene.
 constexpr double kMostReflectance = 0.95;
-// Points to try on a side that is covered in part.
+// Number of random points tried on a side that is partly covered.
 constexpr int kTries = 8;
 
-// Of both sides, weighted by area.
+// Returns the mean over both sides of all patches, weighted by area.
 glm::dvec3 meanReflectance(const Patches& patches) {
     glm::dvec3 reflected(0.0);
     for (size_t side = 0; side < patches.sideCount(); ++side)
@@ -47,15 +50,16 @@ glm::dvec3 meanReflectance(const Patches& patches) {
     return patches.totalArea > 0 ? reflected / (2 * patches.totalArea) : glm::dvec3(0.0);
 }
 
-// The lines to begin with: 0 where they go on to the target error.
+// Returns the number of lines from the sources, or 0 if they are to continue until the target error
+// is reached.
 uint64_t sourceLines(const FirstShotInput& input) {
     const Settings& settings = input.settings;
     if (settings.localRays > 0) return uint64_t(settings.localRays);
     if (settings.minBundles != settings.maxBundles || !(input.linesPerBundle > 0)) return 0;
     const Patches& patches = input.patches;
     const double radius = double(patches.radius);
-    // Crofton: lines through the bounding sphere meet a surface of area A with probability
-    // A / (2 pi R^2).
+    // Crofton: a line through the bounding sphere of radius R meets a surface of area A on average
+    // A / (2 pi R^2) times.
     const double intersections = patches.totalArea / (2 * glm::pi<double>() * radius * radius);
     const double reflectance = sumOfChannels(meanReflectance(patches)) / 3;
     const double lines = localToGlobalRatio(intersections, reflectance, reflectance, 1) *
@@ -103,7 +107,8 @@ FirstShot extendedFirstShot(const FirstShotInput& input) {
     shot.unshot.resize(n);
 
     glm::dvec3 arrived(0.0);
-    std::vector<glm::dvec3> unshot(n), indirect(n);  // W, per side; reflected and received
+    // W, per side: reflected but not yet shot, and received
+    std::vector<glm::dvec3> unshot(n), indirect(n);
     for (size_t side = 0; side < n; ++side) {
         const glm::dvec3& received = sources.received[side];
         shot.irradiance[side] = glm::vec3(received / double(patches.area[side / 2]));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The first shot: the light of the sources, distributed once before any bundle. Each kind is a file
-// of its own and a row of the table in first_shot.cpp.
+// The first shot distributes the light of the sources once, before any bundle is traced. Each kind
+// of first shot has its own file and a row of the table in first_shot.cpp.
 //
 // Sources: thesis sections 2.4.2, 3 and 4.3.3.
 #pragma once
@@ -20,32 +20,35 @@
 
 namespace raybundle {
 
+// The result of a first shot.
 struct FirstShot {
-    std::vector<glm::vec3> irradiance;  // per side, mean over it, from the sources, W/m^2
-    // Where the first shot went on with reflected light: irradiance from it, and the reflected
-    // exitance that is left to the transport, per side, W/m^2; else both are empty.
+    std::vector<glm::vec3> irradiance;  // per side: mean irradiance by the sources, W/m^2
+    // Set only if the first shot has also distributed reflected light, else empty. Per side, W/m^2:
+    // irradiance by reflected light, and the reflected exitance that is left to the transport.
     std::vector<glm::vec3> indirect, unshot;
-    std::vector<glm::vec4> angles;   // per side, of GATHER: means of angleTerms; else empty
-    std::vector<Incoming> incoming;  // per side, of GATHER, if any surface is not Lambert's
-    // Per side: all that it reflects of the irradiance is in `indirect`, by direction too; empty:
-    // of none.
+    std::vector<glm::vec4> angles;   // per side, GATHER only, else empty: means of angleTerms
+    std::vector<Incoming> incoming;  // per side, GATHER only, if any surface is not Lambert's
+    // Per side: whether `indirect` contains all light that the side reflects of the irradiance,
+    // including how that light depends on the direction. Empty if this holds for no side.
     std::vector<bool> sentOn;
-    std::vector<float> error;  // per side, standard error of all irradiance, W/m^2
-    std::vector<uint32_t>
-        noisiest;  // per side, of GATHER: the source with most of that; else empty
-    std::vector<glm::vec3> emission;  // per side: emission that the bundles are to carry, W/m^2
-    std::shared_ptr<const LightBySource> bySource;  // of GATHER: what came from each source
-    glm::dvec3 emitted{0.0};  // power of the gathered sources, W; without a power: what arrives
-    glm::dvec3 escaped{0.0};  // part of it that meets no surface, W
+    std::vector<float> error;  // per side: standard error of the whole irradiance, W/m^2
+    // Per side, GATHER only, else empty: index of the source that contributes most to the error.
+    std::vector<uint32_t> noisiest;
+    std::vector<glm::vec3> emission;                // per side: emission left to the bundles, W/m^2
+    std::shared_ptr<const LightBySource> bySource;  // GATHER only: the light of each source
+    // Power of the gathered sources, W. Sources without power of their own count with the light
+    // that arrives.
+    glm::dvec3 emitted{0.0};
+    glm::dvec3 escaped{0.0};  // part of `emitted` that meets no surface, W
     uint64_t rays = 0;
-    uint64_t sidesByOthers = 0;   // that have the light of others that stand for them (stand_ins.h)
-    uint64_t unblockedSides = 0;  // side and source pairs without noise: wholly visible
-    uint64_t hiddenSides = 0;     // side and source pairs that cannot face each other
-    uint64_t weakSides = 0;    // pairs with fewer rays since the source gives little of the light
-    uint64_t insideSides = 0;  // pairs with fewer rays since the side is the inside of a solid
+    uint64_t sidesByOthers = 0;   // sides that have the light of a stand-in (stand_ins.h)
+    uint64_t unblockedSides = 0;  // pairs of side and source without noise: fully visible
+    uint64_t hiddenSides = 0;     // pairs of side and source that cannot face each other
+    uint64_t weakSides = 0;    // pairs with fewer rays because the source gives little of the light
+    uint64_t insideSides = 0;  // pairs with fewer rays because the side is the inside of a solid
 };
 
-// What first shots are made of. References must outlive them.
+// The input of a first shot. All references must outlive it.
 struct FirstShotInput {
     const DirectLight& light;
     const Patches& patches;
@@ -53,39 +56,43 @@ struct FirstShotInput {
     const Settings& settings;  // targetError: relative standard error to reach
     const Progress& progress;
     double linesPerBundle = 0;             // lines of a bundle through the scene's bounding sphere
-    const Visibility* exchange = nullptr;  // of reflected light, where it differs
-    // The coarse shot of the sides of the tiles, perhaps before some were cut: what
-    // GATHER begins with. Null: it makes its own.
+    const Visibility* exchange = nullptr;  // for reflected light, if it differs; else null
+    // The coarse shot of the sides of the tiles, possibly made before some tiles were cut. GATHER
+    // starts from it. Null: GATHER makes its own.
     const CoarseShot* fromTiles = nullptr;
-    // Of the last GATHER of the same patches to the same error, to be scaled if the strengths of
-    // sources are all that has changed; or null.
+    // The light by source of the last GATHER of the same patches with the same target error. It is
+    // scaled if only the strengths of sources have changed. May be null.
     std::shared_ptr<const LightBySource> before = nullptr;
-    // Per side: whether its light is shown, and not only that of what it lights; null: all is.
+    // Per side: whether the light on it is shown in the result. Light that is not shown only lights
+    // other surfaces. Null: the light of all sides is shown.
     const std::vector<bool>* isShown = nullptr;
-    // Of GATHER: which sides gather for which; null: each for itself.
+    // GATHER only: which sides gather for other sides. Null: each side gathers for itself.
     const StandIns* standIns = nullptr;
 };
 
-// The first shots, one a row of the table.
+// The kinds of first shot, one per row of the table.
 FirstShot gather(const FirstShotInput& input);
 FirstShot shoot(const FirstShotInput& input);
 FirstShot extendedFirstShot(const FirstShotInput& input);
 
-// The best number of local lines of the first shot over global lines after it (thesis eq. 3.1).
-// intersections: of a random line with the scene, mean; meanReflectance: of the scene;
-// sourceReflectance: of the surfaces that the first shot leaves light on; share: of the scene's
-// area that they take, 0 to 1.
+// Returns the best ratio of the number of local lines in the first shot to the number of global
+// lines after it (thesis eq. 3.1).
+//   intersections      mean number of intersections of a random line with the scene
+//   meanReflectance    mean reflectance of the scene
+//   sourceReflectance  reflectance of the surfaces on which the first shot leaves light
+//   share              share of the scene's area that these surfaces take, 0 to 1
 double localToGlobalRatio(double intersections, double meanReflectance, double sourceReflectance,
                           double share);
 
-// What a side reflects of the first shot's light.
+// Returns the reflectance of a side for the light of the first shot, which may depend on its angle.
 glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t side);
 
-// Receivers that are beside each other, by their numbers: those of the sides of neighbouring tiles
-// that gather, for themselves or for others; the patches of a cut one stand beside each other.
+// Returns the pairs of gatherers (indices in standIns.gatherers()) whose sides are beside each
+// other: sides of neighbouring tiles, and of the patches of one cut tile. Only sides that gather,
+// for themselves or for others, are paired.
 std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns);
 
-// A first shot of a kind.
+// Runs a first shot of the given kind.
 FirstShot firstShot(FirstShotKind kind, const FirstShotInput& input);
 
 }  // namespace raybundle

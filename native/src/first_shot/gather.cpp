@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// GATHER: the first shot, seen from the receivers: every patch side gathers the light of the
-// sources.
+// GATHER: every patch side gathers the light of the sources.
 //
 // Sources: thesis sections 2.4.2 and 4.3.3 (first shot, stated error).
-// Differs: the thesis shoots rays from the sources: of N rays a patch gets few, and fewer the finer
-// it is. Gathering spends its rays where the light is to be known (direct_light/direct_light.h).
+// Differs: the thesis shoots rays from the sources, of which a patch gets fewer the finer it is.
+// Gathering takes its rays where the light is needed (direct_light/direct_light.h).
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -20,16 +19,16 @@
 namespace raybundle {
 namespace {
 
-// So many times the error of a result may be that of light on other sides: what it lights gets it
-// from many of them.
+// Factor of the error allowed on sides whose light is not shown. Their light reaches shown surfaces
+// only as the mean over many sides.
 constexpr float kOthersError = 2;
-// It may be so many times at most, as that of sides that reflect nothing: their light counts in the
-// energy balance alone.
+// Largest factor of the error. It applies to sides that reflect nothing, whose light only counts in
+// the energy balance.
 constexpr float kMostError = 10;
 
-// Of all sides, by themselves.
+// Returns the pairs of all sides beside each other, as indices of sides.
 std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
-    std::vector<uint32_t> firstOf;  // per tile; one more at the end
+    std::vector<uint32_t> firstOf;  // first patch of each tile; one more at the end
     for (const Parent& parent : patches.parents)
         for (uint32_t tile = 0; tile < parent.tileCount(); ++tile)
             firstOf.push_back(parent.firstPatch + parent.firstOf(tile));
@@ -64,9 +63,9 @@ std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const St
 
 namespace {
 
-// So many times the error of a result may be that of a side whose light is not shown. What it
-// lights gets it from many such sides, whose errors even out: the variance of their sum goes with
-// the area of each, beside that of all.
+// Returns the factor of the error allowed on a side whose light is not shown. Other surfaces get
+// the light of many such sides, whose errors average out: the variance of the sum is proportional
+// to the share that each side has of the total area.
 float othersError(const Patches& patches, const StandIns& standIns, uint32_t side) {
     if (patches.reflectance[side] == glm::vec3(0.0f) &&
         patches.translucenceOf(side ^ 1) == glm::vec3(0.0f))
@@ -77,7 +76,8 @@ float othersError(const Patches& patches, const StandIns& standIns, uint32_t sid
            std::max(1.0f, edge / std::sqrt(std::max(patches.area[side / 2], 1e-30f)));
 }
 
-// By the coarse shot of the tiles if there is one: only the patches of cut tiles are shot coarsely.
+// Returns the coarse shot of the tiles, if there is one, extended to the patches of cut tiles. Only
+// these are sampled here. Returns an empty coarse shot if there is none of the tiles.
 CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32_t>& gatherers,
                            const std::function<Receiver(size_t)>& receiverAt,
                            const std::function<void(double)>& report) {
@@ -119,8 +119,8 @@ FirstShot gather(const FirstShotInput& input) {
     auto receiverAt = [&](size_t k) {
         const uint32_t side = gatherers[k];
         Receiver receiver{side, patches.normal(side), std::nullopt, side};
-        // Most of the error of a cut tile's patches is not in its mean, which keeps twice what
-        // other tiles have.
+        // Most of the error of the patches of a cut tile averages out over the tile. The mean over
+        // the tile may keep twice the error of other tiles.
         if (const int level = patches.level(side / 2); level > 0)
             receiver.errorFactor = std::ldexp(1.0f, level);
         if (input.isShown && !(*input.isShown)[side]) {

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// SHOOT: the first shot as in the thesis: lines of equal power go from the sources to the sides
+// SHOOT: the first shot as in the thesis. Lines of equal power go from the sources to the sides
 // that they meet first.
 //
 // Sources: thesis section 2.4.2, fig. 2.11; section 4.3.3 (the number of lines by the variance).
 // Differs:
-// - `received[j] = ...` of fig. 2.11 must add up.
-// - Lines are allotted systematically (visibility/local_lines.h), all with the same power; a source
-//   that gets lines for sure shares its whole power among those it got, so that power is conserved
-//   exactly, in each channel.
-// - The number of lines is doubled until the relative error, weighted by area, meets the target;
-//   the thesis tells the user to look.
-// - Light that surfaces do not stop is gathered (direct_light/direct_light.h): lines end at the
-//   first.
+// - The assignment `received[j] = ...` of fig. 2.11 must be an addition.
+// - Lines are allotted systematically (visibility/local_lines.h), all with the same power. A source
+//   that is certain to get lines divides its whole power among the lines that it got, so that power
+//   is conserved exactly, in each channel.
+// - The number of lines is doubled until the relative error, weighted by area, meets the target.
+//   The thesis leaves this decision to the user.
+// - Light that passes surfaces without being stopped is gathered (direct_light/direct_light.h),
+//   because the lines end at the first surface.
 // - The thesis has emissive patches only. Suns shoot parallel lines from a disk that covers the
-//   scene: most of them may miss it. A lamp's disk that turns to each receiver shoots the lines
-//   that each receiver would see it along (lights/light_source.cpp).
+//   scene; most of these lines may miss it. The disk of a lamp that faces each receiver shoots
+//   along the lines on which each receiver would see it (lights/light_source.cpp).
 #include "first_shot/shoot.h"
 
 #include <algorithm>
@@ -43,7 +43,8 @@ LineEnd castFrom(const LightSource& source, const FirstShotInput& input, std::mt
     return {*met, ray.weight};
 }
 
-// Relative RMS error of the irradiance by area; infinite while it is all noise.
+// Returns the relative RMS error of the irradiance, weighted by area; infinite if there is only
+// noise.
 double relativeError(const Patches& patches, const LocalLines& sums, double lines) {
     double noise = 0, signal = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
@@ -56,7 +57,7 @@ double relativeError(const Patches& patches, const LocalLines& sums, double line
     return signal > 0 ? std::sqrt(noise / signal) : INFINITY;
 }
 
-// Gathers what no line that ends at the first surface can bring.
+// Gathers the light that lines ending at the first surface cannot carry.
 void addPassingLight(const FirstShotInput& input, SourceShot& shot) {
     std::vector<uint32_t> sides;
     for (uint32_t side = 0; side < input.patches.sideCount(); ++side)
@@ -103,7 +104,7 @@ SourceShot shootSources(const FirstShotInput& input, uint64_t lines) {
     const uint64_t most = lines > 0 ? lines : kMostShotLines;
     uint64_t batch = lines > 0 ? lines : kFirstLines, done = 0;
     for (uint32_t round = 0; done < most; ++round) {
-        // Each batch is an estimate by itself and counts by its number of lines.
+        // Each batch is an estimate by itself, weighted by its number of lines.
         std::vector<double> expected(sources.size());
         for (size_t k = 0; k < sources.size(); ++k)
             expected[k] = double(batch) * (sumOfChannels(power[k]) / total);
@@ -120,7 +121,7 @@ SourceShot shootSources(const FirstShotInput& input, uint64_t lines) {
             {seed, kShootSources, round}, double(batch),
             [&] { input.progress.report(RB_STAGE_FIRST_SHOT, double(done) / double(most)); });
         done += batch;
-        // Double at most; less where the error says that less will do.
+        // Double the number of lines at most, or take fewer if the error shows that fewer suffice.
         const double error = relativeError(patches, sums, double(done));
         if (lines > 0 || error <= target) break;
         const double missing = double(done) * (1.05 * std::pow(error / target, 2) - 1);

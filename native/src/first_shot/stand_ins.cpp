@@ -19,14 +19,15 @@ StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
             isIn[patch] = !(*isShown)[2 * patch] || !(*isShown)[2 * patch + 1];
         clusters = findClusters(patches, isIn);
     }
-    // Of a side: that of the side of its cluster.
+    // Returns the cluster of a side: 2 * (cluster of its patch) for fronts, plus 1 for backs;
+    // kNoCluster if the side gathers for itself.
     auto clusterOf = [&](uint32_t side) {
         return (*isShown)[side] || clusters[side / 2] == kNoCluster
                    ? kNoCluster
                    : 2 * clusters[side / 2] + side % 2;
     };
     struct StandIn {
-        uint32_t side = 0, sides = 0;  // sides: that it stands for
+        uint32_t side = 0, sides = 0;  // sides: number of sides that it stands for
         float wait = INFINITY;
     };
     std::vector<StandIn> standIns;  // per side of a cluster
@@ -38,7 +39,8 @@ StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
         if (cluster >= standIns.size()) standIns.resize(cluster + 1);
         StandIn& standIn = standIns[cluster];
         isAnyForOthers |= ++standIn.sides > 1;
-        // The first of events of which each comes as often as the patch is large.
+        // Draw exponential waiting times with a rate proportional to the area. The smallest one
+        // selects each side with a probability proportional to its area.
         const float random = (float(hash(side, 0) >> 8) + 0.5f) * 0x1p-24f;
         const float wait = -std::log(random) / patches.area[side / 2];
         if (wait >= standIn.wait) continue;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Sides that stand for others in the first shot: of the sides of a cluster (patches/clusters.h)
-// whose light is not shown one gathers the light of the sources for all. The other sides of its
-// patches may be shown.
+// Stand-ins: sides that gather the light of the sources for others. Among the sides of a cluster
+// (patches/clusters.h) whose light is not shown, one side gathers for all. The other sides of the
+// cluster's patches may be shown.
 //
 // Source: face clusters as receivers (Willmott, Heckbert and Garland, "Face Cluster Radiosity",
-// 1999). Differs: one of the faces receives for all, by chance, as likely as it is large: what
-// surfaces around get from many clusters is right in the mean.
+// 1999).
+// Differs: one of the faces gathers for all, chosen at random with a probability proportional to
+// its area. The light that other surfaces get from many clusters is then right in the mean.
 #pragma once
 
 #include <cstdint>
@@ -16,22 +17,24 @@
 
 namespace raybundle {
 
+// The assignment of sides to the sides that gather for them.
 class StandIns {
   public:
-    // isShown: per side; null: all are, and each side stands for itself alone.
+    // `isShown`, per side, says whether the light of the side is shown. Null: all sides are shown,
+    // and each gathers for itself.
     StandIns(const Patches& patches, const std::vector<bool>* isShown);
 
-    // The sides that gather, ascending.
+    // Returns the sides that gather, in ascending order.
     const std::vector<uint32_t>& gatherers() const { return sides; }
-    // Among them, the number of the one that gathers for a side.
+    // Returns the index in gatherers() of the side that gathers for `side`.
     uint32_t numberOf(uint32_t side) const { return numbers.empty() ? side : numbers[side]; }
-    // Whether it does for others too.
+    // Returns whether the gatherer with this index gathers for other sides too.
     bool isForOthers(uint32_t number) const { return !forOthers.empty() && forOthers[number]; }
 
   private:
     std::vector<uint32_t> sides;
-    std::vector<uint32_t> numbers;  // per side; empty where all gather
-    std::vector<bool> forOthers;    // per gatherer; likewise
+    std::vector<uint32_t> numbers;  // per side; empty if all sides gather
+    std::vector<bool> forOthers;    // per gatherer; empty if all sides gather
 };
 
 }  // namespace raybundle

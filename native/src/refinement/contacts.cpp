@@ -15,18 +15,19 @@
 namespace raybundle {
 namespace {
 
-// Gaps narrower than this share of a tile's width count, and its edges are halved so often. With
-// wider gaps the cuts below round things (scene instances) cost more than they gained; more
-// would leave patches that few lines meet.
+// A gap is narrow if it is narrower than this share of a tile's width. The edges of a tile beside
+// it are halved kContactLevel times. Cuts at wider gaps below round objects (scene "instances")
+// cost more than they gained. More halvings would leave patches that few lines meet.
 constexpr float kNarrow = 0.25f;
 constexpr uint8_t kContactLevel = 2;
-// Rays from each side, one in each quarter of it.
+// First rays from each side, one in each quarter of it.
 constexpr uint32_t kFirstRays = 4;
-// Rays that tell whether a tile is near another surface in part.
+// Rays that decide whether only a part of a tile is near another surface.
 constexpr uint32_t kRays = 16;
-// Patches that the cuts may add: as many as there are tiles, or so many.
+// Largest number of patches that the cuts may add: the number of tiles, but at least this.
 constexpr size_t kMostMore = 40000;
 
+// Finds narrow gaps beside tiles.
 class Gaps {
   public:
     Gaps(const Patches& patches, const Visibility& visibility)
@@ -34,7 +35,8 @@ class Gaps {
         for (const float area : patches.area) widest = std::max(widest, kNarrow * std::sqrt(area));
     }
 
-    // Looks from each side which gaps are narrow beside it or beside what it meets.
+    // Casts rays from each side and marks the sides at gaps that are narrow relative to the side or
+    // to the side met by the ray.
     void find() {
         parallelFor(uint32_t(0), uint32_t(patches.sideCount()), [&](uint32_t side) {
             if (!counts(side)) return;
@@ -44,7 +46,7 @@ class Gaps {
                 const glm::vec4 u = points[i];
                 rays[i] = {patches.point(side / 2, {u.x, u.y}), patches.normal(side), widest};
             }
-            // Over most sides there is nothing, which takes less time to find for all rays at once.
+            // Most sides have nothing above them. Testing all rays at once is faster for these.
             std::array<float, kFirstRays> shares;
             visibility.visibleShares(side, rays.data(), kFirstRays, shares.data());
             for (uint32_t i = 0; i < kFirstRays; ++i) {
@@ -58,7 +60,7 @@ class Gaps {
         });
     }
 
-    // Whether a side lies at a narrow gap, and only a part of it near another surface.
+    // Returns whether a side lies at a narrow gap and only a part of it is near another surface.
     bool isContact(uint32_t side) const {
         if (!narrow[side]) return false;
         const SobolPoints points(hash(side, 1));
@@ -78,8 +80,8 @@ class Gaps {
     }
     float width(uint32_t side) const { return std::sqrt(patches.area[side / 2]); }
 
-    // From a point of a side to what is not too far in a direction, metres; none to what touches
-    // it.
+    // Returns the distance from a point of a side to the nearest surface in a direction, m. Returns
+    // nothing if the surface is further than `farthest` or touches the side.
     std::optional<float> gapAt(uint32_t side, const glm::vec3& point, const glm::vec3& direction,
                                float farthest, uint32_t* met = nullptr) const {
         float distance = 0;
@@ -91,7 +93,7 @@ class Gaps {
 
     const Patches& patches;
     const Visibility& visibility;
-    float widest = 0;                       // no gap is narrow anywhere that is wider, metres
+    float widest = 0;                       // no wider gap is narrow for any tile, m
     std::vector<std::atomic<bool>> narrow;  // per side
 };
 

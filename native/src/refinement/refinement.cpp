@@ -12,29 +12,35 @@
 namespace raybundle {
 namespace {
 
-// What a cut must remove, RMS over that of the light, in targets: see the head of refinement.h.
+// RMS error that a cut must remove, relative to the RMS light, in targets (see the head of
+// refinement.h).
 constexpr double kWorth = 1.5;
-// What all cuts together must remove, likewise, to be worth their shadow rays.
+// RMS error that all cuts together must remove to be worth their shadow rays, relative to the RMS
+// light, in targets.
 constexpr double kLeastGain = 0.4;
-// Of the squares of a step's surplus, and of that of bent light, what halving the edges removes.
+// Shares of the squared surplus that halving the edges removes: for a step, as at the edge of a
+// shadow, and for smooth light.
 constexpr double kStepGain = 0.5, kSmoothGain = 15.0 / 16;
-// Halvings of the edges of a tile that is cut, and the patches that it has more.
+// Number of times that the edges of a cut tile are halved, and the number of patches that this
+// adds.
 constexpr uint8_t kCutLevel = 1;
 constexpr size_t kMorePatches = (size_t(1) << (2 * kCutLevel)) - 1;
 
 struct Mark {
-    double gain = 0;  // squares that the cut removes, over those of the light
+    double gain = 0;  // squared error that the cut removes, over the squared light
     bool isShadowEdge = false;
 };
 
-// Not where no result is wanted, nor the insides of solids.
+// Returns whether the light of a side is part of the result and the side is not the inside of a
+// solid.
 bool isWanted(const Scene& scene, const Patches& patches, uint32_t side) {
     const Parent& parent = patches.parentAt(side);
     const Instance& instance = scene.instances[parent.instance];
     return instance.hasResultOnFace(size_t(parent.face)) && !(parent.isSolid && side % 2 == 1);
 }
 
-// Mean square of the light, as if all but the sources' came from everywhere in a closed room.
+// Returns the mean square of the light, under the assumption that all light but that of the sources
+// is uniform as in a closed room.
 double meanSquareLight(const Patches& patches, const CoarseShot& shot) {
     double sum = 0, squares = 0, area = 0, reflected = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
@@ -53,7 +59,8 @@ double meanSquareLight(const Patches& patches, const CoarseShot& shot) {
     return squares / area + 2 * mean * more + more * more;
 }
 
-// Whether the cuts by the light of one set could be worth a closer look: a bound.
+// Returns whether the cuts for the light of one set could pay, from an upper bound of what they can
+// gain.
 bool mayGain(const Patches& patches, const CoarseShot& shot, double light, double targetError) {
     double most = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side)
@@ -62,7 +69,7 @@ bool mayGain(const Patches& patches, const CoarseShot& shot, double light, doubl
     return most > std::pow(kLeastGain * targetError, 2) * light * patches.totalArea;
 }
 
-// Marks the tiles whose cuts pay by the light of one set.
+// Marks the tiles whose cuts pay for the light of one set.
 void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, double targetError,
           std::vector<Mark>& marks) {
     const double light = meanSquareLight(patches, shot);
@@ -97,7 +104,7 @@ void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, do
                                     ? kStepGain * std::max(0.0, double(found.step))
                                     : 0;
             const double smooth = kSmoothGain * double(found.smooth);
-            // Of a sum over RGB.
+            // The surplus is summed over the three channels.
             const double gain = (step + smooth) / (3 * light);
             if (gain > std::max(least, marks[tile].gain)) marks[tile] = {gain, step > smooth};
         }

@@ -1,26 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Refinement: tiles are cut where the light changes within them by more than the bake may err, and
-// where that gains more than the patches cost; others stay as they are. What tells before any
-// bundle is a coarse first shot, of few shadow rays from each tile: the surplus of its light
-// (stated_error/surplus.h),
-// - at the edge of a shadow, where of the rays of a tile some are blocked and some are not;
-// - in light that bends within a tile, as beside a lamp.
+// Refinement: a tile is cut if the light changes within it by more than the error allowed in the
+// bake, and if the gain is worth the cost of the additional patches. The decision is made before
+// any bundle is traced, from a coarse first shot with few shadow rays from each tile. The surplus
+// of its light (stated_error/surplus.h) marks tiles
+// - at the edge of a shadow, where some of the rays of a tile are blocked and others are not;
+// - where light varies nonlinearly within a tile, as beside a lamp.
 //
-// A cut pays where the squares that it removes, over those of the light, are more than those of
-// kWorth targets. One tile of N is 1 / N of the area, and its cut adds 3 / N to the patches. If a
-// share c of the run time goes with the patches, bundles for as much time would bring the squares
-// of the noise, which are those of the target, down by 2 * kNoiseSlope (bundles/directions.h) * 3 *
-// c of them: with c = 1/2 that is the square of 1.4 targets.
+// A cut pays if the squared error that it removes, relative to the squared light, is more than that
+// of kWorth targets. One tile of N is 1 / N of the area, and its cut adds 3 / N to the number of
+// patches. If a share c of the run time is proportional to the number of patches, bundles traced in
+// the time that the cut takes would reduce the square of the noise, which is that of the target, on
+// this area by 2 * kNoiseSlope (bundles/directions.h) * 3 * c times its value. For c = 1/2 this is
+// the square of 1.4 targets.
 //
-// Contacts are cut only where the sources' light shows them; narrow gaps are cut for themselves
-// (refinement/contacts.h).
+// Contacts are cut here only where the light of the sources shows them. Narrow gaps are cut
+// independently of the light (refinement/contacts.h).
 //
-// Sources: the marks are those of hierarchical radiosity: Cohen, Greenberg, Immel, Brock, "An
+// Sources: the criteria are those of hierarchical radiosity: Cohen, Greenberg, Immel, Brock, "An
 // Efficient Radiosity Approach for Realistic Image Synthesis" (1986); Hanrahan, Salzman, Aupperle,
 // "A Rapid Hierarchical Radiosity Algorithm" (1991).
-// Differs: there an element is cut after its light is known, and its interactions with it; here
-// once, after a coarse first shot and before bundles are traced, because lines are kept
+// Differs: in these an element and its interactions are cut after its light is known. Here tiles
+// are cut once, after a coarse first shot and before bundles are traced, because lines are stored
 // with the patches that they join.
 #pragma once
 
@@ -35,8 +36,9 @@
 
 namespace raybundle {
 
-// The cuts of an uncut subdivision that pay. shots: of all sides, of each light set. At most
-// maxPatches patches come out, the most worthwhile cuts first. targetError: relative.
+// Returns the cuts of a subdivision without cuts that pay. `shots` holds the coarse shot of all
+// sides for each light set. The result has at most `maxPatches` patches; the most worthwhile cuts
+// come first. `targetError` is relative.
 Cuts worthwhileCuts(const Scene& scene, const Patches& patches,
                     const std::vector<CoarseShot>& shots, size_t maxPatches, float targetError);
 
