@@ -15,6 +15,7 @@
 
 #include "patches/coincidence.h"
 #include "patches/patches.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -56,7 +57,7 @@ class Contacts {
         // Surfaces that meet at an angle are close only at their common edge, and see each other.
         constexpr float kOpposite = -0.99f;  // cosine below which normals are opposite
         return gapAcross(a, along) <= touchAt(a) &&
-               glm::dot(patches.normal(a ^ 1), patches.normal(b)) < kOpposite;
+               glm::dot(patches.normal(opposite(a)), patches.normal(b)) < kOpposite;
     }
 
     // Returns whether the two sides coincide and b belongs before a.
@@ -87,16 +88,13 @@ class Contacts {
     double touchAt(uint32_t side) const { return double(patches.islandAt(side).touchDistance); }
     double coincidenceAt(uint32_t side) const { return kCoincidence * touchAt(side); }
     bool areSidesParallel(uint32_t a, uint32_t b) const {
-        return areParallel(patches.parents[patches.parentOf[a / 2]],
-                           patches.parents[patches.parentOf[b / 2]]);
+        return areParallel(patches.parentAt(a), patches.parentAt(b));
     }
     bool isFirst(uint32_t a, uint32_t b) const {
-        return comesBefore(patches, patches.parentOf[a / 2], a % 2 == 0, patches.parentOf[b / 2],
-                           b % 2 == 0);
+        return comesBefore(patches, patches.parentOf[patchOf(a)], !isBack(a),
+                           patches.parentOf[patchOf(b)], !isBack(b));
     }
-    bool isInside(uint32_t side) const {
-        return side % 2 == 1 && patches.parents[patches.parentOf[side / 2]].isSolid;
-    }
+    bool isInside(uint32_t side) const { return isBack(side) && patches.parentAt(side).isSolid; }
 
     const Patches& patches;
     const double touchDistance;

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "patches/side.h"
+
 namespace raybundle {
 namespace {
 
@@ -164,7 +166,7 @@ void FragmentLists::pairLists(BundleLines& out) {
             const uint64_t nearer = std::min(a, b), farther = std::max(a, b);
             if (!hasLeaks && !areNear(nearer, farther)) {
                 *nextSky++ = sideOf(nearer);
-                *nextSky++ = sideOf(farther) ^ 1;
+                *nextSky++ = opposite(sideOf(farther));
                 runs.add(0, sideOf(nearer) ^ 1, sideOf(farther));
                 continue;
             }
@@ -179,12 +181,12 @@ void FragmentLists::pairLists(BundleLines& out) {
         for (const uint64_t* k = first; k + 1 < last; ++k) anyNear |= areNear(k[0], k[1]);
         if (anyNear) orderCoinciding(first, last);
         *nextSky++ = sideOf(*first);
-        *nextSky++ = sideOf(last[-1]) ^ 1;
+        *nextSky++ = opposite(sideOf(last[-1]));
         if (anyNear || hasLeaks)
             pairNear(first, last, out);
         else  // the far side of the nearer surface sees the near side of the farther one
             for (const uint64_t* k = first; k + 1 < last; ++k)
-                runs.add(size_t(k - first), sideOf(k[0]) ^ 1, sideOf(k[1]));
+                runs.add(size_t(k - first), opposite(sideOf(k[0])), sideOf(k[1]));
     }
     out.lines += size_t(nextSky - sky.data()) / 2;
     out.sky.insert(out.sky.end(), sky.data(), nextSky);
@@ -193,8 +195,8 @@ void FragmentLists::pairLists(BundleLines& out) {
 
 void FragmentLists::pairNear(const uint64_t* first, const uint64_t* last, BundleLines& out) {
     for (const uint64_t* k = first; k + 1 < last; ++k) {
-        const uint32_t i = sideOf(k[0]) ^ 1, j = sideOf(k[1]);
-        if (areNear(k[0], k[1]) && contacts.touches(i ^ 1, j, along(k[0], k[1]))) {
+        const uint32_t i = opposite(sideOf(k[0])), j = sideOf(k[1]);
+        if (areNear(k[0], k[1]) && contacts.touches(opposite(i), j, along(k[0], k[1]))) {
             out.touching.push_back(i);
             out.touching.push_back(j);
         } else {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "bundles/newell_order.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -63,7 +64,7 @@ void Painter::project(const Bundle& bundle, BundleLines& out) {
     std::fill(place.begin(), place.end(), 0);
     rasteriser.forEachFragment([&](uint32_t pixel, double depth, uint32_t side) {
         fragments.push_back({depth, pixel, side});
-        if (place[side / 2]++ == 0) drawn.push_back(side / 2);
+        if (place[patchOf(side)]++ == 0) drawn.push_back(patchOf(side));
     });
     out.cycles += order->sort(bundle, drawn);
     group(drawn);
@@ -74,7 +75,7 @@ void Painter::group(const std::vector<uint32_t>& sorted) {
     uint32_t next = 0;
     for (uint32_t patch : sorted) next += std::exchange(place[patch], next);
     strokes.resize(fragments.size());
-    for (const Fragment& f : fragments) strokes[place[f.side / 2]++] = f;
+    for (const Fragment& f : fragments) strokes[place[patchOf(f.side)]++] = f;
 }
 
 void Painter::paint(BundleLines& out) {
@@ -86,7 +87,7 @@ void Painter::paint(BundleLines& out) {
             out.sky.push_back(f.side);
         } else {
             // The far side of the previous patch sees the near side of the current one.
-            const uint32_t i = pixel.side ^ 1, j = f.side;
+            const uint32_t i = opposite(pixel.side), j = f.side;
             const double along = f.depth - pixel.depth;
             const bool touches = contacts.touches(pixel.side, j, along);
             if (touches) {
@@ -104,7 +105,7 @@ void Painter::paint(BundleLines& out) {
         pixel = {f.depth, f.side};
     }
     for (const Pixel& pixel : pixels)
-        if (pixel.side != kEmpty) out.sky.push_back(pixel.side ^ 1);
+        if (pixel.side != kEmpty) out.sky.push_back(opposite(pixel.side));
     runs.moveTo(out.exchanges);
 }
 

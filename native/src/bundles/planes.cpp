@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "patches/side.h"
+
 namespace raybundle {
 namespace {
 
@@ -230,10 +232,10 @@ void Planes::addPair(uint32_t pixel, uint32_t firstPlane, uint32_t crossings, Ke
     if (below == kNone) {
         runs.add(pixel, firstPlane, sideOf(above), kSky, lines);
     } else if (above == kNone) {
-        runs.add(pixel, firstPlane, sideOf(below) ^ 1, kSky, lines);
+        runs.add(pixel, firstPlane, opposite(sideOf(below)), kSky, lines);
     } else if (!contacts.touches(sideOf(below), sideOf(above), along(below, above))) {
         // The far side of the nearer surface sees the near side of the farther one.
-        runs.add(pixel, firstPlane, sideOf(below) ^ 1, sideOf(above), lines);
+        runs.add(pixel, firstPlane, opposite(sideOf(below)), sideOf(above), lines);
     }
 }
 

@@ -28,6 +28,7 @@
 #include "bundles/roulette.h"
 #include "patches/opacity.h"
 #include "patches/patches.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -95,7 +96,7 @@ class Rasteriser {
     // Returns whether the line of a pixel belongs to the view and meets the patch of a side.
     bool isMet(uint32_t pixel, uint32_t side) const {
         return (taken.empty() || !taken[pixel]) &&
-               (patches.opacity.empty() || stops(patches, side / 2, line + pixel));
+               (patches.opacity.empty() || stops(patches, patchOf(side), line + pixel));
     }
     // Visits fragments as if all patches were opaque and all pixels belonged to the view.
     template <class Visit>
@@ -255,9 +256,9 @@ void Rasteriser::sampleSheet(const Sheet& sheet, const Visit& visit) {
         if (sheet.parts.empty()) return;
         for (int k = 0; k < count; ++k)
             if (side[k] >= 2 * Sheet::kUneven)
-                side[k] = 2 * sheet.patchIn(side[k] / 2, patches, s + float(k) * dsdx,
+                side[k] = 2 * sheet.patchIn(patchOf(side[k]), patches, s + float(k) * dsdx,
                                             t + float(k) * dtdx) +
-                          side[k] % 2;
+                          isBack(side[k]);
     };
     sampleOutline(int(sheet.outline.size()), edge, {sheet.origin, sheet.a, sheet.b}, patchAt,
                   lookUp, visit);

@@ -16,6 +16,7 @@
 
 #include "bundles/contacts.h"
 #include "bundles/projector.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -41,7 +42,7 @@ class SingleLine : public Projector {
         ++out.lines;
         out.sky.push_back(hits.front().side);
         for (size_t k = 0; k + 1 < hits.size(); ++k) {
-            const uint32_t i = hits[k].side ^ 1, j = hits[k + 1].side;
+            const uint32_t i = opposite(hits[k].side), j = hits[k + 1].side;
             if (contacts.touches(hits[k].side, j, along(hits[k], hits[k + 1]))) {
                 out.touching.push_back(i);
                 out.touching.push_back(j);
@@ -49,7 +50,7 @@ class SingleLine : public Projector {
                 out.exchanges.push_back({std::min(i, j), std::max(i, j), 1});
             }
         }
-        out.sky.push_back(hits.back().side ^ 1);
+        out.sky.push_back(opposite(hits.back().side));
     }
 
   private:

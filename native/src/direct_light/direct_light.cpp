@@ -11,6 +11,7 @@
 #include "job/cancellation.h"
 #include "lights/emissive_meshes.h"
 #include "lights/receiver_place.h"
+#include "patches/side.h"
 #include "visibility/local_lines.h"
 
 namespace raybundle {
@@ -97,8 +98,8 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
     for (size_t side = 0; side < split->bundled.size(); ++side)
-        coarse.bundled +=
-            double(patches.area[side / 2] * brightest(split->bundled[side])) / patches.totalArea;
+        coarse.bundled += double(patches.area[patchOf(side)] * brightest(split->bundled[side])) /
+                          patches.totalArea;
     if (sources.empty()) return;
     Seen seen(sources.size());
     std::vector<bool> hasNeighbour(coarse.gathered.size(), false);

@@ -9,6 +9,7 @@
 #include "job/cancellation.h"
 #include "lights/enclosing.h"
 #include "lights/receiver.h"
+#include "patches/side.h"
 #include "sampling/sphere_sampling.h"
 #include "visibility/local_lines.h"
 
@@ -63,9 +64,9 @@ std::vector<MeanLight> meanLights(const Scene& scene, const Patches& patches,
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
         throwIfCancelledAt(side);
         MeanLight& mean = means[patches.parentAt(side).island];
-        mean.emitted += patches.area[side / 2] * brightest(emission[side]);
-        if (side % 2 == 0)
-            mean.reflectance += patches.area[side / 2] *
+        mean.emitted += patches.area[patchOf(side)] * brightest(emission[side]);
+        if (!isBack(side))
+            mean.reflectance += patches.area[patchOf(side)] *
                                 brightest(patches.reflectance[side] + patches.translucenceOf(side));
     }
     for (const Light& light : scene.lights) {
@@ -105,7 +106,7 @@ double metShare(const Patches& patches, const Visibility& visibility,
     // The path starts at the centroid of the side. With few paths the start point on the side
     // matters little.
     auto nextHit = [&](uint32_t side, glm::vec2 u) {
-        return visibility.firstHit(side, patches.point(side / 2, glm::vec2(1 / 3.0f)),
+        return visibility.firstHit(side, patches.point(patchOf(side), glm::vec2(1 / 3.0f)),
                                    cosineDirection(patches.normal(side), u));
     };
     // Front and back sides alternate, and Sobol points have a similar regularity: equal steps
@@ -118,7 +119,7 @@ double metShare(const Patches& patches, const Visibility& visibility,
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
         throwIfCancelledAt(side);
         if (patches.parentAt(side).island != island) continue;
-        sum += patches.area[side / 2] * brightest(emission[side]) / power * kPaths;
+        sum += patches.area[patchOf(side)] * brightest(emission[side]) / power * kPaths;
         for (; path < kPaths && start < sum; start = ++path + uniform(random)) {
             const glm::vec4 u = uniformPoint(random);
             const auto receiver = nextHit(side, {u.x, u.y});
@@ -140,7 +141,7 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
                         std::vector<glm::vec3>(sides), std::vector<bool>(sides, false)};
     for (size_t side = 0; side < sides; ++side) {
         throwIfCancelledAt(side);
-        const uint32_t instance = patches.parents[patches.parentOf[side / 2]].instance;
+        const uint32_t instance = patches.parentAt(side).instance;
         if (scene.instances[instance].lightSet != lightSet) split.emitted[side] = glm::vec3(0.0f);
     }
     if (skips.skipLampInsides) {
@@ -150,7 +151,7 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
             glm::vec3& emitted = split.emitted[side];
             if (!isEmpty[patches.parentAt(side).surface] || emitted == glm::vec3(0.0f)) continue;
             ++split.unseen;
-            split.unseenPower += double(patches.area[side / 2]) * glm::dvec3(emitted);
+            split.unseenPower += double(patches.area[patchOf(side)]) * glm::dvec3(emitted);
             emitted = glm::vec3(0.0f);
         }
     }
@@ -174,7 +175,7 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
         if (!patches.parentAt(side).exchanges) continue;
         if (brightest(split.emitted[side]) > limits[patches.parentAt(side).island]) {
             split.isSource[side] = true;
-            split.gathered[side] = patches.opacityOf(side / 2) * split.emitted[side];
+            split.gathered[side] = patches.opacityOf(patchOf(side)) * split.emitted[side];
         } else {
             split.bundled[side] = split.emitted[side];
         }

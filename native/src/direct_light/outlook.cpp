@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -127,7 +128,7 @@ Outlooks::Outlooks(const PartNeighbours& parts, const std::vector<uint32_t>& the
     parallelFor(size_t(0), these.size(), [&](size_t k) {
         const Receiver receiver = receiverAt(these[k]);
         const glm::vec3 at =
-            receiver.point ? *receiver.point : patches.point(receiver.side / 2, {0.5f, 0.5f});
+            receiver.point ? *receiver.point : patches.point(patchOf(receiver.side), {0.5f, 0.5f});
         const glm::vec3 normal =
             kNormalExtent * patches.islandAt(receiver.side).radius * receiver.normal;
         keys[k] = {at.x, at.y, at.z, normal.x, normal.y, normal.z};

@@ -26,6 +26,7 @@
 #include "lights/light_source.h"
 #include "lights/receiver.h"
 #include "patches/patches.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -50,7 +51,7 @@ class Sightings {
     // Calls visit(part, isSeen) for each sample.
     template <class Visit>
     void forEach(const Visit& visit) const {
-        for (size_t k = 0; k < count; ++k) visit(uint32_t(parts[k] / 2), parts[k] % 2 == 1);
+        for (size_t k = 0; k < count; ++k) visit(uint32_t(patchOf(parts[k])), isBack(parts[k]));
     }
 
   private:

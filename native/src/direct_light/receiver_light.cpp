@@ -11,6 +11,7 @@
 #include "direct_light/outlook.h"
 #include "direct_light/source_samples.h"
 #include "lights/receiver_place.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -70,8 +71,8 @@ class DirectLight::SourceGather {
           hasParts(!source.parts().empty()),
           outlook(hasParts ? aim.outlook : nullptr),
           isGuided(outlook && !outlook->seen.empty()),
-          isInside(light.skips.skipInside && !source.staysInside() && receiver.side % 2 == 1 &&
-                   light.patches.parents[light.patches.parentOf[receiver.side / 2]].isSolid),
+          isInside(light.skips.skipInside && !source.staysInside() && isBack(receiver.side) &&
+                   light.patches.parentAt(receiver.side).isSolid),
           mostSamples(aim.mostGrowth * source.mostSamples()),
           seed(hash(light.seed, hash(receiver.seed, uint32_t(index)))),
           samples(light.visibility, source, place, receiver.side, seed),
@@ -248,7 +249,7 @@ AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) c
     constexpr float kLeastShown = 0.05f;
     const Parent& parent = patches.parentAt(side);
     const MaterialSide& surface =
-        scene.materialOf(parent.instance, size_t(parent.face)).sides[side % 2];
+        scene.materialOf(parent.instance, size_t(parent.face)).sides[isBack(side)];
     const glm::vec3 all = glm::max(surface.shown(angles), kLeastShown);
     for (size_t term = 0; term < factors.size(); ++term)
         factors[term] = surface.shownByAngle[term] / all;

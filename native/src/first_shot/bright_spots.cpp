@@ -8,6 +8,7 @@
 
 #include "bundles/directions.h"
 #include "first_shot/directed_light.h"
+#include "patches/side.h"
 #include "scene/channels.h"
 
 namespace raybundle {
@@ -38,7 +39,7 @@ bool isUncovered(const FirstShotInput& input, const Visibility& exchange, uint32
     const glm::vec3 normal = input.patches.normal(side);
     for (uint32_t k = 0; k < kLooks; ++k) {
         const glm::vec4 u = sobolPoint(k, side);
-        if (exchange.isBlocked(side, input.patches.point(side / 2, {u.x, u.y}), normal,
+        if (exchange.isBlocked(side, input.patches.point(patchOf(side), {u.x, u.y}), normal,
                                input.patches.touchDistance))
             return false;
     }
@@ -75,14 +76,14 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
     for (size_t side = 0; side < n; ++side) {
         const Parent& parent = patches.parentAt(uint32_t(side));
         IslandLight& island = islands[parent.island];
-        if (side % 2 == 0) island.area += double(patches.area[side / 2]);
+        if (!isBack(side)) island.area += double(patches.area[patchOf(side)]);
         // Light inside a solid, such as the body of a lamp, stays there.
-        const bool isInside = parent.isSolid && !parent.isInward && side % 2 == 1;
+        const bool isInside = parent.isSolid && !parent.isInward && isBack(side);
         if (!parent.exchanges || isInside) continue;
-        const double area = double(patches.area[side / 2]);
+        const double area = double(patches.area[patchOf(side)]);
         exitance[side] = double(brightest(reflected(patches, shot, side)));
         island.power += area * (exitance[side] + double(brightest(shot.emission[side])));
-        if (side % 2 == 0)
+        if (!isBack(side))
             island.reflectance += area * double(brightest(patches.reflectance[side]));
     }
     double most = 0;
@@ -104,10 +105,10 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
     std::set<uint32_t> objects;  // instances with bright spots
     for (size_t side = 0; side < n; ++side) {
         if (islands[patches.parentAt(uint32_t(side)).island].area == 0) continue;
-        const double area = double(patches.area[side / 2]);
+        const double area = double(patches.area[patchOf(side)]);
         const bool isBright = exitance[side] > kBright * mean;
         (isBright ? inSpots : inRest) += area * std::pow(exitance[side] / mean - 1, 2) *
-                                         lineShare(density, patches.parentOf[side / 2]);
+                                         lineShare(density, patches.parentOf[patchOf(side)]);
         if (!isBright) continue;
         areaOfSpots += area;
         objects.insert(patches.parentAt(uint32_t(side)).instance);

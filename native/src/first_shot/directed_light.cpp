@@ -8,6 +8,7 @@
 
 #include "bundles/directions.h"
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 #include "scene/channels.h"
 #include "surfaces/side_reflectance.h"
@@ -78,14 +79,14 @@ void DirectedLight::findLayers() {
         if (!(brightest(all) > 0)) continue;
         const glm::vec3 diffuse = SideReflectance(patches, side).diffuseMean();
         layers[side] = {patches.normal(side), diffuse / glm::max(all, kLeastReflectance),
-                        2 * patches.parentAt(side).scattering + side % 2};
+                        2 * patches.parentAt(side).scattering + isBack(side)};
     }
 }
 
 double DirectedLight::enoughLines(const FirstShot& shot) const {
     double reflected = 0, bent = 0;
     for (uint32_t side = 0; side < patches.sideCount(); ++side) {
-        const double area = double(patches.area[side / 2]);
+        const double area = double(patches.area[patchOf(side)]);
         reflected += area * double(brightest(patches.reflectance[side] * shot.irradiance[side]));
         for (uint32_t k = first[side]; k < first[side + 1]; ++k)
             bent += area * double(all[k].lobe.contrast() * brightest(all[k].exitance));
@@ -163,14 +164,14 @@ glm::vec3 DirectedLight::beyondMean(uint32_t side, const glm::vec3& direction,
 }
 
 bool DirectedLight::areNear(uint32_t side, uint32_t other) const {
-    const glm::vec4 &from = middles[side / 2], &to = middles[other / 2];
+    const glm::vec4 &from = middles[patchOf(side)], &to = middles[patchOf(other)];
     const glm::vec3 way = glm::vec3(to) - glm::vec3(from);
     const float near = kNear * (from.w + to.w);
     return glm::dot(way, way) < near * near;
 }
 
 glm::vec3 DirectedLight::middleWay(uint32_t side, uint32_t other) const {
-    const glm::vec3 way = glm::vec3(middles[other / 2]) - glm::vec3(middles[side / 2]);
+    const glm::vec3 way = glm::vec3(middles[patchOf(other)]) - glm::vec3(middles[patchOf(side)]);
     const float square = glm::dot(way, way);
     return square > 0 ? way / std::sqrt(square) : patches.normal(side);
 }
@@ -185,7 +186,7 @@ void DirectedLight::forNearWays(uint32_t side, uint32_t other, uint32_t random,
     for (uint32_t k = 0; k < kNearPairs; ++k) {
         const glm::vec4 u = points[k];
         const glm::vec3 way =
-            patches.point(other / 2, {u.z, u.w}) - patches.point(side / 2, {u.x, u.y});
+            patches.point(patchOf(other), {u.z, u.w}) - patches.point(patchOf(side), {u.x, u.y});
         const float square = glm::dot(way, way);
         const float cosines = -glm::dot(normal, way) * glm::dot(otherNormal, way);
         if (!(square > 0) || glm::dot(normal, way) <= 0 || cosines <= 0) continue;

@@ -28,6 +28,7 @@
 #include "bundles/directions.h"
 #include "first_shot/first_shot.h"
 #include "first_shot/shoot.h"
+#include "patches/side.h"
 #include "sampling/sphere_sampling.h"
 #include "scene/channels.h"
 #include "visibility/local_lines.h"
@@ -46,7 +47,7 @@ constexpr int kTries = 8;
 glm::dvec3 meanReflectance(const Patches& patches) {
     glm::dvec3 reflected(0.0);
     for (size_t side = 0; side < patches.sideCount(); ++side)
-        reflected += double(patches.area[side / 2]) * glm::dvec3(patches.reflectance[side]);
+        reflected += double(patches.area[patchOf(side)]) * glm::dvec3(patches.reflectance[side]);
     return patches.totalArea > 0 ? reflected / (2 * patches.totalArea) : glm::dvec3(0.0);
 }
 
@@ -75,8 +76,8 @@ LineEnd castFrom(uint32_t side, const FirstShotInput& input, std::mt19937_64& ra
         const glm::vec3 direction = cosineDirection(normal, {u.z, u.w});
         float distance = 0;
         const Visibility& visibility = input.exchange ? *input.exchange : input.visibility;
-        const auto met =
-            visibility.firstHit(side, patches.point(side / 2, {u.x, u.y}), direction, &distance);
+        const auto met = visibility.firstHit(side, patches.point(patchOf(side), {u.x, u.y}),
+                                             direction, &distance);
         if (!met) return {LineEnd::kSky};
         if (!isCovered(patches, side, *met, direction, distance)) return {*met};
     }
@@ -111,7 +112,7 @@ FirstShot extendedFirstShot(const FirstShotInput& input) {
     std::vector<glm::dvec3> unshot(n), indirect(n);
     for (size_t side = 0; side < n; ++side) {
         const glm::dvec3& received = sources.received[side];
-        shot.irradiance[side] = glm::vec3(received / double(patches.area[side / 2]));
+        shot.irradiance[side] = glm::vec3(received / double(patches.area[patchOf(side)]));
         if (patches.parentAt(uint32_t(side)).exchanges)
             unshot[side] = glm::dvec3(patches.reflectance[side]) * received;
         arrived += received;
@@ -129,7 +130,7 @@ FirstShot extendedFirstShot(const FirstShotInput& input) {
         std::vector<double> expected;
         for (uint32_t side = 0; side < n; ++side) {
             const glm::dvec3 above = glm::max(
-                unshot[side] - double(patches.area[side / 2]) * threshold, glm::dvec3(0.0));
+                unshot[side] - double(patches.area[patchOf(side)]) * threshold, glm::dvec3(0.0));
             if (!(sumOfChannels(above) > 0)) continue;
             shooters.push_back(side);
             excess.push_back(above);
@@ -161,7 +162,7 @@ FirstShot extendedFirstShot(const FirstShotInput& input) {
     }
 
     for (size_t side = 0; side < n; ++side) {
-        const double area = double(patches.area[side / 2]);
+        const double area = double(patches.area[patchOf(side)]);
         shot.indirect[side] = glm::vec3(indirect[side] / area);
         shot.unshot[side] = glm::vec3(glm::max(unshot[side], glm::dvec3(0.0)) / area);
     }

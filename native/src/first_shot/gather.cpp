@@ -15,6 +15,7 @@
 #include "first_shot/stand_ins.h"
 #include "job/cancellation.h"
 #include "patches/neighbours.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -68,12 +69,12 @@ namespace {
 // to the share that each side has of the total area.
 float othersError(const Patches& patches, const StandIns& standIns, uint32_t side) {
     if (patches.reflectance[side] == glm::vec3(0.0f) &&
-        patches.translucenceOf(side ^ 1) == glm::vec3(0.0f))
+        patches.translucenceOf(opposite(side)) == glm::vec3(0.0f))
         return kMostError;
     if (standIns.isForOthers(standIns.numberOf(side))) return kOthersError;
     const float edge = patches.islandAt(side).size;
     return kOthersError *
-           std::max(1.0f, edge / std::sqrt(std::max(patches.area[side / 2], 1e-30f)));
+           std::max(1.0f, edge / std::sqrt(std::max(patches.area[patchOf(side)], 1e-30f)));
 }
 
 // Returns the coarse shot of the tiles, if there is one, extended to the patches of cut tiles. Only
@@ -90,10 +91,11 @@ CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32
     for (uint32_t k = 0; k < gatherers.size(); ++k) {
         throwIfCancelledAt(k);
         const uint32_t side = gatherers[k];
-        if (patches.level(side / 2) > 0)
+        if (patches.level(patchOf(side)) > 0)
             cut.push_back(k);
         else
-            coarse.gathered[k] = input.fromTiles->gathered[2 * patches.tileOf(side / 2) + side % 2];
+            coarse.gathered[k] =
+                input.fromTiles->gathered[sideOf(patches.tileOf(patchOf(side)), isBack(side))];
     }
     input.light.shootCoarsely(coarse, cut, receiverAt, report);
     return coarse;
@@ -121,7 +123,7 @@ FirstShot gather(const FirstShotInput& input) {
         Receiver receiver{side, patches.normal(side), std::nullopt, side};
         // Most of the error of the patches of a cut tile averages out over the tile. The mean over
         // the tile may keep twice the error of other tiles.
-        if (const int level = patches.level(side / 2); level > 0)
+        if (const int level = patches.level(patchOf(side)); level > 0)
             receiver.errorFactor = std::ldexp(1.0f, level);
         if (input.isShown && !(*input.isShown)[side]) {
             receiver.isShown = false;
@@ -160,7 +162,7 @@ FirstShot gather(const FirstShotInput& input) {
     for (uint32_t side = 0; side < n; ++side) {
         const Gathered& result = results[standIns.numberOf(side)];
         shot.irradiance[side] = result.irradiance;
-        shot.emitted += double(patches.area[side / 2]) * glm::dvec3(result.unpowered);
+        shot.emitted += double(patches.area[patchOf(side)]) * glm::dvec3(result.unpowered);
         shot.angles[side] = result.meanAngles();
         if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
         shot.error[side] = std::sqrt(result.variance);

@@ -22,6 +22,7 @@
 #include <cmath>
 
 #include "bundles/directions.h"
+#include "patches/side.h"
 #include "scene/channels.h"
 #include "visibility/local_lines.h"
 
@@ -48,7 +49,7 @@ LineEnd castFrom(const LightSource& source, const FirstShotInput& input, std::mt
 double relativeError(const Patches& patches, const LocalLines& sums, double lines) {
     double noise = 0, signal = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
-        const double area = double(patches.area[side / 2]);
+        const double area = double(patches.area[patchOf(side)]);
         const double variance = sumOfChannels(sums.variance[side]) / (lines * lines);
         const glm::dvec3 power = sums.received[side] / lines;
         noise += variance / area;
@@ -72,7 +73,7 @@ void addPassingLight(const FirstShotInput& input, SourceShot& shot) {
         },
         input.settings.targetError, [&](double) { input.progress.report(RB_STAGE_FIRST_SHOT, 0); });
     for (size_t k = 0; k < sides.size(); ++k) {
-        const double area = double(input.patches.area[sides[k] / 2]);
+        const double area = double(input.patches.area[patchOf(sides[k])]);
         shot.received[sides[k]] += area * glm::dvec3(results[k].irradiance);
         shot.variance[sides[k]] += glm::dvec3(area * area * double(results[k].variance));
         shot.emitted += area * glm::dvec3(results[k].irradiance);
@@ -149,7 +150,8 @@ std::vector<float> standardErrors(const Patches& patches, const std::vector<glm:
     std::vector<float> errors(variance.size());
     for (size_t side = 0; side < errors.size(); ++side) {
         const glm::dvec3& v = variance[side];
-        errors[side] = float(std::sqrt(std::max({v.x, v.y, v.z})) / double(patches.area[side / 2]));
+        errors[side] =
+            float(std::sqrt(std::max({v.x, v.y, v.z})) / double(patches.area[patchOf(side)]));
     }
     return errors;
 }
@@ -161,7 +163,7 @@ FirstShot shoot(const FirstShotInput& input) {
     shot.irradiance.resize(sources.received.size());
     for (size_t side = 0; side < shot.irradiance.size(); ++side)
         shot.irradiance[side] =
-            glm::vec3(sources.received[side] / double(input.patches.area[side / 2]));
+            glm::vec3(sources.received[side] / double(input.patches.area[patchOf(side)]));
     shot.error = standardErrors(input.patches, sources.variance);
     shot.emitted = sources.emitted;
     shot.escaped = sources.escaped;

@@ -6,6 +6,7 @@
 
 #include "job/cancellation.h"
 #include "patches/clusters.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 
 namespace raybundle {
@@ -22,9 +23,9 @@ StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
     // Returns the cluster of a side: 2 * (cluster of its patch) for fronts, plus 1 for backs;
     // kNoCluster if the side gathers for itself.
     auto clusterOf = [&](uint32_t side) {
-        return (*isShown)[side] || clusters[side / 2] == kNoCluster
+        return (*isShown)[side] || clusters[patchOf(side)] == kNoCluster
                    ? kNoCluster
-                   : 2 * clusters[side / 2] + side % 2;
+                   : sideOf(clusters[patchOf(side)], isBack(side));
     };
     struct StandIn {
         uint32_t side = 0, sides = 0;  // sides: number of sides that it stands for
@@ -42,7 +43,7 @@ StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
         // Draw exponential waiting times with a rate proportional to the area. The smallest one
         // selects each side with a probability proportional to its area.
         const float random = (float(hash(side, 0) >> 8) + 0.5f) * 0x1p-24f;
-        const float wait = -std::log(random) / patches.area[side / 2];
+        const float wait = -std::log(random) / patches.area[patchOf(side)];
         if (wait >= standIn.wait) continue;
         standIn.wait = wait;
         standIn.side = side;

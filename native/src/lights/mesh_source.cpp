@@ -9,6 +9,7 @@
 
 #include "job/cancellation.h"
 #include "lights/receiver_place.h"
+#include "patches/side.h"
 #include "sampling/sphere_sampling.h"
 #include "sampling/spherical_triangle.h"
 
@@ -120,7 +121,7 @@ void MeshSource::collectFaces(const std::vector<uint32_t>& parents, uint32_t bac
 }
 
 MeshSource::FaceShape MeshSource::shapeOf(const LightFace& face) const {
-    const uint32_t index = patches.parentOf[face.side / 2];
+    const uint32_t index = patches.parentOf[patchOf(face.side)];
     const Parent& parent = patches.parents[index];
     const Plane plane(parent.origin, parent.a, parent.b, face.normal, wholeExtent);
     const float size = 0.5f * (glm::length(face.a) + glm::length(face.b));
@@ -221,9 +222,10 @@ EmittedRay MeshSource::emit(const glm::vec4& r, float) const {
     ray.origin = pointOn(face, {choice.u, r.y});
     ray.normal = face.normal;
     ray.direction = cosineDirection(ray.normal, {r.z, r.w});
-    const uint32_t patch =
-        sideEmission ? face.side / 2 : patches.patchAt(patches.parentOf[face.side / 2], ray.origin);
-    ray.side = 2 * patch + face.side % 2;
+    const uint32_t patch = sideEmission
+                               ? patchOf(face.side)
+                               : patches.patchAt(patches.parentOf[patchOf(face.side)], ray.origin);
+    ray.side = sideOf(patch, isBack(face.side));
     return ray;
 }
 

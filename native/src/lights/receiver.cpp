@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "patches/side.h"
+
 namespace raybundle {
 namespace {
 
@@ -82,7 +84,7 @@ Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
         const Receiver receiver = receiverAt(k);
         light[k] = brightest(results[k].irradiance) + receiver.otherLight;
         if (const double h = light[k]; h > 0) {
-            const double weight = receiver.point ? 1 : double(patches.area[receiver.side / 2]);
+            const double weight = receiver.point ? 1 : double(patches.area[patchOf(receiver.side)]);
             lit[receiver.isShown] += weight * h;
             litArea[receiver.isShown] += weight;
         }

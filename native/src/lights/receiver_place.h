@@ -6,6 +6,7 @@
 
 #include "lights/receiver.h"
 #include "patches/patches.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -25,7 +26,7 @@ struct ReceiverPlace {
     ReceiverPlace(const Patches& patches, const Receiver& receiver)
         : ReceiverPlace(receiver.point.value_or(glm::vec3(0.0f)), receiver.normal) {
         if (receiver.point) return;
-        const uint32_t patch = receiver.side / 2;
+        const uint32_t patch = patchOf(receiver.side);
         const Parent& parent = patches.parents[patches.parentOf[patch]];
         isTriangle = parent.isTriangle;
         origin = patches.point(patch, {0, 0});

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/mix_bits.h"
 
 namespace raybundle {
@@ -140,9 +141,10 @@ void Clusters::takeMaterials() {
         joined->parents[i].scattering = all->parents[i].scattering;
     joined->byAngle.assign(all->byAngle.empty() ? 0 : joined->sideCount(), AngleFactors{});
     for (uint32_t side = 0; side < joined->byAngle.size(); ++side)
-        forEachMember(side / 2, [&](uint32_t patch, float share) {
+        forEachMember(patchOf(side), [&](uint32_t patch, float share) {
             for (size_t term = 0; term < joined->byAngle[side].size(); ++term)
-                joined->byAngle[side][term] += share * all->byAngle[2 * patch + side % 2][term];
+                joined->byAngle[side][term] +=
+                    share * all->byAngle[raybundle::sideOf(patch, isBack(side))][term];
         });
 }
 

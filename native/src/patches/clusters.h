@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -61,14 +62,14 @@ class Clusters {
 
     // Returns the side of patches() that contains a side of members().
     uint32_t sideOf(uint32_t side) const {
-        return isNone() ? side : 2 * numbers[side / 2] + side % 2;
+        return isNone() ? side : raybundle::sideOf(numbers[patchOf(side)], isBack(side));
     }
     // Returns a side of members() that is part of a side of patches(). Consecutive values of `k`
     // run through all these sides in a cycle.
     uint32_t memberOf(uint32_t side, uint32_t k) const {
         if (isNone()) return side;
-        const uint32_t begin = first[side / 2], count = first[side / 2 + 1] - begin;
-        return 2 * memberList[begin + k % count] + side % 2;
+        const uint32_t begin = first[patchOf(side)], count = first[patchOf(side) + 1] - begin;
+        return raybundle::sideOf(memberList[begin + k % count], isBack(side));
     }
     // Calls visit(member, share) for each patch of members() that is part of `patch` of patches().
     // `share` is the member's share of the area, and the shares add up to 1. Only if !isNone().
@@ -85,8 +86,8 @@ class Clusters {
         if (isNone() || values.empty()) return values;
         std::vector<Value> means(joined->sideCount(), Value(0));
         for (uint32_t side = 0; side < means.size(); ++side)
-            forEachMember(side / 2, [&](uint32_t patch, float share) {
-                means[side] += share * values[2 * patch + side % 2];
+            forEachMember(patchOf(side), [&](uint32_t patch, float share) {
+                means[side] += share * values[raybundle::sideOf(patch, isBack(side))];
             });
         return means;
     }

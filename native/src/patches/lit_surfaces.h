@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -14,7 +15,7 @@ struct LitSurfaces {
 
     // Returns the area of a side that receives and sends light, m^2.
     double exposedArea(size_t side) const {
-        return double(patches.area[side / 2]) * double(exposed[side]);
+        return double(patches.area[patchOf(side)]) * double(exposed[side]);
     }
 };
 

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -29,7 +30,7 @@ Parts partsOf(const Patches& patches, const std::vector<uint32_t>& sides, bool b
         throwIfCancelledAt(side);
         const size_t instance = patches.parentAt(side).instance;
         area.resize(std::max(area.size(), instance + 1), 0.0f);
-        area[instance] += patches.area[side / 2];
+        area[instance] += patches.area[patchOf(side)];
     }
     Parts parts;
     std::map<std::array<int, 7>, uint32_t> numbers;
@@ -39,7 +40,7 @@ Parts partsOf(const Patches& patches, const std::vector<uint32_t>& sides, bool b
         const float width = std::sqrt(kPartOfArea * area[parent.instance]);
         const glm::vec3 from = patches.islandAt(side).centre;
         const glm::vec3 at =
-            patches.axes * (patches.point(side / 2, glm::vec2(0.5f)) - from) / width;
+            patches.axes * (patches.point(patchOf(side), glm::vec2(0.5f)) - from) / width;
         const std::array<int, 7> key{
             int(parent.instance),  bySurface ? int(parent.surface) : 0,
             int(parent.island),    mainAxis(patches.axes * patches.normal(side)),

@@ -25,6 +25,7 @@
 
 #include "patches/doubled_faces.h"
 #include "patches/sheets.h"
+#include "patches/side.h"
 #include "scene/scene.h"
 
 namespace raybundle {
@@ -223,7 +224,7 @@ struct Patches {
     // Returns the area of each side's patch, per side, m^2.
     std::vector<float> sideAreas() const {
         std::vector<float> areas(sideCount());
-        for (size_t side = 0; side < areas.size(); ++side) areas[side] = area[side / 2];
+        for (size_t side = 0; side < areas.size(); ++side) areas[side] = area[patchOf(side)];
         return areas;
     }
     // Returns the translucence of a side, or 0 if no surface is translucent.
@@ -232,15 +233,13 @@ struct Patches {
     }
     // Returns the unit normal of a side.
     glm::vec3 normal(uint32_t side) const {
-        const glm::vec3& front = parents[parentOf[side / 2]].normal;
-        return side % 2 ? -front : front;
+        const glm::vec3& front = parentAt(side).normal;
+        return isBack(side) ? -front : front;
     }
     // Returns the island of a side.
-    const Island& islandAt(uint32_t side) const {
-        return islands[parents[parentOf[side / 2]].island];
-    }
+    const Island& islandAt(uint32_t side) const { return islands[parentAt(side).island]; }
     // Returns the parent of a side.
-    const Parent& parentAt(uint32_t side) const { return parents[parentOf[side / 2]]; }
+    const Parent& parentAt(uint32_t side) const { return parents[parentOf[patchOf(side)]]; }
     // Maps (u, v) in [0, 1]^2 to a point on a patch, uniform by area. In m, relative to `centre`.
     glm::vec3 point(uint32_t patch, glm::vec2 uv) const;
     // Returns the patch of a parent that contains a point in the plane of the parent. The point is

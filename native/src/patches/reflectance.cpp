@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -257,8 +258,8 @@ std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& pa
         const Material& material = scene.materialOf(parent.instance, size_t(parent.face));
         const uint32_t first = 2 * parent.firstPatch;
         for (uint32_t side = first; side < first + 2 * parent.patchCount(); ++side) {
-            const MaterialSide& surface = material.sides[side % 2];
-            const glm::vec3 all = patches.opacityOf(side / 2) * patches.reflectance[side];
+            const MaterialSide& surface = material.sides[isBack(side)];
+            const glm::vec3 all = patches.opacityOf(patchOf(side)) * patches.reflectance[side];
             diffuse[side] = glm::clamp(surface.colorScale * all + surface.colorOffset, 0.0f, 1.0f);
         }
     });

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -39,8 +40,8 @@ std::vector<float> Tiles::sum(const std::vector<float>& weight) const {
     if (!uncut) return weight;
     std::vector<float> result(sideCount(), 0.0f);
     for (size_t side = 0; side < result.size(); ++side)
-        for (size_t p = first[side / 2]; p < first[side / 2 + 1]; ++p)
-            result[side] += weight[2 * p + side % 2];
+        for (size_t p = first[patchOf(side)]; p < first[patchOf(side) + 1]; ++p)
+            result[side] += weight[sideOf(p, isBack(side))];
     return result;
 }
 
@@ -52,13 +53,13 @@ std::vector<Value> Tiles::meanOf(const std::vector<Value>& values,
     std::vector<Value> result(sideCount(), Value(0.0f));
     for (size_t side = 0; side < result.size(); ++side) {
         throwIfCancelledAt(side);
-        const size_t tile = side / 2;
+        const size_t tile = patchOf(side);
         if (levels[tile] == 0) {
-            result[side] = values[2 * first[tile] + side % 2];
+            result[side] = values[sideOf(first[tile], isBack(side))];
             continue;
         }
         for (size_t p = first[tile]; p < first[tile + 1]; ++p) {
-            const size_t at = 2 * p + side % 2;
+            const size_t at = sideOf(p, isBack(side));
             const float share =
                 total[side] > 0 ? weight[at] / total[side] : original.area[p] / uncut->area[tile];
             result[side] += share * values[at];
@@ -82,10 +83,11 @@ std::vector<float> Tiles::errorOfMean(const std::vector<float>& errors) const {
     std::vector<float> result(sideCount(), 0.0f);
     for (size_t side = 0; side < result.size(); ++side) {
         throwIfCancelledAt(side);
-        const size_t tile = side / 2;
+        const size_t tile = patchOf(side);
         float variance = 0;
         for (size_t p = first[tile]; p < first[tile + 1]; ++p) {
-            const float part = original.area[p] / uncut->area[tile] * errors[2 * p + side % 2];
+            const float part =
+                original.area[p] / uncut->area[tile] * errors[sideOf(p, isBack(side))];
             variance += part * part;
         }
         result[side] = std::sqrt(variance);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "patches/patches.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -33,7 +34,7 @@ class Tiles {
     uint32_t patchCount(uint32_t tile) const { return uncut ? first[tile + 1] - first[tile] : 1; }
     // Returns the side of the first patch of a tile that corresponds to a side of the tile.
     uint32_t firstSide(uint32_t side) const {
-        return uncut ? 2 * first[side / 2] + side % 2 : side;
+        return uncut ? sideOf(first[patchOf(side)], isBack(side)) : side;
     }
 
     // Return, per side of the tiles, the sum or the weighted mean of values per side of the

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 #include "sampling/sphere_sampling.h"
 
@@ -44,7 +45,7 @@ class Gaps {
             std::array<ShadowRay, kFirstRays> rays;
             for (uint32_t i = 0; i < kFirstRays; ++i) {
                 const glm::vec4 u = points[i];
-                rays[i] = {patches.point(side / 2, {u.x, u.y}), patches.normal(side), widest};
+                rays[i] = {patches.point(patchOf(side), {u.x, u.y}), patches.normal(side), widest};
             }
             // Most sides have nothing above them. Testing all rays at once is faster for these.
             std::array<float, kFirstRays> shares;
@@ -68,7 +69,8 @@ class Gaps {
         for (uint32_t i = 0; i < kRays; ++i) {
             const glm::vec4 u = points[i];
             const glm::vec3 direction = cosineDirection(patches.normal(side), {u.z, u.w});
-            if (gapAt(side, patches.point(side / 2, {u.x, u.y}), direction, width(side))) ++near;
+            if (gapAt(side, patches.point(patchOf(side), {u.x, u.y}), direction, width(side)))
+                ++near;
         }
         return near > 0 && near < kRays;
     }
@@ -76,9 +78,9 @@ class Gaps {
   private:
     bool counts(uint32_t side) const {
         const Parent& parent = patches.parentAt(side);
-        return parent.exchanges && !(parent.isSolid && side % 2 == 1);
+        return parent.exchanges && !(parent.isSolid && isBack(side));
     }
-    float width(uint32_t side) const { return std::sqrt(patches.area[side / 2]); }
+    float width(uint32_t side) const { return std::sqrt(patches.area[patchOf(side)]); }
 
     // Returns the distance from a point of a side to the nearest surface in a direction, m. Returns
     // nothing if the surface is further than `farthest` or touches the side.

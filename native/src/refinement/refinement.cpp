@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "reconstruction/reconstruction.h"
 #include "scene/channels.h"
 #include "stated_error/surplus.h"
@@ -36,7 +37,7 @@ struct Mark {
 bool isWanted(const Scene& scene, const Patches& patches, uint32_t side) {
     const Parent& parent = patches.parentAt(side);
     const Instance& instance = scene.instances[parent.instance];
-    return instance.hasResultOnFace(size_t(parent.face)) && !(parent.isSolid && side % 2 == 1);
+    return instance.hasResultOnFace(size_t(parent.face)) && !(parent.isSolid && isBack(side));
 }
 
 // Returns the mean square of the light, under the assumption that all light but that of the sources
@@ -47,7 +48,7 @@ double meanSquareLight(const Patches& patches, const CoarseShot& shot) {
         throwIfCancelledAt(side);
         const double h = double(brightest(shot.gathered[side].irradiance));
         if (!(h > 0)) continue;
-        const double a = double(patches.area[side / 2]);
+        const double a = double(patches.area[patchOf(side)]);
         sum += a * h;
         squares += a * h * h;
         reflected += a * h * double(brightest(patches.reflectance[side]));
@@ -64,8 +65,8 @@ double meanSquareLight(const Patches& patches, const CoarseShot& shot) {
 bool mayGain(const Patches& patches, const CoarseShot& shot, double light, double targetError) {
     double most = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side)
-        most += double(patches.area[side / 2]) * kStepGain * double(shot.gathered[side].contrast) *
-                double(shot.gathered[side].contrast);
+        most += double(patches.area[patchOf(side)]) * kStepGain *
+                double(shot.gathered[side].contrast) * double(shot.gathered[side].contrast);
     return most > std::pow(kLeastGain * targetError, 2) * light * patches.totalArea;
 }
 

@@ -9,6 +9,7 @@
 #include <glm/glm.hpp>
 
 #include "patches/patches.h"
+#include "patches/side.h"
 #include "scene/channels.h"
 #include "surfaces/lobe.h"
 
@@ -20,11 +21,11 @@ class SideReflectance {
   public:
     // `patches` must have scattering. Keeps references to it.
     SideReflectance(const Patches& patches, uint32_t side)
-        : surface(patches.scattering[2 * patches.parentAt(side).scattering + side % 2]),
+        : surface(patches.scattering[2 * patches.parentAt(side).scattering + isBack(side)]),
           all(patches.reflectance[side]),
           byAngle(patches.byAngle.empty() ? nullptr : &patches.byAngle[side]),
           // Factor from values relative to the whole patch to values relative to its opaque share.
-          whole(1 / std::max(patches.opacityOf(side / 2), 1e-6f)),
+          whole(1 / std::max(patches.opacityOf(patchOf(side)), 1e-6f)),
           mirrored(glm::clamp(surface.glossScale * all + whole * surface.glossOffset,
                               glm::vec3(0.0f), all)) {
         for (const LobeReflectance& lobe : surface.lobes)

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "patches/lit_surfaces.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -19,7 +20,7 @@ namespace raybundle {
 // part in the exchange of light.
 inline glm::vec3 passedOn(const LitSurfaces& surfaces, size_t side, const glm::vec3& arriving) {
     if (!surfaces.patches.parentAt(uint32_t(side)).exchanges) return glm::vec3(0.0f);
-    return surfaces.exposed[side ^ 1] * surfaces.patches.translucenceOf(side) * arriving;
+    return surfaces.exposed[opposite(side)] * surfaces.patches.translucenceOf(side) * arriving;
 }
 
 }  // namespace raybundle

@@ -2,6 +2,7 @@
 #include "visibility/exposed_share.h"
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 #include "visibility/local_lines.h"
 
@@ -22,8 +23,8 @@ float shareExposed(uint32_t side, const Visibility& visibility, const Clusters& 
         const glm::vec3 normal = surface.normal(from);
         float distance = 0;
         const auto met =
-            visibility.firstHit(from, surface.point(from / 2, {points[k].x, points[k].y}), normal,
-                                &distance, surface.touchDistance);
+            visibility.firstHit(from, surface.point(patchOf(from), {points[k].x, points[k].y}),
+                                normal, &distance, surface.touchDistance);
         covered += met && isCovered(surface, from, *met, normal, distance);
     }
     return float(kPoints - covered) / float(kPoints);

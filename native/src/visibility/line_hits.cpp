@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "patches/opacity.h"
+#include "patches/side.h"
 #include "visibility/ray_query.h"
 #include "visibility/visibility.h"
 
@@ -73,10 +74,10 @@ void Visibility::lineHits(const glm::dvec3& point, const glm::dvec3& direction,
         return a.depth != b.depth ? a.depth < b.depth : a.side < b.side;
     });
     auto isSameCrossing = [&](const LineHit& a, const LineHit& b) {
-        return b.depth - a.depth <= 2 * double(offsetAt(patches, patches.parentOf[a.side / 2])) &&
-               a.side % 2 == b.side % 2 &&
-               haveCommonVertex(patches.parents[patches.parentOf[a.side / 2]],
-                                patches.parents[patches.parentOf[b.side / 2]]);
+        return b.depth - a.depth <=
+                   2 * double(offsetAt(patches, patches.parentOf[patchOf(a.side)])) &&
+               isBack(a.side) == isBack(b.side) &&
+               haveCommonVertex(patches.parentAt(a.side), patches.parentAt(b.side));
     };
     hits.erase(std::unique(hits.begin(), hits.end(), isSameCrossing), hits.end());
 }

@@ -10,6 +10,7 @@
 
 #include "job/error.h"
 #include "patches/opacity.h"
+#include "patches/side.h"
 #include "visibility/embree_device.h"
 #include "visibility/ray_query.h"
 
@@ -80,8 +81,8 @@ struct Visibility::FromSide : SideQuery {
         : SideQuery(visibility.patches, visibility.embree->parentOf.data()) {
         context.filter = passStart;
         const Patches& patches = visibility.patches;
-        parent = patches.parentOf[side / 2];
-        isFront = side % 2 == 0;
+        parent = patches.parentOf[patchOf(side)];
+        isFront = !isBack(side);
         normal = patches.normal(side);
         zone = 2 * offsetAt(patches, parent);
         target.fill(kNoParent);
