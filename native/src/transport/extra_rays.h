@@ -41,7 +41,7 @@ struct ExtraRays {
 struct ExtraRaysInput : LitSurfaces {
     const Visibility& visibility;
     const std::vector<ExtraRays>& wanted;
-    // ^Seed of the rays; calls with different seeds cast different rays.
+    // Seed of the rays; calls with different seeds cast different rays.
     const uint32_t seed;
 };
 
