@@ -14,8 +14,8 @@
 namespace raybundle {
 namespace {
 
-// The light of one set: what sides send by the joint estimate of both halves, and by the estimate
-// of each half.
+// The light of one set: the exitance of sides by the joint estimate of both halves, and by the
+// estimate of each half.
 struct Sent {
     Sent(const LitSurfaces& surfaces, const SetLight& light,
          const std::array<Irradiance, 2>& halves)

@@ -122,7 +122,7 @@ class AroundTable {
 struct Samples {
     std::array<glm::vec3, kDirections> directions;
     std::array<glm::vec4, kCells> terms{};  // mean angle terms (scene/angles.h) of each cell
-    // What light that comes equally from all directions adds to each cell; the sum is 1.
+    // Share that each cell gets of light from all directions; the sum is 1.
     ScatteredLight::Hemisphere even{};
     // Matrix that fits values of cells to values of directions: bilinear interpolation between the
     // centres of the cells is then nearest to the values of directions (least squares). Light that

@@ -67,7 +67,8 @@ class ScatteredLight {
     // terms (scene/angles.h) of this light times this share. Only after setOpen().
     std::pair<glm::vec4, float> addSky(uint32_t side, const glm::vec3& exitance,
                                        Cells& cells) const;
-    // Sets what a side sends by direction, from the irradiance that arrives by cell, W/m^2.
+    // Sets the light that a side sends by direction, from the irradiance that arrives by cell,
+    // W/m^2.
     void set(uint32_t side, const Cells& arriving);
 
     // Returns the exitance of a side towards a direction minus its mean over all directions, W/m^2.
@@ -83,7 +84,8 @@ class ScatteredLight {
     struct Transfer;
     // Per cell: share that is open to an even sky, in steps of 1 / kOpenSteps.
     using Open = std::array<int8_t, kCells>;
-    // What a side sends by direction. The value of a cell is `unit` times its number of steps.
+    // The light that a side sends by direction. The value of a cell is `unit` times its number of
+    // steps.
     struct Sent {
         glm::vec3 x, y;  // unit vectors in the plane of the side
         float unit = 0;  // W/m^2

@@ -15,7 +15,7 @@
 // Illumination" (1999).
 // Differs:
 // - The first iterates lack the later bounces. Some of them are left out of the mean, at most a
-//   quarter of the bundles of the first call. bias() states what the others lack.
+//   quarter of the bundles of the first call. bias() returns the error of the others.
 // - Each half of the bundles has its own iterates.
 // - The mean light of a side is divided by the number of lines that met the side in all bundles,
 //   not by the expected number. T_n itself remains unchanged.

@@ -106,7 +106,7 @@ struct TransportInput : LitSurfaces {
     BundleTracer& tracer;
     // The counts of all bundles traced so far. Only LINE_REUSE adds to them.
     LineCounts& counts;
-    // The solutions for the light of the same light set, per side of `patches`. LINE_REUSE starts
+    // The solutions for the light of this light set, per side of `patches`. LINE_REUSE starts
     // from them and overwrites them. Null if they are not kept beyond the transport.
     LineSolutions* solutions = nullptr;
     // Per side: whether its light is shown in the result. Light that is not shown only lights other
