@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// LINE_REUSE between clusters (patches/clusters.h): what goes in is joined to that of clusters, and
-// what comes out is spread over their patches.
+// LINE_REUSE between clusters (patches/clusters.h). The input is averaged over the patches of each
+// cluster, and each patch gets the light of its cluster.
 
 #include <utility>
 
@@ -12,6 +12,7 @@
 namespace raybundle {
 namespace {
 
+// Returns for each side of the clusters the value of one of its patches.
 std::vector<bool> joined(const Clusters& clusters, const std::vector<bool>& values) {
     std::vector<bool> result(clusters.patches().sideCount());
     for (uint32_t side = 0; side < result.size(); ++side)
@@ -19,7 +20,7 @@ std::vector<bool> joined(const Clusters& clusters, const std::vector<bool>& valu
     return result;
 }
 
-// The light of a first shot on clusters.
+// Returns the light of a first shot, per side of the clusters.
 FirstShot joined(const Clusters& clusters, const FirstShot& shot) {
     FirstShot result;
     result.irradiance = clusters.mean(shot.irradiance);
@@ -41,7 +42,7 @@ class ClusteredReuse : public Transport {
           exposed(clusters.mean(input.exposed)),
           isShown(input.isShown ? joined(clusters, *input.isShown) : std::vector<bool>()) {}
 
-    // What the transport between the clusters is made of.
+    // Returns the input of the transport between the clusters. It refers to members of this object.
     TransportInput inner(const TransportInput& input) const {
         return {{clusters.patches(), exposed},
                 input.visibility,

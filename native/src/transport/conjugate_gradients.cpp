@@ -6,11 +6,13 @@
 namespace raybundle {
 namespace {
 
+// Largest number of iterations of solve().
 constexpr int kMaxIterations = 1000;
-// Where no light of more than this share, squared, reaches what is shown, it may stay rough.
+// Square of a share of the right-hand side. If the solution on the shown sides is smaller than this
+// share, the tolerance is relative to this share instead, so that the light there may stay rough.
 constexpr double kLeastShown = 1e-8;
-// A guess whose squared residual is this many times what is allowed is the solution of a solve to
-// about the same tolerance.
+// A guess counts as the solution if its squared residual is at most this many times the allowed
+// one. It is then the result of a solve with about the same tolerance.
 constexpr double kSameSolution = 1.2;
 
 glm::dvec3 ratio(const glm::dvec3& a, const glm::dvec3& b) {
@@ -37,7 +39,7 @@ ConjugateGradients::ConjugateGradients(LineSystem& lines, const Field& scale, Fi
     });
     rr = dot(r, r);
     if (!isNearlySolution()) {
-        // The best in the measure of conjugate gradients.
+        // This factor is optimal in the norm that conjugate gradients minimise.
         guessFactor = glm::vec3(ratio(dot(z, product), dot(z, p)));
         forEachSide(z.size(), [&](size_t i) {
             z[i] *= guessFactor;
@@ -48,7 +50,8 @@ ConjugateGradients::ConjugateGradients(LineSystem& lines, const Field& scale, Fi
     guessIsEnough = isNearlySolution();
 }
 
-// A sunny yard around a room says nothing of what matters in the room.
+// The light on the shown sides limits the residual too. Otherwise a sunny yard around a room, which
+// makes the right-hand side large, would decide how accurate the light in the room is.
 glm::dvec3 ConjugateGradients::allowed() const {
     const glm::dvec3 shown = isShown ? glm::min(given, dot(z, z, isShown)) : given;
     return glm::max(shown, kLeastShown * given) * tolerance * tolerance;

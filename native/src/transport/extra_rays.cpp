@@ -14,7 +14,8 @@
 namespace raybundle {
 namespace {
 
-// The light of one set: what sides send of it by the estimates of both halves together and of each.
+// The light of one set: the exitance of sides by the joint estimate of both halves, and by the
+// estimate of each half.
 struct Sent {
     Sent(const LitSurfaces& surfaces, const SetLight& light,
          const std::array<Irradiance, 2>& halves)
@@ -28,36 +29,40 @@ struct Sent {
     }
 
     const std::vector<glm::vec3>& emission;        // per side, W/m^2
-    const glm::vec3 world;                         // exitance, W/m^2
-    std::array<std::unique_ptr<SentLight>, 3> by;  // of all, of each half
+    const glm::vec3 world;                         // exitance of the world, W/m^2
+    std::array<std::unique_ptr<SentLight>, 3> by;  // by both halves, by each half
 };
 
-// What the first shot has already brought of reflected light to the exposed part of a side, W/m^2.
+// Returns the irradiance of the exposed part of a side by reflected light that the first shot has
+// already distributed, W/m^2.
 glm::vec3 alreadyIndirect(const FirstShot& shot, const std::vector<float>& exposed, uint32_t side) {
     return shot.indirect.empty() || !(exposed[side] > 0) ? glm::vec3(0.0f)
                                                          : shot.indirect[side] / exposed[side];
 }
 
-// What rays brought: sums, W/m^2.
+// Sums over rays of the light that they brought: emission and world, and reflected light; W/m^2.
 struct Brought {
     glm::vec3 carried{0.0f}, reflected{0.0f};
 };
 
-// So many lines tell the mean of what meets them to about 0.5 %.
+// The balance is kept only if the wanted sides met at least this many lines, whose mean is then
+// accurate to about 0.5 %.
 constexpr double kTellingLines = 40000;
 
-// So much of all that is absorbed rays may lose or make. Lines keep the power of all sides; that of
-// a few sides they have only up to a noise of their own, for the lines of a bundle err in common.
-// To take it over in full is to lose what the rays are cast for: 5 of 14 objects of house_on_plain
-// are then above 4 % at the 95th percentile instead of 1.
+// The share of all absorbed power that rays may add or remove. Lines conserve the power of all
+// sides together. They give the power of a few sides only with noise, because the lines of a bundle
+// have common errors. To keep the power of the wanted sides exactly as the lines gave it would undo
+// the effect of the rays: 5 of 14 objects of house_on_plain would then be above 4 % at the 95th
+// percentile, instead of 1 object.
 constexpr double kMostMade = 1e-4;
 
-// What lines and rays bring a side, W/m^2.
+// Returns the irradiance that lines and rays bring to a side, W/m^2. `already` is the result of
+// alreadyIndirect().
 glm::vec3 broughtTo(uint32_t side, const Irradiance& light, const glm::vec3& already) {
     return light.all(side) - light.gathered[side] - already;
 }
 
-// Brings an estimate by so many lines together with what rays brought.
+// Joins the estimate from `lines` lines with the sums that `rays` rays brought.
 void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought, float rays,
            const glm::vec3& already) {
     if (!(rays > 0)) return;
@@ -71,7 +76,7 @@ void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought
 
 using Samples = std::vector<std::array<float, 2>>;  // per side and half
 
-// The rays of the wanted sides, and what they bring to the light of each set.
+// The rays of the wanted sides, and the light that they bring to each light set.
 class ExtraGather {
   public:
     ExtraGather(const ExtraRaysInput& input, const Samples& samples, const SetLights& lights)
@@ -86,13 +91,13 @@ class ExtraGather {
             linesMet += double(samples[own.side][0]) + double(samples[own.side][1]);
     }
 
-    // sent: per light.
+    // Casts all rays. `sent` is per light.
     void cast(const ExtraRaysInput& input, const std::vector<Sent>& sent) {
         parallelFor(size_t(0), wanted.size(), [&](size_t w) { castThose(w, input, sent); });
     }
 
-    // Brings light k together with what its rays brought. of: 0 for the light itself, 1 and 2 for
-    // its halves.
+    // Joins light k with the light that its rays brought. `of` is 0 for the joint estimate of both
+    // halves, and 1 or 2 for the estimate of a half.
     void bring(size_t k, size_t of, const FirstShot& shot, Irradiance& light) const {
         std::vector<glm::vec3> change(wanted.size());
         for (size_t w = 0; w < wanted.size(); ++w) {
@@ -108,13 +113,14 @@ class ExtraGather {
         if (linesMet >= kTellingLines) keepBalance(change, shot, light);
     }
 
-    // Adds these rays to the samples of their sides.
+    // Adds the rays to the samples of their sides.
     void count(Samples& all) const {
         for (size_t w = 0; w < wanted.size(); ++w)
             for (size_t h = 0; h < 2; ++h) all[wanted[w].side][h] += kLinesOfRay * counted[w][h];
     }
 
   private:
+    // Casts the rays of the w-th wanted side.
     void castThose(size_t w, const ExtraRaysInput& input, const std::vector<Sent>& sent) {
         const ExtraRays& own = wanted[w];
         const SobolPoints points(hash(input.seed, own.side));
@@ -127,7 +133,7 @@ class ExtraGather {
                 own.side, patches.point(own.side / 2, {u.x, u.y}), direction, &distance);
             if (hit && isCovered(patches, own.side, *hit, direction, distance)) continue;
             if (hit && !(std::min(samples[*hit][0], samples[*hit][1]) > 0)) continue;
-            // The first points and the last are each stratified by themselves.
+            // The first half of the Sobol points and the second half are each stratified.
             const size_t half = 2 * i < own.rays ? 0 : 1;
             ++counted[w][half];
             for (size_t k = 0; k < sent.size(); ++k)
@@ -139,16 +145,19 @@ class ExtraGather {
         }
     }
 
-    glm::dvec3 absorbing(uint32_t side) const {  // m^2
+    // Returns the area of a side times the share of light that it absorbs, by channel, m^2.
+    glm::dvec3 absorbing(uint32_t side) const {
         return double(patches.area[side / 2] * exposed[side]) *
                glm::dvec3(1.0f - patches.reflectance[side]);
     }
 
-    // What rays made beyond kMostMade is taken where they changed much: what sees nothing but an
-    // even sky has no noise. change: what rays changed, per wanted side.
+    // Removes the power that the rays added beyond kMostMade, from each side in proportion to the
+    // amount by which the rays changed it. Sides that the rays hardly changed are thus hardly
+    // affected, such as those that see only an even sky and have no noise. `change` is the change
+    // by the rays per wanted side, W/m^2.
     void keepBalance(const std::vector<glm::vec3>& change, const FirstShot& shot,
                      Irradiance& light) const {
-        glm::dvec3 made(0.0), changed(0.0), all(0.0);  // absorbed, W
+        glm::dvec3 made(0.0), changed(0.0), all(0.0);  // absorbed power, W
         for (size_t w = 0; w < wanted.size(); ++w) {
             const glm::dvec3 own = absorbing(wanted[w].side);
             made += own * glm::dvec3(change[w]);
@@ -181,10 +190,11 @@ class ExtraGather {
     const std::vector<float>& exposed;
     const std::vector<ExtraRays>& wanted;
     const Samples& samples;
-    double linesMet = 0;  // by the wanted sides
-    // Per wanted side and light: by the estimates of both halves together and of each.
+    double linesMet = 0;  // number of lines that met the wanted sides
+    // Per wanted side and light: sums for the joint estimate of both halves and for each half.
     std::vector<std::array<Brought, 3>> brought;
-    std::vector<std::array<float, 2>> counted;  // per wanted side: rays of each half
+    // Per wanted side: number of rays of each half that are not left out.
+    std::vector<std::array<float, 2>> counted;
     const size_t lightCount;
 };
 
@@ -194,7 +204,7 @@ void addExtraRays(const ExtraRaysInput& input, std::vector<std::array<float, 2>>
                   SetLights& lights, std::vector<std::array<Irradiance, 2>>& halves) {
     ExtraGather gather(input, samples, lights);
     {
-        // All that is met is read before anything is changed.
+        // All rays read the light as it was before any ray changed it.
         std::vector<Sent> sent;
         for (size_t k = 0; k < lights.size(); ++k) sent.emplace_back(input, lights[k], halves[k]);
         gather.cast(input, sent);

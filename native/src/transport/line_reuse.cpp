@@ -16,35 +16,40 @@ namespace {
 
 using Field = std::vector<glm::vec3>;  // per side
 
-constexpr int kMaxPasses = 200;  // through translucent patches
-// What is sent by direction is found in turns, each from the solution before it, until the share of
-// the reflected light that is left out is so many times the target error, for it is amplified as
-// all light is (0.7 % left out made a bright room 1.1 % too bright), and at most so many.
+// Largest number of solves for the light that passes through translucent patches.
+constexpr int kMaxPasses = 200;
+// Light by direction is found in turns, each from the solution of the turn before. The turns end
+// when the share of the reflected light that is left out is below kSettledTurns times the target
+// error, or after kMostTurns turns. kSettledTurns is below 1 because the light left out is
+// amplified by further reflections like all light (0.7 % left out made a bright room 1.1 % too
+// bright).
 constexpr double kSettledTurns = 0.25;
 constexpr int kMostTurns = 6;
-// The balancing corrects weights by these powers of what is missing, one after the other: all of it
-// settles at once what has no pattern, half of it what is common to all sides, which all of it
-// would reverse. Four such steps leave the deviation of the measured areas from the true ones that
-// eight by halves leave (0.05 % in cornell_box, from 1.6 after the first). Lines of several
-// densities take them twice: with 130 bundles of laid_table the energy is then balanced to 0.05 %
-// instead of 0.15.
+// Each step of the balancing multiplies the weight of each side by the ratio of the wanted to the
+// actual number of lines, raised to one of these powers. The power 1 corrects deviations without a
+// pattern at once, but it would reverse a deviation that is common to all sides, because both ends
+// of a line correct it. The power 0.5 corrects such a common deviation. The first four steps leave
+// the same deviation of the measured areas from the true ones as eight steps of the power 0.5 (0.05
+// % in cornell_box, where the first step leaves 1.6 %). If lines have several densities, all eight
+// steps are taken: with 130 bundles of laid_table the energy is then balanced to 0.05 % instead of
+// 0.15 %.
 constexpr float kBalancePowers[] = {0.5f, 1.0f, 0.5f, 1.0f, 0.5f, 1.0f, 0.5f, 1.0f};
 constexpr size_t kBalanceSteps = 4;
-constexpr float kMaxLineWeight =
-    2.0f;  // and at least its inverse: a few lines cannot stand for many
+// Largest weight of a side's lines; the least is its inverse. A few lines cannot stand for many.
+constexpr float kMaxLineWeight = 2.0f;
 
-// The system in z, with what its right-hand side and z are multiplied by: R_i = scale_i z_i.
+// The factors of the scaled system and its starting point: R_i = scale_i z_i. All per side.
 struct ScaledSystem {
     explicit ScaledSystem(size_t sides) : scale(sides), lineScale(sides), z(sides) {}
 
     Field scale;
-    Field lineScale;  // the same times x_i
-    Field z;          // where the solve starts
+    Field lineScale;  // scale_i times x_i
+    Field z;          // starting point of the solve
 };
 
-// reflected: R where the solve starts; is set to 0 in channels that a side does not reflect, and
-// isKept to false if that changes anything. rightSide: exitance that does not depend on R, W/m^2;
-// is divided by the scale.
+// Returns the scaled system. `reflected` is R at the starting point. Sets R to 0 in channels that a
+// side does not reflect, and then sets `isKept` to false if R was not 0. `rightSide` is the
+// exitance that does not depend on R, W/m^2 per side; it is divided by the scale.
 ScaledSystem scaledSystem(const Patches& patches, const LineSystem& lines, Field& reflected,
                           bool& isKept, Field& rightSide) {
     ScaledSystem system(lines.sideCount());
@@ -130,9 +135,10 @@ Irradiance LineReuse::solve(Half half, float tolerance, LineSolution& guess,
     ByAngle byAngle;
     byAngle.brought = byAngle.ofSources = directed(half, weights);
     Irradiance light = solvePassed(half, tolerance, guess, weights, byAngle);
-    // Halves tell of noise alone.
+    // A half only measures the noise, so it is solved once, without the dependence on angles.
     if (half != Half::BOTH || !directedLight.hasAngles()) return light;
-    // Each turn leaves out what was sent by direction once more often.
+    // The first turn leaves out light that was sent by direction twice or more, and each further
+    // turn leaves out light that was sent by direction once more often.
     double missing = 1;
     for (int turn = 0; turn < kMostTurns && missing > kSettledTurns * double(targetError); ++turn) {
         const double bent = findAngles(weights, guess.reflected, light, byAngle);
@@ -190,7 +196,8 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, LineSolution& g
     addPower(byAngle.brought, exposed, result.redirected);
     const Field known = knownLight(lines, guess.passed, byAngle);
 
-    Field rightSide(n);  // exitance, W/m^2, and then scaled
+    // Exitance, W/m^2. scaledSystem() divides it by the scale.
+    Field rightSide(n);
     forEachSide(n, [&](size_t i) {
         glm::vec3 carried = result.direct[i] - first.gathered[i];
         if (!known.empty()) carried += known[i];
@@ -200,11 +207,13 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, LineSolution& g
     });
     bool isBroughtKnown = !brought.empty();
     ScaledSystem system = scaledSystem(patches, lines, reflected, isBroughtKnown, rightSide);
-    // What the lines bring to a half follows from its last residual, where a channel reflects.
+    // For a half, `brought` follows from the last residual on sides that reflect in all channels,
+    // which saves a product with the matrix.
     const Field rightSideOfHalf = half == Half::BOTH ? Field() : rightSide;
     if (!isBroughtKnown) {
         brought.assign(n, glm::vec3(0.0f));
-        // To the last bit as at the end of the solve that found the guess.
+        // Computed as at the end of the solve that found the guess, so that the values are equal to
+        // the last bit.
         lines.send([&](size_t i) { return lines.x(i) * reflected[i]; });
         if (dot(system.z, system.z) != glm::dvec3(0.0))
             forEachSide(n, [&](size_t i) { brought[i] = lines.brought(i); });
@@ -217,7 +226,7 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, LineSolution& g
     const bool isSolved = solver.isGuessEnough();
     const glm::vec3 factor = solver.factor();
     const Field &z = solver.solution(), &r = solver.residual();
-    // A solution that is one already stays as it is, to the last bit.
+    // A guess that already is the solution remains unchanged to the last bit.
     if (!isSolved || factor != glm::vec3(1.0f))
         forEachSide(n, [&](size_t i) { reflected[i] = system.scale[i] * z[i]; });
     lines.send([&](size_t i) { return lines.x(i) * reflected[i]; });

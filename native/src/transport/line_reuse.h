@@ -1,30 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// LINE_REUSE: the radiosity system on the line counts of all bundles, solved to convergence.
+// LINE_REUSE: solves the radiosity system on the line counts of all bundles to convergence. Per
+// patch side i:
 //
 //   H_i = direct_i + (1 / m_i) sum_j c_ij R_j,   R_i = rho_i H_i   (reflected exitance)
 //   direct_i = gathered_i + (sum_j c_ij E_j + sky_i pi L_world) / m_i
 //
-// and where the first shot has already distributed some of the light that it reflected, R_i =
-// unshot_i + rho_i (H_i - first shot's H_i).
+// If the first shot has already distributed some of the light that it reflected, R_i is unshot_i +
+// rho_i (H_i - H_i of the first shot).
 //
-// With s_i = sqrt(rho_i / m_i) and R_i = s_i z_i it becomes (I - S C S) z = S M direct, symmetric
-// and positive definite, unit diagonal, solved by conjugate gradients for the three channels at
-// once (transport/conjugate_gradients.h).
+// With s_i = sqrt(rho_i / m_i) and R_i = s_i z_i the system becomes (I - S C S) z = S M direct.
+// This matrix is symmetric and positive definite with a unit diagonal. Conjugate gradients solve
+// the system for the three channels at once (transport/conjugate_gradients.h).
 //
-// Light that passes through translucent patches is one more source: R_i + tau_i H_k, k the other
-// side of the patch, is what leaves side i. Solving for R with the H_k of the last solve, again and
-// again, splits the whole system regularly, and so converges: no light is gained on the way.
+// Light that passes through translucent patches is another source: side i sends R_i + tau_i H_k,
+// where k is the other side of the patch. The system is solved for R repeatedly, each time with the
+// H_k of the solve before. This is a regular splitting of the whole system and therefore converges:
+// no light is gained on the way.
 //
 // Sources: thesis section 2.3.2 (eq. 2.30: F = r_ij / r_i) and 2.1.4 (the radiosity system).
 // Differs:
-// - The thesis never solves on the counts; it transports power while it traces. Each line is used
-//   for every bounce here.
-// - m_i counts the lines that leave the scene too, so that rows sum to 1 and the system always
-//   contracts; dividing by counted lines, not by the true area, makes furnaces exact.
-// - The last solve weights each line by x_i x_j, so that m_i becomes proportional to the true area
-//   of the patch while rows still sum to 1 and the matrix stays symmetric (Sinkhorn scaling): then
-//   no power is lost or made between patches.
+// - The thesis transports power while it traces and never solves on the counts. Here each line is
+//   used for every bounce.
+// - m_i includes the lines that leave the scene, so that rows sum to 1 and the system always
+//   contracts. Division by the counted lines instead of the true area makes furnaces exact.
+// - The last solve weights each line by x_i x_j (Sinkhorn scaling). m_i is then proportional to the
+//   true area of the patch, while rows still sum to 1 and the matrix stays symmetric. As a
+//   consequence, no power is lost or made between patches.
 // - Surfaces need not be Lambert's (line_reuse_angles.cpp).
 #pragma once
 
@@ -44,7 +46,7 @@ namespace raybundle {
 
 class LineSystem;
 
-// Calls body(side) for the sides below n, kInTask of them in a task.
+// Calls body(side) in parallel for all sides below n, with `kInTask` sides per task.
 template <size_t kInTask = 2048, class Body>
 void forEachSide(size_t n, const Body& body) {
     parallelFor(tbb::blocked_range<size_t>(0, n, kInTask), [&](const auto& range) {
@@ -52,86 +54,103 @@ void forEachSide(size_t n, const Body& body) {
     });
 }
 
+// The radiosity system of one light on the line counts, and its solution.
 class LineReuse {
   public:
-    // exposed: per side, the share of it that nothing covers; empty: as the counts have it.
-    // isShown: per side, whether its light is shown, and not only that of what it lights; null: all
-    // is. targetError: of all light, of which what is sent by direction leaves out a part. All
+    // `exposed` is per side the share that no other surface covers, 0 to 1; if it is empty, the
+    // share of `counts` is used. `isShown` is per side whether the light of the side is shown in
+    // the result; null: the light of all sides is shown. `targetError` is the relative error
+    // allowed for all light; light by direction is computed only as accurately as it requires. All
     // references must outlive the object.
     LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
               const glm::vec3& worldRadiance, const std::vector<float>& exposed,
               const std::vector<bool>* isShown = nullptr, float targetError = 0.01f);
 
-    // Solves until the residual is below `tolerance` of the right-hand side in every channel, and
-    // of the solution on the sides that are shown. `guess` is where it starts: any multiple of its
-    // `reflected` (R) is as good as itself; it takes the solution. weights: of the same half.
-    // Where patches are translucent, it is solved again with what they passed on until that has
-    // settled: R is without it.
+    // Returns the irradiance from the lines of a half, or of both. In every channel, the residual
+    // is at most `tolerance` times the right-hand side, and at most `tolerance` times the solution
+    // on the shown sides. If a limit of iterations is reached before, isSettled of the result is
+    // false. `guess` is the starting point and receives the solution; a factor on guess.reflected
+    // (R) makes no difference. `weights` must be those of `half`. If any patch is translucent, the
+    // system is solved repeatedly until the light that patches pass on has settled; R does not
+    // contain this light.
     Irradiance solve(Half half, float tolerance, LineSolution& guess,
                      const LineWeights& weights) const;
-    // With the weights of the half; nothing but R is kept.
+    // Returns the irradiance as above, with the weights of lineWeights(half). `reflected` is R as
+    // the starting point, and receives the solution.
     Irradiance solve(Half half, float tolerance, std::vector<glm::vec3>& reflected) const;
 
-    // The share of each side that nothing covers.
+    // Returns the share of each side that no other surface covers, 0 to 1.
     std::vector<float> exposedShare() const {
         return exposed.empty() ? counts.exposedShare() : exposed;
     }
 
-    // For a solve: 1 for a half, balanced for both.
+    // Returns the weights for a solve: 1 for one half; balanced, so that no power is lost, for
+    // both.
     LineWeights lineWeights(Half half) const;
 
-    // Adds what local rays of wanted sides (per side) that few lines met bring to the irradiance
-    // (transport/starved_sides.h). reflected: R of the last solve. Returns the number of sides.
+    // Casts local rays from the wanted sides (per side) that few lines met, and adds their light to
+    // the irradiance (transport/starved_sides.h). `reflected` is R of the last solve. Returns the
+    // number of sides that cast rays.
     size_t gatherStarvedSides(const StarvedRays& rays, const std::vector<bool>& wanted,
                               const std::vector<glm::vec3>& reflected,
                               Irradiance& irradiance) const;
 
-    // Per side: what the lines of a half bring of light by direction, beyond what they bring of it
-    // as by Lambert's law, W/m^2; of a half alone by cells, which is quicker. Empty where there is
-    // none. weights: of the same half.
+    // Returns for each side the irradiance that the lines of a half bring because the light of the
+    // sources is not reflected by Lambert's law: the difference from the irradiance by Lambert's
+    // law, W/m^2. For one half, the light is taken from cells of directions, which is quicker but
+    // less sharp. Empty if there is none. `weights` must be those of `half`.
     std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
 
   private:
-    // Of the entries of a row, so many that stand for all: the larger number.
+    // How many entries of a row suffice to represent it: the larger of the two numbers.
     struct Enough {
-        double share = 0;  // of them
+        // As a share of all entries of the row, 0 to 1.
+        double share = 0;
         size_t entries = 0;
     };
-    // As many at least as the target error asks for.
+    // Returns the given share and the number of entries that the target error requires.
     Enough enoughLines(double share = 0) const;
-    // The lines of a half to a side, or enough of them: add(share, from, entry), where of what
-    // leaves side `from` that share arrives, and entry numbers those that were taken.
+    // Calls add(share, from, entry) for the lines that end on `side`, or for enough of them. The
+    // lines from side `from` bring `share` of its exitance as irradiance. `entry` numbers the calls
+    // for this side from 0.
     template <class Add>
     void alongLines(Half half, const LineWeights& weights, const Enough& enough, uint32_t side,
                     const Add& add) const;
-    // light: per side, W/m^2, of the share that is exposed; power: W.
+    // Adds to `power` (W) the power that `light` (W/m^2 per side) brings to the exposed parts of
+    // the sides.
     void addPower(const std::vector<glm::vec3>& light, const std::vector<float>& exposed,
                   glm::dvec3& power) const;
-    // What differs from Lambert's surfaces, per side, W/m^2; empty or null: nothing.
+    // The differences from Lambert's surfaces, per side, W/m^2. Empty or null if there are none.
     struct ByAngle {
-        std::vector<glm::vec3> ofSources;  // irradiance along lines, see directed
-        std::vector<glm::vec3> brought;    // likewise, of all light
-        std::vector<glm::vec3> reflected;  // exitance by light along lines
+        // Irradiance by the light of the sources, see directed().
+        std::vector<glm::vec3> ofSources;
+        // Irradiance by all light, that of the sources included.
+        std::vector<glm::vec3> brought;
+        std::vector<glm::vec3> reflected;  // see Irradiance::byAngle
         std::shared_ptr<ScatteredLight> scattered;
     };
-    // Of the lines of a side, those to an even sky, weighted; 0 if it is dark.
+    // Returns the weighted share of a side's lines that end in the sky; 0 if the sky is dark.
     float skyShare(const LineWeights& weights, uint32_t side) const;
-    // Which directions are open to an even sky, by what the lines of each side meet.
+    // Estimates which directions are open to an even sky, from the surfaces that the lines of each
+    // side meet.
     void findOpen(const LineWeights& weights, ScatteredLight& scattered) const;
-    // Of a solution: light, and what is reflected of it. byAngle: of the solution before.
-    // Returns what share of reflected light is sent to where Lambert's law would not.
+    // Replaces `byAngle`, found from the solution before, by the differences that follow from a new
+    // solution: `light` and the exitance `reflected`. Returns the share of the reflected light that
+    // leaves otherwise than by Lambert's law.
     double findAngles(const LineWeights& weights, const std::vector<glm::vec3>& reflected,
                       const Irradiance& light, ByAngle& byAngle) const;
-    // With what passes through translucent patches.
+    // Solves repeatedly until the light that passes through translucent patches has settled.
     Irradiance solvePassed(Half half, float tolerance, LineSolution& guess,
                            const LineWeights& weights, const ByAngle& byAngle) const;
-    // Adds light straight from emission and the world, by the lines, to that of the sources.
+    // Sets the direct part of `light`: the light that the first shot gathered, and along lines the
+    // light of emission and of the world.
     void addDirect(LineSystem& lines, const HandOver& first, Irradiance& light) const;
-    // Irradiance that lines bring of what is not solved for, W/m^2: light by direction, and what is
-    // passed on (empty: nothing).
+    // Returns the irradiance by lines that is known before the solve, W/m^2 per side: the
+    // differences from Lambert's surfaces, and light that patches pass on (`passed`, per side,
+    // W/m^2; may be empty).
     std::vector<glm::vec3> knownLight(LineSystem& lines, const std::vector<glm::vec3>& passed,
                                       const ByAngle& byAngle) const;
-    // What is passed on (empty: nothing) is known.
+    // Solves once, with the passed light in `guess` as a known source (empty: none).
     Irradiance solveReflected(Half half, float tolerance, LineSolution& guess,
                               const LineWeights& weights, const ByAngle& byAngle) const;
 

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// LINE_REUSE on surfaces that are not Lambert's: what the lines bring by the direction of the light
-// (first_shot/directed_light.h), and by the angles at which it leaves and arrives.
+// LINE_REUSE on surfaces that are not Lambert's: the light that lines bring depends on the
+// direction in which light of the sources leaves (first_shot/directed_light.h), and on the angles
+// at which reflected light leaves and arrives.
 //
-// Light of the sources is known before the solve, and what it brings by direction with it.
-// Reflected light is known after it: then the system is solved once more, with what the solution
-// brings by the angle at which it leaves (from under a layer), with where sides send what arrives
-// from where (transport/scattered_light.h), and what they reflect by the angle at which it arrives.
-// Where surfaces send much by direction, once more, and so on.
+// The light of the sources, and its dependence on the direction, is known before the solve.
+// Reflected light is known only after the solve. The system is then solved again with three
+// corrections that follow from the solution: how reflected light from under a layer depends on the
+// angle at which it leaves, in which directions sides send light that arrives from given directions
+// (transport/scattered_light.h), and how much sides reflect at the angles at which light arrives.
+// If surfaces send much light by direction, this is repeated.
 //
-// A few lines are enough for what is little of the light, or changes slowly from side to side: some
-// of those of each side stand for all.
+// A few lines suffice for light that is a small part of all light, or that changes slowly from side
+// to side. Some of the lines of each side then represent all of them.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -23,15 +25,19 @@
 namespace raybundle {
 namespace {
 
-// Entries of a row, if it has as many, that are looked at in any case, times the target error: what
-// fewer leave out is to be little beside it. In an office and a box of which all is painted, or of
-// metal, 64 are off by 0.04 to 0.3 % (RMS) from all of a row, 32 by 0.1 to 0.4, 16 by 0.3 to 0.7.
+// The number of entries of a row that are used at least, if the row has as many: this constant
+// divided by the target error, between kFewestEntries and kMostEntries. The error of leaving out
+// the other entries must be small beside the target error. In an office and in a box, with all
+// surfaces painted or of metal, 64 entries deviate by 0.04 to 0.3 % (RMS) from all entries of a
+// row, 32 entries by 0.1 to 0.4 %, and 16 entries by 0.3 to 0.7 %.
 constexpr float kLeastEntriesTimesError = 0.4f;
 constexpr float kFewestEntries = 16, kMostEntries = 256;
-// Likewise where they tell which of 36 cells of directions are open to the sky.
+// The number of entries that are used at least to find which of the 36 cells of directions are open
+// to the sky.
 constexpr size_t kLeastOpenEntries = 1024;
 constexpr float kMostReflectance = 0.999f;
-constexpr size_t kInTask = 256;  // sides: each takes long
+// Sides per task; each side takes long.
+constexpr size_t kInTask = 256;
 
 }  // namespace
 
@@ -53,7 +59,8 @@ void LineReuse::alongLines(Half half, const LineWeights& weights, const Enough& 
         const uint32_t seed = hash(side, h);
         rows.visitSome(
             side, std::max(enough.entries, size_t(enough.share * double(all))),
-            // At random, for bundles follow a pattern.
+            // Positions in the steps are random, because the order of the bundles follows a
+            // pattern.
             [&](size_t step) { return double(hash(seed, uint32_t(step)) >> 8) * 0x1p-24; },
             [&](uint32_t from, float lines) {
                 add(perLine * lines * weights.x[from], from, number++);
@@ -113,8 +120,11 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
     forEachSide<kInTask>(n, [&](uint32_t i) {
         const glm::vec3 normal = patches.normal(i);
         const bool scatters = !scattered.isNone(i);
-        glm::vec4 terms(0.0f);  // of the angles at which light arrives, times its brightness
-        float sum = 0;          // of that brightness
+        // Sum of the angle terms (scene/angles.h) of the arriving light, weighted by its
+        // brightness.
+        glm::vec4 terms(0.0f);
+        // Sum of the brightness.
+        float sum = 0;
         ScatteredLight::Cells arriving{};
         if (const float sky = skyShare(weights, i); sky > 0) {
             const auto [angles, share] = scatters ? scattered.addSky(i, worldExitance, arriving)

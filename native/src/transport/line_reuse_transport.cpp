@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// LINE_REUSE as a transport: while bundles are traced their lines are only counted; light moves
-// when the system on the counts is solved (transport/line_reuse.h). When the counts would pass the
-// memory limit, they are dropped, and further bundles improve the solution one by one
-// (transport/streaming_reuse.h). Light sets share the lines: the transport of one traces them, the
-// others follow.
+// LINE_REUSE as a transport. While bundles are traced, their lines are only counted. Light moves
+// when the system on the counts is solved (transport/line_reuse.h). When the counts would exceed
+// the memory limit, they are dropped, and each further bundle improves the solution by itself
+// (transport/streaming_reuse.h). Light sets share the lines: the transport of one light set traces
+// them, and advances the transports of the others.
 
 #include <algorithm>
 #include <array>
@@ -20,13 +20,15 @@
 namespace raybundle {
 namespace {
 
-// Sides with fewer lines than this also gather with local rays.
+// Sides that fewer lines met than this also gather with local rays.
 constexpr uint32_t kStarvedLines = 16;
-// Lines held before they are merged into the counts: bytes, and a share of the memory limit.
+// Limits for the traced lines that are held before they are merged into the counts: in bytes, and
+// as a share of the memory limit.
 constexpr size_t kMergeBytes = size_t(256) << 20;
 constexpr double kMergeShare = 0.25;
-constexpr uint32_t kStep = 16;  // bundles between two looks at the cancel flag
-// Of the solution that streaming starts from, relative.
+// Number of bundles between two checks of the cancel flag.
+constexpr uint32_t kStep = 16;
+// Relative tolerance of the solution from which streaming starts.
 constexpr float kStartTolerance = 1e-4f;
 
 std::vector<glm::vec3> meanOf(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
@@ -45,8 +47,9 @@ class LineReuseTransport : public Transport {
           own(input.solutions ? 0 : input.patches.sideCount()),
           last(input.solutions ? *input.solutions : own) {}
 
-    // Shares the lines from here on with a transport of another light, which must not advance by
-    // itself and must live as long.
+    // Makes a transport of another light a follower, which from now on gets all lines that this
+    // transport traces. The follower must not advance by itself and must live as long as this
+    // object.
     void lead(LineReuseTransport& follower) { carriers.push_back(&follower); }
 
     void advance(uint32_t count, const Progress& progress) override {
@@ -55,7 +58,7 @@ class LineReuseTransport : public Transport {
         const size_t mostHeld = std::min(kMergeBytes, size_t(kMergeShare * double(limit)));
         for (uint32_t done = 0; done < count;) {
             progress.report(RB_STAGE_BUNDLES, double(done) / count);
-            // Merging needs room for the old and the new counts.
+            // Merging needs memory for the old and the new counts at once.
             if (!streaming[0] && held.empty() && input.counts.bundles > 0 &&
                 2 * input.counts.byteCount() + mostHeld > limit) {
                 for (LineReuseTransport* carrier : carriers) carrier->startStreaming();
@@ -108,7 +111,7 @@ class LineReuseTransport : public Transport {
 
     Irradiance finish(float tolerance, const std::vector<bool>& wanted, Report& report) override {
         Irradiance result = irradiance(Half::BOTH, tolerance);
-        // The first of each half starts from nothing.
+        // The first solve of each half has no solution to start from.
         if (input.settings.skipWarmStart && solves > 2)
             report.skip(SkippedWork::WARM_STARTS, solves - 2);
         const size_t starved = solver.gatherStarvedSides(
@@ -145,7 +148,8 @@ class LineReuseTransport : public Transport {
         exposed = solver.exposedShare();
         const LitSurfaces surfaces{input.patches, exposed};
         first = handOver(surfaces, input.shot);
-        // Light by direction as the lines so far have it: those that follow are not kept.
+        // Light by direction is computed from the lines counted so far, because later lines are not
+        // kept.
         const std::vector<glm::vec3> byDirection =
             solver.directed(Half::BOTH, solver.lineWeights(Half::BOTH));
         std::vector<glm::vec3> source = first.unshot;
@@ -200,15 +204,20 @@ class LineReuseTransport : public Transport {
 
     const TransportInput input;
     const LineReuse solver;
-    const size_t limit;  // bytes
+    // Memory limit of the bake, bytes.
+    const size_t limit;
+    // The solutions if `input` has none, and a reference to the solutions in use.
     LineSolutions own;
     LineSolutions& last;
     uint64_t solves = 0;
-    std::array<std::optional<StreamingReuse>, 2> streaming;  // per half, once the limit is reached
-    // While streaming.
+    // Per half. Empty until the memory limit is reached.
+    std::array<std::optional<StreamingReuse>, 2> streaming;
+    // Only while streaming. `first` also contains light by direction in its indirect part.
     HandOver first;
-    std::vector<float> exposed;                       // per side: the share that nothing covers
-    std::vector<LineReuseTransport*> carriers{this};  // all that the traced lines serve
+    // Per side: the share that no other surface covers.
+    std::vector<float> exposed;
+    // All transports that use the traced lines: this one and its followers.
+    std::vector<LineReuseTransport*> carriers{this};
 };
 
 }  // namespace

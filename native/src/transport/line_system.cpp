@@ -10,12 +10,12 @@ namespace {
 
 constexpr size_t kGrain = 2048;  // sides per task of a sum
 
-// sum_j c_ij x_j; Value: float or Eigen::Array4f.
+// Returns sum_j c_ij x_j of row i. `Value` is float or Eigen::Array4f.
 template <class Value>
 Value rowTimes(const LineCounts& counts, Half half, size_t row, const std::vector<Value>& x,
                const Value& zero) {
     const LineRows::LinesOf<float>& lines = LineRows::linesOf<float>();
-    // Sums that do not wait for each other.
+    // Several sums, so that additions do not wait for each other.
     constexpr int kSums = 4;
     Value sums[kSums] = {zero, zero, zero, zero};
     for (size_t h = 0; h < 2; ++h) {

@@ -10,7 +10,8 @@
 namespace raybundle {
 namespace {
 
-// Batches of a half between two looks at the cancel flag, whose logs are in memory at once.
+// Number of batches of a half between two checks of the cancel flag. Their logs are in memory at
+// once.
 constexpr size_t kHeld = 16;
 
 }  // namespace
@@ -30,7 +31,7 @@ LocalRayTransport::LocalRayTransport(const TransportInput& input, uint64_t sampl
 
 void LocalRayTransport::advance(uint32_t count, const Progress& progress) {
     assert(count % 2 == 0 && "two halves of equal size");
-    const uint64_t wanted = count / 2 * samplesPerBundle;  // of each half
+    const uint64_t wanted = count / 2 * samplesPerBundle;  // number of samples of each half
     std::vector<RayLog> logs(2 * kHeld);
     for (uint64_t done = 0; done < wanted;) {
         progress.report(RB_STAGE_BUNDLES, double(done) / double(wanted));

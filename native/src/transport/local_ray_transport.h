@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A transport whose samples are local rays or paths of them: traced in batches, each with random
-// numbers of its own, and added up in the order of the batches, so that the number of threads does
-// not matter.
+// A transport whose samples are local rays or paths of local rays. Samples are traced in batches,
+// each of which has its own random numbers. The results are added in the order of the batches, so
+// that they do not depend on the number of threads.
 #pragma once
 
 #include <array>
@@ -16,35 +16,39 @@
 
 namespace raybundle {
 
+// Base class of transports by local rays.
 class LocalRayTransport : public Transport {
   public:
     void advance(uint32_t count, const Progress& progress) override;
     uint32_t bundleCount() const override { return bundles; }
     Irradiance irradiance(Half half, float tolerance) override;
 
-    // By the rays from each side; from a side that none left, by those from other patches of the
-    // same face, and else by the world's rays that reached it.
+    // Returns the share by the rays that left each side. If no ray left a side, the rays from other
+    // patches of the same parent are used, and if there are none, the power from the world that
+    // reached the side.
     std::vector<float> openShare() const override;
 
   protected:
-    // samplesPerBundle: what counts as a bundle. mostPerBatch: samples with the same random
-    // numbers.
+    // `samplesPerBundle` is the number of samples that count as one bundle. `mostPerBatch` is the
+    // largest number of samples in a batch.
     LocalRayTransport(const TransportInput& input, uint64_t samplesPerBundle,
                       uint32_t mostPerBatch);
 
-    // Traces `count` independent or consecutive samples. Each score is an estimate of the power
-    // that reaches its side. Called from several threads.
+    // Traces `count` samples, which may be independent or depend on the samples before. Adds them
+    // to `log`; each score estimates the power that reaches its side. Called from several threads.
     virtual void sample(uint32_t count, std::mt19937_64& random, RayLog& log) const = 0;
 
     const TransportInput input;
     const LocalRays rays;
 
   private:
-    // Sums over the samples of one half.
+    // Sums over all samples of one half.
     struct Sums {
         std::vector<glm::dvec3> direct, indirect;  // per side: power that reached it, W
-        std::vector<double> world;                 // per side: that of the world, all channels, W
-        std::vector<uint32_t> rays, escapes;       // per side: that left it; and left the scene
+        // Per side: power from the world that reached it, summed over the channels, W.
+        std::vector<double> world;
+        // Per side: number of rays that left it, and number of these rays that left the scene.
+        std::vector<uint32_t> rays, escapes;
         uint64_t samples = 0, batches = 0;
     };
     void add(const RayLog& log, Sums& to) const;

@@ -11,7 +11,9 @@
 namespace raybundle {
 namespace {
 
-// Points looked at before a partly covered patch is taken for wholly covered.
+// Largest number of points that are tried on a partly covered patch to find an uncovered one. If
+// all are covered, the patch counts as wholly covered, and the ray leaves from the last of the
+// points.
 constexpr int kMostPoints = 64;
 constexpr uint32_t kNoSide = UINT32_MAX;
 
@@ -31,7 +33,7 @@ LocalRays::LocalRays(const TransportInput& input)
         addSource(side, RayLight::EMITTED, area(side) * input.shot.emission[side]);
         addSource(side, RayLight::REFLECTED, area(side) * first.unshot[side]);
     }
-    // Radiance L through the scene's sphere: exitance pi L over its area 4 pi R^2.
+    // The radiance L enters through the scene's sphere: exitance pi L over the area 4 pi R^2.
     const float across = 2 * glm::pi<float>() * patches.radius;
     addSource(kNoSide, RayLight::WORLD, across * across * input.worldRadiance);
 }
@@ -61,7 +63,6 @@ std::optional<uint32_t> LocalRays::fromWorld(std::mt19937_64& random) const {
                                direction);
 }
 
-// Whether another surface lies against a side at a point.
 bool LocalRays::isCovered(uint32_t side, const glm::vec3& point) const {
     return visibility.isBlocked(side, point, patches.normal(side),
                                 patches.islandAt(side).touchDistance);

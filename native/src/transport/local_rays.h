@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Local rays that carry light: from the sources that the first shot left, chosen by power, and on
-// from the sides that they hit. What random walks and the single-ray operator have in common.
+// Local rays that carry light. Rays leave the sources that the first shot left over, chosen by
+// power, and continue from the sides that they hit. Random walks and the single-ray operator of
+// stochastic iteration share this code.
 //
-// (Lines whose numbers are allotted to emitters, for first shots: visibility/local_lines.h.)
+// (visibility/local_lines.h has the lines of first shots, whose numbers are allotted to emitters.)
 //
 // Sources: thesis sections 2.4.2 (fig. 2.11: rays from a surface) and 2.6 (single-ray operator).
 // Differs:
-// - Rays choose their source independently by power and not by a quota per source: the closed
-//   variances of random walks hold for that.
-// - The world is a source too: it shines in from all around the scene's sphere.
+// - Each ray chooses its source independently by power, instead of a quota of rays per source. The
+//   closed-form variances of random walks hold for this choice.
+// - The world is a source too. Its light comes from all around the scene's sphere.
 // - A ray leaves from the part of a patch that no other surface covers.
 #pragma once
 
@@ -24,61 +25,68 @@
 
 namespace raybundle {
 
-// What the light of a ray has gone through.
+// The origin of the light of a ray.
 enum class RayLight : uint8_t {
-    WORLD,     // nothing: it came from the world
-    EMITTED,   // nothing: it came from emission
-    REFLECTED  // at least one reflection
+    WORLD,     // comes from the world, not reflected
+    EMITTED,   // comes from emission, not reflected
+    REFLECTED  // was reflected at least once
 };
 
-// What some rays did; scores are powers that reached a side, W, each for all samples at once.
+// A record of some rays.
 struct RayLog {
+    // An estimate of the power that reaches a side, W, from one sample that stands for all. The
+    // mean over all samples, with 0 for samples without a score, is the estimate of the transport.
     struct Score {
         uint32_t side;
         RayLight light;
         glm::vec3 power;
     };
     std::vector<Score> scores;
-    std::vector<uint32_t> rays;     // sides that a ray left, once per ray
-    std::vector<uint32_t> escapes;  // those of them whose ray left the scene
+    std::vector<uint32_t> rays;  // one entry per ray: the side that it left
+    // One entry per ray that left the scene: the side that it left.
+    std::vector<uint32_t> escapes;
 };
 
-// A ray from a source with the power of all sources, in the colour of its own; W.
+// A ray from a source. Its power, W, is that of all sources, in the colour of its own source.
 struct SourceRay {
-    std::optional<uint32_t> hit;  // side
+    std::optional<uint32_t> hit;  // the side that the ray hits; empty if it leaves the scene
     RayLight light;
     glm::vec3 power;
 };
 
+// Casts rays from sources and sides.
 class LocalRays {
   public:
-    // What `input` refers to must outlive it.
+    // All objects that `input` refers to must outlive the object. input.exposed must have an entry
+    // for each side.
     explicit LocalRays(const TransportInput& input);
 
-    // Power of all sources, summed over the channels, W.
+    // Returns the power of all sources, summed over the channels, W.
     double power() const { return cumulative.empty() ? 0 : cumulative.back(); }
 
-    // Shoots a ray from a source; power() must not be zero.
+    // Shoots a ray from a random source. power() must not be 0.
     SourceRay fromSources(std::mt19937_64& random, RayLog& log) const;
 
-    // The side that a ray from a random point of a side meets first, if any.
+    // Returns the side that a ray from a random point of a side meets first, or nothing if it
+    // leaves the scene. The direction is distributed by the cosine. Adds the ray to `log`.
     std::optional<uint32_t> fromSide(uint32_t side, std::mt19937_64& random, RayLog& log) const;
 
-    // The area of a side that gets light, m^2.
+    // Returns the area of the exposed part of a side, m^2.
     float area(uint32_t side) const { return float(surfaces.exposedArea(side)); }
 
-    // Largest reflectance of a side.
+    // Returns the reflectance of a side in the channel where it is largest.
     static float reflectance(const Patches& patches, uint32_t side) {
         return brightest(patches.reflectance[side]);
     }
 
   private:
     struct Source {
-        uint32_t side;  // none for the world
+        uint32_t side;  // meaningless for the world
         RayLight light;
-        glm::vec3 colour;  // its channels sum to 1
+        glm::vec3 colour;  // sum of the channels is 1
     };
     void addSource(uint32_t side, RayLight light, const glm::vec3& power);
+    // Returns whether another surface touches a side at a point.
     bool isCovered(uint32_t side, const glm::vec3& point) const;
     std::optional<uint32_t> fromWorld(std::mt19937_64& random) const;
 
@@ -86,7 +94,8 @@ class LocalRays {
     const Patches& patches;
     const Visibility& visibility;
     std::vector<Source> sources;
-    std::vector<double> cumulative;  // per source: power up to it, W
+    // Per source: power of all sources up to and including it, W.
+    std::vector<double> cumulative;
 };
 
 }  // namespace raybundle

@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Whether stochastic iteration by bundles converges in the mean square.
+// Decides whether stochastic iteration by bundles converges in the mean square.
 //
-// A bundle gives a side w times the light that it gives on average, w = 2 s^2 m / A for m lines on
-// the area A: E[w] = 1 and E[w^2] = g. On a side that is large beside a pixel w = 2 cos(theta) and
-// g = 4/3; one smaller than a pixel gets one line with probability A cos(theta) / s^2, and
-// g = 2 s^2 / A. The root of the sum of both squares is between 2 % below and 13 % above what
-// counting gives for squares of all sizes, and at most 7 % below for four times as long as wide.
+// A bundle gives a side w times the light that it gives on average, with w = 2 s^2 m / A for m
+// lines on the area A. The moments of w are E[w] = 1 and E[w^2] = g. On a side that is large beside
+// a pixel, w = 2 cos(theta) and g = 4/3. A side that is smaller than a pixel gets one line with the
+// probability A cos(theta) / s^2, so that g = 2 s^2 / A. The root of the sum of the squares of both
+// values is used for all sizes. It is between 2 % below and 13 % above what counting gives for
+// squares of all sizes, and at most 7 % below for rectangles four times as long as wide.
 //
-// The mean squares u of the iterates' deviations then obey
+// The mean squares u of the deviations of the iterates then obey
 //   u_i <= rho_i^2 g_i sum_j F_ij u_j + const
 // and stay finite if the spectral radius of diag(rho^2 g) F is below 1. Where all sides see each
-// other alike, that is the mean of rho^2 g by area: a few small patches do no harm, their own
-// variance aside. Where patches of a kind see each other alone it is the largest value. So sides
-// are sorted into classes of about equal rho^2 g, and the form factors between the classes are
-// counted along the given bundles. A class with less than kLeastShare of the lines joins the next
-// lower one: what is rarer hardly happens twice in a row within the bundles of a bake.
+// other equally, this radius is the mean of rho^2 g by area. A few small patches then do no harm,
+// apart from their own variance. Where patches of one kind see only each other, the radius is the
+// largest value of rho^2 g. Sides are therefore sorted into classes of about equal rho^2 g, and the
+// form factors between the classes are counted along the given bundles. A class with less than
+// kLeastShare of the lines joins the next lower class, because rarer events hardly happen twice in
+// a row within the bundles of a bake.
 //
 // Source: Szirmay-Kalos, "Stochastic Iteration for Non-diffuse Global Illumination" (1999), which
-// asks for a contraction of the random operator; thesis section 2.6 says nothing of it.
+// requires the random operator to be a contraction. Thesis section 2.6 does not mention this.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,19 +37,21 @@ constexpr double kLeastShare = 0.01;
 constexpr int kMaxSweeps = 64;
 constexpr int kPowerSteps = 256;
 
-// rho^2 g of a side.
+// Returns rho^2 g of a side.
 double gain(const TransportInput& input, uint32_t side) {
     const double rho = double(LocalRays::reflectance(input.patches, side));
     const double area = input.exposedArea(side) / input.tracer.pixelArea;
     return area > 0 ? rho * rho * std::hypot(4.0 / 3, 2 / area) : 0;
 }
 
+// Returns the class of a value of rho^2 g.
 int classOf(double gain) {
     const double octave = std::log2(std::max(gain, 1e-9)) - kLowestOctave;
     return std::clamp(int(kClassesPerOctave * octave), 0, kClasses - 1);
 }
 
-// Sides that light can reach by the given lines: what is dark does not count.
+// Returns per side whether light can reach it along the given lines. Dark sides do not affect the
+// convergence.
 std::vector<bool> litSides(const TransportInput& input, const std::vector<TracedBundle>& traced) {
     const Patches& patches = input.patches;
     const HandOver first = handOver(input, input.shot);
@@ -90,8 +94,8 @@ uint32_t warmUpIterates(double reflectance, double missing, uint32_t most) {
 
 double meanSquareGrowth(const TransportInput& input, const std::vector<TracedBundle>& traced) {
     const std::vector<bool> lit = litSides(input, traced);
-    std::array<double, kClasses> lines{},
-        gains{};  // per class: lines of its sides; times their gain
+    // Per class: number of lines of its sides, and the sum of rho^2 g over these lines.
+    std::array<double, kClasses> lines{}, gains{};
     std::array<std::array<double, kClasses>, kClasses> between{};
     auto add = [&](uint32_t side, double count) {
         const double g = gain(input, side);
@@ -137,7 +141,7 @@ double meanSquareGrowth(const TransportInput& input, const std::vector<TracedBun
         for (size_t b = 0; b <= groups; ++b)
             if (groupLines[a] > 0) growth[a][b] *= groupGains[a] / (groupLines[a] * groupLines[a]);
 
-    // The spectral radius, by the power method; the shift keeps it from swinging.
+    // Compute the spectral radius by the power method. The shift keeps it from oscillating.
     std::array<double, kClasses + 1> u;
     u.fill(1);
     double radius = 0;

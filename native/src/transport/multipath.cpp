@@ -1,31 +1,34 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// MULTIPATH: each line moves light both ways between the sides it joins. A side sends the light of
-// the sources along every line, and of the light that it has received but not sent (its unshot
-// power) a fraction.
+// MULTIPATH: each line moves light in both directions between the sides that it joins. Along every
+// line, a side sends light of the sources, and a fraction of the light that it has received but not
+// sent yet (its unshot power).
 //
 // Sources: thesis section 2.4.1, figure 2.8 (single global lines: lines_per_bundle 1), sections
 // 4.2-4.2.3 (bundles).
 // Differs from figures 2.8 and 4.12:
-// - All lines of a bundle read the unshot power of its start. In the thesis what arrives by one
-//   pixel leaves by the next along the same direction, back to where it came from.
-// - A line takes the fraction min(1, s^2 / A_i) of the unshot power (s^2: the pixel's area), so
-//   that a bundle takes about cos(theta). In the thesis any line takes all of it, so that
-//   directions have no cosine.
-// - Lines to the sky take their power away, and bring the world's light.
-// - Power per line is s^2 over the number of bundles, whatever the number of lines was to be. What
-//   arrives at a side is in the end divided by the lines that met it, and not by those that were to
-//   in the mean, so that even light is right however many came: a plain under a sky took 87 times
-//   the bundles.
-// - The light of the first shot is kept in the result; the figure loses it or counts it twice.
-// - Power still unshot at the end would be missing. It is spread evenly over the sides that light
-//   has reached: the ambient term of Cohen et al., "A Progressive Refinement Approach to Fast
-//   Radiosity Image Generation" (1988), who spread it over all. Half of it counts as bias.
-// - The weight of a bundle (ADAPTIVE) and exchanges that stand for several lines (PLANE) multiply
-//   what is sent; a smaller fraction of the unshot power is taken there. A side of which a bundle
-//   took more than all sends a smaller fraction from then on: fractions follow what was met before
-//   and not the bundle in hand, so that the mean stays right.
-// thesis_literal does what figure 2.8 says, line by line; only the first shot's light is kept.
+// - All lines of a bundle read the unshot power that was there before the bundle. In the thesis,
+//   the light that arrives through one pixel leaves through the next one along the same direction,
+//   back to where it came from.
+// - A line takes the fraction min(1, s^2 / A_i) of the unshot power (s^2: area of a pixel), so that
+//   a bundle takes about cos(theta) of it. In the thesis, each line takes all of it, so that the
+//   cosine of the direction has no effect.
+// - Lines to the sky take their power away, and bring the light of the world.
+// - The power per line is s^2 over the number of bundles, whatever number of lines was expected. In
+//   the end, the power that arrived at a side is divided by the number of lines that met the side,
+//   not by the expected number. Constant light is then right for any number of lines. With the
+//   expected number, a plain under a sky took 87 times the bundles.
+// - The light of the first shot is kept in the result. The figure loses it or counts it twice.
+// - Power that is still unshot at the end would be missing. It is spread evenly over the sides that
+//   light has reached, as in the ambient term of Cohen et al., "A Progressive Refinement Approach
+//   to Fast Radiosity Image Generation" (1988), who spread it over all sides. Half of it counts as
+//   bias.
+// - The weight of a bundle (ADAPTIVE) and the number of lines that an exchange stands for (PLANE)
+//   multiply the power that is sent. The fraction of the unshot power is then smaller. If a bundle
+//   took more than all unshot power of a side, the fraction of this side is reduced for later
+//   bundles. The fractions thus depend on earlier bundles only, not on the current one, so that the
+//   mean stays right.
+// thesis_literal follows figure 2.8 line by line, except that the light of the first shot is kept.
 
 #include <algorithm>
 #include <array>
@@ -38,19 +41,21 @@
 namespace raybundle {
 namespace {
 
-constexpr uint32_t kBatch = 16;  // bundles that are traced before the directions learn from them
-// Of the cosine-weighted unshot power, what a bundle takes where bundles or lines have weights:
-// the largest weight of ADAPTIVE is the inverse of this.
+// Number of bundles that are traced before the directions learn from them.
+constexpr uint32_t kBatch = 16;
+// Factor on the unshot power that a bundle takes (about cos(theta) of it) if bundles or lines have
+// weights. The largest weight of ADAPTIVE is the inverse of this factor.
 constexpr float kWeightedShare = 0.3f;
 
-// Of the mean irradiance: sides that receive more take a full part in the light of later bounces.
-// A larger share loses that of sides that few lines have met so far, a smaller one lights the
-// outsides of rooms through their leaks.
+// Threshold of irradiance, relative to the mean. Sides that receive more take a full part in the
+// light of later bounces. A larger value loses that light on sides that few lines have met so far.
+// A smaller value lights the outsides of rooms through their leaks.
 constexpr double kLit = 0.33;
 
 double sum(const glm::vec3& v) { return double(v.x) + double(v.y) + double(v.z); }
 
-// One independent estimate.
+// The independent estimate of one half of the bundles. All vectors except `met` are per side.
+// Powers are multiplied by the number of bundles.
 struct Estimate {
     explicit Estimate(size_t sides)
         : perLine(sides, 0),
@@ -64,22 +69,24 @@ struct Estimate {
           arriving(sides, glm::vec3(0.0f)) {}
 
     uint32_t bundles = 0;
-    std::vector<float> perLine;               // of the unshot power, what a line takes
-    std::vector<glm::vec3> unshot;            // W, times the bundles
-    std::vector<glm::vec3> direct, indirect;  // received, W, times the bundles
-    std::vector<double> lines, skyLines;      // so far, times the weights of their bundles
+    std::vector<float> perLine;               // fraction of the unshot power that a line takes
+    std::vector<glm::vec3> unshot;            // unshot power, W
+    std::vector<glm::vec3> direct, indirect;  // received power, W
+    // Number of lines so far, and of those to the sky, multiplied by the weights of their bundles.
+    std::vector<double> lines, skyLines;
 
-    // Of the bundle in hand.
-    std::vector<uint32_t> met;        // sides
-    std::vector<uint32_t> inBundle;   // lines of each
-    std::vector<float> fraction;      // of its unshot power, per line
-    std::vector<glm::vec3> arriving;  // W, times the bundles
+    // For the current bundle.
+    std::vector<uint32_t> met;        // sides that lines met
+    std::vector<uint32_t> inBundle;   // number of lines
+    std::vector<float> fraction;      // fraction of the unshot power that a line takes
+    std::vector<glm::vec3> arriving;  // arriving power, W
 };
 
-// Light that the power unshot at the end would bring.
+// The light that the power unshot at the end would bring.
 struct Later {
-    std::vector<float> area;     // m^2, per side: where it arrives
-    glm::vec3 irradiance{0.0f};  // there, W/m^2, times the bundles
+    std::vector<float> area;  // per side: area on which it arrives, m^2
+    // Irradiance on this area, W/m^2, times the number of bundles.
+    glm::vec3 irradiance{0.0f};
 };
 
 class Multipath : public Transport {
@@ -142,7 +149,7 @@ class Multipath : public Transport {
                 const float area = float(input.exposedArea(i));
                 if (area <= 0) continue;
                 const float scale = share / (float(estimate.bundles) * area);
-                // thesis_literal counts no lines.
+                // With thesis_literal, lines are not counted.
                 const float perLine =
                     estimate.lines[i] > 0
                         ? share / float(2 * input.tracer.pixelArea * estimate.lines[i])
@@ -179,7 +186,8 @@ class Multipath : public Transport {
     }
 
   private:
-    // Moves the power of one bundle; returns what arrived, W times the bundles and its weight.
+    // Moves the power of one bundle. Returns the power that arrived, W, times the number of bundles
+    // and the weight of the bundle.
     double exchange(Estimate& e, const TracedBundle& traced) const {
         const float weight = float(traced.bundle.weight);
         auto meet = [&](uint32_t side, uint32_t lines) {
@@ -200,7 +208,9 @@ class Multipath : public Transport {
             const float lines = float(e.inBundle[i]);
             e.lines[i] += double(weight * lines);
             e.fraction[i] = weight * e.perLine[i];
-            // From now on no such bundle takes more than all; this one leaves a debt.
+            // Later bundles like this one take no more than all unshot power. This bundle took
+            // more, so that the unshot power becomes negative and reduces what the side sends
+            // later.
             const float all = lines * e.fraction[i];
             if (all > 1) e.perLine[i] /= all;
         }
@@ -222,6 +232,7 @@ class Multipath : public Transport {
         return power;
     }
 
+    // Sends the light of side `from` along `lines` lines to side `to`.
     void send(Estimate& e, uint32_t from, uint32_t to, float lines, float weight) const {
         const glm::vec3 direct = weight * lines * emission[from];
         const glm::vec3 indirect =
@@ -231,7 +242,8 @@ class Multipath : public Transport {
         e.arriving[to] += direct + indirect;
     }
 
-    // Figure 2.8 for every line in turn.
+    // Moves the power of one bundle as in figure 2.8, line by line. Returns the moved power, W,
+    // times the number of bundles.
     double exchangeLiterally(Estimate& e, const TracedBundle& traced) const {
         const std::vector<glm::vec3>& rho = input.patches.reflectance;
         double power = 0;
@@ -254,11 +266,13 @@ class Multipath : public Transport {
         return double(input.patches.area[side / 2] * input.exposed[side]);
     }
 
-    // Where light goes that has been reflected often: everywhere alike, but for sides that hardly
-    // receive any, such as the outsides of rooms. Per side: m^2, at most its exposed area.
+    // Returns for each side the area on which light arrives that was reflected often, m^2, at most
+    // its exposed area. This light is equal everywhere, except on sides that hardly receive any
+    // light, such as the outsides of rooms.
     std::vector<float> reached(const Estimate& e) const {
         auto received = [&](size_t i) { return sum(e.direct[i] + e.indirect[i]); };
-        double ofPower = 0, power = 0;  // mean irradiance, weighted by the power received
+        // ofPower / power is the mean irradiance, weighted by the received power.
+        double ofPower = 0, power = 0;
         for (size_t i = 0; i < e.unshot.size(); ++i) {
             const double area = exposedArea(i);
             if (area <= 0) continue;
@@ -272,7 +286,7 @@ class Multipath : public Transport {
         return result;
     }
 
-    // What the power still unshot would bring over all bounces to come.
+    // Returns the light that the power that is still unshot would bring over all later bounces.
     Later later(const Estimate& e) const {
         Later result;
         result.area = reached(e);
@@ -300,8 +314,8 @@ class Multipath : public Transport {
     const TransportInput input;
     const HandOver first;
     std::array<Estimate, 2> halves;
-    // What a line takes from a side in every bundle, W times the bundles: emission and the light of
-    // the first shot, reflected; and what it brings from the sky.
+    // The power that each line of a bundle brings, W, times the number of bundles: from a side its
+    // emission and its reflected light of the first shot, and from the sky the light of the world.
     std::vector<glm::vec3> emission, reflected;
     glm::vec3 world{0.0f};
 };

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// RANDOM_WALK: light shot from the sources along local rays, on from hit to hit until a surface
-// absorbs the walk or it leaves the scene. Three estimators of the power that reaches a side
-// (settings.estimator), where a walk has the power Phi of all sources and survives a hit with
-// probability R:
+// RANDOM_WALK: walks carry light from the sources along local rays, from hit to hit, until a
+// surface absorbs the walk or it leaves the scene. There are three estimators of the power that
+// reaches a side (settings.estimator). A walk has the power Phi of all sources and survives a hit
+// with probability R. The estimators add:
 //   COLLISION   Phi            at every hit
-//   SURVIVAL    Phi / R        at every hit but the one where the walk dies
-//   ABSORPTION  Phi / (1 - R)  at the hit where the walk dies
+//   SURVIVAL    Phi / R        at every hit that the walk survives
+//   ABSORPTION  Phi / (1 - R)  at the hit where the walk is absorbed
 //
 // Sources: thesis section 2.5, fig. 2.12 (Sbert's Phi_T, Phi_T / R_i and Phi_T / (1 - R_i)).
 // Differs:
-// - With colours, R is the largest channel of the reflectance and the walk's power is multiplied by
-//   reflectance / R, which is 1 on grey surfaces.
-// - No walk survives a black side, and SURVIVAL would find no light on it; there it scores the hit.
-// - Walks go on from a new random point of the patch that they hit: within a patch light is
-//   constant. They start at what the first shot left.
+// - For colours, R is the largest channel of the reflectance, and the power of the walk is
+//   multiplied by reflectance / R, which is 1 on grey surfaces.
+// - No walk survives a hit on a black side, so that SURVIVAL would find no light there. On black
+//   sides it adds Phi at the hit.
+// - Walks continue from a new random point of the patch that they hit, because light is constant
+//   within a patch. They start with the light that the first shot left over.
 // A bundle counts as many walks as a bundle has lines.
 #include <algorithm>
 #include <cmath>
@@ -27,7 +28,7 @@ namespace {
 
 constexpr uint32_t kWalksPerBatch = 4096;
 
-// Lines of a bundle through the scene's sphere.
+// Returns the number of lines of a bundle through the scene's sphere, at least 1.
 uint64_t linesPerBundle(const TransportInput& input) {
     const double across =
         glm::pi<double>() * double(input.patches.radius) * double(input.patches.radius);
@@ -60,7 +61,7 @@ class RandomWalk : public LocalRayTransport {
         }
     }
 
-    // What a hit scores, in powers of the walk.
+    // Returns the power that the estimator adds at a hit, relative to the power of the walk.
     float score(float survival, bool survives) const {
         switch (estimator) {
             case Estimator::SURVIVAL:

@@ -21,14 +21,18 @@ namespace raybundle {
 namespace {
 
 constexpr uint32_t kEdge = ScatteredLight::kEdge, kCells = ScatteredLight::kCells;
-// Directions along an edge of the square, which Lambert's cosine weights alike, and in all.
+// Number of sampled directions along an edge of the unit square, and in all. Each direction stands
+// for an equal share of the cosine.
 constexpr uint32_t kAlong = 2 * kEdge, kDirections = kAlong * kAlong;
+// Largest number of steps in a byte, and the number of steps of a cell that is wholly open to the
+// sky.
 constexpr float kMostSteps = 127;
-constexpr float kOpenSteps = 48;  // those of a cell that is open
-// What is sent by direction makes or loses power by its noise. Between sides that reflect nearly
-// all of it, as in a slit between white boards, that grows without bound: of a channel of which
-// less than this share is absorbed, in proportion less goes by direction. (Between books of pure
-// blue under an even sky there was 8 times the light of the sky. In Cycles it is 1.0 to 1.1 times.)
+constexpr float kOpenSteps = 48;
+// Light by direction adds or removes power by its noise. Between sides that reflect nearly all of
+// it, as in a slit between white boards, this error grows without bound. In a channel that absorbs
+// less than this share, light by direction is therefore reduced in proportion. (Without this, there
+// was 8 times the light of the sky between books of pure blue under an even sky. In Cycles it is
+// 1.0 to 1.1 times.)
 constexpr float kLeastAbsorbed = 0.02f;
 
 int8_t rounded(float steps) {
@@ -37,7 +41,7 @@ int8_t rounded(float steps) {
 
 Eigen::DiagonalMatrix<float, 3> diagonal(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
-// The inverse of onDisk, times kEdge.
+// Returns the inverse of onDisk(), times kEdge.
 glm::vec2 cellsAt(glm::vec2 disk) {
     const float r = glm::length(disk), perAngle = 4 * glm::one_over_pi<float>();
     glm::vec2 p(0.0f);
@@ -51,13 +55,15 @@ glm::vec2 cellsAt(glm::vec2 disk) {
     return (0.5f * p + 0.5f) * float(kEdge);
 }
 
-// The first of the four cells around a direction, and where in the square of their middles it is.
+// The four cells around a direction, and the position of the direction in the square between their
+// centres.
 struct Around {
     static constexpr int kWhole = 255;
-    uint8_t first = 0, s = 0, t = 0;  // s, t: of kWhole
+    // `first` is the index of the first cell. `s` and `t` are 0 to kWhole across the square.
+    uint8_t first = 0, s = 0, t = 0;
 
     Around() = default;
-    // At a point of the square, in cells.
+    // `point` is a point of the unit square, times kEdge.
     explicit Around(const glm::vec2& point) {
         const glm::vec2 p = glm::clamp(point - 0.5f, 0.0f, float(kEdge - 1));
         const glm::uvec2 low = glm::min(glm::uvec2(p), glm::uvec2(kEdge - 2));
@@ -69,18 +75,20 @@ struct Around {
     std::array<uint32_t, 4> cells() const {
         return {first, first + 1u, first + kEdge, first + kEdge + 1};
     }
+    // Returns the bilinear weights of the four cells.
     std::array<float, 4> shares() const {
         const float x = float(s) / kWhole, y = float(t) / kWhole;
         return {(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y};
     }
-    // Of kWhole squared.
+    // Returns shares() times kWhole squared.
     std::array<int, 4> wholeShares() const {
         const int x = s, y = t;
         return {(kWhole - x) * (kWhole - y), x * (kWhole - y), (kWhole - x) * y, x * y};
     }
 };
 
-// By the place on the disk: an arc tangent a line would be most of the work.
+// Table of the cells around a direction by its place on the disk. To compute an arc tangent for
+// each line would take most of the time.
 class AroundTable {
   public:
     AroundTable() {
@@ -90,7 +98,7 @@ class AroundTable {
             entries[k] = Around(cellsAt(disk));
         }
     }
-    // x, y: of the frame that the disk has.
+    // Returns the entry of a direction. `x` and `y` are the axes of the disk, unit vectors.
     const Around& at(const glm::vec3& x, const glm::vec3& y, const glm::vec3& direction) const {
         auto step = [&](const glm::vec3& axis) {
             const float along = (glm::dot(axis, direction) + 1) * (0.5f * kSteps);
@@ -109,13 +117,17 @@ class AroundTable {
     std::array<Around, kSteps * kSteps> entries;
 };
 
-// The directions, around z, and how cells follow from them.
+// The sampled directions, around the z axis, and how values of cells follow from values of
+// directions.
 struct Samples {
     std::array<glm::vec3, kDirections> directions;
-    std::array<glm::vec4, kCells> terms{};  // of the angles in each cell
-    ScatteredLight::Hemisphere even{};      // what light from everywhere adds to each, 1 in all
-    // Cells, bilinear between their middles, that are nearest to values by direction: what is
-    // added to them spreads over four, and this takes it back.
+    std::array<glm::vec4, kCells> terms{};  // mean angle terms (scene/angles.h) of each cell
+    // Share that each cell gets of light from all directions; the sum is 1.
+    ScatteredLight::Hemisphere even{};
+    // Matrix that fits values of cells to values of directions: bilinear interpolation between the
+    // centres of the cells is then nearest to the values of directions (least squares). Light that
+    // is added to cells spreads over four cells, and the transpose of this matrix compensates for
+    // that.
     Eigen::Matrix<float, kCells, kDirections> fit;
 
     Samples() {
@@ -145,12 +157,14 @@ struct Samples {
 
 }  // namespace
 
-// How what arrives is sent on: exitance over irradiance, to a cell (row) from a cell (column).
+// How a surface sends arriving light on: exitance towards a cell (row) over irradiance from a cell
+// (column).
 struct ScatteredLight::Transfer {
     using Matrix = Eigen::Matrix<float, kCells, kCells>;
-    // Gloss with f0 of 1 and of 0, that mirrors all else that it can; a white rough surface.
+    // `white` and `edge` are gloss with an f0 of 1 and of 0; gloss of another f0 is a linear
+    // combination of them. `rough` is the diffuse part of a rough surface that reflects all light.
     Matrix white = Matrix::Zero(), edge = white, rough = white;
-    std::vector<Matrix> lobes;  // of the surface
+    std::vector<Matrix> lobes;  // per lobe of the surface
 
     explicit Transfer(const Scattering& surface) {
         const glm::vec3 z(0, 0, 1);
@@ -234,9 +248,9 @@ ScatteredLight ScatteredLight::renumbered(const std::vector<uint32_t>& sides) co
 }
 
 void ScatteredLight::findTransfers() {
-    // Alike to within a hundredth of the roughness.
+    // Surfaces whose roughnesses are equal to within a hundredth share a transfer.
     auto rounded = [](float roughness) { return float(std::lround(100 * roughness)) / 100; };
-    // Gloss, lobes and the diffuse rest: whether there is, of which kind, how rough.
+    // For gloss, lobes and the diffuse part: whether they exist, their kind and their roughness.
     using Kind = std::tuple<bool, rb_masking, float, std::vector<std::pair<LobeKind, float>>,
                             rb_diffuse_model, float>;
     std::map<Kind, std::vector<size_t>> alike;
@@ -281,8 +295,8 @@ void ScatteredLight::setOpen(uint32_t side, const Hemisphere& met, float sky) {
     const float left = 1 - std::accumulate(met.begin(), met.end(), 0.0f);
     const float scale = left > 0 ? sky / left : 0;
     Open& target = open[indices[side]];
-    // Few lines may meet more in a cell than there is. That stays, for otherwise there would be too
-    // much of what is open elsewhere.
+    // With few lines, more lines may meet surfaces in a cell than the cell can hold. The negative
+    // value remains, because otherwise the other cells would be too open.
     for (uint32_t k = 0; k < kCells; ++k)
         target[k] = rounded(scale * (even[k] - met[k]) / even[k] * kOpenSteps);
 }
@@ -340,7 +354,7 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
 glm::vec3 ScatteredLight::towards(uint32_t side, const glm::vec3& direction) const {
     const Sent& source = sent[indices[side]];
     const Around& around = AroundTable::instance().at(source.x, source.y, direction);
-    // In whole numbers, of which there are fewer to convert.
+    // The sum is in integers, because this needs fewer conversions to float.
     glm::ivec3 sum(0);
     const std::array<uint32_t, 4> at = around.cells();
     const std::array<int, 4> shares = around.wholeShares();

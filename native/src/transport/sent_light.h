@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What sides send of a solved light towards one direction: what a local ray that meets them brings.
-// Without emission, which is not reflected.
+// The exitance of patch sides towards one direction, for solved light. This is the light that a
+// local ray brings from the side that it meets. Emission is not included.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -13,20 +13,24 @@
 
 namespace raybundle {
 
+// The light that sides reflect and pass on, by direction.
 class SentLight {
   public:
     using Of = DirectedLight::Of;
-    // irradiance: solved with that shot. All must outlive the object.
+    // Takes all reflected light, or only the light that the first shot has not distributed itself
+    // (`of`). `irradiance` must have been solved from `shot`. All references must outlive the
+    // object.
     SentLight(const LitSurfaces& surfaces, const FirstShot& shot, const Irradiance& irradiance,
               Of of);
 
-    // Exitance towards a direction (unit) away from the side, W/m^2.
+    // Returns the exitance of the exposed part of a side towards a direction, W/m^2. The direction
+    // is a unit vector that points away from the side.
     glm::vec3 towards(uint32_t side, const glm::vec3& direction) const;
 
   private:
     const Irradiance& irradiance;
     const std::vector<float>& exposed;
-    std::vector<glm::vec3> mean;  // per side, over all directions
+    std::vector<glm::vec3> mean;  // per side: mean exitance over all directions, W/m^2
     const DirectedLight directed;
 };
 

@@ -14,10 +14,12 @@
 namespace raybundle {
 namespace {
 
-// Rays per side: kLocalRays, less where there are many sides, to stay below kMostLocalRays in all.
+// Each side casts kLocalRays rays. If there are many sides, each casts fewer, but at least
+// kFewLocalRays, to stay below kMostLocalRays in all.
 constexpr size_t kLocalRays = 64, kFewLocalRays = 16, kMostLocalRays = 8 << 20;
 constexpr int kMaxSweeps = 64;
-constexpr float kSettledChange = 1e-5f;  // relative, of what the sides send
+// The sweeps end when the exitance changes by less than this, relative to the largest exitance.
+constexpr float kSettledChange = 1e-5f;
 constexpr uint32_t kNoHit = UINT32_MAX;
 
 }  // namespace
@@ -34,7 +36,7 @@ void StarvedSides::find(const std::vector<bool>& wanted) {
     isOther.resize(input.counts.sideCount());
     for (uint32_t i = 0; i < input.counts.sideCount(); ++i) {
         throwIfCancelledAt(i);
-        // The patches of a cut tile do with the lines of the tile.
+        // A patch of a cut tile needs only its share of the lines of a tile.
         const uint32_t enough = std::max(1u, how.minLines >> (2 * input.patches.level(i / 2)));
         const bool isStarved = input.counts.linesMetInAll(i) < enough;
         if (isStarved && wanted[i])
@@ -102,13 +104,14 @@ void StarvedSides::addReflected(const std::vector<glm::vec3>& reflected) {
     if (!input.patches.translucence.empty())
         for (size_t i = 0; i < sent.size(); ++i)
             sent[i] += passedOn(input, i, irradiance.all(i ^ 1));
-    // Starved sides may see each other: sweep until what they send has settled.
+    // Starved sides may see each other, so sweeps are repeated until their exitance has settled.
     for (int k = 0; k < kMaxSweeps; ++k)
         if (sweep(sent, next)) return;
 }
 
-// Finds what arrives at the sides from what is sent, and what they send then. Returns whether that
-// has settled. next: room for what they send.
+// Computes the light that arrives at the starved sides from the exitance `sent` (per side), and
+// updates their exitance in `sent`. Returns whether their exitance has settled. `next` is working
+// memory, per side in `starved`.
 bool StarvedSides::sweep(std::vector<glm::vec3>& sent, std::vector<glm::vec3>& next) {
     const Patches& patches = input.patches;
     parallelFor(size_t(0), starved.size(), [&](size_t k) {

@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// STOCHASTIC_ITERATION with the ray-bundle operator: each iterate is the light that one bundle
-// brings, to all sides at once, from what the iterate before reflects and from the sources.
+// STOCHASTIC_ITERATION with the ray-bundle operator. Each iterate is the light that one bundle
+// brings to all sides at once, from the sources and from the light of the iterate before that sides
+// reflect.
 //
 //   H_n = T_n (E + unshot + rho H_n-1),   H = mean of the H_n
 //   (T_n x)_i = 2 s^2 / (A_i exposed_i) * sum of x_j over the bundle's lines between i and j
 //
 // E: emission left to the bundles, and pi L on lines to the sky; unshot: light of the first shot,
-// reflected for the first time; A_i exposed_i: the part of the side that nothing covers, m^2;
-// s^2: area of a pixel, m^2.
+// reflected for the first time; A_i exposed_i: the part of the side that no other surface covers,
+// m^2; s^2: area of a pixel, m^2.
 //
 // Sources: thesis section 2.6; Szirmay-Kalos, "Stochastic Iteration for Non-diffuse Global
 // Illumination" (1999).
 // Differs:
-// - The first iterates lack the later bounces. Some are left out of the mean, a quarter of the
-//   first call's at most; what the others lack is stated (bias).
-// - Each half of the bundles has iterates of its own.
-// - The mean light of a side is divided by the lines that met it in all bundles, not by how many
-//   there are in the mean: T_n itself stays as it is.
-// - Scenes on which the mean square of the iterates would grow without bound are refused
-//   (mean_square_growth.cpp); the thesis gives no condition.
+// - The first iterates lack the later bounces. Some of them are left out of the mean, at most a
+//   quarter of the bundles of the first call. bias() returns the error of the others.
+// - Each half of the bundles has its own iterates.
+// - The mean light of a side is divided by the number of lines that met the side in all bundles,
+//   not by the expected number. T_n itself remains unchanged.
+// - Throws on scenes on which the mean square of the iterates would grow without bound
+//   (mean_square_growth.cpp). The thesis gives no condition.
 #include "transport/stochastic_iteration.h"
 
 #include <algorithm>
@@ -36,14 +37,17 @@
 namespace raybundle {
 namespace {
 
-constexpr uint32_t kBatch = 16;  // bundles of both halves traced at a time
+// Number of bundles of both halves that are traced at a time.
+constexpr uint32_t kBatch = 16;
 
-// What sides share in both halves.
+// Properties of the sides and of the light, for both halves. Vectors are per side; `unshot` is in
+// W/m^2.
 struct Sides {
     std::vector<glm::vec3> reflectance, unshot;
-    std::vector<float> perLine;  // irradiance per exitance that one line brings
-    glm::vec3 worldExitance;     // W/m^2
-    bool hasDirect;              // there is light straight from emission or the world
+    // Irradiance that one line brings, relative to the exitance at its other end.
+    std::vector<float> perLine;
+    glm::vec3 worldExitance;  // W/m^2
+    bool hasDirect;           // whether there is direct light, of emission or the world
 };
 
 // The iterates of one half.
@@ -59,7 +63,7 @@ class Iterates {
         for (size_t i = 0; i < exitance.size(); ++i) exitance[i] = {emission[i], sides.unshot[i]};
     }
 
-    // Goes on by the next bundle; its light counts in the mean if `counts`.
+    // Computes the next iterate with the lines of a bundle. Adds its light to the mean if `counts`.
     void step(const BundleLines& lines, bool counts) {
         if (sides.hasDirect)
             step<true>(lines, counts);
@@ -67,10 +71,12 @@ class Iterates {
             step<false>(lines, counts);
     }
 
+    // Return the number of iterates in the mean, and the sums of their direct and indirect
+    // irradiance on a side, W/m^2.
     uint32_t counted() const { return count; }
     const glm::dvec3& direct(size_t side) const { return totals[side].direct; }
     const glm::dvec3& indirect(size_t side) const { return totals[side].indirect; }
-    // Of the bundles that count.
+    // Return the number of lines of a side in these bundles, and of those that left the scene.
     uint64_t lines(size_t side) const { return met[side]; }
     uint64_t skyLines(size_t side) const { return sky[side]; }
 
@@ -121,17 +127,19 @@ class Iterates {
 
     const Sides& sides;
     std::vector<Exitance> exitance;          // W/m^2
-    std::vector<Light<glm::vec3>> received;  // exitance times lines, W/m^2
-    std::vector<Light<glm::dvec3>> totals;   // of the irradiances that count, W/m^2
-    std::vector<uint64_t> met, sky;          // lines of bundles that count; that left the scene
-    uint32_t count = 0;                      // bundles that count
+    std::vector<Light<glm::vec3>> received;  // sums of exitance over lines, W/m^2
+    // Sums of the irradiance over the iterates in the mean, W/m^2.
+    std::vector<Light<glm::dvec3>> totals;
+    // Number of lines in the bundles of these iterates, and of those that left the scene.
+    std::vector<uint64_t> met, sky;
+    uint32_t count = 0;  // number of iterates in the mean
 };
 
 class BundleIteration : public Transport {
   public:
     explicit BundleIteration(const TransportInput& input) : input(input), sides(makeSides(input)) {
         assert(input.exposed.size() == input.patches.sideCount());
-        // Judge by the first bundles, and keep them.
+        // The first bundles serve to decide whether the iteration converges, and are then used.
         std::vector<TracedBundle> traced = input.tracer.trace(kBatch);
         refuseIfUnstable(traced);
         keep(std::move(traced));
@@ -171,9 +179,10 @@ class BundleIteration : public Transport {
         return result;
     }
 
-    // Iterate n lacks the bounces after the n-th: rho^n of the lines' light, with rho the
-    // reflectance that this light meets, lines to the sky counted as black; on average over the
-    // iterates that count, rho^(w+1) (1 - rho^N) / (N (1 - rho)) after w that do not.
+    // Returns the relative error by the bounces that the iterates lack. Iterate n lacks the bounces
+    // after the n-th, which are rho^n of the light by lines. rho is the mean reflectance that this
+    // light meets, with the sky counted as black. The mean over N iterates, after w iterates that
+    // are left out, is rho^(w+1) (1 - rho^N) / (N (1 - rho)).
     double bias() const override {
         const std::vector<float> open = openShare();
         double arriving = 0, goingOn = 0, all = 0;
@@ -233,15 +242,16 @@ class BundleIteration : public Transport {
             "the lines, or choose solver LINE_REUSE, MULTIPATH or RANDOM_WALK");
     }
 
-    // Takes bundles to go on by; those before have been used.
+    // Replaces the waiting bundles, all of which must have been used.
     void keep(std::vector<TracedBundle> traced) {
         for (auto& bundles : waiting) bundles.clear();
         for (TracedBundle& t : traced) waiting[t.bundle.half].push_back(std::move(t));
         next = 0;
     }
 
-    // Mean irradiance, direct and indirect: by the lines that met the side and not by those that
-    // were to in the mean, so that even light is right however many came.
+    // Returns the mean direct and indirect irradiance of a side, W/m^2. The sums are divided by the
+    // lines that met the side, not by the expected number, so that constant light is right for any
+    // number of lines.
     std::pair<glm::dvec3, glm::dvec3> mean(Half half, size_t side) const {
         glm::dvec3 direct(0.0), indirect(0.0);
         double count = 0;
@@ -259,10 +269,10 @@ class BundleIteration : public Transport {
     const Sides sides;
     std::array<Iterates, 2> halves{Iterates(sides, input.shot.emission),
                                    Iterates(sides, input.shot.emission)};
-    std::array<std::vector<TracedBundle>, 2> waiting;  // per half: traced bundles,
-    size_t next = 0;                                   // of which these have been used
-    uint32_t done = 0;                                 // bundles of each half
-    uint32_t warmUp = 0;                               // of them, those that do not count
+    std::array<std::vector<TracedBundle>, 2> waiting;  // per half: traced bundles
+    size_t next = 0;      // number of bundles in each list that have been used
+    uint32_t done = 0;    // number of bundles used in each half
+    uint32_t warmUp = 0;  // number of these bundles that are left out of the mean
 };
 
 }  // namespace

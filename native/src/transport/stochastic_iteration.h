@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What the two operators of stochastic iteration have in common, and whether that of bundles
-// converges.
+// Declarations that the two operators of stochastic iteration share, and the test whether the
+// iteration by bundles converges.
 #pragma once
 
 #include <memory>
@@ -14,16 +14,20 @@ namespace raybundle {
 // Share of the light that the first iterate in the mean may lack.
 constexpr double kMissing = 1e-3;
 
-// Largest channel of all reflectances.
+// Returns the largest channel of the reflectances of all sides.
 double largestReflectance(const Patches& patches);
 
-// Iterates until light that lacks all bounces lacks only the share `missing`, but at most `most`.
+// Returns the number of iterates that are left out of the mean: as many as it takes until the
+// bounces that an iterate lacks are at most `missing` of the light, but at most `most`.
+// `reflectance` is that of all surfaces, below 1.
 uint32_t warmUpIterates(double reflectance, double missing, uint32_t most);
 
-// By what factor the mean square of the iterates' deviation grows from bundle to bundle; it
-// converges below 1. `traced`: bundles to judge by, not all of them dark.
+// Returns the factor by which the mean square of the deviation of the iterates grows from bundle to
+// bundle. The iteration converges if it is below 1. The form factors are estimated from the bundles
+// in `traced`, some lines of which must carry light.
 double meanSquareGrowth(const TransportInput& input, const std::vector<TracedBundle>& traced);
 
+// Returns the transport of stochastic iteration with single rays.
 std::unique_ptr<Transport> singleRayIteration(const TransportInput& input);
 
 }  // namespace raybundle

@@ -8,7 +8,8 @@
 namespace raybundle {
 namespace {
 
-// Steps longer than those for this reflectance would forget too much of what was there.
+// Largest reflectance for which the steps are chosen. Longer steps would forget too much of the
+// light before.
 constexpr float kMostReflectance = 0.95f;
 
 }  // namespace

@@ -28,7 +28,7 @@ HandOver handOver(const LitSurfaces& surfaces, const FirstShot& shot) {
     const size_t n = patches.sideCount();
     HandOver light{std::vector<glm::vec3>(n), std::vector<glm::vec3>(n), std::vector<glm::vec3>(n)};
     for (size_t i = 0; i < n; ++i) {
-        // What came to the whole side came in through its exposed part.
+        // The irradiance is a mean over the whole side, but only the exposed part receives light.
         const float concentrated = exposed[i] > 0 ? 1 / exposed[i] : 0;
         light.gathered[i] = concentrated * shot.irradiance[i];
         if (!shot.indirect.empty()) light.indirect[i] = concentrated * shot.indirect[i];

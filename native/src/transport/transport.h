@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What moves light between patch sides after the first shot. Each transport is a file of its own
-// and a row of the table in transport.cpp.
+// Transports move light between patch sides after the first shot. Each transport (the setting
+// `solver`) has its own source file and a row of the table in transport.cpp.
 //
-// A transport runs two independent estimates, one on each half of the bundles; their difference is
-// the stated error, and their mean the result.
+// A transport runs two independent estimates, one on each half of the bundles. The difference of
+// the two estimates measures the noise, and their mean is the result.
 #pragma once
 
 #include <cstdint>
@@ -26,23 +26,31 @@ namespace raybundle {
 class Clusters;
 class ScatteredLight;
 
-// Irradiance per side, W/m^2, in two parts.
+// Irradiance of patch sides, W/m^2, in a direct and an indirect part. The first three vectors have
+// one entry per side.
 struct Irradiance {
     explicit Irradiance(size_t sides = 0) : direct(sides), gathered(sides), indirect(sides) {}
 
-    std::vector<glm::vec3> direct;    // straight from sources, emission and world
-    std::vector<glm::vec3> gathered;  // part of it: from the sources of the first shot
-    std::vector<glm::vec3> indirect;  // after one reflection or more
-    // Exitance by indirect light that comes in at angles at which a side reflects more than of
-    // light from everywhere, or less; empty: none.
+    std::vector<glm::vec3> direct;    // light straight from sources, emission and the world
+    std::vector<glm::vec3> gathered;  // the part of `direct` from the sources of the first shot
+    std::vector<glm::vec3> indirect;  // light that was reflected at least once
+    // Per side, exitance in W/m^2 to add to reflectance times irradiance, because light along lines
+    // arrives at angles at which the side reflects more (positive) or less (negative) than it
+    // reflects of light from all directions. Empty if no side has this dependence.
     std::vector<glm::vec3> byAngle;
-    // What of reflected light goes where Lambert's surfaces would not send it; null: nothing.
+    // How the exitance by reflected light depends on the direction on surfaces that are not
+    // Lambert's. Null if it does not depend on the direction.
     std::shared_ptr<const ScatteredLight> scattered;
-    // Power that arrives and would leave the scene if all surfaces were Lambert's, W.
+    // Power that arrives on surfaces because light does not leave other surfaces by Lambert's law,
+    // W. If all surfaces were Lambert's, this power would leave the scene.
     glm::dvec3 redirected{0.0};
-    bool isSettled = true;  // no more light is to be passed on than the tolerance of the solve
+    // Whether all solves that gave this light reached their tolerance.
+    bool isSettled = true;
 
+    // Returns the direct plus the indirect irradiance of a side, W/m^2.
     glm::vec3 all(size_t side) const { return direct[side] + indirect[side]; }
+    // Adds the light of another estimate of the same sides. Leaves `byAngle` and `scattered` as
+    // they are.
     void add(const Irradiance& other) {
         for (size_t side = 0; side < direct.size(); ++side) {
             direct[side] += other.direct[side];
@@ -54,81 +62,100 @@ struct Irradiance {
     }
 };
 
-// Which bundles an estimate looks at.
+// The half of the bundles that an estimate uses, or both halves.
 enum class Half { FIRST = 0, SECOND = 1, BOTH = 2 };
 
-// The factors x_i of the lines of each side, and how many lines each has with them: m_i.
+// Weights of lines, so that no power is lost between patches. A line between the sides i and j
+// counts x_i x_j times, and a line from side i to the sky counts x_i times. m_i is the number of
+// lines of side i that results. Both vectors are per side.
 struct LineWeights {
     std::vector<float> x, m;
 };
 
-// What LINE_REUSE found by the lines of a half or of both, for solves to start from: of other light
-// too, for the first solve of a bake.
+// A solution of LINE_REUSE on the lines of one half of the bundles, or of both. Later solves start
+// from it. It may belong to fewer bundles than are traced now, and in the first solve of a bake
+// also to other light.
 struct LineSolution {
-    std::vector<glm::vec3> reflected;  // per side: exitance, W/m^2
-    // Likewise, besides: what passed through translucent patches; empty: not known.
+    // Per side: reflected exitance R, W/m^2, without light that passed through patches.
+    std::vector<glm::vec3> reflected;
+    // Per side: exitance of light that passed through translucent patches, W/m^2. Empty if not
+    // known.
     std::vector<glm::vec3> passed;
-    // Per side: the sum of `reflected` at the other ends of its lines, each times its factor x_j;
-    // empty: not known.
+    // Per side: the sum over its lines of x_j times `reflected` of the side j at the other end,
+    // W/m^2. Empty if not known.
     std::vector<glm::vec3> brought;
-    uint32_t bundles = 0;  // that it is of; 0: of none
+    uint32_t bundles = 0;  // number of bundles of the lines; 0 if there is no solution
 };
 
+// The solutions of LINE_REUSE for the light of one light set, and the weights of the lines.
 struct LineSolutions {
     explicit LineSolutions(size_t sides = 0) {
         for (LineSolution& solution : of) solution.reflected.resize(sides);
     }
 
-    LineSolution of[3];   // by Half
-    LineWeights weights;  // for both
+    LineSolution of[3];   // indexed by Half
+    LineWeights weights;  // for Half::BOTH
 };
 
-// What transports are made of. References must outlive them.
+// The input of a transport. All references must outlive the transport.
 struct TransportInput : LitSurfaces {
     const Visibility& visibility;
     const FirstShot& shot;
     const glm::vec3 worldRadiance;  // W/(m^2 sr)
     const Settings& settings;
     BundleTracer& tracer;
-    LineCounts& counts;  // of the bundles traced so far; LINE_REUSE alone adds to it
-    // Of the light of the same set, per side of these patches; null: none are kept.
+    // The counts of all bundles traced so far. Only LINE_REUSE adds to them.
+    LineCounts& counts;
+    // The solutions for the light of this light set, per side of `patches`. LINE_REUSE starts
+    // from them and overwrites them. Null if they are not kept beyond the transport.
     LineSolutions* solutions = nullptr;
-    // Per side: whether its light is shown, and not only that of what it lights; null: all is.
+    // Per side: whether its light is shown in the result. Light that is not shown only lights other
+    // surfaces. Null: the light of all sides is shown.
     const std::vector<bool>* isShown = nullptr;
-    // Between which LINE_REUSE exchanges light: `patches` are theirs, and `visibility` is of those
-    // that they are made of. Null: each patch exchanges light by itself.
+    // The clusters between which LINE_REUSE exchanges light. Null: each patch exchanges light by
+    // itself. `visibility` is always of clusters->members(). `patches` are clusters->members() for
+    // lineReuseOfClusters() and makeTransports(), and clusters->patches() for lineReuseOfMany().
     const Clusters* clusters = nullptr;
 };
 
+// Interface of all transports: an estimate of the irradiance that improves with each bundle.
 class Transport {
   public:
     virtual ~Transport() = default;
 
-    // Does the work of the next `count` bundles (even). Reports the share that is done.
+    // Does the work of the next `count` bundles, and reports the fraction that is done. `count`
+    // must be even.
     virtual void advance(uint32_t count, const Progress& progress) = 0;
 
-    // Bundles whose work is done.
+    // Returns the number of bundles whose work is done.
     virtual uint32_t bundleCount() const = 0;
 
-    // The estimate so far, solved to a relative `tolerance` where there is something to solve.
+    // Returns the estimate from a half of the bundles traced so far, or from both. `tolerance` is
+    // the relative residual at which a transport that solves a system stops; other transports
+    // ignore it.
     virtual Irradiance irradiance(Half half, float tolerance) = 0;
 
-    // The last estimate of all; sides that are not `wanted` may stay rough.
+    // Returns the final estimate from all bundles, and adds skipped work and warnings to the
+    // report. `wanted` (per side) marks the sides whose light is needed; the estimate may stay
+    // rough on others.
     virtual Irradiance finish(float tolerance, const std::vector<bool>& /*wanted*/,
                               Report& /*report*/) {
         return irradiance(Half::BOTH, tolerance);
     }
 
-    // Relative error that both halves have alike, so that their difference does not show it.
+    // Returns the relative error that is common to both halves, and so does not show in their
+    // difference.
     virtual double bias() const { return 0; }
 
-    // Per side: the share of the lines from it that leave the scene. Where none met it 0, if the
-    // power that it would get went to those that lines met; below 0 if each of these has that of
-    // its own area alone, and nothing is known of this one's.
+    // Returns for each side the share of its lines that leave the scene. If no line met a side, the
+    // value depends on the transport. It is 0 if the power that the side should receive went to the
+    // sides that lines met. It is below 0 if each side that lines met received only the power for
+    // its own area, so that nothing is known of this side.
     virtual std::vector<float> openShare() const = 0;
 };
 
-// For Transport::openShare: per side, skyLines(side) / lines(side); 0 where no line met it.
+// Computes the result of Transport::openShare: skyLines(side) / lines(side) for each side, and 0
+// where lines(side) is 0.
 template <class Lines, class SkyLines>
 std::vector<float> openShareOf(size_t sides, const Lines& lines, const SkyLines& skyLines) {
     std::vector<float> share(sides, 0.0f);
@@ -138,32 +165,42 @@ std::vector<float> openShareOf(size_t sides, const Lines& lines, const SkyLines&
     return share;
 }
 
-// The first shot's light at the exposed part of each side, W/m^2.
+// The light of a first shot that a transport starts with, per side and relative to the exposed part
+// of the side, W/m^2.
 struct HandOver {
     std::vector<glm::vec3> gathered;  // direct irradiance
-    std::vector<glm::vec3> indirect;  // irradiance from reflected light, already distributed
+    std::vector<glm::vec3> indirect;  // irradiance by reflected light, already distributed
     std::vector<glm::vec3> unshot;    // reflected exitance that is still to be distributed
 };
+// Returns the light of a first shot, converted from whole sides to their exposed parts.
 HandOver handOver(const LitSurfaces& surfaces, const FirstShot& shot);
 
-// The transports, one a row of the table.
+// Returns the transport of solver LINE_REUSE.
 std::unique_ptr<Transport> lineReuse(const TransportInput& input);
-// One for each input, which differ in their light alone: the first traces and counts the lines for
-// all of them, and advances them with it.
+// One transport for each input, in the order of the inputs.
 using Transports = std::vector<std::unique_ptr<Transport>>;
+// Returns transports of solver LINE_REUSE for inputs that differ only in their light. The first
+// transport traces and counts the lines for all of them, and its advance() advances them all. The
+// others must not advance by themselves.
 Transports lineReuseOfMany(const std::vector<TransportInput>& inputs);
-// The same between clusters: all that goes in and comes out is per side of the patches that they
-// are made of, but for the solutions.
+// Returns transports like lineReuseOfMany(), which exchange light between clusters. All input and
+// output is per side of the patches of which the clusters consist, except `solutions` and `counts`,
+// which are per side of the clusters.
 Transports lineReuseOfClusters(const std::vector<TransportInput>& inputs);
+// Return the transports of the other solvers. stochasticIteration throws Error(INVALID_ARGUMENT) if
+// it would not converge on this scene.
 std::unique_ptr<Transport> multipath(const TransportInput& input);
 std::unique_ptr<Transport> stochasticIteration(const TransportInput& input);
 std::unique_ptr<Transport> randomWalk(const TransportInput& input);
 
-// The transport of a solver. Throws Error(INVALID_ARGUMENT) if it would not converge on this scene.
+// Returns the transport of a solver. Throws Error(INVALID_ARGUMENT) if it would not converge on
+// this scene.
 std::unique_ptr<Transport> makeTransport(Solver solver, const TransportInput& input);
 
-// The same for several lights on the same lines; the first advances all. More than one is for
-// LINE_REUSE alone: no other transport sends two lights along the lines of one trace.
+// Returns one transport per input, for inputs that differ only in their light and share their
+// lines. advance() of the first transport advances all. More than one input, or clusters, require
+// solver LINE_REUSE: no other transport sends several lights along the lines of one trace. Throws
+// like makeTransport().
 Transports makeTransports(Solver solver, const std::vector<TransportInput>& inputs);
 
 }  // namespace raybundle
