@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// AREA_AVERAGE: from patch sides to the corners of the user's mesh. A corner's value is the mean of
-// the light on its smooth region around it, weighted by area and by the corner's own share in the
-// interpolation over the faces (the hat function, 1 at the corner and 0 at those around it):
+// AREA_AVERAGE: reconstruction from patch sides to the corners of the user's mesh by weighted
+// means. The value at a node v (the value that the corners of a smooth region share) is the mean of
+// the light on the patches p around it. Each patch is weighted by its area A_p and by the node's
+// own weight w_v(p) in the interpolation over the faces (the hat function, which is 1 at the corner
+// and 0 at the corners around it):
 //
 //   f_v = sum_p A_p w_v(p) H_p / sum_p A_p w_v(p)
 //
-// Source: Kavan, Bargteil and Sloan, "Least Squares Vertex Baking" (EGSR 2011), who compare with
-// this average; it is their normal equations with the matrix lumped to its diagonal.
+// Source: Kavan, Bargteil and Sloan, "Least Squares Vertex Baking" (EGSR 2011), who compare their
+// method with this average. It is the solution of their normal equations with the matrix lumped to
+// its diagonal.
 // Differs:
 // - The data are means over patches, not point samples.
-// - Shares of patches that lie against another surface do not count.
+// - The parts of patches that another surface covers do not count.
 //
-// It never overshoots and needs no solve, but blurs: light that is linear over the surface comes
-// out flatter at the mesh's border and at sharp edges, where the region lies on one side only.
+// The average never overshoots and needs no solve, but it blurs. Light that is linear over the
+// surface becomes flatter at the border of the mesh and at sharp edges, because the region lies on
+// only one side of the corner there.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -25,7 +29,9 @@
 
 namespace raybundle {
 
-// Arguments and result as in leastSquares.
+// Reconstructs several fields of light on one side of an instance. Each of the `fields` is per
+// patch side. Returns for each field a value per node of `surface.regions`, in the unit of the
+// field. A node without patches has the value 0.
 std::vector<std::vector<glm::vec3>> areaAverage(
     const LitSurfaces& surfaces, const InstanceSide& surface,
     const std::vector<const std::vector<glm::vec3>*>& fields);

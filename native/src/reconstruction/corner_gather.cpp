@@ -10,10 +10,11 @@
 namespace raybundle {
 namespace {
 
-// A corner whose patch is covered by more than this gathers no light itself.
+// Corners gather no light of their own on a patch side whose exposed share is not above this value:
+// they keep the light of the patches.
 constexpr float kHalfCovered = 0.5f;
 
-// RMS over channels and the exposed area of what is baked, W/m^2.
+// Returns the RMS of the light of all baked sides, over the channels and the exposed area, W/m^2.
 double meanLight(const Scene& scene, const LitSurfaces& surfaces,
                  const std::vector<InstanceRange>& ranges, const Irradiance& light) {
     double squares = 0, area = 0;
@@ -34,7 +35,8 @@ double meanLight(const Scene& scene, const LitSurfaces& surfaces,
     return area > 0 ? std::sqrt(squares / area) : 0;
 }
 
-// Those at one node share in its mean, whose error is what counts.
+// Sets the allowed errors of the receivers from index `first` on. Corners at one node contribute to
+// one mean, and only the error of this mean counts, so that each corner may have a larger error.
 void shareErrors(std::vector<CornerReceiver>& corners, size_t first, const SmoothRegions& regions) {
     auto nodeOf = [&](size_t c) { return regions.nodeOf[size_t(corners[c].corner)]; };
     std::vector<uint32_t> count(regions.nodeCount, 0);
@@ -78,7 +80,8 @@ CornerGather::CornerGather(const ReconstructionInput& input,
 void CornerGather::findCorners(const ReconstructionInput& input, const std::vector<bool>& gathers) {
     const Patches& patches = input.patches;
     const Visibility& visibility = input.visibility;
-    // Whether another surface lies against the corner, though not against all of its patch.
+    // Returns whether another surface touches the side at the receiver's point. The surface may
+    // touch the patch at the corner although most of the patch is exposed.
     auto isTouched = [&](const Receiver& receiver) {
         const glm::vec3 normal = patches.normal(receiver.side);
         float distance = 0;
@@ -111,7 +114,8 @@ void CornerGather::findCorners(const ReconstructionInput& input, const std::vect
 void CornerGather::gatherSources(const ReconstructionInput& input, const Progress& progress) {
     const SetLights& lights = input.lights;
     const Settings& settings = input.settings;
-    // After the corners, the other sides of those that show their light.
+    // The receivers are all corners, followed by the other sides of the corners at translucent
+    // patches, which show light of both sides. `behind` lists these corners.
     std::vector<uint32_t> behind;
     for (size_t c = 0; c < corners.size(); ++c)
         if (!showsOwnAlone(c)) behind.push_back(uint32_t(c));
@@ -156,7 +160,9 @@ CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
     const std::vector<uint32_t>& nodeOf = regions[instance].nodeOf;
     const uint32_t nodeCount = regions[instance].nodeCount;
     const size_t begin = first[instance], end = first[instance + 1];
-    std::vector<double> gathered(nodeCount, 0.0);  // variances, in the mean of the channels
+    // Variance of the light that the final gather found, per node, mean over the channels,
+    // (W/m^2)^2.
+    std::vector<double> gathered(nodeCount, 0.0);
     if (others[k]) {
         const FinalGather& gather = *others[k];
         std::vector<bool> wanted(nodeCount, true);
@@ -171,7 +177,7 @@ CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
             for (size_t c = begin; c < end; ++c)
                 if (isNear[c - begin]) wanted[nodeOf[corners[c].corner]] = true;
         }
-        // What comes from behind is not gathered.
+        // The final gather does not collect light from behind, which translucent patches show too.
         for (size_t c = begin; c < end; ++c)
             if (!showsOwnAlone(c)) wanted[nodeOf[corners[c].corner]] = false;
         std::vector<std::vector<FinalGather::Share>> receivers(nodeCount);

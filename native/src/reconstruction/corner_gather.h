@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Light gathered at the corners of meshes themselves: that of the sources at all of them, and that
-// of other surfaces and the world where interpolation does not follow it (final_gather.h). Of
-// POINT, and of objects whose results are few among the corners of a finer mesh: there the patches,
-// of which most are not seen, would cost more than what is shown of them.
+// Light that the corners of meshes gather themselves, instead of taking it from the patches. Every
+// gathering corner gathers the light of the sources. The light of other surfaces and of the world
+// is gathered only where the interpolation does not follow it (reconstruction/final_gather.h). The
+// reconstruction POINT gathers at all corners. If the settings allow it (gathersSparseResults()),
+// LEAST_SQUARES gathers too at the corners of objects with sparse results, whose results are few
+// among the corners of a finer mesh. Most patches of these objects are not seen, and tracing them
+// finely would cost more than the few corners that are shown.
 #pragma once
 
 #include <memory>
@@ -22,48 +25,60 @@
 
 namespace raybundle {
 
-// Whether sparse results (Instance::hasSparseResults) are gathered instead of the light of patches.
+// Returns whether, with these settings, corners gather sparse results (Instance::hasSparseResults)
+// instead of taking the light of patches.
 bool gathersSparseResults(const Settings& settings);
 
-// Per instance: whether its corners gather light.
+// Returns per instance whether its corners gather light.
 std::vector<bool> gatheringInstances(const Scene& scene, const Settings& settings);
 
+// The corners of all instances that gather light, and the light of the sources at these corners.
 class CornerGather {
   public:
-    // Gathers the light of the sources, of all light sets, on both sides where both show. gathers:
-    // see gatheringInstances. ranges, regions: per instance, the latter of those that gather.
-    // surfaces: with what of each side counts (exposedOutside). References must outlive the object.
+    // Finds the corners that gather, and gathers the light of the sources of all light sets at
+    // them. At translucent patches, light is gathered on both sides. `gathers` is per instance, see
+    // gatheringInstances(). `ranges` and `regions` are per instance; only the regions of gathering
+    // instances are used. `surfaces` holds the exposed shares of exposedOutside(). References must
+    // outlive the object.
     CornerGather(const ReconstructionInput& input, const std::vector<InstanceRange>& ranges,
                  const std::vector<bool>& gathers, const std::vector<SmoothRegions>& regions,
                  const LitSurfaces& surfaces, const Progress& progress);
 
-    // Whether an instance has sparse results that its corners gather, and the number of all such.
+    // Returns whether an instance has sparse results that its corners gather.
     bool isSparse(size_t instance) const {
         return gathersSparse && scene.instances[instance].hasSparseResults;
     }
+    // Returns the number of corners with sparse results that gather, over all instances.
     size_t sparseCorners() const { return sparse; }
 
+    // What improve() did at the nodes of an instance.
     struct Outcome {
-        size_t smooth = 0;  // nodes where interpolation was good enough
-        // Of sparse results: nodes whose light is their corners', and the sum of its variances over
-        // RGB there, (W/m^2)^2.
+        size_t smooth = 0;  // nodes that kept the interpolated light, which was good enough
+        // For sparse results: number of nodes whose light their corners gathered, and the sum over
+        // these nodes of the variance of this light, summed over RGB, (W/m^2)^2.
         size_t gathered = 0;
         double noise = 0;
     };
-    // Puts what corners gather of light k in place of that which interpolation has at the nodes of
-    // an instance; nodes none of whose corners can gather keep their light. The indirect and the
-    // carried light are as they arrive; shownShare: per node, what is shown of them; empty: all.
+    // Replaces the light of entry `k` of ReconstructionInput::lights at the nodes of an instance by
+    // what the corners gather. Nodes without a gathering corner keep their light. `cornerAngles` is
+    // per corner of the mesh, radians. On entry, `light` holds the interpolated light; its indirect
+    // and carried light are irradiances of which a node shows only the share `shownShare`, per node
+    // and channel. An empty `shownShare` means that all light is shown. Different instances may be
+    // improved at once.
     Outcome improve(size_t instance, size_t k, const std::vector<float>& cornerAngles,
                     const std::vector<glm::vec3>& shownShare, NodeLight& light) const;
 
+    // Returns the number of shadow rays that the constructor cast.
     uint64_t shadowRays() const { return rays; }
 
   private:
-    // The corners that gather, of all instances.
+    // Finds the corners of all instances that gather.
     void findCorners(const ReconstructionInput& input, const std::vector<bool>& gathers);
-    // The light of the sources at them, and what gathers that of other surfaces.
+    // Gathers the light of the sources at the corners, and prepares the final gather of each light.
     void gatherSources(const ReconstructionInput& input, const Progress& progress);
-    // Per node the mean of its corners' light, weighted by angle; nothing where it has no corners.
+    // Returns per node of an instance the mean of the light of its corners, weighted by their
+    // angles. The mean is empty if the node has no gathering corner. `lightOf` returns the light of
+    // a corner, given its index in `corners`.
     template <class LightOf>
     std::vector<std::optional<glm::vec3>> nodeMeans(size_t instance,
                                                     const std::vector<float>& cornerAngles,
@@ -80,14 +95,16 @@ class CornerGather {
     const LitSurfaces surfaces;
     const Skips skips;
     const bool gathersSparse;
+    // The gathering corners of all instances, one instance after the other.
     std::vector<CornerReceiver> corners;
-    std::vector<size_t> first;                    // per instance, into corners
-    std::vector<std::vector<glm::vec3>> sources;  // per light and corner: irradiance, W/m^2
-    std::vector<std::vector<float>> variances;    // of its brightest channel, (W/m^2)^2
-    uint64_t rays = 0;                            // for them
-    // Per light; null where it is dark, or where that is switched off.
+    // Per instance: its first entry in `corners`; one more entry at the end.
+    std::vector<size_t> first;
+    std::vector<std::vector<glm::vec3>> sources;  // per light and corner: shown irradiance, W/m^2
+    std::vector<std::vector<float>> variances;    // of the brightest channel of each, (W/m^2)^2
+    uint64_t rays = 0;                            // shadow rays for the light of the sources
+    // The final gather per light. Null if the light is dark or the final gather is switched off.
     std::vector<std::unique_ptr<const FinalGather>> others;
-    size_t sparse = 0;  // of the corners
+    size_t sparse = 0;  // number of gathering corners with sparse results
 };
 
 }  // namespace raybundle

@@ -10,21 +10,26 @@
 namespace raybundle {
 namespace {
 
-// How far inside a face a corner's receiver lies, as a share of the way to the centre.
+// Distance of a corner's receiver from the corner, as a share of the way to the middle of the cell.
 constexpr float kTowardsMiddle = 0.01f;
-// Shading normals up to this cosine to a face are as good as at right angles to it, where which
-// side they look at is a matter of rounding: the face's own normal counts then.
+// Smallest cosine between the shading normal and the normal of the face for which the shading
+// normal is used. Below it, the shading normal is as good as perpendicular to the face's normal,
+// and rounding decides to which side it points. The face's normal is used then.
 constexpr float kUpright = 1e-3f;
-// Gaps of so many times that width are narrow; there a receiver lies inside by a share of the gap.
-// At the edges of two plates as long as wide it then gets 3 % less of the light around them.
+// A gap is narrow if it is less than kNarrowGap times as wide as the receiver's distance from its
+// corner. The receiver is then moved to kInsideGap times the width of the gap from the corner. At
+// the edges of two parallel plates that are as long as they are wide, the receiver then gets 3 %
+// less of the light around the plates.
 constexpr float kNarrowGap = 8, kInsideGap = 1.0f / 32;
 
-// How far a point lies outside a parent, in its affine coordinates; negative inside.
+// Returns how far a point lies outside a parent, in affine coordinates of the parent; negative
+// inside.
 float outside(const Parent& parent, glm::vec2 st) {
     const float beyond = parent.isTriangle ? st.x + st.y - 1 : std::max(st.x, st.y) - 1;
     return std::max({-st.x, -st.y, beyond});
 }
 
+// Returns the affine coordinates of a point (m, relative to Patches::centre) in a parent.
 glm::vec2 affine(const Parent& parent, const glm::vec3& point) {
     const glm::dvec3 a(parent.a), b(parent.b), d = glm::dvec3(point) - glm::dvec3(parent.origin);
     const glm::dvec3 n = glm::cross(a, b);
@@ -41,7 +46,8 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
     const glm::dmat3 normalToWorld = glm::transpose(glm::inverse(glm::dmat3(placed.transform)));
     const float turn = placed.side == RB_SIDE_BACK ? -1.0f : 1.0f;
 
-    // Of the parents of a corner's cells, the one that the receiver lies in or is nearest to.
+    // Each receiver lies on the parent of the corner's cells that contains its point or is nearest
+    // to it. `nearest` is per corner: the smallest result of outside() so far.
     std::vector<float> nearest(mesh.cornerCount(), INFINITY);
     std::vector<CornerReceiver> receivers(mesh.cornerCount());
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {

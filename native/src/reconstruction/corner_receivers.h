@@ -11,22 +11,25 @@
 
 namespace raybundle {
 
-// A corner of a mesh as a receiver of light.
+// A corner of a mesh that receives light.
 struct CornerReceiver {
-    int32_t corner = 0;  // of the instance's mesh
-    glm::vec3 vertex;    // where the corner is, relative to Patches::centre
+    int32_t corner = 0;  // corner of the instance's mesh
+    glm::vec3 vertex;    // position of the corner, m, relative to Patches::centre
     Receiver receiver;
-    bool isBesideGap = false;  // the patches there tell nothing of its light
+    bool isBesideGap = false;  // the light of the patches there does not represent it
 };
 
-// The corners of an instance's mesh that lie on patches, each a little inside its face, so that the
-// next wall of a room is beside it and not around it, with its shading normal.
+// Returns the receivers at those corners of an instance's mesh that lie on patches. Each receiver
+// lies slightly inside its face, so that at the edge of a room the next wall is beside the receiver
+// and does not contain it. The receiver has the shading normal of the corner. `range` holds the
+// parents of the instance.
 std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& patches,
                                             uint32_t instance, const InstanceRange& range);
 
-// Moves a receiver so near to its corner that it is beside a narrow gap with the corner, and not in
-// it: another surface this far in front of it hides no more of what the corner sees than it would
-// there.
+// Moves a receiver closer to its corner if another surface lies so near in front of it that both
+// are in a narrow gap. The receiver then lies beside the gap, as the corner does: a surface at this
+// distance hides no more of the surroundings from the receiver than it hides from the corner. Sets
+// `isBesideGap` if the receiver was moved.
 void leaveGap(CornerReceiver& corner, const Patches& patches, const Visibility& visibility);
 
 }  // namespace raybundle

@@ -9,15 +9,19 @@
 namespace raybundle {
 namespace {
 
-// A corner's own side of a wall tells nothing if less than the first share of it is exposed, and
-// all from the second on: between them the other side counts in part, so that exposure, which lines
-// have measured, changes the light at the corner by little where it changes by little.
+// Where a wall cuts a cell, these exposed shares of a corner's own side of the wall decide which
+// patches count at the corner. Up to kLeastExposed, the patches beyond the wall count fully; from
+// kEnoughExposed on, they do not count. In between they count in part. The exposed shares are
+// estimates from lines, and a small change of them then changes the light at the corner only a
+// little.
 constexpr float kLeastExposed = 0.05f, kEnoughExposed = 0.15f;
-// A face more of which is inside of a solid has the dark of that at its corners there.
+// If at least this share of a face lies inside a solid, the face keeps the darkness of the solid at
+// its corners there.
 constexpr float kMostInside = 0.5f;
-// A place in a patch, off its edges and its diagonal.
+// Affine coordinates of a point of a patch that is off the edges and the diagonal.
 constexpr glm::vec2 kInside{0.35f, 0.3f};
 
+// Returns the affine coordinates of the centroid of a parent or patch.
 glm::vec2 middleOf(const Parent& parent) {
     return parent.isTriangle ? glm::vec2(1.0f / 3) : glm::vec2(0.5f);
 }
@@ -28,7 +32,8 @@ CornerWeights::CornerWeights(const LitSurfaces& surfaces, const InstanceRange& r
     : patches(surfaces.patches),
       first(range.firstParent),
       counts(range.lastParent - range.firstParent, {1, 1, 1, 1}) {
-    // Per cell that walls cut, and corner: what of its own side there is, and is exposed, m^2.
+    // Per cell that walls cut, and per corner of the cell: the area of the parents on the corner's
+    // own side of the wall, weighted by the interpolation, and the exposed part of it, m^2.
     struct Support {
         std::array<float, 4> all{}, exposed{};
     };
@@ -97,7 +102,7 @@ std::vector<float> exposedOutside(const LitSurfaces& surfaces, const Visibility&
             isInside[side] = other.isSolid && !other.isInward && *met % 2 == 1;
         }
     });
-    // Per cell and side, m^2.
+    // Per cell and side: area inside of a solid, and whole area, m^2.
     std::map<uint32_t, std::array<float, 2>> inside, all;
     auto forEach = [&](const auto& visit) {
         for (const Parent& parent : patches.parents) {

@@ -7,8 +7,9 @@
 namespace raybundle {
 namespace {
 
-// How far inside a face its corners are looked at, as a share of the way to the middle: on the edge
-// of a source the closed form is a matter of rounding.
+// Distance of the points at which light is evaluated from the corners of the face, as a share of
+// the way to the middle. At the corner itself, which may lie on the edge of a source, rounding
+// would decide the value of the closed form.
 constexpr float kOffCorner = 1e-4f;
 
 }  // namespace
@@ -45,11 +46,11 @@ void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const Sh
         });
         const uint32_t at = 2 * parent.firstPatch + uint32_t(surface.side);
         const glm::vec3 gathered = light.irradiance.gathered[at];
-        // Of what shows both sides' light the slopes would be those of both.
+        // On translucent patches the slopes of the light on both sides would be needed.
         if (!isAlone || gathered == glm::vec3(0.0f) ||
             patches.translucenceOf(at) != glm::vec3(0.0f))
             continue;
-        // Slopes that make less than a part of the target error are no matter.
+        // Slopes that are small compared with the target error are left out.
         light.direct.unblocked(at, points.data(), count, 0.25f * targetError, values.data());
         const glm::vec3 factor = shown.ofSources(at, light.shot);
         glm::vec3 mean(0.0f), share(0.0f);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Direct light over a face that has one patch and shares no value with others, as those of a flatly
-// shaded dense mesh: the patch tells its mean, and nothing tells its slope. What the sources would
-// give at the corners without occluders does, without a shadow ray.
+// Slopes of the direct light over faces that have only one patch and share no value with other
+// faces. A dense mesh with flat shading has such faces. The patch provides the mean of the light on
+// the face, but not its slope. The slope is taken from the irradiance that the sources would give
+// at the corners without occluders, which needs no shadow rays.
 //
-// Where a part of the light is blocked the slope is that share of it.
+// If occluders block a part of the light, the slope is reduced to the share of the light that
+// arrives.
 #pragma once
 
 #include "patches/patches.h"
@@ -15,8 +17,11 @@
 
 namespace raybundle {
 
-// Adds what light differs there from its mean to the nodes of an instance: to the direct
-// irradiance, and times the colour to the exitance.
+// Adds to each node of a face that has only one patch and shares no node with other faces the
+// difference between the direct light at the node and its mean over the face. The difference is
+// added to the direct irradiance, and multiplied by the shown reflectance (ShownLight::color) to
+// the exitance. `targetError` is relative; sources whose light changes by less than a quarter of it
+// over the patch get no slope. `nodes` is per node of `surface.regions`, W/m^2.
 void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const ShownLight& shown,
                    const SetLight& light, float targetError, NodeLight& nodes);
 

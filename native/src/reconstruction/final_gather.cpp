@@ -12,28 +12,35 @@
 namespace raybundle {
 namespace {
 
-// Parts of the Sobol points of all receivers that share in a mean, and of those of each of them at
-// least. Rays of a part: at first and at most.
+// The Sobol points are divided into parts, whose differences show the noise: kParts for all
+// receivers that contribute to a mean, but at least kFewestParts for each receiver. Each part
+// starts with kFirstRays rays and has at most kMostRays.
 constexpr uint32_t kParts = 8, kFewestParts = 2, kFirstRays = 4, kMostRays = 1024;
-// The fewest rays of all parts times the target: what so few miss is a share of the light around of
-// about one over their number.
+// Minimum of the number of rays of all parts times the target error. Features that so few rays miss
+// have a share of the surrounding light of about one over the number of rays.
 constexpr float kFewestTimesTarget = 2.5f;
-// So many patches on a face tell whether interpolation follows them.
+// Minimum number of patches in a parent for which the light of the patches shows whether the
+// interpolation follows it.
 constexpr uint32_t kTellingPatches = 4;
-// Rays that look for surfaces nearer than patches are wide.
+// Number of rays that look for surfaces nearer than patches are wide.
 constexpr uint32_t kNearRays = 8;
-// What is so many lengths of the receiver's patch away may light its ends differently.
+// A surface nearer than this many times the length of the receiver's patch may light the ends of
+// the patch differently.
 constexpr float kNearLengths = 2;
-// Cosine between shading normal and face up to which a face is nearly flat.
+// Minimum cosine between the shading normal and the normal of a face for which the face counts as
+// flat.
 constexpr float kNearlyFlat = 0.99f;
-// The standard error of what is gathered, and how far interpolation may be off the light around,
-// as shares of the error.
+// The largest standard error of the gathered light, and the largest RMS difference between the
+// interpolated light and the light of the patches at which it is kept. Both are relative to the
+// allowed error.
 constexpr float kNoiseShare = 0.6f, kInterpolationShare = 1;
-// The spread of parts that are stratified together over the standard error of their mean, which it
-// overstates: against gathers by many more rays it keeps the error that parts with shifts of their
-// own have at 1 (open_court, instances).
+// Ratio of the standard error that is estimated from the spread of the parts to the actual standard
+// error of the mean. The estimate is too large because the parts are stratified together. With this
+// ratio the actual error, measured against gathers with many more rays in open_court and instances,
+// is equal to that of parts with independent random shifts and a ratio of 1.
 constexpr float kSpreadOverError = 2;
 
+// Returns the mean of the squares over the channels.
 double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 
 }  // namespace
@@ -58,7 +65,7 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
     std::vector<Light> sums(receivers.size() * parts);
     const uint32_t count = uint32_t(sums.size());
     uint32_t wanted = kFirstRays;
-    // Twice as many are taken before the first look at how they differ.
+    // The loop below compares two rounds, so that it casts at least twice this number of rays.
     while (wanted < kMostRays / 2 && 2 * float(wanted * count) * targetError < kFewestTimesTarget)
         wanted *= 2;
     const SobolPoints points(hash(receivers[0].receiver->seed, 0));
@@ -66,7 +73,8 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
     for (uint32_t done = 0; done < kMostRays; wanted *= 2) {
         const Light before = mean;
         mean = {};
-        // Those that are done are the first of the sequence, and these come next.
+        // The rays cast so far used the first points of the sequence. The next points follow,
+        // `each` per part.
         const uint32_t each = wanted - done;
         for (uint32_t k = 0; k < count; ++k) {
             const Share& one = receivers[k / parts];
@@ -75,15 +83,16 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
             mean.carried += share * sums[k].carried;
             mean.reflected += share * sums[k].reflected;
         }
-        // From the mean of all: parts of one receiver are so few that they are alike by chance.
+        // The spread is taken about the mean of all receivers: one receiver has so few parts that
+        // they may agree by chance.
         double variance = 0;
         for (uint32_t k = 0; k < count; ++k) {
             const double share = double(receivers[k / parts].share) / parts;
             variance += share * share * square(sums[k].total() / float(wanted) - mean.total());
         }
         variance *= double(count) / double(count - 1);
-        // What few rays meet can be missed by all parts alike: the step from half as many counts
-        // too.
+        // All parts alike may miss what only few rays meet. The change from half the number of rays
+        // therefore counts too.
         mean.variance = variance / (kSpreadOverError * kSpreadOverError);
         const double step = done > 0 ? square(mean.total() - before.total()) : INFINITY;
         if (std::max(variance, step) <= tolerance) break;
@@ -92,7 +101,8 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
     return mean;
 }
 
-// Adds what the rays by `count` points from the `first` one on bring to a receiver.
+// Adds to `sum` the light that rays bring to a receiver. The rays use `count` points of the
+// sequence, starting with the one at index `first`.
 void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
                           uint32_t count, Light& sum) const {
     const glm::vec3 side = patches.normal(receiver.side);
@@ -100,8 +110,9 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
         const glm::vec4 u = points[i];
         glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
         if (const float up = glm::dot(direction, side); up <= 0) {
-            // Lost on a face that is shaded as if it were bent, as in Cycles; not where a quad is
-            // only a little off its plane.
+            // On a face whose shading normals make it look curved, light from below the face is
+            // lost, as in Cycles. On a nearly flat quad, which is only slightly off its plane, the
+            // direction is mirrored to above the face.
             if (glm::dot(receiver.normal, side) < kNearlyFlat) continue;
             direction -= 2 * up * side;
         }
@@ -145,7 +156,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
-        // What comes from behind is not gathered.
+        // The final gather does not collect light from behind, which translucent patches show too.
         if (patches.translucenceOf(2 * parent.firstPatch + uint32_t(side)) != glm::vec3(0.0f))
             continue;
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {

@@ -1,21 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Final gather: the light that reaches a point from other surfaces and from the world, by rays from
-// the point itself that look up what the patches send which they meet.
+// Final gather: the light that reaches a point from other surfaces and from the world, collected by
+// rays from the point. A ray looks up the light that the patch it meets sends in the ray's
+// direction.
 //
 // Source: Reichert, "A Two-Pass Radiosity Method Driven by Lights and Viewer Position" (1992), and
 // Lischinski, Tampieri and Greenberg, "Combining Hierarchical Radiosity and Discontinuity Meshing"
-// (1993): a last bounce at the places of interest takes away what patches and their interpolation
-// blur.
+// (1993): computing the last bounce at the shown points removes the blur of the patches and of
+// their interpolation.
 // Differs:
-// - Light of the sources is left out: DirectLight gathers it better.
-// - Only where the interpolation leaves the light of the patches around, or where another surface
-//   is nearer than patches are wide and there are too few to tell: elsewhere it is nearer to the
-//   truth than rays are, whose noise differs from point to point.
-// - Where a ray ends nearer than the patch there is wide, the light of the sources is sampled at
-//   its end: the mean of the patch is not what shines into a narrow gap.
-// - As many rays as the error needs. The receivers of a vertex share one sequence of Sobol points,
-//   which are stratified together where they look the same way; the spread of its parts tells.
+// - Light of the sources is left out, because DirectLight gathers it more accurately.
+// - Light is gathered only where the interpolation differs from the light of the patches, or where
+//   another surface is nearer than patches are wide and the face has too few patches to show
+//   whether it differs. Elsewhere the interpolation is more accurate than rays, whose noise differs
+//   from point to point.
+// - If the distance of the surface that a ray meets is less than the width of the patch there, the
+//   light of the sources is sampled at the end of the ray. The mean over the patch is not the light
+//   that shines into a narrow gap.
+// - The number of rays depends on the error. The receivers of a vertex share one sequence of Sobol
+//   points, so that receivers with the same normal are stratified together. The spread of the parts
+//   of this sequence gives the error.
 #pragma once
 
 #include <vector>
@@ -31,36 +35,42 @@
 
 namespace raybundle {
 
+// Gathers the light of one light set from other surfaces and from the world. All functions are
+// const and may be called from several threads at once.
 class FinalGather {
   public:
-    // The light of one set, or what belongs to none. meanLight: of all that is baked, W/m^2;
-    // targetError: relative to it, or to the light of what is brighter. References must outlive the object.
+    // Prepares the final gather for `light`, the light of one light set or of what belongs to no
+    // set. `meanLight` is the RMS of this light over all baked sides, W/m^2. `targetError` is the
+    // allowed error relative to `meanLight`, or at brighter points relative to the light there.
+    // References must outlive the object.
     FinalGather(const LitSurfaces& surfaces, const Visibility& visibility, const SetLight& light,
                 float meanLight, float targetError);
 
-    // What arrives at a point, W/m^2.
+    // Irradiance that arrives at a point, W/m^2, in two parts.
     struct Light {
-        glm::vec3 carried{0.0f};  // emission that is no source, and the world's
+        glm::vec3 carried{0.0f};  // from the world, and from emission that is not a source
         glm::vec3 reflected{0.0f};
-        double variance = 0;  // of the total, in the mean of the channels; only of gather()
+        double variance = 0;  // of total(), mean over the channels, (W/m^2)^2; set only by gather()
         glm::vec3 total() const { return carried + reflected; }
     };
-    // A receiver and its share in a mean.
+    // A receiver and its share in a mean. The receiver is not owned.
     struct Share {
         const Receiver* receiver;
         float share;
     };
-    // The mean of some receivers, whose shares sum to 1. brightness: of all light there, about,
-    // W/m^2.
+    // Returns the mean light of the receivers, whose shares must sum to 1. `brightness` is an
+    // approximation of all light there, brightest channel, W/m^2. It sets the error that is
+    // allowed.
     Light gather(const std::vector<Share>& receivers, float brightness) const;
 
-    // Whether the receiver's face has too few patches to tell whether interpolation follows the
-    // light, and a surface is so near that it may not: nearer than its patch is wide, or than the
-    // receiver's is long.
+    // Returns whether a surface is so near that the interpolation may not follow its light, while
+    // the receiver's parent has too few patches to show it. A surface is near if its distance is
+    // less than the width of its own patch, or less than twice the length of the receiver's patch.
     bool isNear(const Receiver& receiver) const;
 
-    // Per node of an instance: whether the light there is to be gathered. carried, reflected: per
-    // node, as reconstructed.
+    // Returns per node of an instance whether its light must be gathered, because the interpolation
+    // differs too much from the light of the patches around the node. `carried` and `reflected` are
+    // the two parts of the interpolated irradiance (see Light), per node, W/m^2.
     std::vector<bool> isWanted(const InstanceRange& range, const SmoothRegions& regions,
                                rb_side side, const std::vector<glm::vec3>& carried,
                                const std::vector<glm::vec3>& reflected) const;
@@ -68,7 +78,8 @@ class FinalGather {
   private:
     void addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
                  uint32_t count, Light& sum) const;
-    float width(uint32_t side) const;  // of a patch, metres
+    // Returns the square root of the area of a side's patch, m.
+    float width(uint32_t side) const;
 
     const LitSurfaces surfaces;
     const Patches& patches;
@@ -76,9 +87,10 @@ class FinalGather {
     const SetLight& light;
     const std::vector<glm::vec3>& emission;  // per side, without sources, W/m^2
     const SentLight sent;
-    const glm::vec3 world;  // exitance, W/m^2
+    const glm::vec3 world;  // exitance of the world, W/m^2
+    // The error that is allowed, relative and absolute (W/m^2).
     const float targetError;
-    const float error;  // W/m^2
+    const float error;
 };
 
 }  // namespace raybundle

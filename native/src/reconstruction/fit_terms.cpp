@@ -8,18 +8,20 @@
 namespace raybundle {
 namespace {
 
-// Passes that cut fluxes only around nodes out of bounds; what is left is Zalesak's.
+// Maximum number of passes that reduce terms only around nodes out of bounds. Zalesak's limiter
+// then removes what is still out of bounds.
 constexpr int kMaxPasses = 40;
-// Values within bounds but for this share of the largest are.
+// A value that is out of bounds by no more than this share of the largest value counts as within.
 constexpr double kSettled = 1e-6;
 
-// A symmetric matrix as the sum of small ones. Each entry is kept once, however many add to it: a
-// list of all that is added would take ten times the memory.
+// A symmetric matrix that is the sum of small symmetric matrices. Each entry is stored once,
+// however many small matrices add to it. A list of all contributions would take ten times the
+// memory.
 class SymmetricSum {
   public:
     explicit SymmetricSum(size_t size) : rows(size) {}
 
-    // To (i, j) and, if they differ, to (j, i).
+    // Adds a value to the entry (i, j) and, if i and j differ, to (j, i).
     void add(uint32_t i, uint32_t j, double value) {
         std::vector<Entry>& row = rows[std::max(i, j)];
         const uint32_t column = std::min(i, j);
@@ -31,7 +33,8 @@ class SymmetricSum {
             row.push_back({column, value});
     }
 
-    // valueAt(a, b), symmetric, at (node[a], node[b]); a node may occur several times.
+    // Adds the symmetric N x N matrix valueAt(a, b) to the entries (node[a], node[b]). A node may
+    // occur several times.
     template <size_t N, class ValueAt>
     void add(const std::array<uint32_t, N>& node, const ValueAt& valueAt) {
         for (size_t a = 0; a < N; ++a)
@@ -40,6 +43,8 @@ class SymmetricSum {
                     add(node[a], node[b], a != b && node[a] == node[b] ? 2 * value : value);
     }
 
+    // Returns the matrix. A row without entries gets 1 on the diagonal, so that the matrix can be
+    // solved.
     Eigen::SparseMatrix<double> matrix() {
         for (uint32_t i = 0; i < rows.size(); ++i)
             if (rows[i].empty()) add(i, i, 1);
@@ -49,7 +54,7 @@ class SymmetricSum {
         for (const auto& row : rows)
             for (const Entry& entry : row) ++counts[entry.column];
         lower.reserve(counts);
-        // In the order of rows, so that columns are.
+        // Insert row by row, so that the entries of each column are sorted.
         for (Eigen::Index i = 0; i < n; ++i) {
             throwIfCancelledAt(size_t(i));
             for (const Entry& entry : rows[size_t(i)])
@@ -65,7 +70,7 @@ class SymmetricSum {
         uint32_t column;
         double value;
     };
-    std::vector<std::vector<Entry>> rows;  // of the lower triangle
+    std::vector<std::vector<Entry>> rows;  // per row: its entries in the lower triangle
 };
 
 }  // namespace
@@ -136,7 +141,8 @@ void FitTerms::forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWant
     }
 }
 
-// Cuts what the terms add to the mean until values keep within bounds.
+// Reduces the contributions that the terms add to the area-weighted mean, until all values are
+// within their bounds.
 class FitTerms::Limiter {
   public:
     using Vector = Eigen::VectorXd;  // per node
@@ -151,6 +157,7 @@ class FitTerms::Limiter {
           settled(kSettled * std::max(mean.cwiseAbs().maxCoeff(), solution.cwiseAbs().maxCoeff())) {
     }
 
+    // Returns whether the solution itself is within bounds.
     bool isWithin() const {
         bool isWithin = true;
         for (Eigen::Index v = 0; v < solution.size(); ++v)
@@ -158,6 +165,7 @@ class FitTerms::Limiter {
         return isWithin;
     }
 
+    // Starts with all contributions of all terms: the values are then those of the solution.
     void addAll() {
         added = Vector::Zero(mean.size());
         terms.forEachFlux(solution, kAny, [&](size_t, const auto& node, const auto& amount) {
@@ -166,8 +174,9 @@ class FitTerms::Limiter {
         share.assign(terms.ofPatches.size() + terms.squares.size(), 1.0f);
     }
 
-    // Keeps per node the share of what all its terms add that keeps it within bounds, for as long
-    // as that settles.
+    // Reduces contributions around nodes that are out of bounds. Each such node keeps the share of
+    // its contributions that brings its value to the bound. Ends when no node is out of bounds, or
+    // after kMaxPasses passes.
     void cutAround() {
         Vector kept(mean.size());
         for (int pass = 0; pass < kMaxPasses; ++pass) {
@@ -188,6 +197,7 @@ class FitTerms::Limiter {
         }
     }
 
+    // Returns whether any node with area is out of bounds.
     bool isAnyOut() const {
         bool isAny = false;
         for (Eigen::Index v = 0; v < mean.size(); ++v)
@@ -195,7 +205,7 @@ class FitTerms::Limiter {
         return isAny;
     }
 
-    // Zalesak's limiter, which leaves nothing out of bounds.
+    // Applies Zalesak's limiter, after which no value is out of bounds.
     void cutAll() {
         Vector more = Vector::Zero(mean.size()), less = more;
         terms.forEachFlux(solution, kAny, [&](size_t term, const auto& node, const auto& amount) {
@@ -228,7 +238,9 @@ class FitTerms::Limiter {
     double valueAt(Eigen::Index v) const {
         return terms.mass[v] > 0 ? mean[v] + added[v] / terms.mass[v] : solution[v];
     }
-    // Keeps of each term what its nodes keep of all that they get, at most.
+    // Reduces each term to the smallest share that one of its nodes keeps. keptOf(node, amount)
+    // returns the share that a node keeps of an amount; only terms with isWanted(nodes) are
+    // examined.
     template <class KeptOf, class IsWanted>
     void keep(const KeptOf& keptOf, const IsWanted& isWanted) {
         terms.forEachFlux(solution, isWanted,
@@ -246,9 +258,9 @@ class FitTerms::Limiter {
 
     const FitTerms& terms;
     const Vector &low, &high, &mean, &solution;
-    const double settled;      // values so little out of bounds are within
-    Vector added;              // what the kept shares of the terms add, m^2 times the values
-    std::vector<float> share;  // kept, per term
+    const double settled;  // values out of bounds by less than this count as within
+    Vector added;  // per node: sum of the kept contributions, m^2 times the unit of the values
+    std::vector<float> share;  // per term: the share of its contributions that is kept
 };
 
 Eigen::VectorXd FitTerms::within(const Eigen::VectorXd& low, const Eigen::VectorXd& high,
@@ -258,7 +270,7 @@ Eigen::VectorXd FitTerms::within(const Eigen::VectorXd& low, const Eigen::Vector
     if (limiter.isWithin()) return limiter.bounded(solution);
     limiter.addAll();
     limiter.cutAround();
-    // What has not settled.
+    // If that did not settle, reduce all contributions.
     if (limiter.isAnyOut()) limiter.cutAll();
     return limiter.bounded(limiter.values());
 }

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The terms of a least-squares fit of corner values to the light of patches, kept one by one, and
-// how the fit is brought within bounds without a change of its mean.
+// The terms of a least-squares fit of corner values to the light of patches. They are kept one by
+// one, so that the fit can be brought within bounds without changing its mean.
 //
 // Source: flux-corrected transport for finite elements (Kuzmin, Löhner and Turek, "Flux-Corrected
 // Transport", 2nd ed., 2012, chapters 6 and 7) and its limiter (Zalesak, "Fully Multidimensional
 // Flux-Corrected Transport Algorithms for Fluids", 1979). The area-weighted mean around each node
-// is within all bounds and has the same integral as the fit; what each term adds to it sums to
-// zero over the term's nodes, so that any share of it may be left out.
-// Differs: what is left out is at first only around nodes that are out of bounds, since Zalesak's
-// limiter, which looks at increases and decreases apart, cuts where nothing is wrong.
+// is within all bounds and has the same integral as the fit. The contributions of a term to its
+// nodes, which lead from the mean to the fit, sum to zero. Any share of them may therefore be left
+// out.
+// Differs: contributions are first reduced only around nodes that are out of bounds. Zalesak's
+// limiter treats increases and decreases separately and therefore also reduces contributions that
+// do no harm.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,46 +22,56 @@
 
 namespace raybundle {
 
+// The terms of a fit, the matrix of its normal equations, and its limiter. Nodes are indices below
+// the number given to the constructor.
 class FitTerms {
   public:
     explicit FitTerms(uint32_t nodes)
         : nodeCount(nodes), mass(Eigen::VectorXd::Zero(Eigen::Index(nodes))) {}
 
-    // What the patches of a cell add, m^2: the sum of weight[a] * weight[b] * area over them. A
-    // node may occur several times.
+    // Adds the term of the patches of one cell, or of a part of it. `square[a][b]` is the sum over
+    // these patches of weight[a] * weight[b] * area, m^2, where weight[a] is the interpolation
+    // weight of node[a] at the patch. A node may occur several times.
     void addPatches(const std::array<uint32_t, 4>& node,
                     const std::array<std::array<double, 4>, 4>& square);
 
-    // weight * (stencil . values)^2; the stencil sums to zero.
+    // Adds the term weight * (sum over k of stencil[k] * value of node[k])^2. The stencil must sum
+    // to zero. `weight` is in m^2; the term is ignored unless `weight` is positive.
     void addSquare(const std::array<uint32_t, 8>& node, const std::array<double, 8>& stencil,
                    double weight);
 
-    // Of the normal equations. A node that no term holds has 1 on the diagonal.
+    // Returns the matrix of the normal equations, m^2. A node that occurs in no term has 1 on the
+    // diagonal.
     Eigen::SparseMatrix<double> matrix() const;
 
-    // The area that counts for each node, m^2; they sum to that of all patches.
+    // Returns the area that counts for each node, m^2. The sum over the nodes is the weighted area
+    // of all patches.
     const Eigen::VectorXd& areas() const { return mass; }
 
-    // The solution of the normal equations, or what came near it, within bounds, which `mean` (the
-    // right-hand side by areas()) must keep. The sum of values by areas() is that of `mean`. Of
-    // nodes without area the solution stays, within the bounds.
+    // Returns the solution of the normal equations limited to the bounds [low, high]. All arguments
+    // are per node, in one unit of light. `mean`, the right-hand side divided by areas(), must be
+    // within the bounds. `solution` may be approximate. The sum of the result weighted by areas()
+    // equals that of `mean`. A node without area keeps its solution, clamped to the bounds.
     Eigen::VectorXd within(const Eigen::VectorXd& low, const Eigen::VectorXd& high,
                            const Eigen::VectorXd& mean, const Eigen::VectorXd& solution) const;
 
   private:
     class Limiter;
+    // The term of the patches of a cell, see addPatches().
     struct CellTerm {
         std::array<uint32_t, 4> node;
         std::array<std::array<float, 4>, 4> square;  // m^2
     };
+    // The term of a squared difference, see addSquare().
     struct Square {
         std::array<uint32_t, 8> node;
         std::array<float, 8> stencil;
         double weight;  // m^2
     };
 
-    // Calls visit(term, nodes, amounts) for what each term moves to each of its nodes, m^2 times
-    // the values, of those whose nodes are wanted; the amounts of a term sum to zero.
+    // Calls visit(term, nodes, amounts) for each term with isWanted(nodes). `term` is the index of
+    // the term, and `amounts` its contributions to its nodes at the given values, m^2 times the
+    // unit of the values. The amounts of a term sum to zero.
     template <class IsWanted, class Visit>
     void forEachFlux(const Eigen::VectorXd& values, const IsWanted& isWanted,
                      const Visit& visit) const;

@@ -7,9 +7,10 @@
 
 namespace raybundle {
 
-// One side of an instance's faces, whose light is reconstructed. References must outlive it.
+// The side of an instance's faces on which light is reconstructed. References must outlive the
+// object.
 struct InstanceSide {
-    const InstanceRange& range;    // its cells and parents
+    const InstanceRange& range;    // cells and parents of the instance
     const SmoothRegions& regions;  // which of its corners share a value: the nodes
     rb_side side;
 };

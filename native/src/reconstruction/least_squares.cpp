@@ -13,26 +13,31 @@
 namespace raybundle {
 namespace {
 
-// The light of a patch bounds that at its nodes, of one that is exposed by less than this share of
-// what the most exposed one there is, not at all: what is exposed of it is too uncertain.
+// The light of the patches at a node bounds the value of the node. A patch does not count if its
+// exposed share is below this fraction of that of the most exposed patch at the node, because so
+// small a share is too uncertain.
 constexpr float kLeastBounding = 0.4f;
-// A face with less than this share exposed touches something.
+// A face touches another surface if less than this share of it is exposed.
 constexpr double kTouched = 0.9;
+// Relative residual at which the iteration ends, and its maximum number of steps.
 constexpr double kTolerance = 1e-6;
 constexpr Eigen::Index kMaxIterations = 2000;
-// Relative residual of a fit that is shown.
+// Maximum relative residual of a fit that is shown.
 constexpr double kMostResidual = 1e-3;
-// A face is at least so high over its edge, as a share of the edge, and its far corners lie at most
-// so many edges beside it: what the slopes of thinner ones were would follow rounding errors.
+// Bounds of the shape of a face over its edge, in lengths of the edge: the least height, and how
+// far beyond the ends of the edge the other corners lie at most. Thinner faces are treated as if
+// they had this shape, since rounding errors would decide their slopes.
 constexpr double kLeastHeight = 0.02;
 constexpr double kMostAlong = 3;
-// How far values may be beyond those of the patches around them: by half of how much these differ
-// from those around, as in a slope that goes on to the border, but upwards no more than by this
-// share.
+// How far values may exceed the range of the light of the patches around them: by half of the
+// difference between this range and that of the patches further around, as a slope does that
+// continues to the border. Upwards, values may exceed the range by no more than the share
+// kMostAbove of its upper end.
 constexpr double kBeyond = 0.5;
 constexpr double kMostAbove = 0.2;
 
-// Looks at each iteration whether the bake is to stop.
+// A diagonal preconditioner that throws Error(CANCELLED) in the next iteration after a bake was
+// cancelled.
 class CancellableJacobi : public Eigen::DiagonalPreconditioner<double> {
   public:
     template <class Rhs>
@@ -42,20 +47,23 @@ class CancellableJacobi : public Eigen::DiagonalPreconditioner<double> {
     }
 };
 
-// The nodes of a cell; a triangle repeats its first, with weight 0 wherever it is used.
+// Returns the nodes of a cell. The fourth node of a triangle repeats the first, with weight 0
+// wherever it is used.
 std::array<uint32_t, 4> nodesOf(const Cell& cell, const SmoothRegions& regions) {
     std::array<uint32_t, 4> node;
     for (int k = 0; k < 4; ++k) node[k] = regions.nodeOf[cell.corner[cell.corner[k] < 0 ? 0 : k]];
     return node;
 }
 
-// Slope of the interpolation across an edge of a cell, away from the edge, times the height of the
-// cell over the edge: a stencil over the cell's nodes, and that height, m.
+// The slope of the interpolation across an edge of a cell, away from the edge, times the height of
+// the cell over the edge. It is given as a stencil over the cell's nodes; `height` is in m.
 struct EdgeSlope {
     std::array<double, 4> stencil{0, 0, 0, 0};
     double height = 0;
 };
 
+// Returns the slope of a cell across the edge from corner `from` to corner `to`. The height is 0 if
+// the edge has no length.
 EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
     EdgeSlope slope;
     const int n = cell.cornerCount();
@@ -81,9 +89,10 @@ EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
     return slope;
 }
 
-// openness: per cell from range.firstCell on, the share of its area that is exposed, and not parted
-// from the rest by a wall. Light on the two sides of a covered strip (a wall on a floor) has
-// nothing to do with each other.
+// Adds a penalty on changes of slope across the edges of smooth regions, and on the twist of quads.
+// `openness` is, per cell from range.firstCell on, the share of its area that is exposed and not
+// separated from the rest of the cell by a wall. The penalty is reduced to this share, since the
+// light on the two sides of a covered strip (a wall on a floor) is unrelated.
 void addRegularization(const Patches& patches, const InstanceSide& surface,
                        const std::vector<double>& openness, double weight, FitTerms& terms) {
     const InstanceRange& range = surface.range;
@@ -99,8 +108,8 @@ void addRegularization(const Patches& patches, const InstanceSide& surface,
         const EdgeSlope s1 = slopeAcross(cell1, edge.corner[2], edge.corner[3]);
         if (!(s0.height > 0) || !(s1.height > 0)) continue;
         const std::array<uint32_t, 4> n0 = nodesOf(cell0, regions), n1 = nodesOf(cell1, regions);
-        // The slopes' difference times the harmonic mean of the heights, which bounds the stencil
-        // however thin one of them is.
+        // The difference of the slopes is multiplied by the harmonic mean of the heights. This
+        // bounds the stencil even if one of the faces is very thin.
         const double both = s0.height + s1.height;
         for (int k = 0; k < 4; ++k) {
             node[k] = n0[k];
@@ -122,7 +131,7 @@ void addRegularization(const Patches& patches, const InstanceSide& surface,
         }
 }
 
-// The least and most light of patches, per node.
+// The least and the most light of patches, per node.
 struct Range {
     Eigen::VectorXd least, most;
 
@@ -135,14 +144,16 @@ struct Range {
     }
 };
 
-// A patch side at a node, and the share of it that is exposed and counts there.
+// A patch side at a node, and the share of the side that is exposed and counts at the node.
 struct PatchAtNode {
     uint32_t node = 0, side = 0;
     float share = 0;
 };
 
-// About the mean at each node, what its patches add to that, of those that are little exposed a
-// part. Where exposure is a little other, as lines have measured it, the range is too.
+// Returns per node the range that spans the mean at the node and the light of its patches. Patches
+// that are less exposed extend the range by a part of their difference from the mean, so that a
+// small change of the exposed shares, which are estimates from lines, changes the range only a
+// little.
 Range rangeAround(const Eigen::VectorXd& mean, const std::vector<PatchAtNode>& patchesAt,
                   const std::vector<float>& mostExposed, const std::vector<glm::vec3>& field,
                   int channel) {
@@ -157,7 +168,7 @@ Range rangeAround(const Eigen::VectorXd& mean, const std::vector<PatchAtNode>& p
     return range;
 }
 
-// That of the patches of all cells that share a node with the cells of a node.
+// Returns per node the range of `range` over all nodes of the cells that the node belongs to.
 Range around(const Range& range, const std::vector<std::array<uint32_t, 4>>& cells) {
     Range wide = range;
     for (const std::array<uint32_t, 4>& node : cells) {
@@ -173,8 +184,8 @@ Range around(const Range& range, const std::vector<std::array<uint32_t, 4>>& cel
 
 using Fields = std::vector<const std::vector<glm::vec3>*>;  // each per side
 
-// The normal equations of an instance, a column for each channel of each field, and what bounds
-// their solutions.
+// The normal equations of an instance, and the bounds of their solutions. There is one right-hand
+// side, a column, for each channel of each field.
 class NormalEquations {
   public:
     NormalEquations(const LitSurfaces& surfaces, const InstanceSide& surface, float regularization,
@@ -188,7 +199,8 @@ class NormalEquations {
           mostExposed(size_t(nodes()), 0.0f) {
         const InstanceRange& range = surface.range;
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
-            openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);  // nothing covers slivers
+            // No surface covers slivers.
+            openness.push_back(patches.cells[c].hasPatches ? 0.0 : 1.0);
         const CornerWeights weights(surfaces, range, surface.side);
         for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
             throwIfCancelledAt(p);
@@ -202,11 +214,12 @@ class NormalEquations {
 
     size_t columns() const { return 3 * fields.size(); }
 
-    // The solution of a column within its bounds, per node; empty where the column has no light.
-    // isSolved: whether the iteration came to a solution; else the means bound the result.
+    // Returns the solution of a column within its bounds, per node. Empty if the column has no
+    // light. `isSolved` is set to false if the iteration did not converge; the result is then made
+    // from the area-weighted means.
     Eigen::VectorXd solve(size_t column, bool& isSolved) const {
         isSolved = true;
-        // Start from the area-weighted mean; nodes without a patch (degenerate faces) keep zero.
+        // Start from the area-weighted mean. Nodes without a patch (of degenerate faces) keep zero.
         Eigen::VectorXd mean = Eigen::VectorXd::Zero(nodes());
         for (Eigen::Index v = 0; v < nodes(); ++v)
             if (terms.areas()[v] > 0) mean[v] = rhs(v, Eigen::Index(column)) / terms.areas()[v];
@@ -219,7 +232,7 @@ class NormalEquations {
         solver.setMaxIterations(kMaxIterations);
         solver.compute(matrix);
         Eigen::VectorXd fit = solver.solveWithGuess(rhs.col(Eigen::Index(column)), mean);
-        // What does not come near to a solution could be anything.
+        // A result that did not come near the solution may have any value.
         if (!(solver.error() <= kMostResidual)) {
             fit = mean;
             isSolved = false;
@@ -230,7 +243,8 @@ class NormalEquations {
   private:
     Eigen::Index nodes() const { return surface.regions.nodeCount; }
 
-    // Adds up the patches of a parent in a 4 x 4 matrix over the corners of its cell.
+    // Adds the terms of the patches of a parent, summed in a 4 x 4 matrix over the corners of its
+    // cell.
     void addParent(uint32_t p, const CornerWeights& weights) {
         const Parent& parent = patches.parents[p];
         const Cell& cell = patches.cells[parent.cell];
@@ -258,7 +272,8 @@ class NormalEquations {
         terms.addPatches(node, square);
     }
 
-    // At a contact the exposed part of a face is small, and its slope uncertain.
+    // Finds the nodes of all cells, and per node the least openness of its cells. Near a contact
+    // the exposed part of a face is small, and its slope uncertain.
     void findOpenAt() {
         openAt.assign(size_t(nodes()), 1.0);
         for (uint32_t c = surface.range.firstCell; c < surface.range.lastCell; ++c) {
@@ -269,8 +284,9 @@ class NormalEquations {
         }
     }
 
-    // At a contact no value is above what is seen around it, and the more is covered, the less it
-    // is below.
+    // Returns the bounds of the values at all nodes. Near a contact, a value may not exceed the
+    // light around it; and the more of the faces is covered, the less may a value lie below that
+    // light.
     Range findBounds(const Eigen::VectorXd& mean, size_t column) const {
         const Range seen =
             rangeAround(mean, patchesAt, mostExposed, *fields[column / 3], int(column % 3));
@@ -301,9 +317,9 @@ class NormalEquations {
     Eigen::SparseMatrix<double> matrix;
     std::vector<PatchAtNode> patchesAt;
     std::vector<float> mostExposed;              // per node
-    std::vector<double> openness;                // per cell, see addRegularization
-    std::vector<double> openAt;                  // per node: the least of its cells
-    std::vector<std::array<uint32_t, 4>> cells;  // nodes of each
+    std::vector<double> openness;                // per cell, see addRegularization()
+    std::vector<double> openAt;                  // per node: the least openness of its cells
+    std::vector<std::array<uint32_t, 4>> cells;  // per cell: its nodes
 };
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace {
 
 using Values = std::vector<glm::vec3>;
 
-// Calls act(values) for each field of light of an instance.
+// Calls act(values) for each field of light of an instance: those of all sources and of each set.
 template <class Act>
 void forEachField(InstanceLight& light, const Act& act) {
     auto ofOne = [&](CornerLight& one) {
@@ -20,7 +20,8 @@ void forEachField(InstanceLight& light, const Act& act) {
     for (CornerLight& set : light.sets) ofOne(set);
 }
 
-// Gives each corner that is not known the mean of the known ones at its vertex, by their angles.
+// Gives each corner without light the mean of the corners with light (`known`, per corner) at its
+// vertex, weighted by their angles.
 void spreadAtVertices(const std::vector<bool>& known, InstanceLight& light) {
     auto spread = [&](auto& values) {
         using Value = std::decay_t<decltype(values[0])>;

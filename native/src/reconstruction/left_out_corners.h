@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The corners of faces that have no patches: of doubled faces (patches/doubled_faces.h), which get
-// the light of those that stand for them, and of faces without area, which get the mean of the
-// other corners at their vertex, so that they change nothing in a mean over it.
+// The light at the corners of faces without patches. A doubled face (patches/doubled_faces.h) gets
+// the light of the face that stands for it. A face without area gets the mean of the other corners
+// at each of its vertices, so that it does not change a mean over the corners of a vertex.
 #pragma once
 
 #include <vector>
@@ -14,8 +14,9 @@
 
 namespace raybundle {
 
-// ranges: of the parents of each instance. Sets the light and the errors of such corners, and the
-// stated error of objects of which they are all.
+// Sets the light and the error at all corners of faces without patches. If an object has no patches
+// because its faces are doubled ones, also sets its stated error in `report`. `ranges`, `light` and
+// Report::objects are per instance.
 void fillLeftOutCorners(const Patches& patches, const std::vector<InstanceRange>& ranges,
                         std::vector<InstanceLight>& light, Report& report);
 

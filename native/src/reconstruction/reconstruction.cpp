@@ -20,25 +20,29 @@
 namespace raybundle {
 namespace {
 
-// An object whose front gets less than this share of the light of its back is probably inside out.
+// An object is probably inside out if its baked sides get less than this share of the light of the
+// other sides.
 constexpr double kInsideOut = 1e-3;
-constexpr size_t kTogether = 16;  // objects
+constexpr size_t kTogether = 16;  // number of objects that are reconstructed at once
 
 using Field = std::vector<glm::vec3>;
 
 double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
 
-// The light of one set on the sides, as it goes into a reconstruction: of exitance what COMBINED
-// shows, without gloss.
+// The light of one light set on all patch sides, as input of a reconstruction. The exitance is that
+// of the output COMBINED, without gloss.
 struct SideLight {
     Irradiance shown;
-    Field emission;  // W/m^2
-    Field exitance;  // emission included, W/m^2
-    // For what corners gather: as if all of it were shown, whatever its angle, W/m^2.
+    Field emission;  // per side, exitance, W/m^2
+    Field exitance;  // per side, with emission, W/m^2
+    // Set if corners gather: irradiance per side, W/m^2, as if outputs showed all light whatever
+    // its angle.
     Field carried;  // direct light without that of the sources
     Field indirect;
 };
 
+// Returns whether an object is probably inside out: its baked sides get almost no light, but the
+// other sides do.
 bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side side,
                  const std::vector<SideLight>& lights) {
     double lit[2] = {0, 0};
@@ -47,13 +51,16 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
             const uint32_t at = 2 * patches.parents[p].firstPatch + k;
             glm::dvec3 total(0.0);
             for (const SideLight& light : lights) total += light.shown.all(at);
-            // The inside of a lamp, whose light nobody asked for.
+            // The emission of the other side counts as well: if the baked side is the dark inside
+            // of a lamp, the user has probably chosen the wrong side.
             if (at % 2 != uint32_t(side)) total += patches.emission[at];
             lit[at % 2] += double(patches.area[at / 2]) * sum(total);
         }
     return lit[side] < kInsideOut * lit[1 - side];
 }
 
+// Returns the light of all light sets on the patch sides. `gathersCorners` is true if the corners
+// of any instance gather.
 std::vector<SideLight> sideLights(const ReconstructionInput& input, bool gathersCorners) {
     const auto& [patches, exposed] = static_cast<const LitSurfaces&>(input);
     std::vector<SideLight> result;
@@ -62,7 +69,7 @@ std::vector<SideLight> sideLights(const ReconstructionInput& input, bool gathers
         SideLight out{
             shown.of(light, exposed), light.direct.emission(), Field(patches.sideCount()), {}, {}};
         for (size_t side = 0; side < out.exitance.size(); ++side) {
-            // Of the whole patch, what lets light through included.
+            // Emission is relative to the whole patch, including the share that lets light through.
             const float opacity = patches.opacityOf(uint32_t(side / 2));
             out.emission[side] *= opacity;
             out.exitance[side] = out.emission[side] + shown.color()[side] * out.shown.all(side);
@@ -79,7 +86,8 @@ std::vector<SideLight> sideLights(const ReconstructionInput& input, bool gathers
     return result;
 }
 
-// Of the light at the corners with a result, summed over RGB.
+// Returns the mean of the squared irradiance at the corners with a result, summed over RGB,
+// (W/m^2)^2.
 double meanSquare(const Instance& instance, const InstanceLight& light) {
     double sum = 0;
     size_t count = 0;
@@ -92,7 +100,7 @@ double meanSquare(const Instance& instance, const InstanceLight& light) {
     return count > 0 ? sum / double(count) : 0;
 }
 
-// One value per corner from one per node.
+// Copies the light of each node to all corners of the node.
 CornerLight cornerLight(const SmoothRegions& regions, const NodeLight& nodes) {
     CornerLight light;
     for (uint32_t node : regions.nodeOf) {
@@ -103,7 +111,8 @@ CornerLight cornerLight(const SmoothRegions& regions, const NodeLight& nodes) {
     return light;
 }
 
-// Fields per side that are brought to the nodes of an instance together, each with its place there.
+// Fields per side that are reconstructed at the nodes of an instance in one call, each with the
+// field per node that receives the result.
 class NodeFields {
   public:
     void add(const Field& ofSides, Field& atNodes) {
@@ -132,13 +141,14 @@ LeastSquaresFit byAreaAverage(const LitSurfaces& surfaces, const InstanceSide& s
     return {areaAverage(surfaces, surface, fields)};
 }
 
-// A reconstruction. What POINT's corners gather is put in the place of what it fits.
+// A row of the table of reconstructions. In POINT, the light that corners gather replaces the
+// fitted light.
 struct Kind {
     Reconstruction value;
-    // From fields per side to fields per node.
+    // Reconstructs fields per node from fields per side.
     LeastSquaresFit (*fit)(const LitSurfaces& surfaces, const InstanceSide& surface,
                            const Settings& settings, const FieldList& fields);
-    bool addsSlopes;  // where nothing is gathered, see reconstruction/face_slopes.h
+    bool addsSlopes;  // on instances that gather nothing, see reconstruction/face_slopes.h
 };
 
 constexpr Kind kKinds[] = {
@@ -148,7 +158,7 @@ constexpr Kind kKinds[] = {
 };
 static_assert(hasEveryValue(kKinds));
 
-// Reconstructs the instances, each by itself.
+// Reconstructs the instances independently of each other.
 class InstanceReconstruction {
   public:
     InstanceReconstruction(const ReconstructionInput& input, const Progress& progress)
@@ -172,7 +182,8 @@ class InstanceReconstruction {
         return std::find(gathers.begin(), gathers.end(), true) != gathers.end();
     }
 
-    // Also what the report says of it. Different instances may be reconstructed at once.
+    // Reconstructs instance `i`, and sets its entry `said` of the report. Different instances may
+    // be reconstructed at once.
     void reconstruct(size_t i, InstanceLight& out, Report::Object& said) {
         const Instance& instance = input.scene.instances[i];
         const Mesh& mesh = input.scene.meshes[instance.mesh];
@@ -202,7 +213,7 @@ class InstanceReconstruction {
         }
     }
 
-    // What all instances together say.
+    // Adds to the report the warnings and counts of all instances that were reconstructed.
     void addTo(Report& report) const {
         for (const std::optional<Warning>& warning : warnings)
             if (warning) report.warnings.push_back(*warning);
@@ -221,15 +232,16 @@ class InstanceReconstruction {
     }
     bool isSparse(size_t i) const { return gathers[i] && atCorners->isSparse(i); }
 
-    // What is reconstructed of an instance.
+    // The light that is reconstructed at the nodes of an instance.
     struct AtNodes {
         std::vector<NodeLight> lights;  // per light
-        // Where corners gather, per node: the colour, and what is shown of light from everywhere
-        // (empty: all of it).
+        // On instances whose corners gather, per node: the shown reflectance, and the share that is
+        // shown of light from everywhere (empty: all of it).
         Field color, shownShare;
     };
-    // The light of all sets at the corners of an instance. Returns the noise of what corners
-    // gathered of it, mean square.
+    // Computes the light of all light sets at the corners of an instance. Returns the mean square
+    // of the noise of the light that its corners gathered, summed over RGB, (W/m^2)^2; 0 if they
+    // gathered none.
     double addLight(size_t i, InstanceLight& out) {
         const InstanceSide surface{ranges[i], regionsOf[i], input.scene.instances[i].side};
         AtNodes nodes = fitted(i, surface);
@@ -251,7 +263,7 @@ class InstanceReconstruction {
         return noise;
     }
 
-    // By the light of patches.
+    // Returns the light at the nodes of an instance, reconstructed from the light of the patches.
     AtNodes fitted(size_t i, const InstanceSide& surface) {
         AtNodes nodes;
         nodes.lights.resize(onSides.size());
@@ -272,7 +284,7 @@ class InstanceReconstruction {
         if (gathers[i]) fields.add(input.shown.color(), nodes.color);
         if (gathers[i] && !input.shown.everywhere().empty())
             fields.add(input.shown.everywhere(), nodes.shownShare);
-        // Of sparse results only corners that cannot gather have the light of patches.
+        // With sparse results, only the few corners that cannot gather show the light of patches.
         const auto fit = isSparse(i) ? byAreaAverage : kind.fit;
         LeastSquaresFit result =
             fit({input.patches, outside}, surface, input.settings, fields.ofSides());
@@ -287,8 +299,8 @@ class InstanceReconstruction {
         return nodes;
     }
 
-    // Puts what corners gather of light k in place of what was fitted. Returns its noise, mean
-    // square.
+    // Replaces the fitted light of light `k` by what the corners gather. Returns the mean square of
+    // the noise of the gathered light, summed over RGB, (W/m^2)^2.
     double gather(size_t i, size_t k, const std::vector<float>& cornerAngles, AtNodes& nodes) {
         NodeLight& light = nodes.lights[k];
         const CornerGather::Outcome outcome =
@@ -304,10 +316,11 @@ class InstanceReconstruction {
     const ReconstructionInput& input;
     const Kind& kind;
     const std::vector<InstanceRange> ranges;
-    const std::vector<float> outside;  // per side: the share of it that counts
+    const std::vector<float> outside;  // per side: the share that counts, see exposedOutside()
     const std::vector<bool> gathers;   // per instance
     const std::vector<SideLight> onSides;
-    std::vector<SmoothRegions> regionsOf;  // of those that gather, and of those in hand
+    // Per instance: set if the instance gathers, or while it is reconstructed.
+    std::vector<SmoothRegions> regionsOf;
     std::optional<CornerGather> atCorners;
     std::atomic<size_t> occluders = 0, smooth = 0;
     std::vector<std::optional<Warning>> warnings;  // per instance
@@ -338,7 +351,7 @@ std::vector<InstanceLight> reconstruct(const ReconstructionInput& input, const P
     const size_t count = input.scene.instances.size();
     std::vector<InstanceLight> result(count);
     report.objects.resize(count);
-    // Some at a time, so that this thread can report, and cancel, between them.
+    // A few instances at a time, so that this thread can report progress and cancel in between.
     for (size_t i = 0; i < count; i += kTogether) {
         const double share = double(i) / double(count);
         progress.report(RB_STAGE_RECONSTRUCTION,

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// From patch sides to the corners of each mesh that is baked.
+// Reconstruction: from the light on patch sides to the light at the corners of each mesh that is
+// baked. The setting `reconstruction` selects one of the methods:
 //
 // LEAST_SQUARES: the corner values whose interpolation is nearest to the light on the faces
 //   (reconstruction/least_squares.h).
 // AREA_AVERAGE: the mean of the light on the faces around each corner
 //   (reconstruction/area_average.h).
-// POINT: the light at the corners themselves, as Cycles' bake has it. Light of the sources, which
-//   changes within a face, is gathered at each corner, and the rest where it is not smooth;
-//   elsewhere it is that of least squares (reconstruction/corner_gather.h). Corners that another
+// POINT: the light at the corners themselves, as in Cycles' bake. The light of the sources, which
+//   changes within a face, is gathered at each corner. The rest is gathered where it is not smooth,
+//   and is that of least squares elsewhere (reconstruction/corner_gather.h). Corners that another
 //   surface covers, where no light arrives, keep the value of least squares.
 #pragma once
 
@@ -24,11 +25,13 @@
 
 namespace raybundle {
 
-// Cells and parents are in the order of the instances.
+// Returns the ranges of cells and parents of each instance. Patches::cells and Patches::parents
+// must be in the order of the instances.
 std::vector<InstanceRange> instanceRanges(const Scene& scene, const Patches& patches);
 
-// Light of every instance, by all lights and by each light set; of those that only occlude, empty.
-// Adds the objects, warnings and skips to the report.
+// Returns the light of every instance of the scene, by all sources and by each light set. Occluders
+// have no light if the setting `skipOccluders` is on. Adds the objects, warnings and skips to the
+// report. Throws Error(CANCELLED) if the bake is cancelled.
 std::vector<InstanceLight> reconstruct(const ReconstructionInput& input, const Progress& progress,
                                        Report& report);
 

@@ -12,7 +12,8 @@
 
 namespace raybundle {
 
-// What reconstructions are made of. References must outlive them.
+// The input of a reconstruction. The inherited `exposed` is per patch side. References must outlive
+// the object.
 struct ReconstructionInput : LitSurfaces {
     const Scene& scene;
     const Visibility& visibility;

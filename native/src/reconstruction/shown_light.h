@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What outputs show of the light on patches, and on which: that of the front, and where a patch is
-// translucent the mean of both sides, weighted by what the side sends of each; times its colour it
-// is what the side sends without gloss. Of materials that reflect light by its angle it is what
-// they send straight up: light of the sources by its angles, all else as if it came from
-// everywhere.
+// Shown light: the part of the light on patches that outputs show, and the sides whose light they
+// show. A side shows the irradiance that arrives at it. A side of a translucent patch shows the
+// mean of the irradiances of both sides, weighted by the share of what the side sends that comes
+// from each. Multiplied by the shown reflectance, shown light is the exitance of the side without
+// gloss. A material whose reflection depends on the angle of the light shows the light that it
+// sends along the normal. The light of the sources then counts by its actual angles, and all other
+// light as if it arrived equally from everywhere.
 //
 // Source: measured against Cycles' Diffuse bake, which sees surfaces from straight above and counts
 // Translucent BSDFs among the diffuse.
@@ -19,62 +21,78 @@
 
 namespace raybundle {
 
-// Per side: whether its light shows, on itself or on the other side of its patch. gathersAtCorners:
-// whether sparse results are gathered (corner_gather.h).
+// Returns for each patch side whether its light is shown, on the side itself or through a
+// translucent patch on the other side. `gathersAtCorners` is true if corners gather sparse results
+// (reconstruction/corner_gather.h); opaque sides with sparse results are then not shown.
 std::vector<bool> shownSides(const Scene& scene, const Patches& patches, bool gathersAtCorners);
 
+// The shown light of all patch sides. If no instance is baked, all sides count as results.
 class ShownLight {
   public:
-    // gathersAtCorners: as in shownSides. Both others must outlive the object.
+    // Prepares the sides and their shown reflectances. See shownSides() for `gathersAtCorners`. The
+    // other arguments must outlive the object.
     ShownLight(const Scene& scene, const Patches& patches, bool gathersAtCorners);
 
-    // Per side: the diffuse reflectance and the translucence of the whole patch, what lets light
-    // straight through included.
+    // Returns the shown reflectance per side: the sum of the diffuse reflectance and the
+    // translucence, relative to the whole patch, including the share of the patch that lets light
+    // straight through.
     const std::vector<glm::vec3>& color() const { return colors; }
 
-    // Whether a side has a result; all have where none is asked for.
+    // Returns whether a side has a result. All sides have one if no instance is baked.
     bool isResult(size_t side) const { return results[side]; }
-    // Per side, m^2: the whole area of those that have a result, else 0.
+    // Returns per side the whole area of its patch if it has a result, otherwise 0, m^2.
     std::vector<float> resultArea() const;
-    // See shownSides.
+    // Returns the result of shownSides().
     const std::vector<bool>& sides() const { return shown; }
-    // Whether a side has a result that is not its own light: what its corners gather.
+    // Returns whether a side has a result that is not the light of the side itself, but the light
+    // that its corners gather.
     bool isGathered(size_t side) const { return results[side] && !shown[side]; }
 
-    // Whether every side shows its own light alone.
+    // Return whether every side, or the given side, shows only light that arrives at itself.
     bool isOwnAlone() const { return patches.translucence.empty(); }
     bool isOwnAlone(size_t side) const { return patches.translucenceOf(side) == glm::vec3(0.0f); }
 
-    // What a side shows of light that reaches it, by the means of its angleTerms.
+    // Returns the ratio of the light that a side shows to the light that arrives at it, per
+    // channel, 0 to 16. `angles` holds the means of the angleTerms() of the light.
     glm::vec3 byAngle(size_t side, const glm::vec4& angles) const;
-    // The same of the light of the sources, by a first shot.
+    // Returns the result of byAngle() for the light of the sources of a first shot.
     glm::vec3 ofSources(size_t side, const FirstShot& shot) const {
         return byAngle(side, shot.angles.empty() ? kEverywhere : shot.angles[side]);
     }
-    // The same of light from everywhere, per side; empty where all show all of it.
+    // Returns per side the result of byAngle() for light that arrives equally from everywhere.
+    // Empty if every side shows all of its light.
     const std::vector<glm::vec3>& everywhere() const { return fromEverywhere; }
 
-    // Of light that arrives at a side, of which it shows all, and at the other side of its patch,
-    // both W/m^2; exposed: per side, the share of it that nothing covers.
+    // Returns the irradiance that a side shows, W/m^2. `own` arrives at the side, which shows all
+    // of it, and `others` at the other side of the patch, both W/m^2. `exposed` is per side, the
+    // share that nothing covers, 0 to 1.
     glm::vec3 of(size_t side, const glm::vec3& own, const glm::vec3& others,
                  const std::vector<float>& exposed) const;
-    // The same on all sides.
+    // Returns the irradiance that all sides show, W/m^2, where `light` is the irradiance that
+    // arrives. All light counts fully, whatever its angle.
     Irradiance of(Irradiance light, const std::vector<float>& exposed) const;
-    // What is shown, by angle too.
+    // Return the irradiance that all sides show of the light of one set, or of several. The angle
+    // of the light is taken into account.
     Irradiance of(const SetLight& light, const std::vector<float>& exposed) const;
     Irradiance of(const SetLights& lights, const std::vector<float>& exposed) const;
 
   private:
     const Material& materialOf(size_t side) const;
-    // own: what each side shows of the light that reaches it; arriving: the light itself.
+    // Mixes the light of the two sides of each patch. `own` holds, per side, what the side shows of
+    // the light that reaches it, and receives the result. `arriving` is the light that reaches the
+    // sides.
     void mixSides(Irradiance& own, const Irradiance& arriving,
                   const std::vector<float>& exposed) const;
 
     const Scene& scene;
     const Patches& patches;
+    // Per side.
     std::vector<bool> results, shown;
     std::vector<glm::vec3> colors;
-    std::vector<glm::vec3> othersShare;  // per side, of what it sends; empty where it is 0
+    // Per side and channel: the share of what the side sends that has arrived at the other side.
+    // Empty if no patch is translucent.
+    std::vector<glm::vec3> othersShare;
+    // Per side, see everywhere().
     std::vector<glm::vec3> fromEverywhere;
 };
 

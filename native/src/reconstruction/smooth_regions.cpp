@@ -11,18 +11,19 @@
 namespace raybundle {
 namespace {
 
-// Shading normals that differ by less than about 1 degree are the same.
+// Shading normals count as equal if their cosine is at least this, an angle of about 1 degree.
 constexpr float kSameNormal = 0.99985f;
 
-// One directed edge of a cell, for pairing with its neighbour's.
+// A directed edge of a cell, which is paired with that of the neighbour.
 struct HalfEdge {
     uint64_t key;
     uint32_t cell;
-    int32_t from, to;  // corners
-    bool ascending;    // from the smaller vertex to the larger
-    bool isParted;     // a wall stands on it
+    int32_t from, to;  // corners of the mesh
+    bool ascending;    // from the smaller index of a vertex to the larger
+    bool isParted;     // whether a wall stands on the edge
 };
 
+// Returns the position of a corner of a cell.
 glm::vec3 placeOf(const Cell& cell, int32_t corner) {
     int k = 0;
     while (cell.corner[size_t(k)] != corner) ++k;
@@ -52,15 +53,15 @@ SmoothRegions smoothRegions(const Mesh& mesh, const std::vector<Cell>& cells, ui
         if (!mesh.cornerNormals.empty()) return glm::vec3(mesh.cornerNormals[corner]);
         return glm::vec3(cells[cell].normal());
     };
-    // The normal of a sliver is rounding alone: that of what lies beyond its longest edge stands
-    // for it, by its corners.
+    // The normal of a sliver is mere rounding. The normal of the cell beyond the sliver's longest
+    // edge, at a corner of that cell, is used as well.
     auto isLongest = [&](const HalfEdge& e) {
         const Cell& cell = cells[e.cell];
         const float length = glm::distance(placeOf(cell, e.from), placeOf(cell, e.to));
         return length >=
                std::max({glm::length(cell.a), glm::length(cell.b), glm::distance(cell.a, cell.b)});
     };
-    std::map<uint32_t, glm::vec3> beyond;  // of slivers
+    std::map<uint32_t, glm::vec3> beyond;  // per sliver
     for (size_t i = 0; i + 1 < halfEdges.size(); ++i)
         for (size_t k : {i, i + 1}) {
             const HalfEdge &e = halfEdges[k], &f = halfEdges[2 * i + 1 - k];

@@ -17,26 +17,28 @@ glm::dvec3 power(const Patches& patches, size_t side, const glm::vec3& perArea) 
     return double(patches.area[side / 2]) * glm::dvec3(perArea);
 }
 
-// What lines bring the sides of an object that they met, in the mean.
+// Sums of what lines bring to the sides of one object that they met, to estimate the mean.
 struct BroughtByLines {
-    double area = 0;        // m^2, that is exposed
+    double area = 0;        // exposed area, m^2
     glm::dvec3 power{0.0};  // W
     double open = 0;        // area times the share of lines that leave the scene, m^2
 };
 
+// Returns the irradiance that lines bring to a side: all but the gathered light, W/m^2.
 glm::vec3 byLines(const Irradiance& irradiance, size_t side) {
     return irradiance.all(side) - irradiance.gathered[side];
 }
 
+// Returns the index of a side's object and orientation: 2 * instance, + 1 for backs.
 size_t objectSide(const Patches& patches, size_t side) {
     return 2 * patches.parentAt(uint32_t(side)).instance + side % 2;
 }
 
-// Per instance, its fronts and its backs.
+// Returns the sums per objectSide().
 std::vector<BroughtByLines> broughtByLines(const LitSurfaces& surfaces,
                                            const Irradiance& irradiance,
                                            const std::vector<float>& openShare) {
-    std::vector<BroughtByLines> brought;  // for as many instances as have patches
+    std::vector<BroughtByLines> brought;  // as many as instances up to the last one with patches
     for (size_t side = 0; side < surfaces.exposed.size(); ++side) {
         const size_t of = objectSide(surfaces.patches, side);
         brought.resize(std::max(brought.size(), of + 1));
@@ -58,7 +60,7 @@ void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
     const Irradiance& irradiance = light.irradiance;
     const glm::vec3 worldExitance = glm::pi<float>() * light.worldRadiance;
     const std::vector<BroughtByLines> brought = broughtByLines(surfaces, irradiance, openShare);
-    // What the insides of lamps emit they absorb.
+    // The power that the insides of lamps emit is absorbed there.
     glm::dvec3 emitted = shot.emitted + light.direct.unseenPower();
     glm::dvec3 absorbed = light.direct.unseenPower(), escaped = shot.escaped;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
@@ -72,7 +74,8 @@ void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
         glm::vec3 ofLines = byLines(irradiance, side);
         if (open < 0 && others.area > 0) {
             open = float(others.open / others.area);
-            // Unless local rays brought it something.
+            // Lines brought nothing to this side, but local rays may have. Otherwise take the
+            // object's mean.
             if (ofLines == glm::vec3(0.0f)) ofLines = glm::vec3(others.power / others.area);
         }
         open = std::max(0.0f, open);
@@ -84,7 +87,7 @@ void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
         absorbed += exposed * power(patches, side, irradiance.gathered[side] + ofLines - reflected);
         escaped += exposed * power(patches, side, open * (shot.emission[side] + reflected));
     }
-    // In a closed scene that is noise, and stays in the balance.
+    // In a closed scene the redirected power is noise and stays in the balance.
     if (sum(escaped) > sum(shot.escaped)) escaped -= irradiance.redirected;
     report.emitted += sum(emitted);
     report.absorbed += sum(absorbed);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Where the power goes, and the share of it that goes wrong ways because a projector lets it.
+// Energy balance: where the emitted power goes, and which share of it goes wrong ways because a
+// projector lets lines pass through surfaces.
 #pragma once
 
 #include <vector>
@@ -12,20 +13,24 @@
 
 namespace raybundle {
 
-// Compares the power that the lights emit with what surfaces absorb and what leaves the scene: adds
-// those of one light set. openShare: per side, the share of its lines that leave the scene, as Transport::openShare has it: sides of which nothing is known
-// get what others of their object do by lines, in the mean.
+// Adds the power that one light set emits, the power that surfaces absorb, and the power that
+// leaves the scene to Report::emitted, absorbed and escaped, W. `light.irradiance` must be solved.
+// `openShare` is per side the share of its lines that leave the scene, see Transport::openShare().
+// For a side with a negative share, about which nothing is known, the mean of the other sides of
+// its object is used.
 void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
                    const std::vector<float>& openShare, Report& report);
 
-// The share of the lines of the weighted sides that leave the scene, or stay in it, only because
-// the projector lets lines through surfaces (ROULETTE): the difference to exact projection, object
-// by object, so that the noise of single sides cancels.
+// Returns the share of lines, 0 to 1, that leave the scene, or stay in it, only because the
+// projector lets lines pass through surfaces (ROULETTE). `open` and `exactOpen` are per side the
+// shares of lines that leave the scene with this projector and with exact projection; `weight` is
+// per side. The differences are summed up per object before their sizes are added, so that the
+// noise of single sides cancels.
 double leakedShare(const Scene& scene, const Patches& patches, const std::vector<float>& weight,
                    const std::vector<float>& exactOpen, const std::vector<float>& open);
 
-// Relative error of the light where so large a share of the exchanges is wrong: each reflection
-// adds to it.
+// Returns the relative error of the light if the given share of the exchanges is wrong. The error
+// accumulates with each reflection.
 double errorByWrongExchanges(const Patches& patches, double share);
 
 }  // namespace raybundle

@@ -7,15 +7,16 @@
 namespace raybundle {
 namespace {
 
-// At the first look the noise is stated so much above what the halves say; less with each look.
+// Relative increase of the stated noise at the first look. It decreases with the square of the
+// number of looks.
 constexpr double kSmallSample = 0.15;
-// Bundles may have this share of the target at least: less of theirs would cost many and hardly be
-// seen beside the noise of the first shot.
+// Smallest share of the target that the noise of bundles is required to reach. A smaller share
+// would take many bundles and would hardly be noticeable beside the noise of the first shot.
 constexpr double kLeastOfBundles = 0.6;
-// Weight of the looks before.
+// Weight of the earlier looks in the average.
 constexpr double kMemory = 0.5;
 
-// Per side of tiles: two numbers a cell.
+// Returns per side of the tiles the index of its cell and side: 2 * cell, + 1 for backs.
 std::vector<uint32_t> cellsOf(const Patches& tiles) {
     std::vector<uint32_t> cells(tiles.sideCount());
     for (uint32_t side = 0; side < cells.size(); ++side)
@@ -36,16 +37,19 @@ Noise::Noise(const Looks& before, const std::vector<float>& weight,
 void Noise::measure(const std::array<Irradiance, 2>& half) {
     const size_t n = weight.size();
     difference.resize(n);
-    // Sums over the sides of a cell: of the weight, of it times half the difference of the halves,
-    // of its square times the variance of the first shot; and of its square times the powers of the
-    // difference, for what differs from side to side.
+    // Sums over the sides of a cell. `weight`: of the weight w. `difference` and `light`: of w
+    // times half the difference, and times the mean, of the halves. `direct`: of w^2 times the
+    // variance of the first shot. `squares0` to `squares2`: of w^2 times the powers of half the
+    // difference, for the noise that differs from side to side. `sides`: number of sides with a
+    // weight.
     struct Cell {
         double weight = 0, direct = 0, sides = 0;
         glm::dvec3 difference{0.0}, light{0.0};
         double squares0 = 0, squares2 = 0;
         glm::dvec3 squares1{0.0};
 
-        // Of the mean times the weight, by what differs from side to side at random: squares.
+        // Returns `weight` times the part of the squared noise of the cell's mean that is caused by
+        // random differences between its sides.
         double random() const {
             if (sides < 2) return 0;
             const glm::dvec3 mean = difference / weight;
@@ -98,10 +102,10 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
     measure(half);
     bias = sharedBias;
     if (bundles == 0 && count == before.bundles) {
-        // An earlier bake has seen the same lines.
+        // An earlier bake has already looked at these lines.
         pooled = before.share * bundleNoise;
     } else {
-        // What the looks before foretell for this one.
+        // The noise that the earlier looks predict for this number of bundles.
         const double foretold =
             bundles > 0 ? pooled * std::pow(double(bundles) / count, 2 * kNoiseSlope) : bundleNoise;
         pooled = kMemory * foretold + (1 - kMemory) * bundleNoise;

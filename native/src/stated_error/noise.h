@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The noise: how far the light on the patch sides is from that of infinitely many bundles and
-// shadow rays on the same patches. Light is shown interpolated over the cells of the user's faces,
-// so that what differs from patch to patch within a cell is not seen: that of the cells' means
-// foretells the noise at corners (stated_error/object_noise.h).
+// Noise: the random error of the light on patch sides, compared with the light of infinitely many
+// bundles and shadow rays on the same patches. The result is interpolated over the cells of the
+// user's faces, so that noise which differs from patch to patch within a cell is not seen. The
+// noise at corners is therefore predicted from the noise of the means over cells
+// (stated_error/object_noise.h).
 //
 // Source: thesis section 4.3.3 (stated error).
 // Differs:
-// - Two independent halves of the bundles instead of repeated runs: half their difference, joined
-//   with the standard error of the first shot.
-// - The difference of two halves is one sample of few degrees of freedom: bundles err alike on
-//   whole walls. So each look at the halves is averaged with those before, brought to the same
-//   number of bundles; and as long as there are few looks a factor makes up for the chance that
-//   the difference is small, which a stop at the first look that meets the target prefers.
+// - The bundles form two independent halves, where the thesis repeats the whole run. Half the
+//   difference of the halves is combined with the standard error of the first shot.
+// - The difference of two halves is one sample with few degrees of freedom, because the errors of
+//   bundles are correlated over whole walls. Each look at the halves is therefore averaged with the
+//   earlier looks, scaled to the same number of bundles. A bake that stops at the first look below
+//   the target would prefer looks whose difference is small by chance. A factor compensates for
+//   this while there are few looks.
 #pragma once
 
 #include <array>
@@ -24,113 +26,138 @@
 
 namespace raybundle {
 
-// What the looks at the halves of some lines have told, for the next bake with the same lines.
+// What all looks at the halves of a set of lines have found, for the next bake with the same lines.
 struct Looks {
+    // Number of looks, and number of bundles at the last look.
     uint32_t count = 0, bundles = 0;
-    double share = 1;  // of the last look's squares that counts, by the looks before it
-    std::vector<double> shareOfParts{};  // likewise, see NoisyParts; empty: not known
+    // Ratio of the squared noise that was averaged over all looks to that of the last look.
+    double share = 1;
+    // The same ratio for each part of NoisyParts. Empty if not known.
+    std::vector<double> shareOfParts{};
 };
 
+// The noise of the light of one light set, or of all light. "Noise of bundles" is that from
+// finitely many bundles; "relative" is relative to the RMS of the light.
 class Noise {
   public:
-    // before: of earlier bakes with these lines. weight: per side of tiles, exposed area in m^2
-    // where the light is a result, else 0. directError: per side, standard error of the first shot,
-    // W/m^2, independent of that of others. cellOf: per side, the cell that shows it. All must
-    // outlive the object.
+    // Prepares the measurement. `before` holds the looks of earlier bakes with these lines. The
+    // other arguments are per side of the tiles. `weight` is the exposed area of sides with a
+    // result, otherwise 0, m^2. `directError` is the standard error of the first shot, W/m^2,
+    // independent between sides. `cellOf` is the index of the cell and side that shows the side's
+    // light. The last three must outlive the object.
     Noise(const Looks& before, const std::vector<float>& weight,
           const std::vector<float>& directError, const std::vector<uint32_t>& cellOf);
 
-    // A look at the halves of so many bundles.
+    // Measures the noise from the two halves (irradiance per side of the tiles, W/m^2) after
+    // `bundles` bundles. `bias` is the relative error that both halves share, see
+    // Transport::bias().
     void look(const std::array<Irradiance, 2>& half, uint32_t bundles, double bias);
-    // Of the same bundles, after what else has made the halves better.
+    // Measures again with the same bundles, after other work (extra rays) has improved the halves.
     void lookAgain(const std::array<Irradiance, 2>& half);
 
-    // On the sides, as of the last look, relative to the RMS of the light.
+    // Returns the noise of bundles and first shot on the sides at the last look, relative.
     double relative() const;
-    // What both halves are off alike, by Transport::bias; relative.
+    // Returns the relative error that both halves share, as given to look().
     double biasOfBoth() const { return bias; }
-    // So many times too large is the noise of bundles for a relative target beside that of the
-    // first shot, which they do not help: beside that of the cells' means, where the target is out
-    // of reach on the sides.
+    // Returns the ratio of the noise of bundles to the noise that the relative `target` leaves for
+    // bundles. Bundles do not reduce the noise of the first shot, which is therefore subtracted
+    // from the target. If the first shot alone nearly exceeds the target on the sides, its noise in
+    // the means over cells is subtracted instead.
     double excess(double target) const;
+    // Returns what the looks have found, for the next bake with these lines.
     Looks looks() const;
-    // So many times the last look's squares are the noise of bundles, by the looks before it too.
+    // Returns the ratio of the stated squared noise of bundles, averaged over all looks, to that of
+    // the last look alone.
     double scale() const;
-    // Per side: half the difference of the halves, brought to the stated size, W/m^2.
+    // Returns a sample of the noise of bundles per side: half the difference of the halves, scaled
+    // to the stated noise, W/m^2.
     std::vector<glm::vec3> perSide() const;
-    // Of one side of a cell, of the last look: the noise of bundles in its mean, what of that is
-    // because patches differ at random, that of the first shot, and the light; squares summed over
-    // RGB, (W/m^2)^2.
+    // The noise in the mean over one side of a cell at the last look. All but `area` are squares,
+    // summed over RGB, (W/m^2)^2: `noise` of bundles; `random`, the part of it that is caused by
+    // random differences between patches; `direct`, of the first shot; `light`, the light itself.
     struct OfCell {
-        double area = 0;  // exposed, m^2; 0: it has no result
+        double area = 0;  // exposed area with a result, m^2; 0 if there is none
         double noise = 0, random = 0, direct = 0, light = 0;
     };
-    // Two a cell.
+    // Returns the noise of the cells, indexed by 2 * cell for fronts and 2 * cell + 1 for backs.
     const std::vector<OfCell>& cells() const { return ofCells; }
 
   private:
+    // Sets all members that depend on the last look alone.
     void measure(const std::array<Irradiance, 2>& half);
-    // Of bundles alone, on the sides, relative.
+    // Returns the relative noise of bundles on the sides, with the error that both halves share.
     double ofBundles() const;
+    // Returns the factor by which the noise is increased while there are few looks.
     double factor() const;
 
     const std::vector<float>& weight;
     const std::vector<float>& directError;
     const std::vector<uint32_t>& cellOf;
 
-    std::vector<glm::vec3> difference;  // per side: half that of the halves, W/m^2
+    std::vector<glm::vec3> difference;  // per side: half the difference of the halves, W/m^2
     std::vector<OfCell> ofCells;
-    double bundleNoise = 0;  // relative squares, of the last look
-    double pooled = 0;       // the same, averaged with the looks before
+    double bundleNoise = 0;  // relative square, of the last look
+    double pooled = 0;       // relative square, averaged over all looks
+    // Relative square of the first shot's noise on the sides; relative shared error; sum over the
+    // sides of the weight times the squared light, (W/m^2)^2 m^2.
     double directNoise = 0, bias = 0, signal = 0;
-    double directOfCells = 0;  // relative square, of the cells' means
+    double directOfCells = 0;  // relative square of the first shot's noise in the means over cells
+    // At the last look; and the number of looks, those of earlier bakes included.
     uint32_t bundles = 0, looked = 0;
     Looks before;
 };
 
-// Per side.
+// The noise per side of the tiles, and what the bake derived from it.
 struct SideNoise {
     explicit SideNoise(size_t sides) : ofBundles(sides, glm::vec3(0.0f)), direct(sides, 0.0f) {}
 
-    std::vector<glm::vec3> ofBundles;  // a sample of it, see Noise::perSide, W/m^2
+    std::vector<glm::vec3> ofBundles;  // a sample of it, see Noise::perSide(), W/m^2
     std::vector<float> direct;         // standard error of the first shot, W/m^2
-    std::vector<double> ofObjects;     // per instance: see noiseAtCorners; empty: there is no light
-    // Whether rays have left more than the target, since more bundles gain little on what they met.
+    // Relative, per instance, see noiseAtCorners(). Empty if there is no light.
+    std::vector<double> ofObjects;
+    // Whether extra rays have left more noise than the target. This noise lies in the light of the
+    // surfaces that the rays met, and further bundles would reduce it only a little.
     bool isOutOfReach = false;
 };
 
-// The noise of the light of all, and that of each light set.
+// The noise of the light of all sources, and of the light of each light set.
 class SetNoise {
   public:
-    // As above. errorOfSets: of each set, standard error of the first shot per side, W/m^2. tiles:
-    // whose sides these are. weight must outlive the object.
+    // Prepares the measurement. See Noise for `before` and `weight`. `errorOfSets` is, per entry of
+    // SetLights, the standard error of the first shot per side of the tiles, W/m^2. `weight` must
+    // outlive the object; `tiles`, whose patches are the tiles, need not.
     SetNoise(const Looks& before, std::vector<std::vector<float>> errorOfSets,
              const std::vector<float>& weight, const Patches& tiles);
     SetNoise(const SetNoise&) = delete;
 
-    // A look at the halves of all lights.
+    // Measures the noise of all lights. `halves` is per entry of SetLights. For the other arguments
+    // see Noise::look().
     void look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles, double bias);
 
-    // Of the same bundles, after what else has made the halves better.
+    // Measures again with the same bundles, after other work (extra rays) has improved the halves.
     void lookAgain(const std::vector<std::array<Irradiance, 2>>& halves);
 
-    // As of the last look, relative: of the light of all, then of each light set.
+    // Returns the relative noise at the last look, of the light of all sources and then of each
+    // light set.
     std::vector<double> relative() const;
-    // The largest of theirs, see Noise::excess.
+    // Returns the largest Noise::excess() of all lights.
     double excess(double target) const;
-    // Of the light of all.
+    // Returns the looks at the light of all sources.
     Looks looks() const { return noises.front().looks(); }
+    // Returns the noise of the light of all sources per side. The noise of objects is not set.
     SideNoise perSide() const;
-    // Of the light of all, then of each light set.
+    // Returns the noise of the light of all sources, and then of each light set.
     const std::vector<Noise>& ofLights() const { return noises; }
 
   private:
+    // Calls look(noise, halves) for the light of each light set, and then for the light of all
+    // sources.
     template <class Look>
     void lookAtAll(const std::vector<std::array<Irradiance, 2>>& halves, const Look& look);
 
     const std::vector<std::vector<float>> errorOfSets;
     const std::vector<uint32_t> cellOf;
-    std::vector<float> directError;  // of the light of all, per side, W/m^2
+    std::vector<float> directError;  // of the light of all sources, per side, W/m^2
     std::vector<Noise> noises;
 };
 

@@ -13,39 +13,48 @@ namespace raybundle {
 namespace {
 
 constexpr uint32_t kNone = UINT32_MAX;
-// What is darker than this share of the mean, of the scene and of its island, counts as that.
+// A cell whose RMS light is below this share of that of the scene or of its island, whichever is
+// less, is judged as if it had that much light.
 constexpr double kDarkPart = 0.05;
-// So many cells of the whole object are added to those of a part, as they are without the noisiest
-// ones: a few that are nearly covered say nothing of the others.
+// The noise of a part is averaged over its cells and kOfObject cells of the whole object. The
+// latter have the mean noise of the object without its noisiest cells: only the share kUsual of the
+// cells counts, since a few nearly covered cells are not representative.
 constexpr double kOfObject = 4, kUsual = 0.95;
-// What the halves tell of a part is a single sample, and a bake ends where it is small: squares
-// count so many times. At a target of 2 % no object of cornell_box, two_rooms and big_room has more
-// than 2.8 % at its 95th percentile then (6 seeds); with 1.5, 3.5 % for an eighth fewer bundles.
+// Factor on the squared noise of a part. The difference of the halves is a single sample, and a
+// bake tends to end when this sample is small by chance. At a target of 2 % with this factor, no
+// object of cornell_box, two_rooms and big_room has more noise than 2.8 % at its 95th percentile (6
+// seeds). With a factor of 1.5 the noise is up to 3.5 %, for an eighth fewer bundles.
 constexpr double kByChance = 2;
-// Time that a line takes, projected, kept and solved with, over that of local rays which tell as
-// much (30 ns, and 400 ns a ray; measured in cornell_box).
+// Time of a line, which is projected, stored and solved with, divided by the time of the local rays
+// that give as much information (30 ns a line and 400 ns a ray, measured in cornell_box).
 constexpr double kLineOverRays = 0.15;
-// Where there are windows of finer lines, a face takes the time of so many lines in each bundle,
-// for it is projected in several of them (1.8 us on 24,000 leaves, most of which lie in some).
+// If there are windows of finer lines, a face takes the time of this many lines in each bundle,
+// because it is projected in several windows (1.8 us, measured on 24,000 leaves, most of which lie
+// in some windows).
 constexpr double kLinesOfFace = 30;
-// Rays lose and make light by their noise, which lines do not: what gets more than this share of
-// all lines is left to these.
+// The noise of rays adds or removes power, while lines conserve it. Parts that get more than this
+// share of all lines are therefore left to bundles.
 constexpr double kMostByRays = 0.4;
-// Rays of a side: those that are fewer tell nothing. They are to tell as much as so many times the
-// lines that would do: of parts which only lines clean most are below the target, and the noise of
-// others' rays would be at it everywhere (objects of open_court 5.1 -> 4.4 % at the 95th
-// percentile, of instances 6.5 -> 4.4).
+// Minimum number of rays of a side, since fewer rays are no useful estimate; and the ratio of the
+// samples that rays have to provide to those that would suffice as lines. If bundles alone clean an
+// object, most of its parts end below the target. Rays are aimed at each part, whose noise would be
+// at the target everywhere without this ratio (95th percentile of the noise: objects of open_court
+// 5.1 -> 4.4 %, of instances 6.5 -> 4.4 %).
 constexpr double kFewestRays = 8, kSamplesByRays = 2;
-// More rays where some have taken the noise of an object's noisy parts to less than this share of
-// what it was, for those of them that are above so many targets; at most so many times the samples.
+// Conditions for more rays on the noisy parts of an object. The last pass must have reduced the
+// noise of these parts to less than kWorthMoreRays of what it was. Only parts above kNearlyClean
+// targets get more, and at most kMostGrowth times the samples.
 constexpr double kWorthMoreRays = 0.85, kNearlyClean = 1.25, kMostGrowth = 4;
-// What a pass of twice the rays leaves at best (measured in the rooms of house_on_plain). Objects
-// that all passes to come will not clean get no more.
+// Share of the noise that a pass with twice the rays leaves at best (measured in the rooms of
+// house_on_plain). An object gets no more rays if all further passes together cannot clean it.
 constexpr double kLeftByPass = 0.55;
-// A lower target than this has rays where this one has.
+// If the target is lower than this value, rays are used on the objects on which they would be used
+// with this target, even if they cannot reach the lower one.
 constexpr double kUsualTarget = 0.02;
-// Share of these parts, and of all of an object, whose noise stands for that of the object.
+// The noise of an object is this quantile of the noise of its parts: of all parts, or of those that
+// need more rays.
 constexpr double kMostParts = 0.9;
+// Weight of the earlier looks in the average.
 constexpr double kOfLooksBefore = 0.5;
 
 }  // namespace
@@ -71,7 +80,7 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
         const Parent& parent = patches.parentAt(side);
         uint32_t& cell = cellNumbers[2 * parent.cell + side % 2];
         if (cell == kNone) {
-            // A cell is of the part that its first side is of.
+            // A cell belongs to the part of its first side.
             uint32_t& part = partNumbers[found.of[k]];
             if (part == kNone) {
                 part = uint32_t(parts.size());
@@ -98,8 +107,8 @@ std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
     }
     const double allArea = std::accumulate(area.begin(), area.end(), 0.0);
     const double mean = std::accumulate(light.begin(), light.end(), 0.0) / std::max(allArea, 1e-30);
-    // Per part, and of the whole object but for its worst cells: sums of squares, and of cells,
-    // which count by how much of them is to be seen.
+    // Sums of the squared noise of cells: per part, and per object without its noisiest cells. Each
+    // cell is weighted by the share of it that is exposed and has a result.
     std::vector<double> squares(parts.size(), 0), weights(parts.size(), 0);
     std::vector<std::vector<std::pair<double, double>>> ofInstance(growth.size());
     for (const SeenCell& cell : cells) {
@@ -127,7 +136,8 @@ std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
     }
     for (size_t p = 0; p < parts.size(); ++p) {
         const double ofObject = usual[parts[p].instance];
-        // Corners that gather see many parts of their object.
+        // Corners that gather see many parts of their object, so the noise of the whole object
+        // counts.
         squares[p] = parts[p].isGathered
                          ? ofObject
                          : kByChance * shownOverForetold[parts[p].instance] *

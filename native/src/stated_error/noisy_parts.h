@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Noise where it is seen: that of the bundles on each part of each object, relative to the light
-// there. It tells when there are enough bundles, and where local rays of their own take less time
+// Noise where it is seen: the noise of the bundles on each part of each object, relative to the
+// light there. It determines when there are enough bundles, and where local rays take less time
 // than more bundles would (transport/extra_rays.h).
 //
 // Source: none; the thesis judges the whole scene (section 4.3.3).
-// - Half the difference of the halves at a cell is one sample of its noise. Those of a part are
-//   pooled, those of its object count a little too, and what the looks before have told.
-// - A bundle takes time for each line, wherever that goes, and for each face in its windows. While
-//   the parts that need more of them get so many of the lines that rays would take longer, another
-//   bundle is cheaper.
-// - Rays come in passes. What a pass leaves on an object is seen in its halves; each sees what
-//   those before have brought.
+// - Half the difference of the halves at a cell is one sample of its noise. The samples of all
+//   cells of a part are averaged. Those of the whole object, and the earlier looks, count a little
+//   too.
+// - A bundle takes time for each of its lines, wherever they go, and for each face in its windows.
+//   As long as the parts that need more lines get so large a share of the lines that rays would
+//   take longer, another bundle is cheaper.
+// - Rays are cast in passes. The noise that a pass leaves on an object is visible in the halves,
+//   and decides about the next pass.
 #pragma once
 
 #include <cstdint>
@@ -24,83 +25,98 @@
 
 namespace raybundle {
 
-// What NoisyParts are made of. References must outlive it.
+// The input of NoisyParts. References must outlive this struct.
 struct NoisyPartsInput {
     const Tiles& tiles;
-    const Looks& before;               // of earlier bakes with these lines
-    const std::vector<float>& weight;  // per side of the tiles, positive where it has a result
-    // Where corners gather instead of showing their side's light, rays do not help.
+    const Looks& before;  // of earlier bakes with these lines
+    // Per side of the tiles: exposed area of sides with a result, otherwise 0, m^2.
+    const std::vector<float>& weight;
+    // Rays do not help where corners gather instead of showing the light of their side.
     const ShownLight& shown;
-    // Per instance, see stated_error/object_noise.h; the second as of the halves that are looked
-    // at.
+    // Per instance, see cornerGrowth() and shownOverForetold() (stated_error/object_noise.h). The
+    // second must belong to the halves of the last look.
     const std::vector<double>& growth;
     const std::vector<double>& shownOverForetold;
-    // Of sheets and single faces, of each bundle, where there are windows of finer lines; else 0.
+    // Number of sheets and single faces that are projected in each bundle if there are windows of
+    // finer lines, otherwise 0.
     const double projections;
     const double target;  // relative
 };
 
+// The noise of the parts of all objects with a result. A part is a piece of an object that faces
+// one way (patches/parts.h).
 class NoisyParts {
   public:
-    // The tiles, growth and shownOverForetold must outlive the object.
+    // Finds the parts. `tiles`, `growth` and `shownOverForetold` of the input must outlive the
+    // object.
     explicit NoisyParts(const NoisyPartsInput& input);
 
-    // As of the last look of all lights. lines: per side of the tiles, how many have met it; all:
-    // those of all sides, not shown ones included.
+    // Takes over the last look of `noise` after `bundles` bundles. `lines` is per side of the tiles
+    // the number of lines that have met it, and `all` the number of lines over all sides, including
+    // sides that are not shown.
     void look(const SetNoise& noise, uint32_t bundles, const std::vector<float>& lines, double all);
 
-    // See Looks::shareOfParts.
+    // Returns per part the value of Looks::shareOfParts for the next bake with these lines.
     std::vector<double> shares() const;
-    // So many times too large for the target is the noise at corners where more bundles are
-    // the cheapest remedy.
+    // Returns the ratio to the target of the noise at corners on the parts where further bundles
+    // are the cheapest remedy. Parts that rays clean in less time do not count.
     double excess() const;
-    // For each side of the patches that has too few samples for the target: rays. By the last look
-    // alone: the same light has the same ones, whatever was baked before. samples: per side and
-    // half, how many lines have met it, and rays by what they tell. most: of a side.
+    // Returns the rays for each side of the patches that has too few samples for the target. Only
+    // the last look counts, so that the same light always gets the same rays, whatever was baked
+    // before. `samples` is per side and half the number of lines that have met the side, plus its
+    // earlier rays in units of lines. `most` is the largest number of rays per side.
     std::vector<ExtraRays> rays(const std::vector<std::array<float, 2>>& samples,
                                 uint32_t most) const;
-    // As of a look at the halves with these rays: parts that are not clean yet are to have more if
-    // that has made those of their object cleaner, and furtherPasses of twice as many each may
-    // clean them. Returns how many times too large is what is left, on the object where that is
-    // most: of nine parts of ten of it. It is the noise of the light that rays met, and their own.
+    // Takes over a look of `noise` at halves that include the rays cast so far. A part above the
+    // target is to get more rays if the rays have reduced the noise of its object enough, and if
+    // `furtherPasses` passes, each with twice as many rays, can clean the object. Returns the ratio
+    // of the remaining noise to the target, for the object where it is largest; the noise of an
+    // object is its quantile over nine tenths of its parts. The remaining noise is that of the
+    // rays, and that of the light that they met.
     double lookWithRays(const SetNoise& noise, uint32_t furtherPasses);
 
   private:
+    // A part of an object.
     struct Part {
         uint32_t instance = 0;
         bool isGathered = false;
+        // Sides, and lines that have met them.
         double sides = 0, lines = 0;
-        // Squares of the noise at corners over the light there: by the last look, and pooled with
-        // those before.
+        // Squared noise at the corners divided by the squared light there: at the last look, and
+        // averaged with the earlier looks.
         double last = 0, squares = 0;
-        // Whether rays are worth their time; so many times the samples that the last look foretells
-        // are to be had.
+        // Whether more rays are worth their time, and the factor on the number of samples that the
+        // last look predicts to be needed.
         bool wantsRays = true;
         double wanting = 1;
     };
+    // One side of a cell with a result.
     struct SeenCell {
-        uint32_t number;  // two a cell, as Noise has them
+        uint32_t number;  // index in Noise::cells()
         uint32_t part, island;
-        double area;  // m^2, with what is covered
+        double area;  // of the whole cell, covered parts included, m^2
     };
-    // Squares over the light of one noise, per part.
+    // Returns per part the squared relative noise at the corners. The second function returns the
+    // largest value over all lights.
     std::vector<double> squaresOf(const Noise& noise) const;
-    std::vector<double> squaresOf(const SetNoise& noise) const;  // the largest of all lights
-    // Per instance: of nine parts of ten, of it or of those of it that want rays. squares: per
-    // part.
+    std::vector<double> squaresOf(const SetNoise& noise) const;
+    // Returns per instance the quantile over nine tenths of its parts, or of those parts that want
+    // rays. `squares` is per part.
     std::vector<double> squaresOfObjects(const std::vector<double>& squares,
                                          bool onlyWantingRays) const;
 
     const Tiles& tiles;
     const Looks before;
-    std::vector<uint32_t> partOf;  // per side of the tiles; kNone: has no result
-    std::vector<SeenCell> cells;   // of those with a result
+    std::vector<uint32_t> partOf;  // per side of the tiles; kNone without a result
+    std::vector<SeenCell> cells;   // with a result
     std::vector<Part> parts;
     const std::vector<double>& growth;
     const std::vector<double>& shownOverForetold;
-    // Per instance, with the rays there are: of the parts that want more, see squaresOfObjects.
+    // Per instance: squared relative noise with the rays cast so far, over the parts that want more
+    // rays, see squaresOfObjects().
     std::vector<double> ofObjects;
     const double projections, target;
+    // At the last look: the number of lines over all sides, and the number of bundles.
     double allLines = 0;
     uint32_t bundles = 0;
 };

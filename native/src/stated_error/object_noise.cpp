@@ -13,14 +13,17 @@
 namespace raybundle {
 namespace {
 
-// What is usual of shownOverForetold counts as much as so many cells of an object.
+// The usual value of shownOverForetold() counts as much as the measurement on this many cells of an
+// object.
 constexpr double kUsualCells = 4;
+// Growth of the variance if there are as many corners as cells, and the power of corners per cell
+// with which it rises.
 constexpr double kGrowthOfGrid = 3, kGrowthPower = 1.2;
-// Of n cells the noise is stated 1 + kFewCells / (n + 2) times as high: the halves of six differ by
-// less than half of what is usual in one bake of twenty.
+// The noise on n cells is stated 1 + kFewCells / (n + 2) times as high. In one bake of twenty, the
+// difference of the halves on six cells is less than half of what it usually is.
 constexpr double kFewCells = 3;
-// What the halves tell of an object is a single sample of its noise: squares are stated so many
-// times as high.
+// Factor on the stated squares, because the difference of the halves is a single sample of an
+// object's noise.
 constexpr double kStatedOverMeasured = 1.1;
 
 }  // namespace

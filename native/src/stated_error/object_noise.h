@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The noise at corners, which is what is shown: that of each object, and of the whole scene.
+// The noise at corners, where the result is shown: the noise of each object, and of the whole
+// scene.
 //
-// Source: none; what the halves tell of the cells' means (stated_error/noise.h), by object.
-// - What corners show is measured: least squares are fitted to the light of each half as they will
-//   be to all of it. Half of the difference is one sample of the noise at each corner; from cell to
-//   cell it differs by chance, so that of it only the whole object's is taken, and what the means
-//   of cells foretell says how that is spread.
-// - Values at corners whose interpolation is nearest to the light have more variance than the means
-//   of cells, as far as that is random within these: 3 times in a grid, where there is one corner a
-//   cell (the diagonal of the inverse of the hat functions' mass matrix), and 16 times on a quad by
-//   itself, which has four of them.
-// - Few cells are few samples: their noise is stated higher, by the chance that they agree.
+// Source: none. The noise of the means over cells (stated_error/noise.h) is summed up by object.
+// - The noise at corners is measured by fitting least squares to the light of each half, as they
+//   will be fitted to the whole light. Half of the difference at a corner is one sample of its
+//   noise. From cell to cell these samples vary by chance, so only their sum over an object is
+//   used. The noise of the cells' means determines how it is distributed over the object.
+// - Corner values whose interpolation is nearest to the light have a larger variance than the means
+//   over cells, as far as the noise within cells is random. In a grid, with one corner per cell,
+//   the variance is 3 times as large (the diagonal of the inverse of the mass matrix of the hat
+//   functions). On a single quad, with four corners, it is 16 times as large.
+// - The noise of an object with few cells is stated higher, because few samples may be small by
+//   chance.
 #pragma once
 
 #include <array>
@@ -23,35 +25,44 @@
 
 namespace raybundle {
 
-// An object that is darker than this share of the scene's RMS light counts as that.
+// An object whose RMS light is below this share of the scene's RMS light is judged as if it had
+// this much light.
 constexpr double kNearlyBlack = 0.01;
 
-// Per instance: how much the variance grows from the means of cells to corners, as far as it is
-// random within them.
+// Returns per instance the ratio of the variance at corners to that of the means over cells, for
+// noise that is random within cells. It is larger the more corners a cell has. Instances that are
+// not baked have the ratio of a grid, 3.
 std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches);
 
-// Squares of the noise of bundles at the corners of a cell, as its mean foretells them: of the last
-// look. growth: of its instance.
+// Returns the squared noise of bundles at the corners of a cell, as predicted from the noise of the
+// cell's mean at the last look, summed over RGB, (W/m^2)^2. `growth` is the value of cornerGrowth()
+// for the cell's instance.
 double bundlesAtCorners(const Noise::OfCell& cell, double growth);
 
-// What is usual of shownOverForetold.
+// The value that shownOverForetold() usually has.
 constexpr double kUsuallyOverForetold = 2;
 
-// Per instance: squares of the noise of bundles that its corners show, over what bundlesAtCorners
-// foretells of them. halves: per side of the tiles, of the noise's last look, W/m^2;
-// regularization: see leastSquares. Of few cells it is near what is usual.
+// Returns per instance the ratio of the squared noise of bundles at its corners, measured with fits
+// to both halves, to the prediction of bundlesAtCorners(). For instances with few cells, or without
+// a measurement, the ratio is near or equal to kUsuallyOverForetold. `tiles` are the tiles and
+// their exposed shares. `halves` are those of the last look of `noise`, per side of the tiles,
+// W/m^2. For `regularization` see leastSquares(); `growth` is the result of cornerGrowth().
 std::vector<double> shownOverForetold(const Scene& scene, const LitSurfaces& tiles,
                                       const Noise& noise, const std::array<Irradiance, 2>& halves,
                                       float regularization, const std::vector<double>& growth);
 
-// Relative to the RMS of the light, that of the first shot included.
+// The noise at corners relative to the RMS of the light, with the noise of the first shot.
 struct CornerNoise {
+    // Of the whole scene, with the error that both halves share.
     double ofAll = 0;
-    // Per instance; its light is taken to be kNearlyBlack of the scene's at least.
+    // Per instance. The light of an instance is taken to be at least kNearlyBlack times that of the
+    // scene.
     std::vector<double> ofObjects;
 };
 
-// tiles: whose cells these are; growth, shown: per instance, see above.
+// Returns the stated noise at the corners at the last look of `noise`. `tiles` are the patches of
+// whose cells `noise` was measured. `growth` and `shown` are the results of cornerGrowth() and
+// shownOverForetold().
 CornerNoise noiseAtCorners(const Scene& scene, const Patches& tiles, const Noise& noise,
                            const std::vector<double>& growth, const std::vector<double>& shown);
 

@@ -16,25 +16,37 @@
 namespace raybundle {
 namespace {
 
-// A mesh is too coarse where its share of the error is above this, and above so many targets.
+// A mesh is too coarse if the part `mesh` of its stated error is above both kCoarse and
+// kCoarseTargets times the target.
 constexpr double kCoarse = 0.05, kCoarseTargets = 2;
-// Objects that are named for it.
+// Maximum number of objects that a warning names.
 constexpr size_t kMostNamed = 6;
-// An object is noisy above so many targets, unless it is kNearlyBlack: a room beside a sunny plain
-// is not.
+// An object is noisy if its noise is above this many targets, unless its light is less than
+// kNearlyBlack times that of the scene. A room beside a sunny plain has more light than that.
 constexpr double kNoisyTargets = 2;
-// Objects darker than this share of the mean square light are not worth a finer mesh.
+// An object whose mean squared light is below this share of that of the scene is not worth a finer
+// mesh.
 constexpr double kDark = 0.01;
-// An object of whose area less than this is known takes over the surplus of the others.
+// If the surplus is known on less than this share of an object's area, the surplus of all objects
+// together is used for it.
 constexpr double kKnownShare = 0.3;
 
-// Squares summed over RGB times exposed area, (W/m^2)^2 m^2.
+// Sums over patches of squares times exposed area. Squares are summed over RGB; the sums are in
+// (W/m^2)^2 m^2 except where stated. `signal` is of the light on the patches, `noise` of its noise,
+// and `residual` of the difference between the interpolated light and the light on the patches.
 struct Squares {
     double signal = 0, noise = 0, residual = 0;
-    double shown = 0;     // signal at the corners, which have less of what is narrower than a face
-    double ripple = 0;    // of the noise: what interpolation between the corners cannot follow
-    double gathered = 0;  // noise of what corners gather, beside that of bundles
-    double smooth = 0, step = 0, known = 0;  // of the patches whose surplus is known; their signal
+    // Of the light at the corners, in which light that varies within a face is smoothed.
+    double shown = 0;
+    // The part of `noise` that the interpolation between corners cannot follow.
+    double ripple = 0;
+    // Noise of the light that corners gather, in addition to that of bundles.
+    double gathered = 0;
+    // The two parts of the surplus on the patches where it is known, and the signal of these
+    // patches.
+    double smooth = 0, step = 0, known = 0;
+    // Areas with known surplus, of all patches, and of all cells, m^2. Numbers of patches and
+    // cells.
     double knownArea = 0, area = 0, cellArea = 0, patches = 0, cells = 0;
 
     void add(const Squares& o) {
@@ -50,9 +62,11 @@ struct Squares {
         knownArea += o.knownArea;
         area += o.area;
     }
-    // The residual without the noise in it.
+    // Returns the residual without the noise that it contains. `noiseScale` is the factor on the
+    // squared noise.
     double mesh(double noiseScale) const { return std::max(0.0, residual - noiseScale * ripple); }
-    // The surplus over the signal, squares; by chance steps may be below zero.
+    // Return the parts of the surplus relative to the signal, as squares. The sum of the steps may
+    // be negative by chance.
     double smoothShare() const { return known > 0 ? smooth / known : 0; }
     double stepShare() const { return known > 0 ? std::max(step, 0.0) / known : 0; }
 };
@@ -69,7 +83,7 @@ std::string inMetres(double length) {
     return text.str();
 }
 
-// Of one instance: adds up the squares, and notes the square of the error at each corner.
+// The errors of one instance: sums over its patches, and the error at each corner.
 class InstanceErrors {
   public:
     InstanceErrors(const Instance& instance, const Tiles& tiles, const InstanceRange& range,
@@ -110,7 +124,8 @@ class InstanceErrors {
                                                 light.indirect[size_t(corner)]);
             if (!instance.hasResultOnFace(size_t(cell.face))) continue;
             ++sum.cells;
-            // Of the parallelogram of which a triangle is half: the square of about an edge.
+            // A triangle counts with the parallelogram of which it is half, which is about the
+            // square of an edge.
             sum.cellArea += double(glm::length(glm::cross(cell.a, cell.b)));
             corners += cell.isTriangle() ? 0.5 : 1.0;
         }
@@ -122,8 +137,9 @@ class InstanceErrors {
 
     const Squares& squares() const { return sum; }
 
-    // RMS error around each corner, as radiance, W/(m^2 sr). noiseScale: of the squares.
-    // unknownShare: surplus over signal, squares, where there are too few patches around.
+    // Returns the RMS error around each corner as radiance, W/(m^2 sr). `corners` is the number of
+    // corners of the mesh, and `noiseScale` the factor on the squared noise. `unknownShare` is the
+    // squared surplus relative to the signal, for patches with too few patches around them.
     std::vector<float> perCorner(size_t corners, double noiseScale, double unknownShare) const {
         std::vector<double> squares(corners, 0), weights(corners, 0);
         const double ripple = sum.noise > 0 ? sum.ripple / sum.noise : 0;
@@ -156,12 +172,14 @@ class InstanceErrors {
     bool hasResult(uint32_t at) const {
         return instance.hasResultOnFace(size_t(patches.parentAt(at).face));
     }
+    // Returns the squared noise on a side, summed over RGB, (W/m^2)^2.
     double noiseAt(uint32_t at) const {
         if (sides.noise.empty()) return 0;
         return square(sides.noise[at]) + 3 * double(sides.directError[at] * sides.directError[at]);
     }
 
-    // The share of the noise that differs from patch to patch, less what the corners can follow.
+    // Returns the share of the noise that differs from patch to patch and that the corners cannot
+    // follow.
     double rippleShare() const {
         if (sides.noise.empty()) return 0;
         double rough = 0, all = 0;
@@ -178,7 +196,8 @@ class InstanceErrors {
         return all > 0 ? std::min(1.0, rough / all) * unfollowed : 0;
     }
 
-    // body(side, exposed area, cell, corner weights at its middle, square of the residual, surplus)
+    // Calls body(side, exposed area, cell, corner weights at the centroid, squared residual,
+    // surplus) for each patch with a result.
     template <class Body>
     void forEachPatch(const Body& body) const {
         const uint32_t first = range.firstParent < range.lastParent
@@ -193,15 +212,16 @@ class InstanceErrors {
             for (uint32_t k = 0; k < parent.patchCount(); ++k) {
                 const uint32_t patch = parent.firstPatch + k, at = 2 * patch + side;
                 const double weight = double(patches.area[patch] * sides.exposed[at]);
-                // The mean of the interpolation over the patch is its value in the middle.
+                // The mean of the interpolation over the patch is its value at the centroid.
                 const auto w = cell.weights(parent.position(parent.pointOn(k, middle)));
                 glm::vec3 shown(0.0f);
                 for (int c = 0; c < 4; ++c)
                     if (cell.corner[c] >= 0)
                         shown += w[c] * (light.direct[size_t(cell.corner[c])] +
                                          light.indirect[size_t(cell.corner[c])]);
-                // What the patches of a cut tile have of its surplus is known, but nothing between
-                // the corners follows it: no face is smaller than a tile.
+                // The patches of a cut tile resolve a part of the tile's surplus. This part is
+                // known but still an error of the mesh, because the interpolation between corners
+                // does not follow it: no face is smaller than a tile.
                 Surplus beyond = surplus[patch - first];
                 beyond.smooth = std::ldexp(beyond.smooth, -4 * tiles.level(patch));
                 beyond.step = std::ldexp(beyond.step, -tiles.level(patch));
@@ -218,7 +238,7 @@ class InstanceErrors {
 
     const Instance& instance;
     const Tiles& tiles;
-    const Patches& patches;  // a tile each
+    const Patches& patches;  // each is a tile
     const InstanceRange& range;
     const uint32_t side;
     const SideErrors& sides;
@@ -226,10 +246,11 @@ class InstanceErrors {
     const InstanceLight& light;
     const std::vector<Surplus> surplus;
     Squares sum;
-    double corners = 0;  // about, of the cells with a result
+    double corners = 0;  // about the number of corners of the cells with a result
 };
 
-// noise: at the corners, by that of the patches, relative.
+// Returns the relative errors. `noise` is the relative noise at corners, as predicted from the
+// patches, and `discretisation` the squared relative surplus.
 Report::Errors relative(const Squares& s, double noiseScale, double noise, double discretisation) {
     if (!(s.signal > 0)) return {};
     return {std::hypot(noise, s.shown > 0 ? std::sqrt(s.gathered / s.shown) : 0),
@@ -237,8 +258,9 @@ Report::Errors relative(const Squares& s, double noiseScale, double noise, doubl
             std::sqrt(noiseScale * s.noise / s.signal)};
 }
 
-// The edge at which the mesh's error would be `limit`: that of smooth light falls with its square,
-// that of steps with its root.
+// Returns the length of the edges, m, at which the error by the surplus of patches would be
+// `limit`. The error falls with the square of the edge where light is smooth, and with its square
+// root at steps.
 double edgeFor(double limit, double smoothShare, double stepShare, double patchEdge) {
     double low = 0, high = 1e6;
     for (int k = 0; k < 60; ++k) {
@@ -249,7 +271,8 @@ double edgeFor(double limit, double smoothShare, double stepShare, double patchE
     return low * patchEdge;
 }
 
-// Names the noisiest. noises: of those that have too much, relative, with their names.
+// Warns of noisy objects and names the noisiest. `noises` holds the relative noise and the name of
+// each noisy object.
 void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double target,
                  bool isOutOfReach, Report& report) {
     if (noises.empty()) return;
@@ -270,9 +293,11 @@ void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double targ
                              : "; lower target_error"));
 }
 
-// A mesh that is too coarse: its squared error, and what to say of it.
+// A mesh that is too coarse: its squared error, and the text of the warning.
 using CoarseMesh = std::pair<double, std::string>;
 
+// Returns the warning if the mesh of an object is too coarse. `limit` is the largest relative error
+// that is allowed.
 std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, double noiseScale,
                                      double limit, double smoothShare, double stepShare) {
     const double mesh = std::sqrt(s.mesh(noiseScale) / s.signal);
@@ -290,7 +315,7 @@ std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, 
             inMetres(0.5 * edge)};
 }
 
-// Names those whose error is largest.
+// Warns of coarse meshes and names those with the largest errors.
 void warnOf(std::vector<CoarseMesh> meshes, Report& report) {
     std::stable_sort(meshes.begin(), meshes.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -322,10 +347,10 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     for (InstanceLight& baked : light) baked.error.assign(baked.direct.size(), 0.0f);
     if (!(all.signal > 0)) return;
 
-    // Also what the halves have in common.
+    // The scale includes the error that both halves share.
     const double noiseScale =
         all.noise > 0 ? report.estimatedError * report.estimatedError * all.signal / all.noise : 0;
-    const double shown = report.error.noise;  // as the bake has measured it at all corners
+    const double shown = report.error.noise;  // measured by the bake at all corners
     const double limit = std::max(kCoarse, kCoarseTargets * targetError);
     double discretisation = 0;
     std::vector<CoarseMesh> coarse;
@@ -337,7 +362,8 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         const Squares& known = own.knownArea >= kKnownShare * own.area ? own : all;
         const double smooth = known.smoothShare(), step = known.stepShare();
         discretisation += (smooth + step) * own.signal / all.signal;
-        // What corners gather is the light of many patches, wherever these are.
+        // The light that corners gather comes from many patches of the whole scene, so the noise of
+        // the whole scene counts.
         const double ofPatches =
             light[i].gatheredNoise ? shown : std::max(sides.ofObjects[i], errsAlike ? shown : 0);
         report.objects[i].error = relative(own, noiseScale, ofPatches, smooth + step);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The stated error of the result, in three parts, per object and in all:
-// - noise: of the light on the patches, from finitely many bundles and shadow rays
+// The stated error of the result, per object and for the whole scene, in three parts:
+// - noise: the random error of the light on the patches, from finitely many bundles and shadow rays
 //   (stated_error/noise.h);
-// - discretisation: what light has beyond the best linear function on each patch, which nothing
-//   that is made of the patches can show (stated_error/surplus.h);
-// - mesh: how far the interpolation between the corners is from the light of the patches, which is
-//   what a finer mesh would mend.
-// Together they stand for the surface error: the distance of the interpolated result from the light
-// at all points of the faces.
+// - discretisation: the difference between the light and the best linear function on each patch,
+//   which no result made of the patches can show (stated_error/surplus.h);
+// - mesh: the difference between the interpolation over the corners and the light of the patches,
+//   which a finer mesh would remove.
+// Together they estimate the surface error: the difference between the interpolated result and the
+// true light, at all points of the faces.
 #pragma once
 
 #include <vector>
@@ -23,22 +23,26 @@
 
 namespace raybundle {
 
-// What is known about the light on the sides of the tiles; references must outlive it.
+// What is known about the light on the sides of the tiles. All arrays except `ofObjects` are per
+// side of the tiles. References must outlive the object.
 struct SideErrors {
-    const Irradiance& irradiance;           // mean over each side
+    const Irradiance& irradiance;           // mean over each side, W/m^2
     const std::vector<float>& exposed;      // share of each side that nothing covers
-    const std::vector<glm::vec3>& noise;    // a sample of that of the bundles, W/m^2; empty: none
+    const std::vector<glm::vec3>& noise;    // sample of that of bundles, W/m^2; empty if none
     const std::vector<float>& directError;  // standard error of the sources' light, W/m^2
-    const std::vector<double>& ofObjects;   // per instance: noise at corners, relative
+    const std::vector<double>& ofObjects;   // relative noise at corners, per instance
     bool isOutOfReach = false;              // see SideNoise
 };
 
-// Adds the errors, and warnings of objects whose mesh is too coarse, to the report, and the error
-// per corner to the light. report.error.noise is the shown noise in all. ranges: of the patches.
-// Where the directions of bundles are independent, all objects get too much light together, or too
-// little: what the halves tell of one object is a single sample then, and none has less noise than
-// all together. Sparse results that are gathered are the light of points
-// (InstanceLight::gatheredNoise), whose error is noise alone.
+// Adds the stated errors, and warnings of objects that are noisy or whose mesh is too coarse, to
+// the report, and sets InstanceLight::error at each corner. On entry, report.error.noise must be
+// the relative noise at all corners of the scene, and report.estimatedError that of the patch
+// sides. `ranges` and `light` are per instance; the ranges refer to the tiles.
+// If the directions of bundles are independent, the errors of all objects are correlated: all get
+// too much light, or all too little. The halves then give only a single sample, and no object is
+// stated to have less noise than the whole scene.
+// Gathered sparse results (InstanceLight::gatheredNoise) are the light at points, whose only error
+// is noise.
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
                  const SideErrors& sides, const Settings& settings,
                  std::vector<InstanceLight>& light, Report& report);

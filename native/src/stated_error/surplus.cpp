@@ -11,46 +11,53 @@
 namespace raybundle {
 namespace {
 
-// The light of a patch more covered than this is too uncertain to compare.
+// Light on a patch is too uncertain to be compared if its exposed share is not above this.
 constexpr float kHalfCovered = 0.5f;
-// Patches less high than this share of their longest edge say nothing: their neighbours lie at no
-// distance, or far away.
+// A parent is too thin to be compared if its height is below this share of its longest edge: its
+// neighbours have almost no distance, or are far away.
 constexpr float kThin = 0.02f;
-// Mean squares of second derivatives times edges to mean squares of distance. Two of four
-// neighbours lie along each axis, and both see the mixed derivative.
+// Factors from the mean square of the change of the gradient between neighbours (a second
+// derivative times an edge) to the mean square difference from the linear function. Only two of the
+// four neighbours lie along each axis, but all of them show the mixed derivative.
 constexpr float kStraight = 1.0f / 360, kMixed = 1.0f / 144;
+// The corresponding factor for steps, see the head of surplus.h.
 constexpr float kStep = 17.0f / 144 / 0.0933f;
-// Change of light per radian that the surface turns, over the light; and the mean square of a
-// coordinate over a patch of edge 1.
+// Change of light per radian by which the surface turns, relative to the light; and the mean square
+// of a coordinate over a patch with edges of length 1, relative to its middle.
 constexpr float kTurn = 0.5f, kSpread = 1.0f / 12;
-// What counts of the disagreement where there is only noise, over the mean variance of two patches
-// in a row of patches: the disagreement has 1.25 of it, the change of the gradients 1.
+// Contribution of noise to the square that measures steps, relative to the mean variance of two
+// neighbours in a row of patches. The squared deviation from the gradients contains 1.25 times this
+// variance. The squared change of the gradients, which is subtracted, contains it once. Negative
+// differences count as 0.
 constexpr float kDisagreementNoise = 0.85f;
-// Neighbours in directions nearer to one line than this give no gradient.
+// Neighbours whose directions are nearer to a common line than this do not define a gradient.
 constexpr float kLeastSpread = 0.05f;
 
-// Light as seen in the plane of a patch.
+// The gradient of light in the plane of a patch.
 struct Gradient {
-    glm::vec3 alongA{0.0f}, alongB{0.0f};  // per axis: change of RGB per metre
+    glm::vec3 alongA{0.0f}, alongB{0.0f};  // change of RGB per metre along each axis, W/m^3
 };
 
-// A patch and what its neighbours say about the light on it.
+// A patch, and what the light of its neighbours implies about the light on it.
 struct Site {
+    // Centre (m, relative to Patches::centre) and orthonormal axes of the plane.
     glm::vec3 centre{0.0f}, axisA{0.0f}, axisB{0.0f};
     bool isUsed = false, hasGradient = false;
+    // Number of neighbours found, and number of neighbours of a patch away from borders.
     int neighbours = 0, wanted = 0;
-    // Normal equations of the gradients of all light and of that of the sources.
+    // Normal equations of two gradients: of all light, and of the light of the sources.
     float aa = 0, ab = 0, bb = 0;
     std::array<glm::vec3, 2> ra{glm::vec3(0.0f), glm::vec3(0.0f)};
     std::array<glm::vec3, 2> rb{glm::vec3(0.0f), glm::vec3(0.0f)};
     std::array<Gradient, 2> gradient;
-    // Sums over pairs with neighbours.
+    // Sums over the pairs with neighbours.
     int pairs = 0;
     float straight = 0, mixed = 0, step = 0, turn = 0;
 
+    // Returns whether the patch has a neighbour on each side.
     bool isInside() const { return hasGradient && neighbours == wanted; }
 
-    // Offset of another site, unfolded into the plane of this one, metres.
+    // Returns the offset to another site, unfolded into the plane of this one, m.
     glm::vec2 offset(const Site& other) const {
         const glm::vec3 d = other.centre - centre;
         const glm::vec2 flat(glm::dot(d, axisA), glm::dot(d, axisB));
@@ -58,6 +65,7 @@ struct Site {
         return length > 0 ? flat * (glm::length(d) / length) : flat;
     }
 
+    // Computes the gradients, if the neighbours define them.
     void solve() {
         const float det = aa * bb - ab * ab;
         hasGradient = det > kLeastSpread * 0.25f * (aa + bb) * (aa + bb);
@@ -67,14 +75,15 @@ struct Site {
     }
 };
 
+// Returns the change of light per metre times `direction` (m), W/m^2.
 glm::vec3 slope(const Gradient& g, glm::vec2 direction) {
     return direction.x * g.alongA + direction.y * g.alongB;
 }
 
-// The patches of some parents, one side of each.
+// The patches of some parents, with the light on one side of each.
 class Sites {
   public:
-    // The arguments of surplusOf.
+    // For the arguments see surplusOf().
     Sites(const Patches& patches, uint32_t firstParent, uint32_t lastParent, rb_side side,
           const Irradiance& irradiance)
         : patches(patches),
@@ -85,6 +94,7 @@ class Sites {
         sites.resize(last.firstPatch + last.patchCount() - first);
     }
 
+    // Places the patches, and finds the pairs of neighbours that can be compared.
     void place(uint32_t firstParent, uint32_t lastParent, const std::vector<float>& exposed) {
         for (uint32_t p = firstParent; p < lastParent; ++p) {
             throwIfCancelledAt(p);
@@ -115,6 +125,7 @@ class Sites {
                     pairs.end());
     }
 
+    // Computes the gradients on all patches.
     void findGradients() {
         for (const TilePair& pair : pairs) {
             throwIfCancelledAt(looked++);
@@ -124,7 +135,7 @@ class Sites {
         for (Site& site : sites) site.solve();
     }
 
-    // directError: see surplusOf.
+    // Compares the light and the gradients of all pairs. `directError` is per side, W/m^2.
     void comparePairs(const std::vector<float>& directError) {
         for (const TilePair& pair : pairs) {
             throwIfCancelledAt(looked++);
@@ -132,13 +143,14 @@ class Sites {
         }
     }
 
+    // Returns the surplus of each patch.
     std::vector<Surplus> surplus() const {
         std::vector<Surplus> result(sites.size());
         for (size_t k = 0; k < sites.size(); ++k) {
             const Site& site = sites[k];
             if (site.pairs == 0) continue;
             const glm::vec3 light = allLight(first + uint32_t(k));
-            // Half of the neighbours along each of the two axes.
+            // Only half of the neighbours lie along each of the two axes, so the mean is doubled.
             const float turn = kTurn * kTurn * kSpread * 2 * site.turn / float(site.pairs);
             result[k] = {true,
                          (kStraight * site.straight + kMixed * site.mixed) / float(site.pairs) +
@@ -156,11 +168,11 @@ class Sites {
         return irradiance.gathered[sideOf(patch)];
     }
 
-    // To the normal equations of the gradients at a.
+    // Adds patch `b` to the normal equations of the gradients at patch `a`.
     void addNeighbour(uint32_t a, uint32_t b) {
         Site& site = of(a);
         const glm::vec2 d = site.offset(of(b));
-        // All neighbours count alike, however far.
+        // All neighbours have the same weight, whatever their distance.
         const float weight = 1 / std::max(glm::dot(d, d), 1e-30f);
         ++site.neighbours;
         site.aa += weight * d.x * d.x;
@@ -174,9 +186,11 @@ class Sites {
         }
     }
 
+    // Compares the two patches of a pair and adds the result to both.
     void compare(const TilePair& pair, const std::vector<float>& directError) {
         Site &a = of(pair.first), &b = of(pair.second);
-        // A gradient at the border looks to one side only: beside another one it says nothing.
+        // The gradient of a patch at a border is one-sided. The pair is used only if the other
+        // patch lies inside.
         if (!a.hasGradient || !b.hasGradient || (!a.isInside() && !b.isInside())) return;
         const glm::vec2 dA = a.offset(b), dB = -b.offset(a);
         const glm::vec2 acrossA(-dA.y, dA.x), acrossB(-dB.y, dB.x);
@@ -184,7 +198,7 @@ class Sites {
         const glm::vec3 mixed = slope(b.gradient[0], acrossB) - slope(a.gradient[0], acrossA);
         const float cosine =
             glm::dot(patches.normal(2 * pair.first), patches.normal(2 * pair.second));
-        // The square of the angle.
+        // The square of the angle between the two planes.
         const float turn = 2 * std::max(0.0f, 1 - cosine);
         float step = 0;
         if (a.isInside() && b.isInside()) {
@@ -193,7 +207,7 @@ class Sites {
                 lightOfSources(pair.second) - lightOfSources(pair.first) - foretold;
             const float errorA = directError[sideOf(pair.first)];
             const float errorB = directError[sideOf(pair.second)];
-            // The error is that of the brightest channel.
+            // The standard error is that of the brightest channel, here assumed for all three.
             const glm::vec3 bend = slope(b.gradient[1], dB) - slope(a.gradient[1], dA);
             step = std::max(0.0f, glm::dot(off, off) - glm::dot(bend, bend)) -
                    3 * kDisagreementNoise * 0.5f * (errorA * errorA + errorB * errorB);
@@ -203,7 +217,7 @@ class Sites {
             site->straight += glm::dot(straight, straight);
             site->mixed += glm::dot(mixed, mixed);
             site->turn += turn;
-            // Each patch has half of what lies between two.
+            // Each of the two patches gets half of a step between them.
             site->step += 0.5f * step;
         }
     }
@@ -211,10 +225,10 @@ class Sites {
     const Patches& patches;
     const rb_side side;
     const Irradiance& irradiance;
-    const uint32_t first;  // patch
+    const uint32_t first;  // index of the first patch
     std::vector<Site> sites;
-    std::vector<TilePair> pairs;  // of neighbours that both count
-    size_t looked = 0;            // at pairs
+    std::vector<TilePair> pairs;  // of neighbours that can both be compared
+    size_t looked = 0;            // number of pairs, for cancellation
 };
 
 }  // namespace
