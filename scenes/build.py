@@ -41,8 +41,7 @@ def build_scene(name: str, folder: Path = FOLDER, density: float = 1.0) -> Path:
 
 
 def summary(path: Path) -> str:
-    """Returns one line about the open scene: its objects and faces, and those that a render shows.
-    """
+    """Returns one line about the open scene: its objects and faces, and those in a render."""
     graph = bpy.context.evaluated_depsgraph_get()
     own = [item for item in bpy.context.view_layer.objects
            if item.type == "MESH" and not item.hide_render]

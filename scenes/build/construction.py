@@ -182,8 +182,7 @@ class Diffuse:
 
 @dataclass(frozen=True)
 class Emission:
-    """A surface that emits ``colour * strength``, its radiance in W/(m^2 sr), and reflects nothing.
-    """
+    """A surface that emits the radiance ``colour * strength``, W/(m^2 sr), and reflects nothing."""
 
     colour: Colour
     strength: float
@@ -287,8 +286,7 @@ def new_mesh(name: str, shape: Shape, materials: Sequence[bpy.types.Material]
 
 def add_object(name: str, data: bpy.types.ID | None,
                collection: bpy.types.Collection | None = None) -> bpy.types.Object:
-    """Returns a new object with this data, linked to the collection, or else to that of the scene.
-    """
+    """Returns a new object with this data, linked to the collection or else to the scene's."""
     result = bpy.data.objects.new(name, data)
     (collection or bpy.context.scene.collection).objects.link(result)
     return result
