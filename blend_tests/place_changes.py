@@ -120,8 +120,7 @@ SHEAR = Matrix(((1.0, 0.4, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)
 
 
 def _prepare_shear() -> None:
-    """Moves lamps as the shear does, but keeps their shape, since they have no mesh to be sheared.
-    """
+    """Moves lamps as the shear does, but keeps their shape: they have no mesh to be sheared."""
     apply_modifiers()
     bpy.context.view_layer.update()
     for item in items():

@@ -129,11 +129,12 @@ def off_contact_edges(items: Sequence[bpy.types.Object]) -> dict[str, np.ndarray
     At a contact edge the point sample of Cycles is arbitrary, because it may be on either side of
     the contact. A vertex is off contact edges if two conditions hold:
 
-    - No other surface (another object, or another loose part of its own mesh) touches its own surface
-      within the longest edge at the vertex. A nearer contact crosses a face at the vertex. The light
-      on this face jumps where the mesh has no edge, as on a floor beside a box that does not fit the
-      floor's grid. The neighbours of a vertex on a room's edge, one edge away, are off this contact.
-      A surface that is near but does not touch, such as a lamp below a ceiling, is no contact.
+    - No other surface (another object, or another loose part of its own mesh) touches its own
+      surface within the longest edge at the vertex. A nearer contact crosses a face at the vertex.
+      The light on this face jumps where the mesh has no edge, as on a floor beside a box that does
+      not fit the floor's grid. The neighbours of a vertex on a room's edge, one edge away, are off
+      this contact. A surface that is near but does not touch, such as a lamp below a ceiling, is no
+      contact.
     - No concave edge of its own mesh ends at the vertex.
     """
     parts = [part for item in items for part in _loose_parts(item)]

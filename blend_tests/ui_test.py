@@ -70,8 +70,7 @@ def show_panel() -> None:
 
 
 def screenshot(path: Path) -> np.ndarray:
-    """Saves a picture of the window. Returns (height, width, 3) in 0..1, first row at the bottom.
-    """
+    """Saves a picture of the window. Returns (height, width, 3) in 0..1, bottom row first."""
     with bpy.context.temp_override(window=window(), area=properties_area()):
         bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=2)
         bpy.ops.screen.screenshot(filepath=str(path), check_existing=False)

@@ -18,8 +18,7 @@ LOWER = np.array((0.3, 0.4, 0.5))
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene, and stores the exact light (irradiance / pi) for the tessellation's areas.
-    """
+    """Fills the scene, and stores the exact light (irradiance / pi) for its tessellation."""
     strength = float(RADIANCE.max())
     mesh = bpy.data.meshes.new("sphere")
     shape = bmesh.new()
