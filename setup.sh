@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# What ./bake and ./test have in common: missing Debian packages are installed (as root or with sudo; else they are
-# named and the command stops), and the native library is configured and built as far as it is out of date.
-# Sourced with the repository root as working directory.
+# Functions for ./bake, ./test and other scripts, which source this file with the repository root as working
+# directory: they install missing Debian packages, and configure and build the native library if it is out of date.
 
 bake_packages=(blender python3-numpy g++ cmake ninja-build libembree-dev libglm-dev libopenmesh-dev libtbb-dev
     libeigen3-dev nlohmann-json3-dev)
-# The window of the UI test is drawn by Mesa in software, figures by Matplotlib.
+# Mesa draws the window of the UI test in software. Matplotlib draws figures.
 test_packages=(libgtest-dev librapidcheck-dev python3-pytest python3-matplotlib xvfb xauth xdotool libgl1-mesa-dri
     libegl-mesa0)
-# Clang's sanitizers, and what names the lines in their reports.
+# Clang with its sanitizers, and LLVM, which adds line numbers to their reports.
 sanitizer_packages=(clang libclang-rt-14-dev llvm)
 
+# require_packages PACKAGE ...: installs Debian packages that are missing, as root or with sudo. Without these rights
+# prints the command that installs them and exits.
 require_packages() {
     local missing=() package
     for package in "$@"; do
@@ -32,9 +33,10 @@ require_packages() {
         apt-get install -q -y --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# Sets blender to BLENDER's or the first on PATH, as the caller has it, and gives what is started from here on an
-# environment of its own: Debian's Blender takes its Python's folders from the python3 that it finds on PATH, which
-# in a virtual environment, or after another Python was installed, has no numpy.
+# Sets the variable blender to the program that BLENDER names, or else to the first Blender on the caller's PATH. Then
+# makes the environment of all further commands independent of the caller's Python: Debian's Blender takes the folders
+# of its Python from the python3 that is first on PATH. In a virtual environment, or after another Python was
+# installed, this python3 has no numpy.
 use_own_environment() {
     blender=$(command -v "${BLENDER:-blender}") ||
         { echo "${BLENDER:-blender}: there is no such program" >&2; exit 1; }
@@ -42,7 +44,9 @@ use_own_environment() {
     export PATH=/usr/bin:/bin:$PATH
 }
 
-# build TESTS [TARGET ...]: TESTS is ON or OFF. Tests use the Blender of use_own_environment, if that was called.
+# build TESTS [TARGET ...]: configures the library if needed and builds the targets, or all. TESTS, ON or OFF, is
+# whether tests are configured. They use the Blender of use_own_environment, if that function was called before. On a
+# failure prints the log and exits.
 build() {
     local log=build/release.log cache=build/release/CMakeCache.txt options=("RAYBUNDLE_TESTS:BOOL=$1") option
     local is_configured=true

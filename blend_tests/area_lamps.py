@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Area lights in place of emissive faces, for references.
+"""Area lights in place of emissive faces, for references by Cycles.
 
-Cycles (3.4) samples large emissive meshes with an error that no number of samples lessens: beside
-the lamps of `big_room` it is 3 to 9 % below the integral (docs/validation.md). Area lights it
-samples by their solid angle, without error.
+Cycles 3.4 samples large emissive meshes with an error that more samples do not reduce: beside the
+lamps of `big_room` its light is 3 to 9 % below the integral (docs/validation.md). It samples area
+lights by their solid angle, without this error.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ import numpy as np
 from mathutils import Matrix, Vector
 from raybundle.light_export import area_light_radiance
 
-GAP = 1e-3  # m, between a light and the face that it stands for
+GAP = 1e-3  # distance of a light from the face that it replaces, m
 
 
 @contextmanager
 def area_lamps() -> Iterator[None]:
-    """Faces whose material has one Emission node, a constant, shine as lights.
+    """Replaces emissive faces by area lights within a `with` statement.
 
-    A rectangle becomes one of the same size; any other face, which should be near a regular
-    polygon, a disk of its area. Backs shine too, but inside closed meshes, and of materials that
-    mix the node with others, by the side that is looked at.
+    This holds for faces whose material has exactly one Emission node, with constant inputs. A
+    rectangle is replaced by a rectangular light of equal size. Any other face, which should be
+    nearly a regular polygon, is replaced by a disk of equal area. Each face gets a light on its
+    front. It also gets one on its back, unless its mesh is closed or its material mixes the
+    Emission node with another shader for the other side.
     """
     nodes = {material: node for material in bpy.data.materials
              if (node := _emission_node(material)) is not None}
@@ -72,7 +74,7 @@ def _is_mixed(emission: bpy.types.Node) -> bool:
 
 def _place_light(item: bpy.types.Object, face: bpy.types.MeshPolygon, node: bpy.types.Node,
                  side: float) -> bpy.types.Object:
-    """side: 1 for the front, -1 for the back."""
+    """Adds the light that replaces one side of a face. side: 1 for the front, -1 for the back."""
     corners = [item.matrix_world @ item.data.vertices[index].co for index in face.vertices]
     first, second = corners[1] - corners[0], corners[-1] - corners[0]
     normal = side * first.cross(second).normalized()
@@ -87,7 +89,7 @@ def _place_light(item: bpy.types.Object, face: bpy.types.MeshPolygon, node: bpy.
     data.energy = (node.inputs['Strength'].default_value
                    / float(area_light_radiance(np.ones(3), area)[0]))
     light = bpy.data.objects.new("lamp", data)
-    # It shines along its -Z.
+    # An area light emits along its -Z axis.
     right = first.normalized()
     turn = Matrix((right, (-normal).cross(right), -normal)).transposed()
     light.matrix_world = (Matrix.Translation(sum(corners, Vector()) / len(corners) + GAP * normal)

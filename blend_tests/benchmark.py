@@ -1,26 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""Run time against error: Raybundle's bake and Cycles' vertex bake, interleaved in one run.
+r"""Compares run time and error of Raybundle's bake and Cycles' vertex bake, run in turns.
 
     blender -b --factory-startup -P blend_tests/benchmark.py -- \
         [--scenes cornell_box big_room] [--runs 5] [--set name=value ...] [--threads 0] \
         [--surface SAMPLES] [--out FILE.json]
 
-Each run bakes once with Raybundle (output LIGHTING, nothing kept from the run before) and with
-Cycles at 64, 256 and 1024 samples (Diffuse, direct and indirect, all objects at once, every bounce,
-no denoising). Times are those a user waits for, and medians over the runs. Two errors, both the
-relative RMSE over RGB, weighted by area, over all objects:
+Each run bakes once with Raybundle (output LIGHTING, without data of the previous run) and with
+Cycles at 64, 256 and 1024 samples (Diffuse, direct and indirect, all objects at once, all bounces,
+no denoising). Times are the times that a user waits, as medians over the runs. There are two
+errors. Each is the relative RMSE over RGB of all objects, weighted by area:
 
-vertex   Against scenes/NAME.cycles.npz (README there) at vertices off contact edges. Cycles has
-         point samples, as the reference, and only noise; Raybundle's values are those whose
-         interpolation is nearest to the light on the faces, which on coarse faces differ from point
-         samples; with --set reconstruction=POINT they are point samples too.
-surface  What is seen: the values, interpolated over the faces, against Cycles at points inside the
-         faces (--surface gives the samples of that reference; it is made first, which takes time).
+vertex   against scenes/NAME.cycles.npz (see the README there), at the vertices off contact edges.
+         Cycles computes point samples, as the reference does, and has only noise. Raybundle's
+         values are those whose interpolation is nearest to the light on the faces. On coarse faces
+         they differ from point samples. With --set reconstruction=POINT they are point samples
+         too.
+surface  the visible error: the values, interpolated over the faces, against Cycles at points inside
+         the faces. --surface gives the number of samples of this reference. The reference is made
+         first, which takes time.
 
-For equal error Cycles' time is interpolated in the logarithms of time and error, and extrapolated
-with error ~ time^-1/2 as long as noise is its error. Where more samples do not help it any more
-(its surface error at contacts and shadow edges), there is no such time. --out appends one line of
-JSON per scene.
+The time that Cycles needs for an equal error is interpolated in the logarithms of time and error.
+It is extrapolated with error ~ time^-1/2 as long as the error of Cycles is noise. If more samples
+no longer reduce its error (the surface error at contacts and edges of shadows), there is no such
+time. --out appends one line of JSON for each scene.
 """
 
 from __future__ import annotations
@@ -54,13 +56,15 @@ from surface_reference import Light, SurfaceReference, joined_error  # noqa: E40
 SCENES = HERE.parent / "scenes"
 CYCLES_SAMPLES = (64, 256, 1024)
 ERRORS_OF_INTEREST = (0.05, 0.02, 0.01)
-# With four times the samples noise is halved; an error that keeps more than this is something else.
+# Four times the samples halve noise. An error of which more than this share remains is not noise.
 STILL_NOISE = 0.7
 RAYBUNDLE = "Raybundle"
 
 
 @dataclass
 class Contestant:
+    """A method that is compared: its times, s, and its errors, one for each run."""
+
     name: str
     seconds: list[float] = field(default_factory=list)
     vertex: list[SurfaceError] = field(default_factory=list)
@@ -119,7 +123,7 @@ def bake_cycles(objects: Sequence[bpy.types.Object], samples: int, seed: int
 
 
 class VertexReference:
-    """Cycles' light at the corners, and which of them are compared."""
+    """The light of Cycles at the corners, and the weights of the corners that are compared."""
 
     def __init__(self, name: str, objects: Sequence[bpy.types.Object]) -> None:
         self._values = load(SCENES / f"{name}.cycles.npz")
@@ -163,7 +167,7 @@ def run_scene(name: str, options: argparse.Namespace) -> dict:
                 seconds, light, report = bake_raybundle(objects)
                 reports.append(report)
             else:
-                # The reference has seed 0.
+                # The reference was made with seed 0.
                 seconds, light = bake_cycles(objects, key, 1 + run)
             contestant.seconds.append(seconds)
             for kind, reference in references.items():
@@ -183,7 +187,10 @@ def run_scene(name: str, options: argparse.Namespace) -> dict:
 
 
 def time_ratios(contestants: dict, kind: str) -> dict[str, dict]:
-    """Times of Cycles over Raybundle's, at its error and at fixed ones, or why there is none."""
+    """Returns Cycles' time divided by Raybundle's, at Raybundle's error and at fixed errors.
+
+    If there is no ratio, the note of the entry says why.
+    """
     own = contestants[RAYBUNDLE]
     own_error = own.median_error(kind)
     cycles = [contestants[samples] for samples in CYCLES_SAMPLES]
@@ -203,7 +210,7 @@ def time_ratios(contestants: dict, kind: str) -> dict[str, dict]:
 
 
 def _time_at(cycles: Sequence[Contestant], kind: str, error: float) -> float | None:
-    """None if more samples do not bring Cycles to this error."""
+    """Returns the time in which Cycles has this error, s; None if more samples do not reach it."""
     errors = np.array([entry.median_error(kind) for entry in cycles])
     seconds = np.array([entry.median_seconds() for entry in cycles])
     if error > errors[0]:
@@ -212,7 +219,7 @@ def _time_at(cycles: Sequence[Contestant], kind: str, error: float) -> float | N
         if errors[-1] > STILL_NOISE * errors[-2]:
             return None
         return float(seconds[-1] * (errors[-1] / error) ** 2)
-    # np.interp wants rising abscissae.
+    # np.interp requires ascending abscissae.
     return float(np.exp(np.interp(-np.log(error), -np.log(errors), np.log(seconds))))
 
 

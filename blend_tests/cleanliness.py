@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How clean each object is at the default: noise where it is seen.
+"""Measures the noise of each object at the default settings, where it is seen.
 
     blender -b --factory-startup -P blend_tests/cleanliness.py -- \\
         [SCENE ...] [--target 0.02 ...] [--seeds 1] [--converged 0.0015] [--work build/cleanliness]
         [--stated]
 
-Of LIGHTING, at the corners of each object: the difference between a bake and one that has converged
-(--converged, another seed; kept in --work until it is deleted), relative to the light there;
-light below 5 % of the scene's mean counts as 5 %. Printed are the 95th percentiles of all objects
-together, of the worst and how many objects are above 3 and 4 %. With --stated nothing is compared:
-printed is what noise each target costs and gets by the report, and what that says of it. SCENE: a
-name of scenes/, a file, or room:NAME (lamp_rooms.py); without any, all of scenes/.
+Bakes LIGHTING, and compares it at the corners of each object with a converged bake (with the target
+--converged and another seed; it is kept in the folder --work until it is deleted). Differences are
+relative to the light at the corner. Light below 5 % of the scene's mean counts as 5 %. The table
+shows the 95th percentile of all objects together, that of the worst object, and the number of
+objects above 3 and 4 %. With --stated nothing is compared. The table then shows, for each target,
+the time of a bake, and the noise and the first warning about noise in its report. SCENE is the name
+of a scene in scenes/, a file, or room:NAME (lamp_rooms.py). By default all scenes in scenes/ are
+baked.
 """
 
 from __future__ import annotations
@@ -34,20 +36,22 @@ import raybundle  # noqa: E402
 from object_light import SCENES, open_file  # noqa: E402
 from surface_error import corner_areas, read_colors  # noqa: E402
 
-DARK = 0.05  # of the scene's mean: what is darker counts as that
+DARK = 0.05  # share of the scene's mean light; darker light counts as this share
 CLEAN, MOST = 0.03, 0.04
 SEED_OF_CONVERGED = 1000
 
 
 @dataclass
 class Baked:
+    """The result of a bake."""
+
     light: dict[str, np.ndarray]  # (corners, 3) per object
     areas: dict[str, np.ndarray]  # (corners,) m^2
     bundles: int
     seconds: float
     noise: float
-    noisiest: tuple[float, str]  # what the report states of an object, which
-    said: str  # first warning of noise, or of what is noisy
+    noisiest: tuple[float, str]  # stated noise and name of the object with the most noise
+    said: str  # first warning about noise
 
 
 def bake(scene: str, target: float, seed: int, settings: dict[str, str]) -> Baked:
@@ -80,7 +84,7 @@ def converged(scene: str, target: float, settings: dict[str, str], work: Path
 
 
 def differences(baked: Baked, reference: dict[str, np.ndarray]) -> dict[str, float]:
-    """The 95th percentile of each object's; all together by the key ''."""
+    """Returns the 95th percentile of each object's differences; '' is the key of that of all."""
     total = sum(areas.sum() for areas in baked.areas.values())
     mean = sum(baked.areas[name] @ reference[name].mean(axis=1) for name in reference) / total
     off = {name: np.abs(baked.light[name] - truth).max(axis=1)

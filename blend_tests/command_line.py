@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Command lines of the programs in this folder that run inside Blender.
 
-Blender keeps all it is given after `--` for the script that it runs.
+Blender leaves all arguments after `--` to the script that it runs.
 """
 
 import argparse
@@ -10,11 +10,14 @@ from pathlib import Path
 
 
 def arguments() -> list[str]:
-    """Those after `--`, none if there is no `--`."""
+    """Returns the arguments after `--`, or none if there is no `--`."""
     return sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
 
 
 def parser(script: str, description: str) -> argparse.ArgumentParser:
-    """script: its __file__; description: its __doc__, whose lines are kept as they are."""
+    """Returns a parser of a script's arguments.
+
+    script: its `__file__`. description: its `__doc__`, whose line breaks are kept.
+    """
     return argparse.ArgumentParser(prog=Path(script).name, description=description,
                                    formatter_class=argparse.RawDescriptionHelpFormatter)

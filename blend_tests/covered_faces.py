@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces that something lies against: nobody sees them, and what is stored there is arbitrary.
+"""Faces that another surface lies against. They are invisible, and their stored light is arbitrary.
 
-A face attribute tells them, which follows the faces when objects are joined or cut up.
+A face attribute marks them, which stays with the faces when objects are joined or cut up.
 """
 
 from __future__ import annotations
@@ -11,21 +11,22 @@ import numpy as np
 from mathutils.bvhtree import BVHTree
 from surface_error import corner_vertices, face_means, face_sizes, world_positions
 
-COVERED = "raybundle_covered"  # face attribute: 1 where something lies against the face
-# Of the diagonal of all, and of a face: what is nearer lies against it.
+COVERED = "raybundle_covered"  # face attribute: 1 if something lies against the face
+# Surfaces lie against each other if their distance is smaller than these shares of the diagonal of
+# all objects and of the size of the face.
 TOUCH, TOUCH_OF_FACE = 2e-5, 1e-2
 
 
 def covered_faces(found: list[bpy.types.Object]) -> dict[str, np.ndarray]:
-    """(faces,) by object name: whether another face lies against some of the face.
+    """Returns (faces,) masks by object name: whether another face lies against some of the face.
 
-    Looked for at a tenth of the way from the corners to the centre, half-way and there; those that
-    share a vertex with the face are its neighbours.
+    Other faces are searched for at a tenth of the way from each corner to the centre, half-way, and
+    at the centre. Faces that share a vertex with the face are its neighbours and do not count.
     """
     sizes = [face_sizes(item.data) for item in found]
     places = [world_positions(item) for item in found]
     begins = np.cumsum([0, *map(len, places)])
-    # By corner, in all of them.
+    # Per corner of all objects.
     vertices = np.concatenate([corner_vertices(item.data) + begin
                                for item, begin in zip(found, begins)])
     corners = np.concatenate(places).astype(float)[vertices]
@@ -52,7 +53,10 @@ def covered_faces(found: list[bpy.types.Object]) -> dict[str, np.ndarray]:
 
 
 def mark_covered(covered: dict[str, np.ndarray]) -> None:
-    """As `covered_faces` found them; what shares a mesh is covered where one of them is."""
+    """Stores the result of `covered_faces` in the meshes.
+
+    A face of a shared mesh is marked if it is covered in one of the objects that share the mesh.
+    """
     for name, faces in covered.items():
         mesh = bpy.data.objects[name].data
         attribute = mesh.attributes.get(COVERED) or mesh.attributes.new(COVERED, 'INT', 'FACE')

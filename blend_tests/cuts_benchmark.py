@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""Run time against error without and with the patches that a setting cuts, interleaved in one run.
+r"""Compares run time and error without and with the cuts of a setting, in turns.
 
-    blender -b --factory-startup -P blend_tests/cuts_benchmark.py -- contacts|refine \\
+    blender -b --factory-startup -P blend_tests/cuts_benchmark.py -- contacts|refine \
         SCENE [SCENE ...]
 
 Errors are relative RMSEs of the baked corners, weighted by area, against a bake with patches of
-half the size and 1024 bundles: the noise and what larger patches do, without what the mesh itself
-cannot show. In house_on_plain and laid_table, where patches of half the size everywhere would be
-too many, it is the surface error of the small objects against Cycles, whose noise is taken out.
-Per scene and setting a row of: seconds, error, stated error (of noise and discretisation),
-patches and bundles at falling targets, each the median over the seeds.
+half the size and 1024 bundles. They consist of noise and of the error of larger patches, but not of
+what the mesh itself cannot show. In house_on_plain and laid_table, patches of half the size
+everywhere would be too many. There the error is the surface error of the small objects against
+Cycles, without the noise of Cycles. For each scene and value of the setting, a row shows seconds,
+error, stated error (noise and discretisation), patches and bundles at decreasing targets, each as
+the median over the seeds.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ SWITCHES = ("contacts", "refine")
 TARGETS = (0.08, 0.04, 0.02, 0.01)
 SEEDS = range(3)
 REFERENCE_BUNDLES, REFERENCE_SEED = 1024, 77
-# The automatic patch size is a 64th of the diagonal.
+# Share of the diagonal. The automatic patch size is a 64th of the diagonal.
 REFERENCE_SHARE = 1 / 128
 CYCLES_SAMPLES = 256
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small scenes baked by Cycles and by Raybundle, compared object by object.
+"""Compares small scenes baked by Cycles and by Raybundle, object by object.
 
-Cycles bakes with two seeds of SAMPLES each. The mean over an object has thousands of them; how far
-the two are apart, which says how noisy their mean is, is asserted to stay below NOISE. Raybundle
-bakes with `reconstruction` POINT: the same point samples at the vertices, so that a shadow's edge
-inside a face makes no difference.
+Cycles bakes with two seeds of SAMPLES samples each. The mean over an object contains thousands of
+samples. The difference between the two seeds shows the noise of their mean, which is asserted to be
+below NOISE. Raybundle bakes with `reconstruction` POINT, whose values are point samples at the
+vertices as those of Cycles are, so that the edge of a shadow inside a face makes no difference.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from cycles_reference import bake_objects
 from surface_error import read_colors
 
 SAMPLES = 128
-NOISE = 0.003  # of the mean over an object, of the two seeds together
-# Relative, of the mean over an object and all channels that are lit.
+NOISE = 0.003  # relative noise of the mean over an object, of both seeds together
+# Relative tolerance of the mean over an object, in each channel.
 MEAN_TOLERANCE = 0.01
 
 
 def square(size: float, cells: int) -> tuple[list, list]:
-    """Vertices, row by row, and faces of a square about the origin that looks up."""
+    """Returns vertices, row by row, and faces of an upward square, centred on the origin."""
     steps = np.linspace(-size / 2, size / 2, cells + 1)
     row = cells + 1
     return ([(x, y, 0.0) for y in steps for x in steps],
@@ -34,7 +34,10 @@ def square(size: float, cells: int) -> tuple[list, list]:
 
 def cycles_light(items: Sequence[bpy.types.Object], passes=("DIRECT", "INDIRECT"),
                  kind: str = "DIFFUSE", samples: int = SAMPLES) -> dict[str, np.ndarray]:
-    """(corners, 3) by name."""
+    """Returns the light that Cycles bakes: (corners, 3) by object name.
+
+    Asserts that its noise is below NOISE.
+    """
     first, second = (bake_objects(items, samples, seed, kind, frozenset(passes))
                      for seed in (0, 1))
     for name in first:
@@ -46,7 +49,7 @@ def cycles_light(items: Sequence[bpy.types.Object], passes=("DIRECT", "INDIRECT"
 
 def raybundle_light(items: Sequence[bpy.types.Object], output: str = 'LIGHTING', **settings
                     ) -> dict[str, np.ndarray]:
-    """(corners, 3) by name."""
+    """Returns the light that Raybundle bakes: (corners, 3) by object name."""
     values = {'target_error': 0.005, 'reconstruction': 'POINT', 'output': output, **settings}
     raybundle.bake(bpy.context, **values)
     return {item.name: read_colors(item) for item in items}
@@ -54,12 +57,16 @@ def raybundle_light(items: Sequence[bpy.types.Object], output: str = 'LIGHTING',
 
 def assert_same_mean(actual: dict[str, np.ndarray], expected: dict[str, np.ndarray],
                      tolerance: float = MEAN_TOLERANCE, scale: dict | None = None) -> None:
-    """scale: values by name that the tolerance is a share of, instead of those expected."""
+    """Asserts that the means of objects agree in each channel.
+
+    The tolerance is relative to the mean of `scale`, values by object name, or of `expected` by
+    default.
+    """
     for name, values in expected.items():
         mean = values.mean(axis=0)
         size = (scale or expected)[name].mean()
         difference = np.abs(actual[name].mean(axis=0) - mean).max()
-        # Shown by pytest -s.
+        # `pytest -s` shows this.
         print(f"{name}: {mean.round(4).tolist()}, difference "
               f"{100 * difference / max(size, 1e-9):.2f} %")
         assert difference <= tolerance * size + 1e-6, \

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A scene as the native library gets it, as JSON for the programs of native/bench.
+"""Writes a scene, as the native library gets it, as JSON for the programs of native/bench.
 
     blender -b --factory-startup [FILE.blend] -P blend_tests/export_scene.py -- OUT.json \\
         [--show COLLECTION ...] [--hide COLLECTION ...] [--room NAME]
 
-The scene is exported by the add-on itself. --show and --hide include and exclude collections of the
-view layer first: scenes/office.blend has its lamps in lamps_up and lamps_down. --room exports one of
-lamp_rooms.py instead of a file. The .blend file is never saved. The format, read by
-native/bench/scene_file.cpp, is that of SceneData: one list per kind, arrays flat, a surface and its
-parts as objects, indices are positions in the lists; fields that are None are left out.
+The add-on exports the scene. --show and --hide first include collections in the view layer and
+exclude collections from it: scenes/office.blend has its lamps in lamps_up and lamps_down. --room
+exports a room of lamp_rooms.py instead of a file. The .blend file is never saved. The format is
+that of SceneData and is read by native/bench/scene_file.cpp. It has one list per kind. Arrays are
+flat, surfaces and their parts are objects, and indices are positions in the lists. Fields that are
+None are left out.
 """
 
 from __future__ import annotations

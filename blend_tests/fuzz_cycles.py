@@ -1,27 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random scenes (fuzz_scenes.py), baked at the defaults and by Cycles, object by object.
+"""Bakes random scenes (fuzz_scenes.py) at the defaults, and compares each object with Cycles.
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/fuzz_cycles.py -- FIRST LAST \\
         [--samples 128] [--json FILE]
 
-For each seed from FIRST to LAST a line:
+Prints a line for each seed from FIRST to LAST:
 
-    light      of the object that is worst for what it may be: deviation of the mean by area of
-               LIGHTING, the channel that is most off, from Cycles' mean, relative to that (or to
-               5 % of the scene's mean light, if that is more). It may be 6 %, or three times the
-               noise of both, if that is more: that which Raybundle states of the object, and
-               Cycles' own, from two bakes of half the samples
-    smooth     the same of objects that are shaded smooth, which do not count: Cycles lights them
-               by the vertices' normals
-    balance    of energy, at most 1 %
+    light      deviation of the mean light of an object (LIGHTING, by area, the channel with the
+               largest deviation) from that of Cycles, relative to the latter, or to 5 % of the
+               scene's mean light if that is more. Shown for the object with the largest deviation
+               relative to its limit. The limit is 6 %, or three times the noise of both if that is
+               more: the noise that Raybundle states for the object, and that of Cycles, from two
+               bakes with half of the samples each
+    smooth     the same of objects that are shaded smooth. They do not count, because Cycles uses
+               the normals of their vertices for lighting
+    balance    error of the energy balance, at most 1 %
     bundles    at most 4000
 
-Cycles bakes probes: a quarter of each face, in its middle and just above it, that no ray meets. So
-its values are at four points inside each quad, whose mean is that of the face, and none is at an
-edge. The light of emissive meshes is found without sampling them as lights: with it Cycles 3.4 is
-some per cent too dark beside them (docs/validation.md). Without it, rare bright paths from a small
-one are missing more often than two bakes tell, and four points miss a bright spot that is smaller
-than a face: an object that is too far off is compared again, with lamps sampled and with 64 points.
+Cycles bakes probes: faces of a quarter of each face, in its middle and just above it, which no ray
+meets. Its values are therefore at four points inside of each quad, whose mean is that of the face,
+and no value is on an edge. The light of emissive meshes is found without sampling them as lights.
+If they are sampled, Cycles 3.4 is some per cent too dark beside them (docs/validation.md). Without
+sampling, rare bright paths from a small emissive mesh are missing more often than two bakes show.
+Moreover, four points miss a bright spot that is smaller than a face. An object whose deviation is
+too large is therefore compared again, with sampled lamps and 64 points per face.
 """
 
 from __future__ import annotations
@@ -49,13 +51,16 @@ from surface_error import (  # noqa: E402
     corner_areas, corner_vertices, face_means, face_sizes, read_colors, world_positions)
 
 LIGHT, NOISES, DARK, BALANCE, BUNDLES = 0.06, 3.0, 0.05, 0.01, 4000
-HEIGHT = 1e-3  # of a probe above its face, of the face's size
-# Rays of a kind that no scene here has: without any Cycles leaves an object out.
+HEIGHT = 1e-3  # height of a probe above its face, relative to the size of the face
+# Kinds of rays that do not meet the probes. Without any kind of ray Cycles would leave an object
+# out. One kind remains, which no scene here uses.
 INVISIBLE = ("camera", "diffuse", "glossy", "transmission", "shadow")
 
 
 @dataclass
 class ObjectLight:
+    """The deviation of an object's mean light from that of Cycles, and its limit, both relative."""
+
     name: str
     is_smooth: bool
     deviation: float
@@ -67,6 +72,8 @@ class ObjectLight:
 
 @dataclass
 class Outcome:
+    """The comparison of one scene."""
+
     seed: int
     kind: str
     objects: list[ObjectLight] = field(default_factory=list)
@@ -84,7 +91,7 @@ class Outcome:
 
 
 def add_probe(item: bpy.types.Object) -> bpy.types.Object:
-    """Its corners are those of the object's faces, half-way to the faces' centres."""
+    """Adds a probe. Its corners are half-way from those of the object's faces to their centres."""
     mesh = item.data
     corners = world_positions(item)[corner_vertices(mesh)].astype(float)
     sizes = face_sizes(mesh)
@@ -137,23 +144,26 @@ def is_smooth(item: bpy.types.Object) -> bool:
 
 @dataclass(frozen=True)
 class CyclesLight:
-    """At the corners of an object's probe."""
+    """The light that Cycles bakes at the corners of an object's probe."""
 
-    areas: np.ndarray  # (corners,) m^2
-    halves: np.ndarray  # (2, corners, 3): independent bakes of half the samples
+    areas: np.ndarray  # (corners,) areas, m^2
+    halves: np.ndarray  # (2, corners, 3): independent bakes with half of the samples each
 
     def mean(self) -> np.ndarray:
         return self.areas @ self.halves.mean(axis=0) / self.areas.sum()
 
     def noise(self) -> np.ndarray:
-        """(3,) of the mean: each value has its own random numbers."""
+        """Returns (3,) the noise of the mean. The random numbers of the values are independent."""
         difference = self.halves[0] - self.halves[1]
         return 0.5 * np.sqrt(self.areas ** 2 @ difference ** 2) / self.areas.sum()
 
 
 def cycles_light(items: list[bpy.types.Object], samples: int, lamps_are_sampled: bool = False,
                  cuts: int = 0) -> dict[str, CyclesLight]:
-    """By object name; cuts: of the edges of each face, for more points in it."""
+    """Returns the light of Cycles by object name.
+
+    cuts: number of cuts of each edge, for more points in each face.
+    """
     sample_emissive_meshes(lamps_are_sampled)
     copies = [_cut(item, cuts) for item in items]
     areas = [corner_areas(copy) for copy in copies]
@@ -164,7 +174,8 @@ def cycles_light(items: list[bpy.types.Object], samples: int, lamps_are_sampled:
     bakes = [bake_objects(probes, samples // 2, seed) for seed in (1, 2)]
     result = {}
     for item, probe, own in zip(items, probes, areas):
-        # The faces of a mirrored object run the other way round: the values are by vertex.
+        # The faces of a mirrored object have the reverse order of corners. The values are matched
+        # by vertex.
         vertices = corner_vertices(probe.data)
         halves = np.empty((2, len(vertices), 3))
         for half, bake in zip(halves, bakes):
@@ -219,7 +230,10 @@ def measure(seed: int, samples: int = 128) -> Outcome:
 
 def compare(items: list[bpy.types.Object], stated: dict[str, float],
             expected: dict[str, CyclesLight]) -> list[ObjectLight]:
-    """stated: noise by object name, relative."""
+    """Compares the light of objects with that of Cycles.
+
+    stated: relative noise by object name. expected: light of Cycles by object name.
+    """
     means = {name: light.mean() for name, light in expected.items()}
     areas = np.array([light.areas.sum() for light in expected.values()])
     dark = DARK * float(areas @ [mean.mean() for mean in means.values()] / areas.sum())

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Random scenes by seed, for fuzz_cycles.py: `build(seed)` fills an empty file.
 
-A room, a room with a window or open ground; 2 to 5 objects of eight shapes, turned, scaled unevenly
-and half of them mirrored, that neither overlap nor touch; a third of them emit; one to three lamps
-of any type; a world where it can be seen. All surfaces are Lambertian. A third of the round shapes
-are shaded smooth.
+A scene is a room, a room with a window, or open ground. It has 2 to 5 objects of eight shapes,
+which are rotated, scaled unevenly, half of them mirrored, and neither overlap nor touch. A third of
+them emit light. There are one to three lamps of any type, and a world if it can be seen. All
+surfaces are Lambertian. A third of the round shapes are shaded smooth.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ import math
 from collections.abc import Callable
 
 import bpy
-import lamp_rooms  # noqa: F401  (by which the construction of scenes is found)
+import lamp_rooms  # noqa: F401  (makes the package `build` of scenes importable)
 import numpy as np
 from build.construction import (Diffuse, Emission, FaceBlock, Shape, Sum, add_mesh, add_object, box,
                                 cylinder, grid, material, room, set_world, smooth, uv_sphere)
 from mathutils import Euler, Matrix, Vector
 
-GAP = 0.08  # m at least between objects, lamps and walls
+GAP = 0.08  # least distance between objects, lamps and walls, m
 TRIES = 200
 
-Sphere = tuple[np.ndarray, float]  # centre and radius of what is taken
+Sphere = tuple[np.ndarray, float]  # centre and radius of an occupied place, m
 
 
 def build(seed: int) -> str:
-    """What kind of scene it is."""
+    """Builds the scene of a seed and returns its kind: room, window or ground."""
     random = np.random.default_rng(seed)
     bpy.ops.wm.read_homefile(use_empty=True)
     kind = str(random.choice(("room", "window", "ground")))
@@ -98,7 +98,10 @@ def _torus(around: int = 20, across: int = 8) -> Shape:
 
 
 def _wave() -> Shape:
-    """Of triangles: its quads would not be plane, and be taken for other surfaces by others."""
+    """Returns a wavy sheet of triangles.
+
+    Its quads would not be plane, and Cycles and Raybundle would divide them differently.
+    """
     shape = grid((-1, -1, 0), (2, 0, 0), (0, 2, 0), 8, 8)
     x, y, _ = shape.vertices.T
     shape.vertices[:, 2] = 0.2 * np.sin(3.0 * x) * np.cos(2.0 * y)
@@ -106,7 +109,7 @@ def _wave() -> Shape:
     return Shape(shape.vertices, [FaceBlock(np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]))])
 
 
-# Of about radius 1 about the origin; whether they are round.
+# Shapes of a radius of about 1 around the origin, and whether they are round.
 SHAPES: tuple[tuple[str, Callable[[], Shape], bool], ...] = (
     ("box", lambda: box((1.2, 1.2, 1.2), (4, 4, 4), at=(0, 0, -0.6)), False),
     ("sphere", lambda: uv_sphere(1.0, 20, 10), True),
@@ -133,7 +136,7 @@ def add_object_at_random(random: np.random.Generator, number: int, size: np.ndar
     colour = tuple(random.uniform(0.1, 0.8, 3))
     shader = Diffuse(colour)
     if emits:
-        # About as much light from each, whatever its size.
+        # The power is about equal for objects of all sizes.
         shader = Sum(shader, Emission(tuple(random.uniform(0.3, 1.0, 3)),
                                       float(random.uniform(0.5, 2.0) / radius ** 2)))
     if place is None:
@@ -184,7 +187,7 @@ def add_lamp_at_random(random: np.random.Generator, number: int, size: np.ndarra
         light.size, light.size_y = random.uniform(0.2, 1.0, 2)
         radius = 0.5 * math.hypot(light.size, light.size_y)
     place = _free_place(random, size, radius, taken)
-    # Downwards, more or less.
+    # Approximately downwards.
     turn = random.uniform((-0.8, -0.8, -3.0), (0.8, 0.8, 3.0))
     if place is None:
         bpy.data.lights.remove(light)

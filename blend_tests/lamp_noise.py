@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The stated noise of each lamp's room against the true one: relations.py --noise.
+"""Compares the stated noise of each room of lamps with the true noise: relations.py --noise.
 
 Each room (lamp_rooms.py) is baked with several seeds at the targets 0.02 and 0.005. The true noise
-is the standard deviation over the seeds of the light at the corners, root mean square by area,
-relative to that of the light, as the report defines its `noise`. Eight seeds, four at the finer
-target, tell it to 10 to 30 %: bundles err alike on whole walls. What is stated must be 0.7 to 1.5 times the true one, and the
-target reached, or a warning name the light and the object where it is not.
+is the standard deviation over the seeds of the light at the corners, as a root mean square by area,
+relative to that of the light. The report defines its `noise` in this way. Eight seeds, or four at
+the finer target, determine it to 10 to 30 %, because bundles have correlated errors on whole walls.
+The stated noise must be 0.7 to 1.5 times the true noise. If the target is not reached, a warning
+must name the light and the object.
 """
 
 from __future__ import annotations
@@ -20,19 +21,23 @@ import numpy as np
 import raybundle
 from surface_error import corner_areas, read_colors
 
-SEEDS = {0.02: 8, 0.005: 4}  # by target
+SEEDS = {0.02: 8, 0.005: 4}  # number of seeds by target
 TARGETS = tuple(SEEDS)
 LEAST, MOST = 0.7, 1.5
-REACHED = 1.1  # groups of small patches may have a tenth more (docs/user_guide.md)
+# Largest noise, in multiples of the target. Groups of small patches may have a tenth more than the
+# target (docs/user_guide.md).
+REACHED = 1.1
 
 
 @dataclass(frozen=True)
 class RoomNoise:
+    """The relative noise of a room, and the cost of its bakes."""
+
     stated: float
     true: float
     bundles: int  # mean over the seeds
-    seconds: float  # likewise
-    warnings: tuple[str, ...]  # of the first seed's bake
+    seconds: float  # mean over the seeds
+    warnings: tuple[str, ...]  # of the bake with the first seed
 
     def failures(self, target: float) -> list[str]:
         found = []
@@ -48,7 +53,8 @@ def measure(room: str, target: float, cells: int = lamp_rooms.FINE) -> RoomNoise
     values, stated, bundles, seconds = [], [], [], []
     warnings: tuple[str, ...] = ()
     for seed in range(1, SEEDS[target] + 1):
-        # Lines of the bake before would be gone on with: a new file for each.
+        # A new file for each seed, because a bake would continue with the lines of the previous
+        # bake.
         lamp_rooms.build(room, cells)
         started = time.perf_counter()
         report = raybundle.bake(bpy.context, output='LIGHTING', domain='CORNER',
@@ -69,7 +75,7 @@ def measure(room: str, target: float, cells: int = lamp_rooms.FINE) -> RoomNoise
 
 
 def print_table(rooms: Sequence[str], quick: bool = False) -> int:
-    """How many rooms failed."""
+    """Prints a table of the rooms, and returns the number of rooms and targets that failed."""
     cells = lamp_rooms.COARSE if quick else lamp_rooms.FINE
     print("| room | target | noise stated | true | ratio | bundles | seconds | |\n"
           "|---|---|---|---|---|---|---|---|")

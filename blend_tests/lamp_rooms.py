@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One room with each kind of lamp: what relations.py and lamp_noise.py bake beside the scenes.
+"""Rooms with one kind of lamp each, which relations.py and lamp_noise.py bake beside the scenes.
 
-A room of 4 x 4 x 3 m, its walls objects of their own with the fronts to the inside, a box that
-stands across the floor's grid and a turned cube in the air. What brings the light is all that
-differs. A new kind of lamp adds its function and its row in ROOMS.
+Each is a room of 4 x 4 x 3 m, whose walls are separate objects with the fronts inside, with a box
+that does not fit the floor's grid and a rotated cube in the air. The rooms differ only in what
+gives light. A new kind of lamp adds a function and a row in ROOMS.
 """
 
 from __future__ import annotations
@@ -25,11 +25,14 @@ from surface_error import corner_vertices  # noqa: E402
 
 SIZE = (4.0, 4.0, 3.0)
 WALL, LAMP_REFLECTANCE = 0.6, 0.5
-FINE, COARSE = 4, 2  # cells of the walls along a metre
+FINE, COARSE = 4, 2  # cells of the walls per metre
 
 
 def build(name: str, cells: int = FINE) -> None:
-    """Fills an empty file with the room of that name."""
+    """Fills an empty file with the room of this name.
+
+    cells: cells of the walls per metre.
+    """
     bpy.ops.wm.read_homefile(use_empty=True)
     set_world()
     grey = material("grey", Diffuse((WALL, WALL, WALL)))
@@ -50,7 +53,7 @@ def build(name: str, cells: int = FINE) -> None:
 
 def _light(kind: str, location: tuple[float, float, float], power: float, **values
            ) -> bpy.types.Object:
-    """One that shines down; power: W, of a sun W/m^2."""
+    """Adds a lamp that shines down. power: W, or W/m^2 for a sun."""
     data = bpy.data.lights.new("lamp", kind)
     data.energy = power
     for name, value in values.items():
@@ -61,13 +64,13 @@ def _light(kind: str, location: tuple[float, float, float], power: float, **valu
 
 
 def _mesh_lamp(shape: Shape, radiance: float, name: str = "lamp") -> bpy.types.Object:
-    """It shines from both sides and reflects."""
+    """Adds an object that emits from both sides and reflects. radiance: W/(m^2 sr)."""
     grey = (LAMP_REFLECTANCE,) * 3
     return add_mesh(name, shape, material(name, Sum(Diffuse(grey), Emission((1, 1, 1), radiance))))
 
 
 def _window() -> None:
-    """The middle of the south wall is taken away."""
+    """Removes the middle of the south wall."""
     wall = bpy.data.objects["wall_south"]
     positions = np.empty(3 * len(wall.data.vertices), np.float32)
     wall.data.vertices.foreach_get('co', positions)
@@ -90,7 +93,7 @@ def _sun() -> None:
 
 
 def _sky() -> None:
-    """One that differs by direction, through a window."""
+    """Adds a window and a sky whose radiance depends on the direction."""
     _window()
     tree = bpy.context.scene.world.node_tree
     sky = tree.nodes.new("ShaderNodeTexSky")
@@ -107,7 +110,7 @@ def _panel(low: tuple[float, float], high: tuple[float, float], height: float,
 
 
 def _panel_on_wall() -> None:
-    """In the very plane of the wall."""
+    """Adds a panel exactly in the plane of the wall."""
     _mesh_lamp(grid((-0.5, 2, 1), (0, 0, 1), (1, 0, 0), 1, 1).flipped(), 10.0)
 
 
@@ -117,7 +120,7 @@ def _two_panels() -> None:
 
 
 def _subdivided() -> None:
-    """Two panels, and objects whose vertices are few beside the faces that modifiers make."""
+    """Adds two panels, and objects whose modifiers make many faces from few vertices."""
     _two_panels()
     grey = material("prop", Diffuse((0.5, 0.5, 0.6)))
     ball = add_mesh("ball", uv_sphere(0.35, 8, 6, at=(0, 0, 0)), grey)
@@ -129,16 +132,22 @@ def _subdivided() -> None:
 
 
 def coloured_dots(texels: int) -> np.ndarray:
-    """(texels, texels, 3) 8 x 8 of them, linear colours; texels: a multiple of 8."""
+    """Returns an image of 8 x 8 dots in linear colours, (texels, texels, 3).
+
+    texels: a multiple of 8.
+    """
     dots = np.random.default_rng(1).random((8, 8, 3)) ** 3
     return dots.repeat(texels // 8, axis=0).repeat(texels // 8, axis=1)
 
 
 def shine_by_image(item: bpy.types.Object, pixels: np.ndarray, places: np.ndarray) -> None:
-    """Gives the emission of an object's first material the colours of an image. pixels: (height,
-    width, 3) by row from below, linear; places: (vertices, 2) in the image, 0 to 1."""
+    """Gives the emission of an object's first material the colours of an image.
+
+    pixels: (height, width, 3) linear colours, rows from the bottom. places: (vertices, 2) positions
+    in the image, 0 to 1.
+    """
     height, width, _ = pixels.shape
-    image = bpy.data.images.new("screen", width, height, float_buffer=True)  # of linear colours
+    image = bpy.data.images.new("screen", width, height, float_buffer=True)  # with linear colours
     image.pixels = np.concatenate([pixels, np.ones((height, width, 1))], axis=2).ravel()
     image.pack()
     item.data.uv_layers.new().data.foreach_set(
@@ -151,7 +160,7 @@ def shine_by_image(item: bpy.types.Object, pixels: np.ndarray, places: np.ndarra
 
 
 def _screen() -> None:
-    """In front of the wall, it shines to the room."""
+    """Adds a screen in front of the wall that shines into the room."""
     shape = grid((-0.6, 1.9, 1.0), (0, 0, 0.8), (1.2, 0, 0), 1, 1).flipped()
     item = _mesh_lamp(shape, 40.0)
     shine_by_image(item, coloured_dots(32), (shape.vertices[:, [0, 2]] - (-0.6, 1.0)) / (1.2, 0.8))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes of what shines in the open scene, or adds nothing to it: its light changes as is known.
+"""Changes of the lights in the open scene, or additions that give no light. Their effect is known.
 
-relations.py bakes a scene before and after one of them. What a scene offers nothing for raises
-NotApplicable with the reason.
+relations.py bakes a scene before and after each of them. A change raises NotApplicable with the
+reason if the scene has nothing that it could change.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from scene_items import (
 
 _CUBE = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
 _CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-FAR = 100.0  # diagonals of the scene
+FAR = 100.0  # distance, in diagonals of the scene
 
 
 def far_object_added() -> None:
-    """A black cube half as large as the scene, far below."""
+    """Adds a black cube half as large as the scene, far below it."""
     size, (low, high) = diagonal(), bounds()
     centre = 0.5 * (low + high) - (0.0, 0.0, FAR * size)
     add_mesh_item("far", (centre + 0.5 * size * np.array(_CUBE)).tolist(), _CUBE_FACES,
@@ -36,7 +36,7 @@ def far_object_added() -> None:
 
 
 def far_copy_added() -> None:
-    """The whole scene once more, far away: neither lights the other."""
+    """Adds a copy of the whole scene, far away, so that neither lights the other."""
     bpy.context.view_layer.update()
     move = Matrix.Translation(Vector((FAR * diagonal(), 0.0, 0.0)))
     for item in items():
@@ -50,7 +50,7 @@ def far_copy_added() -> None:
 
 
 def dust_added(grains: int = 300) -> None:
-    """Black triangles of half a thousandth of the scene: 4e-5 of its cross-section together."""
+    """Adds black triangles of 5e-4 of the scene's size, with 4e-5 of its cross-section in all."""
     random = np.random.default_rng(11)
     low, high = bounds()
     places = np.repeat(random.uniform(low, high, (grains, 3)), 3, axis=0)
@@ -79,7 +79,7 @@ def power_scaled(factor: float) -> Callable[[], None]:
 
 
 def lamps_halved() -> None:
-    """Each lamp becomes two of half its power in the same place."""
+    """Replaces each lamp by two lamps of half its power in the same place."""
     if not lamps():
         raise NotApplicable("there are no lamps")
     make_single_users()
@@ -91,10 +91,12 @@ def lamps_halved() -> None:
 
 
 def _plates(shine: bool) -> None:
-    """Instead of each area lamp a plate, its back black; or the lamp just in front of a black one.
+    """Replaces area lamps by emissive plates with black backs, or adds black plates behind them.
 
-    The plate takes light from others as a lamp's body does, so both have one, and both are a
-    thousandth of their size in front of where the lamp was: what lies in its plane stays behind.
+    Without `shine`, each lamp is placed just in front of a black plate. A plate blocks the light of
+    other sources, as the body of a lamp does. Therefore both scenes have one. Both the plate and
+    the lamp are a thousandth of their size in front of the former place of the lamp, so that
+    surfaces in the plane of the lamp remain behind them.
     """
     found = [item for item in lamps() if item.data.type == 'AREA'
              and item.data.shape in ('SQUARE', 'RECTANGLE') and item.data.spread > 3.14]
@@ -114,7 +116,7 @@ def _plates(shine: bool) -> None:
         else:
             edges = [(matrix @ Vector(corners[k]) - matrix @ Vector(corners[1])).length
                      for k in (0, 2)]
-            # Blender 4.0 corrected 1/4 to 1/pi.
+            # Blender 4.0 corrected the factor from 1/4 to 1/pi.
             share = 4.0 if bpy.app.version < (4, 0, 0) else math.pi
             radiance = light.energy / (share * edges[0] * edges[1])
             material = one_sided_emission(tuple(light.color), radiance)
@@ -127,7 +129,7 @@ def _plates(shine: bool) -> None:
 
 
 def one_sided_emission(colour: tuple[float, float, float], radiance: float) -> bpy.types.Material:
-    """It shines from the front; the back is black."""
+    """Returns a material that emits from the front and has a black back."""
     material = black_material()
     tree = material.node_tree
     output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
@@ -153,7 +155,7 @@ def area_lamps_as_faces() -> None:
 
 
 def in_light_sets() -> None:
-    """All that shines in three sets: every other lamp, the others, and the world."""
+    """Divides all lights into three sets: every second lamp, the other lamps, and the world."""
     scene = bpy.context.scene
     shining = lamps() + [item for item in mesh_items() if is_emissive(item)]
     world = scene.world

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes of the order and the division of the open scene's meshes that leave its light as it is.
+"""Changes of the order and the division of the open scene's meshes that do not change its light.
 
-relations.py bakes a scene before and after one of them. What a scene offers nothing for raises
-NotApplicable with the reason.
+relations.py bakes a scene before and after each of them. A change raises NotApplicable with the
+reason if the scene has nothing that it could change.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scene_items import (
 
 
 def elements_reordered(kind: str) -> Callable[[], None]:
-    """kind: faces or verts of each mesh, at random."""
+    """Returns a change that orders elements of each mesh at random. kind: 'faces' or 'verts'."""
     def change() -> None:
         random = np.random.default_rng(5)
         make_single_users()
@@ -38,7 +38,7 @@ def elements_reordered(kind: str) -> Callable[[], None]:
 
 
 def objects_reordered() -> None:
-    """They come in another order from their collections."""
+    """Puts the objects of all collections into another order."""
     random = np.random.default_rng(7)
     for collection in (bpy.context.scene.collection, *bpy.data.collections):
         found = list(collection.objects)
@@ -49,7 +49,7 @@ def objects_reordered() -> None:
 
 
 def materials_reordered() -> None:
-    """The slots of each object the other way round, behind one that no face has."""
+    """Reverses the order of each object's material slots, after an added slot that no face uses."""
     make_single_users()
     unused = black_material()
     for item in mesh_items():
@@ -91,7 +91,7 @@ def _join(chosen: list[bpy.types.Object]) -> None:
         raise NotApplicable("there are no two to join")
     bpy.context.view_layer.update()
     for item in chosen:
-        # Blender would turn the faces of mirrored ones.
+        # Blender would flip the faces of mirrored objects.
         item.data.transform(item.matrix_world)
         if item.matrix_world.determinant() < 0.0:
             item.data.flip_normals()
@@ -124,7 +124,7 @@ def separated_parts() -> None:
 
 
 def separated_halves() -> None:
-    """Each object becomes two, of the faces on either side of its middle."""
+    """Divides each object into two objects with the faces on either side of its middle."""
     remember_origins()
     was_cut = False
     for item in mesh_items():
@@ -149,8 +149,10 @@ def separated_halves() -> None:
 
 
 def instanced() -> None:
-    """Every third object and all that shine are shown by way of a collection: they get no colours
-    of their own, but give the same light."""
+    """Replaces every third object, and all emissive objects, by instances of a collection.
+
+    Instances get no colours of their own, but give the same light.
+    """
     apply_modifiers()
     found = mesh_items()
     chosen = [item for index, item in enumerate(found) if index % 3 == 2 or is_emissive(item)]
@@ -167,7 +169,7 @@ def instanced() -> None:
 
 
 def made_real() -> None:
-    """Instances become objects, and shared meshes copies."""
+    """Makes instances real objects, and gives objects with a shared mesh copies of it."""
     instancers = [item for item in items()
                   if item.type == 'EMPTY' and item.instance_type == 'COLLECTION']
     shared = [item for item in mesh_items() if item.data.users > 1]

@@ -5,17 +5,17 @@
         [--scenes NAME ...] [--densities 0.5 1 2] [--samples 128] [--seeds 2] \\
         [--set name=value ...] [--out FILE.json]
 
-Builds each scene with so many times the cells along every edge, bakes LIGHTING with Raybundle (each
-`reconstruction`) and with Cycles (every bounce, no denoising) at the same corners, and compares
-both, interpolated over the faces, with Cycles at points inside the faces: relative RMSE over RGB,
-weighted by area, over all objects.
+Builds each scene with its number of cells along every edge multiplied by each density. Bakes
+LIGHTING with Raybundle (each `reconstruction`) and with Cycles (all bounces, no denoising) at the
+same corners. Interpolates both over the faces and compares them with Cycles at points inside the
+faces. The error is the relative RMSE over RGB of all objects, weighted by area.
 
-Cycles' noise is taken out, so that few samples do: its two references and its two bakes are
-independent, and the mean product of the differences of the first from the first and of the second
-from the second is the square of the error that is left with infinitely many samples. The noise of
-4096 samples is then added to the bake of Cycles, by what the two bakes differ: its variance falls
-as the inverse of the samples. Prints a table in Markdown; --out appends one line of JSON per scene
-and density.
+The noise of Cycles is eliminated, so that few samples suffice. Its two references and its two bakes
+are independent. The mean product of the difference of the first bake from the first reference and
+that of the second bake from the second reference is the square of the error that remains with
+infinitely many samples. The noise of 4096 samples is then added to the bake of Cycles. It follows
+from the difference of the two bakes, since its variance is inversely proportional to the number of
+samples. Prints a table in Markdown. --out appends one line of JSON for each scene and density.
 """
 
 from __future__ import annotations
@@ -43,11 +43,14 @@ from cycles_reference import bakeable_objects  # noqa: E402
 from raybundle.properties import assign  # noqa: E402
 from surface_reference import Light, SurfaceReference  # noqa: E402
 
-CYCLES_SAMPLES = 4096  # whose noise is stated
+CYCLES_SAMPLES = 4096  # number of samples whose noise is stated
 
 
 def scene_builder():
-    """The module scenes/build.py (a package of the same name lies beside it)."""
+    """Returns the module scenes/build.py.
+
+    Its file is loaded by its path, because a package beside it has the same name.
+    """
     spec = importlib.util.spec_from_file_location("scene_builder", ROOT / "scenes/build.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -55,7 +58,7 @@ def scene_builder():
 
 
 def make_plain() -> None:
-    """Gives every object that is shown, instances too, a mesh of its own without modifiers."""
+    """Gives every visible object, instances included, a mesh of its own without modifiers."""
     bpy.ops.object.select_all(action='SELECT')
     bpy.ops.object.duplicates_make_real()
     bpy.ops.object.select_all(action='SELECT')
@@ -68,7 +71,7 @@ def make_plain() -> None:
 
 
 def compare(options: argparse.Namespace) -> dict[str, float]:
-    """Of the scene that is open: relative RMSE of each contestant."""
+    """Returns the relative RMSE of each method in the open scene."""
     settings = bpy.context.scene.raybundle
     settings.output = 'LIGHTING'
     for assignment in options.set:
@@ -93,7 +96,10 @@ def compare(options: argparse.Namespace) -> dict[str, float]:
 
 
 def squared_error(references: Sequence[SurfaceReference], lights: Sequence[Light]) -> float:
-    """Relative and without the noise of either, of two independent lights (or one twice)."""
+    """Returns the relative squared error of a light without the noise of lights and references.
+
+    lights: two independent lights, or one light twice. references: two independent references.
+    """
     product = scale = 0.0
     for name in lights[0]:
         parts = [reference.points(name, light[name])
@@ -106,7 +112,7 @@ def squared_error(references: Sequence[SurfaceReference], lights: Sequence[Light
 
 
 def squared_noise(reference: SurfaceReference, lights: Sequence[Light]) -> float:
-    """Relative, of one of two independent bakes."""
+    """Returns the relative squared noise of each of two independent bakes."""
     noise = scale = 0.0
     for name in lights[0]:
         (first, truth, area), (second, _, _) = (reference.points(name, light[name])

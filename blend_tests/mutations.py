@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files as no one should make them: the scenes of the tree with random changes, each baked.
+"""Bakes badly broken files: the scenes of the repository with random changes.
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/mutations.py -- [--first 0]
         [--files 100]
 
-Numbers become 0, negative, tiny, huge, infinite or none at all, nodes are added, wired at random
-and removed, meshes lose their shape, slots their materials, images their files. A bake must end
-with finite light that is not negative, or be refused with a message. Each file has a seed of its
-own, which is printed before Blender evaluates it, so that one that ends the process is known; one
-that ends it earlier is Blender's.
+Numbers become 0, negative, tiny, huge, infinite or NaN. Nodes are added, connected at random and
+removed. Meshes lose their shape, slots their materials, images their files. A bake must end with
+finite light that is not negative, or be refused with a message. Each file has a seed of its own.
+The seed is printed before Blender evaluates the file, so that a file that ends the process is
+known. A file that ends the process before that shows an error of Blender.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ SCENES = sorted((HERE.parent / "scenes").glob("*.blend"))
 FLOATS = (0.0, -0.0, -1.0, 1e-30, 1e-7, 0.5, 1.0, 2.0, 100.0, 1e6, 1e20, 3e38, -3e38, math.inf,
           -math.inf, math.nan)
 INTEGERS = (-1, 0, 1, 2, 3, 7)
-# They would only take long, or Blender does not survive them.
+# Properties that would only take a long time, or with which Blender crashes.
 LEFT_ALONE = {'use_nodes', 'levels', 'render_levels', 'count', 'frame_current', 'paint_active_slot',
               'paint_clone_slot'}
-# Blender ends itself at those that it does not register.
+# Blender crashes if a node type is added that it has not registered.
 NODES = [name for name in dir(bpy.types) if name.startswith("ShaderNode")
          and name not in ("ShaderNode", "ShaderNodeTree", "ShaderNodeCustomGroup",
                           "ShaderNodeScript")
@@ -48,7 +48,7 @@ MODIFIERS = ('ARRAY', 'BEVEL', 'BOOLEAN', 'BUILD', 'CAST', 'CURVE', 'DATA_TRANSF
              'DISPLACE', 'EDGE_SPLIT', 'LATTICE', 'MASK', 'MIRROR', 'NORMAL_EDIT', 'SCREW',
              'SHRINKWRAP', 'SIMPLE_DEFORM', 'SMOOTH', 'SOLIDIFY', 'SUBSURF', 'TRIANGULATE',
              'UV_PROJECT', 'WARP', 'WAVE', 'WEIGHTED_NORMAL', 'WELD', 'WIREFRAME')
-SLOW = 30.0  # seconds; a bake takes about one
+SLOW = 30.0  # s; a bake takes about 1 s
 
 
 def number(chance: random.Random) -> float:
@@ -56,7 +56,7 @@ def number(chance: random.Random) -> float:
 
 
 def change_properties(data: bpy.types.bpy_struct, chance: random.Random, count: int = 1) -> None:
-    # Those of the name bl_ belong to all nodes of a kind.
+    # Properties whose names begin with bl_ belong to all nodes of a kind.
     properties = [p for p in data.bl_rna.properties if not p.is_readonly
                   and p.identifier not in LEFT_ALONE and not p.identifier.startswith("bl_")
                   and p.type in ('FLOAT', 'INT', 'BOOLEAN', 'ENUM')
@@ -76,7 +76,7 @@ def change_properties(data: bpy.types.bpy_struct, chance: random.Random, count: 
         try:
             setattr(data, prop.identifier, value)
         except (TypeError, AttributeError, ValueError):
-            pass  # not for this one
+            pass  # the property does not accept this value
 
 
 def change_inputs(node: bpy.types.Node, chance: random.Random) -> None:
@@ -107,7 +107,7 @@ def change_tree(tree: bpy.types.NodeTree | None, chance: random.Random) -> None:
             try:
                 added = tree.nodes.new(chance.choice(NODES))
             except RuntimeError:
-                continue  # not in this kind of tree
+                continue  # the node does not belong in this kind of tree
             wire(tree, chance, list(added.outputs))
         elif kind < 0.6:
             wire(tree, chance)
@@ -177,7 +177,7 @@ def change_mesh(chance: random.Random) -> None:
                                            else chance.uniform(-5.0, 5.0) for _ in range(3)]
         chance.choice(mesh.polygons).material_index = chance.choice((0, 1, 7, 32767))
     if chance.random() < 0.2:
-        # Faces with a corner twice, and corners of an edge that is not theirs.
+        # Makes a face that has a vertex twice, and a corner that does not fit its edge.
         chance.choice(mesh.loops).vertex_index = chance.randrange(len(mesh.vertices))
 
 
@@ -224,7 +224,7 @@ CHANGES: tuple[Callable[[random.Random], None], ...] = (
 
 
 def bake_file(seed: int) -> str:
-    """What became of the bake: finished, refused with a message, or what was wrong."""
+    """Returns the outcome of a bake: finished, refused, or the name of an error."""
     chance = random.Random(seed)
     path = chance.choice(SCENES)
     bpy.ops.wm.open_mainfile(filepath=str(path))
@@ -244,7 +244,7 @@ def bake_file(seed: int) -> str:
     for item in bpy.context.scene.objects:
         if item.type == 'MESH' and attribute in item.data.color_attributes:
             light = read_colors(item, attribute)
-            # Not so where it is none or negative: neither is true of what is no number.
+            # Written so that NaN fails too, for which both comparisons are false.
             if not ((light >= 0.0) & (light < math.inf)).all():
                 return "wrong light"
     return "finished" if time.perf_counter() - started < SLOW else "slow"

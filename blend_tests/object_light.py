@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes of the tree and rooms of lamps, baked: the mean light of each object that was."""
+"""Bakes scenes and rooms of lamps, and returns the mean light of each original object."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ SCENES = Path(__file__).parent.parent / "scenes"
 
 @dataclass
 class Bake:
-    """light and noise: by the name of the object that was, before it was joined or cut up."""
+    """The result of a bake.
 
-    light: dict[str, np.ndarray]  # (3,) mean by area of LIGHTING
+    Light and noise are by the name of the original object, before objects were joined or cut up.
+    """
+
+    light: dict[str, np.ndarray]  # (3,) mean of LIGHTING by area
     areas: dict[str, float]  # m^2
-    noise: dict[str, float]  # stated, in the unit of the light
+    noise: dict[str, float]  # stated noise, in the unit of the light
     balance: float
     bundles: int
     seconds: float
@@ -35,11 +38,11 @@ class Bake:
         return float(areas @ np.mean(list(self.light.values()), axis=1) / areas.sum())
 
 
-_covered: dict[str, dict[str, np.ndarray]] = {}  # by scene
+_covered: dict[str, dict[str, np.ndarray]] = {}  # per scene: result of covered_faces
 
 
 def open_scene(name: str, cells: int = lamp_rooms.FINE) -> None:
-    """As it is, but that its faces remember whether they are covered."""
+    """Opens a scene and marks its covered faces (covered_faces.py)."""
     open_file(name, cells)
     bpy.context.view_layer.update()
     if name not in _covered:
@@ -57,7 +60,7 @@ def open_file(name: str, cells: int) -> None:
 
 
 def bake(**settings: object) -> Bake:
-    """The open scene."""
+    """Bakes the open scene."""
     bpy.context.view_layer.update()
     started = time.perf_counter()
     report = raybundle.bake(bpy.context, **settings)
@@ -88,7 +91,7 @@ def bake(**settings: object) -> Bake:
 
 
 def face_numbers(item: bpy.types.Object, attribute: str) -> np.ndarray:
-    """(faces,) of an attribute, 0 where there is none."""
+    """Returns (faces,) values of a face attribute, 0 if the mesh does not have it."""
     numbers = np.zeros(len(item.data.polygons), np.int32)
     if attribute in item.data.attributes:
         item.data.attributes[attribute].data.foreach_get('value', numbers)
@@ -96,7 +99,7 @@ def face_numbers(item: bpy.types.Object, attribute: str) -> np.ndarray:
 
 
 def _by_origin(item: bpy.types.Object) -> list[tuple[str, np.ndarray]]:
-    """(corners,) masks of an object's corners by the object that they belonged to."""
+    """Returns (corners,) masks of an object's corners by the name of the original object."""
     if ORIGIN not in item.data.attributes:
         return [(item.name, np.ones(len(item.data.loops), bool))]
     names = bpy.context.scene[ORIGINS]

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""The table of docs/performance.md: what is to be reached, and what this machine reaches.
+r"""Prints the table of docs/performance.md: the goals, and what this machine reaches.
 
     blender -b --factory-startup -P blend_tests/performance.py -- \
         [--only ROW ...] [--runs 3] [--samples 1024] [--micro FILE.json] [--out FILE.json]
 
-native/bench/performance runs it with the micro-benchmarks' results. Times are medians of --runs,
-those of Cycles and Raybundle interleaved. Equal error: relative RMSE over RGB at vertices off
-contact edges, `reconstruction` POINT, against two independent bakes of Cycles with --samples, whose
-noise is taken out and which have area lights in place of emissive faces (area_lamps.py);
-Raybundle's time is interpolated between the targets whose errors are next to it. Cycles' is what it
-takes without samples and what the samples take that bring its noise to the error: how far it is off
-beside emissive faces is forgiven.
+native/bench/performance runs this script with the results of the micro-benchmarks. Times are
+medians of --runs, where Cycles and Raybundle run in turns. The error is the relative RMSE over RGB
+at the vertices off contact edges, with `reconstruction` POINT, against two independent bakes of
+Cycles with --samples. The noise of these references is eliminated, and they have area lights in
+place of emissive faces (area_lamps.py). Raybundle's time at an error is interpolated between the
+targets whose errors are next to it. The time of Cycles is its time without samples, plus the time
+of the samples that reduce its noise to the error. Its error beside emissive faces is not counted.
 
-Rows: equal (rooms), lamps (rooms whose lamp is a mesh), open (sun and sky), others (the scenes that
-remain), million (patches), slope (10k to 1M patches), relight, warm (a scripted bake of
+The rows are: equal (rooms), lamps (rooms whose lamp is a mesh), open (sun and sky), others (the
+remaining scenes), million (patches), slope (10k to 1M patches), relight, warm (a scripted bake of
 cornell_box), threads, micro.
 """
 
@@ -51,22 +51,24 @@ OPEN = ("open_court", "instances")
 OTHERS = ("facing_squares", "furnace", "house_on_plain", "laid_table", "sphere_interior",
           "thin_wall")
 LAMPS = ("bulb", "tube", "ring", "box", "wavy_panel")
-# Lights in place of the faces would pierce these: there the references' rays only meet the
-# emission. They are noisy: so many times the samples.
+# Area lights in place of the faces of these lamps would intersect the faces. Here the references
+# use rays that meet the emission by chance. They are noisy and need this many times the samples.
 WAVY = ("room:wavy_panel",)
 WAVY_SAMPLES = 8
 ERRORS = (0.02, 0.01)
-# Of the noise of single parts of objects: that of the whole scene, which is compared, is 2 to 10 times
-# less.
+# Targets of Raybundle. They hold for the noise of single parts of objects. The noise of the whole
+# scene, which is compared, is 2 to 10 times smaller.
 TARGETS = (0.25, 0.16, 0.1, 0.06, 0.04, 0.03, 0.0225, 0.015, 0.01, 0.0075, 0.005)
-# Of which the first tell what Cycles takes without any.
+# Numbers of samples of Cycles. The difference of their times gives the time per sample, and the
+# rest is the time without samples.
 CYCLES_SAMPLES = (4, 64)
-# Cells along an edge of each of the six sides of a room whose mesh has a million triangles.
+# Cells along an edge of each of the six sides of a room. Triangulated, its mesh has a million
+# triangles.
 MILLION_CELLS = 289
 
 
 class Row:
-    """A line of the table. reached: a number, or None with a note that says why."""
+    """A row of the table. reached: a number, or None with a note that gives the reason."""
 
     def __init__(self, what: str, wanted: str, reached: float | None, unit: str, note: str = ""
                  ) -> None:
@@ -89,7 +91,7 @@ def open_scene(name: str):
 
 
 def median_bake(objects, runs: int) -> tuple[float, dict]:
-    """Of bakes from nothing: seconds, and the report of the last."""
+    """Returns the median time of bakes from nothing, s, and the report of the last one."""
     bakes = [bake_raybundle(objects) for _ in range(runs)]
     return float(np.median([seconds for seconds, _, _ in bakes])), bakes[-1][2]
 
@@ -101,10 +103,10 @@ def median_bake(objects, runs: int) -> tuple[float, dict]:
 
 def equal_error(name: str, wanted: str, options: argparse.Namespace) -> Iterator[Row]:
     settings = open_scene(name)
-    # Where objects share a mesh, Cycles leaves all of them the light of the last.
+    # If objects share a mesh, Cycles leaves the light of the last object in all of them.
     make_plain()
     settings.reconstruction = 'POINT'
-    # Area lights in place of a lamp's faces do not show what its faces give each other.
+    # Area lights in place of a lamp's faces do not show the light that these faces give each other.
     objects = [item for item in bakeable_objects(bpy.context)
                if not (name.startswith("room:") and item.name.startswith("lamp"))]
     with nullcontext() if name in WAVY else area_lamps():
@@ -143,7 +145,10 @@ def equal_error(name: str, wanted: str, options: argparse.Namespace) -> Iterator
 
 
 def times_of(error: float, curve: list[np.ndarray]) -> list[float]:
-    """Seconds by which the error is met. curve: seconds and squared error by falling target."""
+    """Returns times in which the error is met, s.
+
+    curve: time and squared error for each target, in descending order of the targets.
+    """
     times = [seconds for seconds, square in curve if square ** 0.5 <= error]
     for (coarse, more), (fine, less) in zip(curve, curve[1:]):
         if more ** 0.5 > error >= less ** 0.5 and less > 0.0:
@@ -154,7 +159,7 @@ def times_of(error: float, curve: list[np.ndarray]) -> list[float]:
 
 def squared_noise(objects: list[bpy.types.Object], first: Light, second: Light,
                   references: list[Light]) -> float:
-    """Relative, of each of two bakes that differ in their seed."""
+    """Returns the relative squared noise of each of two bakes that differ in their seed."""
     off = {name: values - second[name] for name, values in first.items()}
     return mean_product(objects, [off, off], references) / 2
 
@@ -165,11 +170,11 @@ def squared_noise(objects: list[bpy.types.Object], first: Light, second: Light,
 
 
 def build_room(cells: int) -> None:
-    """A closed room of 6 x `cells` x `cells` quads with a lamp, as one mesh."""
+    """Builds a closed room of 6 x `cells` x `cells` quads as one mesh, with a lamp."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     t = np.linspace(-1.0, 1.0, cells + 1)
     u, v = (axis.ravel() for axis in np.meshgrid(t, t))
-    # Turned to the inside: right-handed in the order of the corners below.
+    # With the fronts inside: right-handed in the order of the corners below.
     sides = [(u, v, -np.ones_like(u)), (v, u, np.ones_like(u)), (-np.ones_like(u), u, v),
              (np.ones_like(u), v, u), (v, -np.ones_like(u), u), (u, np.ones_like(u), v)]
     points = np.concatenate([np.stack(side, axis=1) for side in sides])
@@ -207,7 +212,7 @@ def million(_options: argparse.Namespace) -> Iterator[Row]:
     bpy.context.view_layer.objects.active = room
     room.modifiers.new("triangles", 'TRIANGULATE')
     bpy.ops.object.modifier_apply(modifier="triangles")
-    # From here on the peak is that of the bake, and no longer that of other rows.
+    # Resets the peak of the memory, so that it is that of this bake and not that of other rows.
     Path("/proc/self/clear_refs").write_text("5")
     seconds, report = median_bake([room], 1)
     note = (f"{report['patches']} patches, {report['bundles']} bundles, noise "

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changes of the open scene's place, size and shape that leave its light as it is.
+"""Changes of the open scene's place, size and shape that do not change its light.
 
-relations.py bakes a scene before and after one of them. What a scene offers nothing for raises
-NotApplicable with the reason.
+relations.py bakes a scene before and after each of them. A change raises NotApplicable with the
+reason if the scene has nothing that it could change.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scene_items import NotApplicable, apply_modifiers, items, lamps, make_singl
 
 
 def transform(matrix: Matrix) -> None:
-    """Everything, lamps and empties too, by the objects' matrices; not the world's directions."""
+    """Transforms all objects, lamps and empties included, but not the directions of the world."""
     bpy.context.view_layer.update()
     for item in items():
         if item.parent is None:
@@ -42,7 +42,7 @@ def turned_at_random(seed: int) -> Callable[[], None]:
 
 
 def turned_in_meshes() -> None:
-    """The vertices move, not the objects; lamps and empties have nothing else to move."""
+    """Rotates the vertices of meshes, not the objects. Lamps and empties are rotated as objects."""
     apply_modifiers()
     matrix = Euler((0.4, 0.7, 1.1)).to_matrix().to_4x4()
     bpy.context.view_layer.update()
@@ -57,12 +57,16 @@ def turned_in_meshes() -> None:
 
 
 def moved_far() -> None:
-    """By 1 km, along none of the axes."""
+    """Moves the scene by 1 km, not along an axis."""
     transform(Matrix.Translation(Vector((600.0, -480.0, 640.0))))
 
 
 def scaled(factor: float) -> Callable[[], None]:
-    """Lamps of W get factor^2 of it: radiance stays. A sun's strength is W/m^2."""
+    """Returns a change that scales the scene.
+
+    The power of lamps in W is multiplied by factor^2, so that radiances stay equal. The strength of
+    a sun in W/m^2 does not change.
+    """
     def change() -> None:
         make_single_users()
         transform(Matrix.Scale(factor, 4))
@@ -81,7 +85,9 @@ def mirrored() -> None:
 
 
 def turn_world(matrix: Matrix) -> None:
-    """The world's directions by an orthogonal matrix; one without any is the same from all sides.
+    """Transforms the directions of the world by an orthogonal matrix.
+
+    Does nothing if the world does not depend on the direction.
     """
     world = bpy.context.scene.world
     tree = world.node_tree if world and world.use_nodes else None
@@ -92,7 +98,7 @@ def turn_world(matrix: Matrix) -> None:
     mapping = tree.nodes.new('ShaderNodeMapping')
     tree.links.new(place.outputs['Generated'], mapping.inputs['Vector'])
     back = matrix.transposed()
-    if back.determinant() < 0.0:  # Mapping scales before it turns
+    if back.determinant() < 0.0:  # the Mapping node scales before it rotates
         mapping.inputs['Scale'].default_value = (-1.0, 1.0, 1.0)
         back = back @ Matrix.Diagonal((-1.0, 1.0, 1.0))
     mapping.inputs['Rotation'].default_value = back.to_euler()
@@ -108,13 +114,13 @@ def turn_world(matrix: Matrix) -> None:
                 tree.links.new(mapping.outputs['Vector'], node.inputs['Vector'])
 
 
-# x follows y: floors stay level, and what is flush with a ceiling stays so.
+# x depends on y: floors stay level, and surfaces flush with a ceiling stay flush.
 SHEAR = Matrix(((1.0, 0.4, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0),
                 (0.0, 0.0, 0.0, 1.0)))
 
 
 def _prepare_shear() -> None:
-    """Lamps move with the rest, but keep their shape: they have no mesh to be sheared alike."""
+    """Moves lamps as the shear does, but keeps their shape: they have no mesh to be sheared."""
     apply_modifiers()
     bpy.context.view_layer.update()
     for item in items():
@@ -123,11 +129,11 @@ def _prepare_shear() -> None:
             matrix.translation = SHEAR @ matrix.translation
             item.matrix_world = matrix
         elif item.type != 'MESH' and item.instance_type != 'NONE':
-            bpy.data.objects.remove(item)  # a collection's content has meshes that others share
+            bpy.data.objects.remove(item)  # the meshes of a collection's content are shared
 
 
 def sheared_by_parents() -> None:
-    """By two empties: one turned and stretched, and one turned in it."""
+    """Shears all meshes by two parents: one rotated and scaled, and one rotated in the first."""
     _prepare_shear()
     left, stretch, right = np.linalg.svd(np.array(SHEAR)[:3, :3])
     if np.linalg.det(left) < 0.0:
@@ -151,7 +157,7 @@ def sheared_in_meshes() -> None:
 
 
 def jittered(share: float) -> Callable[[], None]:
-    """Each vertex by up to this share of its mesh's size."""
+    """Returns a change that moves each vertex at random by up to this share of its mesh's size."""
     def change() -> None:
         random = np.random.default_rng(3)
         for mesh in {item.data: None for item in mesh_items()}:

@@ -1,28 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What must not change the light of a scene, changed: a table for docs/stability.md.
+"""Checks changes that must not change the light of a scene: a table for docs/stability.md.
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/relations.py -- \\
         [--quick] [--only TEXT] [--noise] [SCENE ...]
 
-SCENE is a name of scenes/, the path of a .blend, or `room:NAME` (lamp_rooms.py); without any it is
-all scenes and all rooms, or some small ones and all rooms (`--quick`). Each relation bakes a scene
-that was changed (place_changes.py, mesh_changes.py, light_changes.py), or with other settings, and
-compares it with the scene as it was:
+SCENE is a name of a scene in scenes/, the path of a .blend file, or `room:NAME` (lamp_rooms.py). By
+default all scenes and all rooms are baked, or with --quick some small scenes and all rooms. Each
+relation bakes a scene that was changed (place_changes.py, mesh_changes.py, light_changes.py), or
+with other settings, and compares it with the unchanged scene:
 
-    light      of each object the mean by area of LIGHTING, each channel: within 2 %, or twice the
-               noise that is stated of the object in either bake, if that is more. Objects with less
-               than 5 % of the scene's mean light are compared by 5 % of that mean. Faces that
-               something lies against are left out: nobody sees them. By chance alone one mean in
-               twenty is more than twice its noise off where that is the same on a whole wall: what
-               is just too far off is looked at again, in the mean of four seeds
-    balance    energy neither absorbed nor escaped, of what is emitted: below 5e-3, or 1.5e-2 of
-               the methods that are only asked for 3 % of noise
-    bundles    within twice (not where the method is another, or each light set has a noise target)
+    light      mean of LIGHTING by area of each object, in each channel: equal within 2 %, or
+               within twice the noise that is stated for the object in either bake, if that is
+               more. Objects with less than 5 % of the scene's mean light are compared relative to
+               5 % of that mean. Faces that another surface lies against are left out, because
+               they are invisible. If noise is correlated on a whole wall, one mean in twenty is by
+               chance off by more than twice its noise. A deviation that is slightly too large is
+               therefore measured again, in the mean of four seeds
+    balance    share of the emitted energy that is neither absorbed nor escapes: below 5e-3, or
+               below 1.5e-2 for methods with a target of 3 %
+    bundles    half to twice the number of the unchanged scene. Not checked for other methods and
+               for light sets, each of which has a noise target of its own
 
-Of methods that approximate, light may be wrong where a warning says so. Relations that a scene has
-nothing for are not counted. Failures are listed above the table; the exit code is then 1. `--noise`
-bakes the rooms by several seeds instead (lamp_noise.py); `--quick` takes the relations of the tests
-and coarse rooms. A new kind of lamp, material or setting adds its row.
+If a method approximates, its light may be wrong where a warning says so. Relations that do not
+apply to a scene are not counted. Failures are listed above the table, and the exit code is then 1.
+`--noise` bakes the rooms with several seeds instead (lamp_noise.py). `--quick` uses the relations
+of the tests and coarse rooms. A new kind of lamp, material or setting adds a row.
 """
 
 from __future__ import annotations
@@ -50,8 +52,8 @@ from object_light import SCENES, Bake, bake, open_scene  # noqa: E402
 from scene_items import NotApplicable, apply_modifiers  # noqa: E402
 
 LIGHT, NOISES, DARK, BALANCE, COST = 0.02, 2.0, 0.05, 5e-3, 2.0
-SAME = 1e-5  # where only the threads are others
-# What is up to so many times as far off as it may be is looked at again with these seeds too.
+SAME = 1e-5  # tolerance if only the number of threads differs
+# A deviation of up to AGAIN times its limit is measured again with these additional seeds.
 AGAIN, SEEDS = 3.0, (11, 12, 13)
 SMALL = ("cornell_box", "instances", "thin_wall")
 SETTINGS = {'output': 'LIGHTING', 'domain': 'CORNER', 'target_error': 0.01, 'max_bundles': 8192}
@@ -59,22 +61,26 @@ SETTINGS = {'output': 'LIGHTING', 'domain': 'CORNER', 'target_error': 0.01, 'max
 
 @dataclass(frozen=True)
 class Relation:
+    """A change of a scene or of settings, and what may differ after it."""
+
     name: str
     change: Callable[[], None] = lambda: None
-    # What it is compared with is the scene changed so.
+    # Change that makes the scene with which the changed scene is compared. None: the scene as it
+    # is.
     reference: Callable[[], None] | None = None
-    settings: dict[str, object] = field(default_factory=dict)  # of the changed scene's bake
-    factor: float = 1.0  # that the light must have
+    # Settings of the bake of the changed scene.
+    settings: dict[str, object] = field(default_factory=dict)
+    factor: float = 1.0  # factor by which the light must change
     tolerance: float = LIGHT
     costs_same: bool = True
-    least_cost: float = 1.0 / COST  # bundles, of those before
-    # What warnings say where light may be wrong; such a bake may also be refused.
+    least_cost: float = 1.0 / COST  # least number of bundles, as a share of those before
+    # Texts in warnings with which the light may be wrong. A bake may then also be refused.
     says: tuple[str, ...] = ()
     is_quick: bool = False
 
 
 RANDOM = {'directions': 'RANDOM'}
-# Warnings of what follows no angles and has no smaller patches in gaps.
+# Warnings of methods that ignore the angle of light and do not cut patches in narrow gaps.
 LAMBERT = ("at which angles light arrives", "gaps much narrower than they are")
 
 
@@ -108,7 +114,7 @@ RELATIONS = (
     Relation("emissive meshes joined", mesh_changes.lamps_joined, apply_modifiers),
     Relation("separated by loose parts", mesh_changes.separated_parts, apply_modifiers),
     Relation("separated into halves", mesh_changes.separated_halves, apply_modifiers),
-    # What gets no colours of its own is not judged by its noise.
+    # Instances get no colours, and their noise does not count.
     Relation("instanced", mesh_changes.instanced, apply_modifiers, least_cost=0.0),
     Relation("made real", mesh_changes.made_real),
     Relation("an object far away", light_changes.far_object_added, is_quick=True),
@@ -125,7 +131,8 @@ RELATIONS = (
     Relation("one thread", settings={'threads': 1}, tolerance=SAME, is_quick=True),
     Relation("three threads", settings={'threads': 3}, tolerance=SAME),
     method("solver MULTIPATH", *LAMBERT, solver='MULTIPATH', **RANDOM),
-    # Its noise is alike on whole walls: at 0.01 the balance is 3e-3 off in the mean of seeds.
+    # Its noise is correlated on whole walls: at a target of 0.01 the error of the balance is 3e-3
+    # in the mean of seeds.
     method("solver STOCHASTIC_ITERATION", *LAMBERT, solver='STOCHASTIC_ITERATION',
            target_error=0.006, max_bundles=16384, **RANDOM),
     method("solver RANDOM_WALK", *LAMBERT, solver='RANDOM_WALK', **RANDOM),
@@ -148,25 +155,27 @@ RELATIONS = (
 
 @dataclass
 class Result:
+    """The comparison of a scene before and after one relation."""
+
     relation: str
     scene: str
-    skipped: str = ""  # why it is not counted
-    worst: str = ""  # the object whose light is farthest off, for what it may be
+    skipped: str = ""  # reason why it is not counted
+    worst: str = ""  # object with the largest deviation relative to its limit
     deviation: float = np.nan
     allowed: float = np.nan
     balance: float = np.nan
     bundles: tuple[int, int] = (0, 0)
     seconds: float = 0.0
-    said: list[str] = field(default_factory=list)  # what is wrong and was warned of
+    said: list[str] = field(default_factory=list)  # deviations that a warning announced
     failures: list[str] = field(default_factory=list)
 
     def cost(self) -> float:
-        """Bundles, of those before."""
+        """Returns the number of bundles as a multiple of those before."""
         return self.bundles[1] / max(self.bundles[0], 1)
 
 
 class Scene:
-    """A scene and its bakes before any change, one for each reference and seed."""
+    """A scene and its bakes before any change: one for each reference and seed."""
 
     def __init__(self, name: str, cells: int = lamp_rooms.FINE) -> None:
         self.name = name
@@ -207,7 +216,7 @@ class Scene:
 
 
 def mean_of(bakes: list[Bake]) -> Bake:
-    """The light of several seeds; the noise stays that of one."""
+    """Returns the mean light of several seeds, with the noise of the first."""
     names = set.intersection(*(set(entry.light) for entry in bakes))
     return replace(bakes[0], light={name: np.mean([entry.light[name] for entry in bakes], axis=0)
                                     for name in names})
@@ -215,7 +224,11 @@ def mean_of(bakes: list[Bake]) -> Bake:
 
 def compare(relation: Relation, before: Bake, after: Bake
             ) -> tuple[dict[str, str], str, float, float]:
-    """What is wrong with which object; of the worst object the deviation and what is allowed."""
+    """Compares the light of objects before and after a change.
+
+    Returns a text for each object whose deviation is too large, and of the worst object its name,
+    its deviation and its limit, both relative.
+    """
     dark = DARK * before.scene_mean()
     wrong: dict[str, str] = {}
     worst = ("", np.nan, np.nan)

@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""Bakes every .blend file of a folder and compares it with Cycles: how real files fare.
+r"""Bakes every .blend file of a folder and compares it with Cycles, as a test with real files.
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/road_test.py -- \
         FOLDER [--limit 120] [--samples 64] [--corners 20000] [--out TABLE.md]
 
-Each file is baked at the defaults in a Blender of its own (road_test_file.py), which may take
---limit seconds; the comparison, another three times as long. The table has a row each:
+Each file is baked at the defaults in a Blender process of its own (road_test_file.py). The bake may
+take --limit seconds, and the comparison three times as long. The table has a row for each file:
 
-    verdict    baked; refused, with the message; or what must not be: crash, hang, traceback
-    faces      of all meshes and their instances, as evaluated
-    seconds    of the bake, and of its longest stage
+    verdict    baked; refused, with the message; or a failure: crash, hang, traceback
+    faces      number of faces of all meshes and their instances, as evaluated
+    seconds    time of the bake, and its longest stage
     memory     peak of the native library, MB
-    stated     error in all, as the report has it: noise, discretisation, mesh
-    mean, rms  difference to Cycles at the vertices of objects, those where surfaces touch left out,
-               by reconstruction POINT, Cycles' noise taken out: of the worst object, of the
-               median one, and how many of how many means are more than 6 % off. Objects with
-               modifiers, or of more than --corners corners, are not compared
-    warnings   lines of the report
+    stated     total error in the report, and its parts: noise, discretisation, mesh
+    mean, rms  difference from Cycles at the vertices of objects, except where surfaces touch, with
+               reconstruction POINT, without the noise of Cycles: that of the worst object, that of
+               the median object, and how many of the means are off by more than 6 %. Objects with
+               modifiers, or with more than --corners corners, are not compared
+    warnings   number of warnings in the report
 
 The exit code is 1 after a crash, a hang or a traceback.
 """
@@ -33,14 +33,14 @@ from pathlib import Path
 
 import bpy
 
-OFF = 0.06  # an object's mean is off by more
+OFF = 0.06  # a mean of an object that is off by more than this is counted
 CHILD = Path(__file__).with_name("road_test_file.py")
 HEADER = ("| file | verdict | faces | seconds (most in) | MB | stated error | mean: worst, median, how many "
           "| rms: worst, median | warnings |\n|---|---|---|---|---|---|---|---|---|")
 
 
 def run(path: Path, options: argparse.Namespace) -> dict:
-    """What road_test_file.py wrote, with a verdict."""
+    """Bakes a file with road_test_file.py, and returns its result with a verdict."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "result.json"
         command = [bpy.app.binary_path, "-b", str(path), "--factory-startup",

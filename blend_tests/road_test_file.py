@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One file of road_test.py, in Blender: baked at the defaults, and compared with Cycles.
+"""Bakes the open file for road_test.py at the defaults, and compares it with Cycles.
 
     blender -b FILE.blend --factory-startup -P blend_tests/road_test_file.py -- RESULT.json SAMPLES CORNERS
 
-RESULT.json is written before the bake, when it is done or refused, and with the comparison. The .blend
-file is not saved.
+RESULT.json is written before the bake, after it was done or refused, and with the comparison. The
+.blend file is not saved.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from cycles_reference import bake_objects  # noqa: E402
 from surface_error import is_defined, off_contact_edges, read_colors  # noqa: E402
 
 ATTRIBUTE = "RoadTest"
-DARK = 0.05  # of the scene's mean light: darker objects are compared by that
+# Share of the scene's mean light; differences of darker objects are relative to this share.
+DARK = 0.05
 
 
 def baked_faces() -> int:
@@ -36,10 +37,14 @@ def baked_faces() -> int:
 
 
 def compare(names: list[str], samples: int, most: int) -> list[dict]:
-    """Of the objects whose mesh is as it is edited, of `most` corners at most: light at the vertices
-    off the edges at which surfaces touch, where one point decides, against two bakes of Cycles, as
-    far as that has values: black surfaces and metals have none.
-    mean and rms: difference to Cycles' mean or to DARK of the scene's, Cycles' noise taken out."""
+    """Compares the light of objects with Cycles at their vertices.
+
+    Compares objects without modifiers and with at most `most` corners. Leaves out vertices on edges
+    where surfaces touch, because a single point decides there, and those without a value of Cycles,
+    which are those of black surfaces and metals. mean and rms are differences from two bakes of
+    Cycles without their noise, relative to Cycles' mean, or to DARK of the scene's mean if that is
+    more.
+    """
     items = [item for item in map(bpy.data.objects.get, names)
              if not item.modifiers and len(item.data.loops) <= most and item.data.users == 1]
     raybundle.bake(bpy.context, output='LIGHTING', domain='CORNER', data_type='FLOAT_COLOR',
@@ -67,7 +72,7 @@ def compare(names: list[str], samples: int, most: int) -> list[dict]:
 def main(path: Path, samples: int, corners: int) -> None:
     raybundle.register()
     if bpy.context.object is not None and bpy.context.object.mode != 'OBJECT':
-        bpy.ops.object.mode_set(mode='OBJECT')  # else its mesh would be empty
+        bpy.ops.object.mode_set(mode='OBJECT')  # otherwise its mesh would be empty
     bpy.context.view_layer.update()
     result: dict[str, object] = {'blender': bpy.app.version_string, 'faces': baked_faces()}
 

@@ -3,7 +3,7 @@
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/run.py -- [pytest arguments]
 
-or with the Python of an environment that has Blender as a module, bpy.
+or with the Python of an environment that has Blender as the module bpy.
 """
 
 import sys
@@ -13,7 +13,7 @@ import pytest
 
 arguments = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
 here = Path(__file__).parent
-# Blender sets its own sys.argv and paths: name the folder, unless a file in it was asked for.
+# Blender changes sys.argv and the paths. Names this folder unless the arguments name a file in it.
 if not any(argument.split("::")[0].endswith(".py") for argument in arguments):
     arguments.append(str(here))
 sys.exit(pytest.main(["-p", "no:cacheprovider", f"--rootdir={here}", *arguments]))

@@ -3,7 +3,7 @@
 
     python3 blend_tests/run_ui_test.py [--blender PATH] [--scene NAME] [--out DIR]
 
-Needs xvfb-run and xdotool. Exit code 0 if the test passed.
+Needs xvfb-run and xdotool. The exit code is 0 if the test passed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SECONDS = 180
 
 
 def run(blender: str, scene: str, out: Path) -> int:
-    """The exit code."""
+    """Runs the test and returns its exit code."""
     missing = [name for name in (blender, "xvfb-run", "xdotool") if shutil.which(name) is None]
     if missing:
         print(f"ui: not found: {', '.join(missing)}")
@@ -30,13 +30,13 @@ def run(blender: str, scene: str, out: Path) -> int:
                "--python-exit-code", "1", "--window-geometry", "0", "0", "1280", "960",
                str(ROOT / "scenes" / f"{scene}.blend"),
                "-P", str(ROOT / "blend_tests" / "ui_test.py"), "--", "--out", str(out)]
-    # Software OpenGL. A Blender of the system takes the first Python on the path for its own, which
-    # must not be that of a version manager or virtual environment that runs this script.
+    # Software OpenGL. Debian's Blender uses the first Python on the PATH. This must not be the
+    # Python of a version manager or virtual environment that runs this script.
     folders = os.environ["PATH"].split(os.pathsep)
     if sys.prefix not in ("/usr", "/usr/local"):
         folders = [folder for folder in folders if not folder.startswith(sys.prefix)]
     environment = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1", "PATH": os.pathsep.join(folders)}
-    # A session of its own, so that Xvfb and Blender can be ended together.
+    # A separate session, so that Xvfb and Blender can be ended together.
     process = subprocess.Popen(command, env=environment, start_new_session=True,
                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
@@ -51,7 +51,7 @@ def run(blender: str, scene: str, out: Path) -> int:
         print(f"{output}\nui: no result after {SECONDS} s")
         return 1
     print(output)
-    # Blender may leave with 0 for other reasons: the test must have said that it passed.
+    # Blender may exit with 0 for other reasons. The test must also have printed that it passed.
     if process.returncode == 0 and "ui_test: Bake was clicked" in output:
         print(f"ui: passed; the window is in {out / 'raybundle_panel.png'}")
         return 0

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The open scene's objects, lamps and what shines, and what several changes of them begin with.
+"""Objects, lamps and emission of the open scene, and steps that several changes of them share.
 
-Where objects are cut up or joined, each face remembers by an attribute which object it came from
-(`remember_origins`), so that light can be compared by the objects that were.
+If objects are cut up or joined, a face attribute stores the original object of each face
+(`remember_origins`), so that light can be compared by original objects.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-ORIGIN = "raybundle_origin"  # face attribute: index into scene[ORIGINS]
+ORIGIN = "raybundle_origin"  # face attribute: index in scene[ORIGINS]
 ORIGINS = "raybundle_origins"
 
 
 class NotApplicable(Exception):
-    """The scene has nothing that could be changed so; the text says what is missing."""
+    """The scene has nothing that this change could change. The text says what is missing."""
 
 
 # --------------------------------------------------------------------------------------------------
@@ -28,7 +28,7 @@ class NotApplicable(Exception):
 
 
 def items() -> list[bpy.types.Object]:
-    """The objects of the view layer; others are seen as instances at most."""
+    """Returns the objects of the view layer. Other objects can only be visible as instances."""
     return list(bpy.context.view_layer.objects)
 
 
@@ -42,7 +42,7 @@ def lamps() -> list[bpy.types.Object]:
 
 
 def emission_inputs(tree: bpy.types.NodeTree | None) -> list[bpy.types.NodeSocket]:
-    """The strengths of what shines in a material or a world."""
+    """Returns the inputs for the strength of emission in the node tree of a material or a world."""
     names = {'EMISSION': "Strength", 'BACKGROUND': "Strength",
              'BSDF_PRINCIPLED': "Emission Strength"}
     nodes = tree.nodes if tree else ()
@@ -63,7 +63,7 @@ def is_emissive(item: bpy.types.Object) -> bool:
 
 
 def diagonal() -> float:
-    """Of the box around all meshes, m."""
+    """Returns the diagonal of the box around all meshes, m."""
     low, high = bounds()
     return float(np.linalg.norm(high - low))
 
@@ -80,7 +80,7 @@ def bounds() -> tuple[np.ndarray, np.ndarray]:
 
 
 def make_single_users() -> None:
-    """Each mesh object gets a mesh of its own, and each lamp its light."""
+    """Gives each mesh object a mesh of its own, and each lamp a light of its own."""
     for item in items():
         if item.type in ('MESH', 'LIGHT') and item.data.users > 1:
             item.data = item.data.copy()
@@ -98,7 +98,10 @@ def apply_modifiers() -> None:
 
 
 def remember_origins() -> None:
-    """Modifiers and shared meshes are gone afterwards, for faces to have one origin each."""
+    """Stores the original object of each face in an attribute.
+
+    Applies modifiers and copies shared meshes first, so that each face has one origin.
+    """
     apply_modifiers()
     found = mesh_items()
     bpy.context.scene[ORIGINS] = [item.name for item in found]
@@ -109,7 +112,7 @@ def remember_origins() -> None:
 
 
 def edited(item: bpy.types.Object) -> Iterator[bmesh.types.BMesh]:
-    """`for mesh in edited(item)`: its bmesh once, written back afterwards."""
+    """Yields the object's bmesh once, and writes it back afterwards: `for mesh in edited(item)`."""
     mesh = bmesh.new()
     mesh.from_mesh(item.data)
     yield mesh
@@ -131,7 +134,7 @@ def black_material() -> bpy.types.Material:
 
 
 def new_shader(material: bpy.types.Material, kind: str) -> bpy.types.Node:
-    """Leaves the material with nothing but a new shader of this kind, which is returned."""
+    """Replaces all nodes of a material by a new shader of this kind, and returns the shader."""
     material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()

@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Error and time of small objects in large scenes: a house on a plain, a laid table in a hall.
+"""Measures error and time of small objects in large scenes: a house on a plain, a table in a hall.
 
     blender -b --factory-startup -P blend_tests/small_objects.py -- \\
         [--target 0.01] [--seeds 2] [--factor 10] [--runs 3] [--samples 1024]
 
-Of LIGHTING, at the corners of the small objects alone, relative RMSE over RGB by area, with each of
-two reconstructions:
+Errors are relative RMSEs of LIGHTING over RGB by area, at the corners of the small objects only,
+with each of two reconstructions:
 
-noise     against the same patches with --factor times the bundles (4096 at most) and another seed,
-          at all corners, hidden ones included, at the vertices off contact edges, and as it is
-          seen: interpolated over the faces, at points inside them that nothing covers;
-vertices  against Cycles at the vertices off contact edges;
-surface   interpolated over the faces, against Cycles at points inside them; beside it what Cycles'
-          own vertex bake has without noise.
+noise     against the same patches with --factor times the bundles (4096 at most) and another seed:
+          at all corners, hidden ones included; at the vertices off contact edges; and as it is
+          seen, which is interpolated over the faces, at points inside them that nothing covers
+vertices  against Cycles at the vertices off contact edges
+surface   interpolated over the faces, against Cycles at points inside them; beside it the error of
+          Cycles' own vertex bake without noise
 
-Cycles' noise is taken out as in mesh_densities.py. And the seconds of a bake over those of the same
-small objects without the extent around them (the plain cut to 18 m; a hall of 5 x 6 x 3.2 m), side
-by side: medians of --runs. Prints a table in Markdown.
+The noise of Cycles is eliminated as in mesh_densities.py. The last column is the time of a bake
+divided by that of the same small objects without the large surroundings (the plain cut to 18 m, or
+a hall of 5 x 6 x 3.2 m), run in turns, as medians of --runs. Prints a table in Markdown.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from surface_error import (corner_areas, is_defined, off_contact_edges,  # noqa:
                            surface_error)
 from surface_reference import Light, SurfaceReference  # noqa: E402
 
-# Names begin with these.
+# Names of the large and of the small objects begin with these texts.
 LARGE = {"house_on_plain": ("plain",), "laid_table": ("floor", "ceiling", "wall_", "lamp_")}
 SMALL = {"house_on_plain": ("",),
          "laid_table": ("plate", "cup", "fork", "knife", "candlestick")}
@@ -57,7 +57,7 @@ def small_objects(scene: str) -> list[bpy.types.Object]:
 
 
 def cut(scene: str) -> None:
-    """Takes the extent away from the scene that is open."""
+    """Removes the large surroundings from the open scene."""
     if scene == "house_on_plain":
         mesh = bpy.data.objects["plain"].data
         shape = bmesh.new()
@@ -81,7 +81,10 @@ def open_scene(name: str) -> None:
 
 def squared_vertex_error(objects: list[bpy.types.Object], light: Light, references: list[Light]
                          ) -> float:
-    """Relative, off contact edges, without the noise of the two independent references."""
+    """Returns the relative squared error at vertices off contact edges.
+
+    It does not contain the noise of the two independent references.
+    """
     off = [{name: light[name] - values for name, values in reference.items()}
            for reference in references]
     return max(0.0, mean_product(objects, off, references))
@@ -89,7 +92,10 @@ def squared_vertex_error(objects: list[bpy.types.Object], light: Light, referenc
 
 def mean_product(objects: list[bpy.types.Object], factors: list[Light], references: list[Light]
                  ) -> float:
-    """Of two values at the corners, off contact edges, over that of the two references."""
+    """Returns the mean product of two values at the corners off contact edges, by area.
+
+    It is relative to the mean product of the two references.
+    """
     off_contacts = off_contact_edges(bakeable_objects(bpy.context))
     product = scale = 0.0
     for item in objects:
@@ -101,7 +107,7 @@ def mean_product(objects: list[bpy.types.Object], factors: list[Light], referenc
 
 
 def seen_noise(reference: SurfaceReference, found: Light, truth: Light) -> float:
-    """Relative RMSE at the reference's points."""
+    """Returns the relative RMSE at the points of the reference."""
     noise = scale = 0.0
     for name, values in found.items():
         (shown, _, area), (true, _, _) = (reference.points(name, light[name])
@@ -112,7 +118,7 @@ def seen_noise(reference: SurfaceReference, found: Light, truth: Light) -> float
 
 
 def time_ratio(name: str, options: argparse.Namespace, reconstruction: str) -> float:
-    """Seconds of a bake over those without the extent."""
+    """Returns the time of a bake divided by its time without the large surroundings."""
     seconds: dict[bool, list[float]] = {False: [], True: []}
     for _ in range(options.runs):
         for is_cut, times in seconds.items():
@@ -127,7 +133,7 @@ def time_ratio(name: str, options: argparse.Namespace, reconstruction: str) -> f
 
 
 def measure(name: str, options: argparse.Namespace) -> list[str]:
-    """Rows of the table, one for each reconstruction."""
+    """Returns rows of the table, one for each reconstruction."""
     open_scene(name)
     objects = small_objects(name)
     cycles = [bake_cycles(objects, options.samples, seed)[1] for seed in (2, 3)]

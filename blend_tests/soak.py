@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many random bakes in one Blender: nothing crashes, leaks or drifts.
+"""Runs many random bakes in one Blender: nothing may crash, leak memory or change its results.
 
     blender -b --factory-startup --python-exit-code 1 -P blend_tests/soak.py -- [--bakes 500] [--seed 1]
 
-Scenes, materials, lights and settings are random; some bakes are cancelled at a random moment, some
-are of the scene of the bake before with other lights. After every tenth a scene that is always the
-same is baked: its light must be the first one's to the last bit, and the memory that is allocated
-then must not grow by more than 2 % from the second fifth of the bakes to the last, in the median. If
-Blender's allocator is jemalloc, as Debian's is, it tells how much that is; otherwise what is resident
-is taken, which wanders by more with what the allocator keeps for later.
+Scenes, materials, lights and settings are random. Some bakes are cancelled at a random moment, some
+use the scene of the previous bake with additional lights. After every tenth bake a fixed scene is
+baked. Its light must be equal to that of the first time to the last bit. From the second fifth of
+the bakes to the last fifth, the median of the memory that is allocated at this point must not grow
+by more than 2 %. If the allocator of Blender is jemalloc, as in Debian, it returns this number.
+Otherwise the resident memory is used, which varies more, because it includes memory that the
+allocator keeps for later.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ def add_light(random: np.random.Generator) -> bpy.types.Object:
 
 
 def build(random: np.random.Generator) -> None:
-    """A room or an open place with boxes, lamps and a world."""
+    """Builds a random room or open place with boxes, lamps and a world."""
     bpy.ops.wm.read_homefile(use_empty=True)
     if random.uniform() < 0.7:
         add_box(random, np.array([2.0, 2.0, 1.6]), True)
@@ -123,7 +124,7 @@ def settings(random: np.random.Generator) -> dict[str, object]:
 
 
 def bake_at_random(random: np.random.Generator) -> str:
-    """What became of the bake: finished, cancelled, or refused with a message."""
+    """Bakes with random settings. Returns finished, cancelled, or refused (with a message)."""
     calls_left = int(random.integers(1, 25)) if random.uniform() < 0.2 else -1
 
     def progress(_stage: str, _fraction: float) -> bool:
@@ -158,11 +159,11 @@ def resident_bytes() -> int:
 
 
 def allocated_bytes() -> int | None:
-    """Allocated by the process and not freed; None where jemalloc is not the allocator."""
+    """Returns the memory that the process has allocated and not freed, or None without jemalloc."""
     mallctl = getattr(ctypes.CDLL(None), "mallctl", None)
     if mallctl is None:
         return None
-    # What is read next is as of this epoch.
+    # Updates the statistics that are read next.
     epoch = ctypes.c_uint64(1)
     mallctl(b"epoch", None, None, ctypes.byref(epoch), ctypes.c_size_t(8))
     allocated, size = ctypes.c_size_t(), ctypes.c_size_t(ctypes.sizeof(ctypes.c_size_t))
@@ -172,7 +173,7 @@ def allocated_bytes() -> int | None:
 
 
 def growth(memory: list[int]) -> float:
-    """From the median of the second fifth to that of the last."""
+    """Returns the relative growth from the median of the second fifth to that of the last fifth."""
     fifth = max(1, len(memory) // 5)
     return float(np.median(memory[-fifth:]) / np.median(memory[fifth:2 * fifth]) - 1.0)
 
@@ -186,7 +187,7 @@ def main(arguments: list[str]) -> None:
     random = np.random.default_rng(options.seed)
     first = control_light()
     counts: dict[str, int] = {}
-    # After every tenth bake, bytes.
+    # Bytes after every tenth bake.
     memory: dict[str, list[int]] = {"resident": []}
     if allocated_bytes() is not None:
         memory["allocated"] = []

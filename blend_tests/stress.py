@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes as no one should make them, made in Blender: the second part of docs/stability.md's table.
+"""Bakes badly made scenes of Blender, for the second part of the table in docs/stability.md.
 
-    blender -b --factory-startup --python-exit-code 1 -P blend_tests/stress.py -- \
+    blender -b --factory-startup --python-exit-code 1 -P blend_tests/stress.py -- \\
         [--quick] [--only TEXT]
 
-`native/stress/stability` runs it after its own cases, which build scenes without Blender; here it
-is Blender that evaluates transforms, modifiers and instances. Most scenes stand in the light of a
-white furnace: the world has radiance 1 / pi and both sides of all surfaces emit what they do not
-reflect, so that the irradiance is 1 wherever a surface is, whatever its shape. Of every case:
+`native/stress/stability` runs this script after its own cases, which build scenes without Blender.
+Here Blender evaluates transforms, modifiers and instances. Most scenes are in a white furnace: the
+world has radiance 1 / pi, and both sides of all surfaces emit what they do not reflect, so that the
+irradiance is 1 W/m^2 on every surface, whatever its shape. The columns are:
 
-    largest    deviation of the irradiance at the corners from the exact answer
-    RMS        of the means of the faces, by area: at most 1.25 times what the report states
-               (or 0.001); faces that others cover wholly have no light, and are left out
-    balance    energy that is emitted and neither absorbed nor escapes, of what is emitted
+    largest    largest relative deviation of the irradiance at the corners from the exact answer
+    RMS        relative RMS deviation of the means of the faces, by area: at most 1.25 times the
+               error that the report states (or 0.001). Faces that other faces cover wholly have no
+               light and are left out
+    balance    share of the emitted energy that is neither absorbed nor escapes
 
-Whatever happens, the colours are finite and not negative, another attribute of the mesh stays as it
-was, and what is left out, clamped or refused is named.
+In every case the colours are finite and not negative, another attribute of the mesh does not
+change, and a message names what is left out, clamped or refused.
 """
 
 from __future__ import annotations
@@ -41,25 +42,29 @@ from surface_error import (  # noqa: E402
 
 # As in native/stress/stability.cpp.
 EXACT, STATED_SHARE, MOST_IMBALANCE = 1e-3, 1.25, 1e-3
-MINE = (0.25, 0.5, 0.75, 1.0)  # what an attribute of the user's holds
+MINE = (0.25, 0.5, 0.75, 1.0)  # value of a colour attribute of the user
 
 
 @dataclass
 class Case:
+    """A scene, and what its bake must give."""
+
     name: str
     build: Callable[[], None]
-    # Irradiance at every corner of what is baked, W/m^2; None: whatever keeps the energy balanced.
+    # Irradiance at every baked corner, W/m^2. None: any light with a balanced energy.
     light: float | None = 1.0
-    # What a warning says, or the message with which the bake is refused.
+    # Text in a warning, or in the message with which the bake is refused.
     says: str = ""
     is_refused: bool = False
-    hides_faces: bool = False  # some are wholly covered by others, or have no area
+    hides_faces: bool = False  # some faces are wholly covered by others, or have no area
     settings: dict[str, object] = field(default_factory=dict)
     is_quick: bool = True
 
 
 @dataclass
 class Result:
+    """The deviations of one case, relative, and what failed."""
+
     largest: float = np.nan
     rms: float = np.nan
     stated: float = np.nan
@@ -135,7 +140,7 @@ def masked_to_nothing() -> None:
 
 
 def sheared(factor: float) -> None:
-    """By a parent that is scaled along one axis, of a child that is turned by 45 degrees."""
+    """Adds a cube, rotated by 45 degrees, whose parent is scaled along one axis."""
     parent = bpy.data.objects.new("Parent", None)
     bpy.context.scene.collection.objects.link(parent)
     parent.scale = (factor, 1.0, 1.0)
@@ -151,7 +156,7 @@ def scaled(*scale: float) -> None:
 
 
 def slivers(count: int) -> None:
-    """A metre long and a micrometre wide, side by side."""
+    """Adds faces of 1 m by 1 micrometre, side by side."""
     rows = np.arange(count + 1) * 1e-6
     vertices = [(x, y, 0.0) for y in rows for x in (0.0, 1.0)]
     polygons(vertices, *[(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(count)])
@@ -177,7 +182,7 @@ def box_that_fills_a_room() -> None:
 
 
 def interlocked_bars() -> None:
-    """Each of three bars lies on the next."""
+    """Adds three bars, each of which lies on the next."""
     corners = (np.array(CUBE_VERTICES) * (1.0, 0.1, 0.1)).tolist()
     for k in range(3):
         bar = create_object(f"Bar {k}", corners, CUBE_FACES, white())
@@ -198,7 +203,7 @@ def on_circle(count: int, radii=(1.0,)):
 
 
 def with_vertex(*place: float) -> None:
-    """A mesh of which one vertex is out of place, beside others."""
+    """Adds a mesh with one misplaced vertex, and another mesh."""
     item = cube("Broken")
     item.data.vertices[0].co = place
     cube("Whole", (2.0, 0.0, 0.0))
@@ -225,7 +230,7 @@ def many_objects(count: int) -> None:
 
 
 def nested_instances(levels: int) -> None:
-    """A cube, three times in a collection, which is three times in another, and so on."""
+    """Adds a cube, three times in a collection, which is three times in another one, and so on."""
     ground()
     inner = bpy.data.collections.new("Level")
     item = cube(size=0.02)
@@ -245,7 +250,7 @@ def nested_instances(levels: int) -> None:
 
 
 def lamp(kind: str, energy: float = 100.0, **values) -> None:
-    """In a room that is open at the top."""
+    """Adds a lamp in a room that is open at the top."""
     create_object("Room", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES[:5]], grey(0.5, 0.0))
     data = bpy.data.lights.new("Lamp", kind)
     data.energy = energy
@@ -296,7 +301,7 @@ def mesh_cases() -> Iterator[Case]:
     yield Case("a cube twice", lambda: cubes((0, 0, 0), (0, 0, 0)), hides_faces=True)
     yield Case("a cube twice, 1e-7 m apart", lambda: cubes((0, 0, 0), (1e-7, 1e-7, 1e-7)),
                hides_faces=True)
-    # As far as depth tells, this is a box that fills a room: nothing shines between.
+    # By their depths, these cubes are a box that fills a room: no light gets between them.
     yield Case("a box that fills a room", box_that_fills_a_room, None)
     yield Case("a cube with a shell of no thickness", lambda: modified('SOLIDIFY', thickness=0.0))
     yield Case("cubes through each other",
@@ -335,7 +340,7 @@ def mesh_cases() -> Iterator[Case]:
 
 
 def value_cases() -> Iterator[Case]:
-    """Of materials, the world and lamps."""
+    """Returns cases of values of materials, the world and lamps."""
     yield Case("an emission of -1 W/m^2", room_of_negative_emission, None, "Grey")
     yield Case("an emission that is no number", lambda: room(0.5, np.nan), None, "Grey", True)
     yield Case("a reflectance that is no number", lambda: room(np.nan), None, "Grey", True)
@@ -360,7 +365,7 @@ def value_cases() -> Iterator[Case]:
 
 
 def user_colors(mesh: bpy.types.Mesh) -> None:
-    """An attribute that no bake may touch."""
+    """Adds a colour attribute that no bake may change."""
     values = mesh.color_attributes.new("Mine", 'FLOAT_COLOR', 'CORNER').data
     values.foreach_set('color', np.tile(np.array(MINE, np.float32), len(values)))
 
@@ -404,7 +409,10 @@ def measure(case: Case) -> Result:
 
 def compare(case: Case, items: list[bpy.types.Object], light: list[np.ndarray], result: Result
             ) -> None:
-    """light: (corners, 3) of each, irradiance."""
+    """Compares the light of a bake with the exact one.
+
+    light: irradiance of each object, (corners, 3), W/m^2.
+    """
     corners, faces, areas = [], [], []
     for item, values in zip(items, light):
         means = face_means(item, values)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far baked light is from a reference, and where on a mesh the comparison means something.
+"""The error of baked light relative to a reference, and where on a mesh a comparison is meaningful.
 
-Values are RGB per corner. Each corner stands for its share of its face: weights are areas.
+Values are RGB per corner. Each corner is weighted by its share of the area of its face.
 """
 
 from __future__ import annotations
@@ -13,20 +13,21 @@ import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-# Surfaces nearer than this share of the longest edge at a vertex touch: float coordinates of
-# touching objects differ by 1e-7 of the scene, gaps that let light through are wider.
+# Surfaces touch if they are nearer than this share of the longest edge at a vertex. Coordinates of
+# touching objects differ by rounding, 1e-7 of the scene. Gaps that let light through are wider.
 TOUCHING = 1e-3
 
-# Vertices at exactly one edge's length from a contact count as off it, whatever their rounding.
+# Share of the longest edge within which contacts are searched for. A vertex at exactly the length
+# of an edge from a contact thus counts as off the contact, whatever its rounding.
 REACH = 0.999
 
-# Edges whose faces enclose a room corner: the cosine between them falls below this.
+# Faces at an edge of a room's corner have a smaller cosine between their normals than this.
 FLAT_COSINE = 0.999
 
 
 @dataclass(frozen=True)
 class SurfaceError:
-    """Area-weighted; rmse, maximum and percentile_99 relative to the reference's RMS over RGB."""
+    """Errors weighted by area, relative to the reference's RMS over RGB; the bias to its mean."""
 
     rmse: float
     bias: float  # mean / mean of the reference - 1
@@ -41,7 +42,11 @@ class SurfaceError:
 
 
 def surface_error(values: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> SurfaceError:
-    """values, reference: (n, 3); weights: (n,) areas, 0 where nothing is compared."""
+    """Returns the error of values.
+
+    values, reference: (n, 3). weights: (n,) areas, 0 where values are not compared. Raises
+    ValueError if all weights are 0.
+    """
     used = weights > 0.0
     if not used.any():
         raise ValueError("there is nothing to compare")
@@ -61,7 +66,7 @@ def surface_error(values: np.ndarray, reference: np.ndarray, weights: np.ndarray
 
 
 def read_colors(item: bpy.types.Object, attribute: str = "Radiosity") -> np.ndarray:
-    """(corners, 3) of an attribute on face corners."""
+    """Returns (corners, 3) RGB of a colour attribute on face corners."""
     data = item.data.color_attributes[attribute].data
     colors = np.empty(4 * len(data), np.float32)
     data.foreach_get('color', colors)
@@ -74,21 +79,21 @@ def read_colors(item: bpy.types.Object, attribute: str = "Radiosity") -> np.ndar
 
 
 def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(corners,) index of each corner's vertex."""
+    """Returns (corners,) the index of each corner's vertex."""
     indices = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get('vertex_index', indices)
     return indices
 
 
 def face_sizes(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(faces,) number of corners."""
+    """Returns (faces,) the number of corners of each face."""
     sizes = np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get('loop_total', sizes)
     return sizes
 
 
 def world_positions(item: bpy.types.Object) -> np.ndarray:
-    """(vertices, 3)."""
+    """Returns (vertices, 3) positions in the world, m."""
     positions = np.empty(3 * len(item.data.vertices), np.float32)
     item.data.vertices.foreach_get('co', positions)
     matrix = np.array(item.matrix_world)
@@ -96,36 +101,41 @@ def world_positions(item: bpy.types.Object) -> np.ndarray:
 
 
 def corner_areas(item: bpy.types.Object) -> np.ndarray:
-    """(corners,) each corner's share of its face's area in the world."""
+    """Returns (corners,) each corner's share of the area of its face, in the world, m^2."""
     vectors = _face_area_vectors(item)
     sizes = face_sizes(item.data)
     return np.repeat(np.linalg.norm(vectors, axis=1) / sizes, sizes)
 
 
 def face_means(item: bpy.types.Object, values: np.ndarray) -> np.ndarray:
-    """(faces, 3) mean of the corners of each face."""
+    """Returns (faces, 3) the mean of the corners of each face."""
     sizes = face_sizes(item.data)
     starts = np.cumsum(sizes) - sizes
     return np.add.reduceat(values.astype(float), starts, axis=0) / sizes[:, None]
 
 
 def is_defined(item: bpy.types.Object, reference: np.ndarray) -> np.ndarray:
-    """(corners,) whether Cycles has a value: on faces that reflect nothing all corners are 0."""
+    """Returns (corners,) whether Cycles has a value.
+
+    On faces that reflect nothing its values are 0 at all corners.
+    """
     lit = face_means(item, reference).any(axis=1)
     return np.repeat(lit, face_sizes(item.data))
 
 
 def off_contact_edges(items: Sequence[bpy.types.Object]) -> dict[str, np.ndarray]:
-    """(corners,) by object name: whether a corner's vertex is off all contact edges.
+    """Returns (corners,) masks by object name: whether a corner's vertex is off all contact edges.
 
-    At a contact edge Cycles' point sample is arbitrary: it may lie on either side. A vertex is off
-    contact edges if
-    - no other surface (another object, another loose part of its own mesh) that touches its own
-      surface does so nearer than the longest edge at the vertex. Nearer than that the contact
-      crosses a face at the vertex, whose light jumps where the mesh cannot follow: floor beside a
-      box that stands across its grid. The neighbours of a room's edge, one edge away, are off it.
-      What is near but does not touch, such as a lamp below a ceiling, is no contact;
-    - no concave edge of its own mesh ends at it.
+    At a contact edge the point sample of Cycles is arbitrary, because it may be on either side of
+    the contact. A vertex is off contact edges if two conditions hold:
+
+    - No other surface (another object, or another loose part of its own mesh) touches its own
+      surface within the longest edge at the vertex. A nearer contact crosses a face at the vertex.
+      The light on this face jumps where the mesh has no edge, as on a floor beside a box that does
+      not fit the floor's grid. The neighbours of a vertex on a room's edge, one edge away, are off
+      this contact. A surface that is near but does not touch, such as a lamp below a ceiling, is no
+      contact.
+    - No concave edge of its own mesh ends at the vertex.
     """
     parts = [part for item in items for part in _loose_parts(item)]
     result = {}
@@ -145,7 +155,7 @@ class _Part:
     item: bpy.types.Object
     vertices: np.ndarray  # indices in the mesh
     positions: np.ndarray
-    longest_edges: np.ndarray  # by vertex
+    longest_edges: np.ndarray  # per vertex
     tree: BVHTree
 
 
@@ -178,7 +188,7 @@ def _loose_parts(item: bpy.types.Object) -> list[_Part]:
         lowest = labels.copy()
         for end in (0, 1):
             np.minimum.at(lowest, edges[:, end], labels[edges[:, 1 - end]])
-        # Labels are vertices too: follow them, so that few rounds are needed.
+        # Labels are indices of vertices. Following them reduces the number of rounds.
         lowest = lowest[lowest]
         if (lowest == labels).all():
             break
@@ -195,7 +205,7 @@ def _loose_parts(item: bpy.types.Object) -> list[_Part]:
 
 
 def _on_concave_edge(item: bpy.types.Object) -> np.ndarray:
-    """(vertices,) whether two faces at one of its edges face each other."""
+    """Returns (vertices,) whether two faces at one of the vertex's edges face each other."""
     mesh = item.data
     positions = world_positions(item)
     sizes = face_sizes(mesh)
@@ -209,7 +219,7 @@ def _on_concave_edge(item: bpy.types.Object) -> np.ndarray:
     same = corner_edges[order[1:]] == corner_edges[order[:-1]]
     first, second = faces[order[:-1][same]], faces[order[1:][same]]
     bent = (normals[first] * normals[second]).sum(axis=1) < FLAT_COSINE
-    # The neighbour's centre rises above the face's plane.
+    # The centre of the neighbour is above the plane of the face.
     above = (normals[first] * (centres[second] - centres[first])).sum(axis=1) > 0.0
     concave = np.zeros(len(positions), bool)
     concave[_edge_vertices(mesh)[corner_edges[order[:-1][same]][bent & above]]] = True
@@ -223,7 +233,7 @@ def _edge_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _face_area_vectors(item: bpy.types.Object) -> np.ndarray:
-    """(faces, 3) normal times area."""
+    """Returns (faces, 3) normals times areas, m^2."""
     positions = world_positions(item)[corner_vertices(item.data)]
     sizes = face_sizes(item.data)
     ends = np.cumsum(sizes)

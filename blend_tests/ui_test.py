@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake by the mouse, in a Blender with a window; started by run_ui_test.py.
+"""Bakes with the mouse in a Blender with a window; started by run_ui_test.py.
 
     blender --factory-startup FILE.blend -P blend_tests/ui_test.py -- --out DIR
 
 Shows the Raybundle panel in the Render properties, finds its Bake button on the screen, clicks it
-with xdotool and checks what the click has done. Leaves with exit code 0 or 1, and with pictures of
-the window in DIR.
+with xdotool, and checks the result of the click. The exit code is 0 or 1. Pictures of the window
+are saved in DIR.
 """
 
 from __future__ import annotations
@@ -28,15 +28,16 @@ sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
 
-# Buttons of operators have this colour while they are looked for; nothing else in Blender has it.
+# Buttons of operators have this colour while the test searches for them. Nothing else in Blender
+# has it.
 MARK = (1.0, 0.0, 1.0)
-# Between two steps: Blender draws and handles events.
+# Pause between two steps, s, in which Blender draws and handles events.
 PAUSE = 0.3
 BAKE_SECONDS = 60.0
 
 
 class UiError(Exception):
-    """What the test expected and did not see."""
+    """The screen does not show what the test expects."""
 
 
 # --------------------------------------------------------------------------------------------------
@@ -56,7 +57,7 @@ def properties_area() -> bpy.types.Area:
 
 
 def show_panel() -> None:
-    """The Render properties with no other panel but Raybundle's, which is open by default."""
+    """Shows the Render properties with only Raybundle's panel, which is open by default."""
     panels = list(bpy.types.Panel.__subclasses__())
     for panel in panels:
         if (getattr(panel, 'bl_space_type', '') == 'PROPERTIES'
@@ -69,7 +70,7 @@ def show_panel() -> None:
 
 
 def screenshot(path: Path) -> np.ndarray:
-    """(height, width, 3) in 0..1, first row at the bottom."""
+    """Saves a picture of the window. Returns (height, width, 3) in 0..1, bottom row first."""
     with bpy.context.temp_override(window=window(), area=properties_area()):
         bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=2)
         bpy.ops.screen.screenshot(filepath=str(path), check_existing=False)
@@ -82,8 +83,10 @@ def screenshot(path: Path) -> np.ndarray:
 
 
 def find_bake_button(path: Path) -> tuple[int, int]:
-    """Centre of the leftmost button in the top row of the panel's buttons, from the window's lower
-    left corner."""
+    """Returns the centre of the Bake button, in pixels from the lower left corner of the window.
+
+    It is the leftmost button in the top row of the panel's buttons.
+    """
     theme = bpy.context.preferences.themes[0].user_interface.wcol_tool
     before = tuple(theme.inner)
     theme.inner = (*MARK, 1.0)
@@ -97,13 +100,13 @@ def find_bake_button(path: Path) -> tuple[int, int]:
     rows = np.flatnonzero(marked.sum(axis=1) > 8)
     if not len(rows):
         raise UiError("there is no button in the Render properties: is the panel closed or hidden?")
-    # Rows of the topmost button, without the rounding of its corners.
+    # Rows of the topmost button, without its rounded corners.
     top = rows[-1]
     bottom = next((row for row in range(top, -1, -1) if marked[row].sum() <= 8), -1) + 1
     middle = (top + bottom) // 2
     columns = np.flatnonzero(marked[bottom:top + 1].any(axis=0))
-    # The text lies in the button: gaps of a letter's width belong to it; between buttons there is a
-    # line of another colour from top to bottom.
+    # The text is inside the button, so that gaps of the width of a letter belong to the button.
+    # Between buttons there is a line of another colour from top to bottom.
     left = columns[0]
     right = left
     while right + 1 < marked.shape[1] and marked[bottom:top + 1, right + 1].any():
@@ -119,12 +122,13 @@ def xdotool(*arguments: object) -> str:
 
 
 def click(x: int, y: int) -> Iterator[float]:
-    """The steps of a click at x, y from the window's lower left corner, in pixels."""
+    """Clicks at x, y, in pixels from the window's lower left corner. Yields pauses in s."""
     identifiers = xdotool("search", "--onlyvisible", "--name", "Blender").split()
     if len(identifiers) != 1:
         raise UiError(f"there are {len(identifiers)} windows of Blender")
     place = ["mousemove", "--window", identifiers[0], x]
-    # From outside the button, so that it knows of the mouse, with time for Blender to see it.
+    # Enters the button from outside, so that the button notices the mouse, with time for Blender to
+    # react.
     for offset in (40, 2, 0):
         xdotool(*place, window().height - 1 - y - offset)
         yield PAUSE
@@ -132,7 +136,7 @@ def click(x: int, y: int) -> Iterator[float]:
     yield PAUSE
     xdotool("mouseup", 1)
     yield PAUSE
-    # Away, or the button's tooltip hides a part of the panel.
+    # Moves away, because the tooltip of the button would hide a part of the panel.
     xdotool("mousemove", "--window", identifiers[0], 5, 5)
 
 
@@ -147,7 +151,7 @@ def baked_objects() -> list[bpy.types.Object]:
 
 
 def steps(out: Path) -> Iterator[float]:
-    """Each value is the pause before the next step, in seconds."""
+    """Runs the test. Yields the pauses between its steps, s."""
     show_panel()
     yield 2.0 * PAUSE
     if bpy.context.scene.raybundle.report or baked_objects():
@@ -185,7 +189,7 @@ def check_result() -> None:
 def leave(code: int, message: str) -> None:
     print(f"ui_test: {message}", flush=True)
     sys.stdout.flush()
-    # Blender would ask whether to save the file.
+    # A normal exit would ask whether to save the file.
     os._exit(code)
 
 

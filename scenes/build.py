@@ -22,9 +22,10 @@ SCENES = ("cornell_box", "furnace", "facing_squares", "sphere_interior", "big_ro
 
 
 def build_scene(name: str, folder: Path = FOLDER, density: float = 1.0) -> Path:
-    """Builds one scene in an empty file and saves it in the folder.
+    """Builds one scene in an empty file, saves it in the folder and returns the path of the file.
 
-    density: cells of all grids along each edge, relative to those of the scenes in this folder.
+    density: factor for the number of cells of all grids along each edge; 1 for the scenes of this
+    folder.
     """
     construction.density = density
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -40,7 +41,7 @@ def build_scene(name: str, folder: Path = FOLDER, density: float = 1.0) -> Path:
 
 
 def summary(path: Path) -> str:
-    """One line about the scene that is open: objects and faces that a render shows."""
+    """Returns one line about the open scene: its objects and faces, and those in a render."""
     graph = bpy.context.evaluated_depsgraph_get()
     own = [item for item in bpy.context.view_layer.objects
            if item.type == "MESH" and not item.hide_render]
@@ -52,7 +53,7 @@ def summary(path: Path) -> str:
 
 
 def main(names: list[str]) -> None:
-    """Builds the named scenes, or all."""
+    """Builds the named scenes, or all scenes if there are no names. Exits if a name is unknown."""
     unknown = sorted(set(names) - set(SCENES))
     if unknown:
         sys.exit(f"unknown scene: {', '.join(unknown)}; known: {', '.join(SCENES)}")

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A bake that runs out of memory at its first allocation, at its second, and so on to its last, on
-// whichever thread, for that allocation alone or until it ends: each time it must say so, keep the
-// results of the run before, and be as good as new afterwards. Or it gives the light that it
-// should, where whoever asked does without.
+// Checks that a bake survives running out of memory at any point. Bakes run out of memory at their
+// first allocation, at their second, and so on to their last, on any thread, either for that
+// allocation alone or for all allocations after it as well. Each bake must return an error, keep
+// the results of the previous run and work again afterwards. If the failed allocation can be done
+// without, the bake must give the right light instead.
 //
-//   allocation_faults [STEP [FIRST]]     fails every STEP-th allocation (1) from the FIRST-th on (0)
+//   allocation_faults [STEP [FIRST]]
 //
-// The C library's malloc and its kin, and mmap, are replaced for all libraries, so that what
-// oneTBB, its allocator and Embree take fails too. Each allocation has a process of its own:
-// whatever it breaks is seen. Where STEP is 1 the first bake of a process, which starts oneTBB, is
-// tried too.
+// Lets every STEP-th allocation fail (default 1), from the FIRST-th on (default 0).
+//
+// The program replaces malloc and related functions of the C library, and mmap, for all libraries,
+// so that allocations of oneTBB, its allocator and Embree fail too. Each failing allocation has a
+// process of its own, so that any damage is noticed and does not reach the next one. With a STEP of
+// 1, allocations also fail in the first bake of a process, which starts oneTBB.
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -34,18 +37,18 @@ namespace {
 enum Way { MALLOC, CALLOC, REALLOC, ALIGNED, MMAP, WAYS };
 constexpr std::array<const char*, WAYS> kWays{"malloc", "calloc", "realloc", "aligned", "mmap"};
 
-std::atomic<bool> isBaking{false};  // allocations are counted, and fail, only then
-std::atomic<int64_t> untilFault{0};
-bool stays = false;  // all after that at 0 fail too
+std::atomic<bool> isBaking{false};  // allocations are counted, and can fail, only while this is set
+std::atomic<int64_t> untilFault{0};  // allocations before the failing one; below 0 after it
+bool stays = false;                  // whether all allocations after the failing one fail too
 
-// What a process tells the one that started it.
+// Memory that a process shares with the process that started it.
 struct Told {
-    std::array<float, 2 * 72> wanted;  // light
-    Way failed;                        // the allocation
+    std::array<float, 2 * 72> wanted;  // the right light
+    Way failed;                        // kind of the allocation that failed last
 };
 Told* told = nullptr;
 
-// A function of its own as a place to stop at in a debugger.
+// A separate function, so that a debugger can stop in it.
 [[gnu::noinline]] bool fail(Way way) {
     told->failed = way;
     errno = ENOMEM;
@@ -107,10 +110,11 @@ namespace {
 
 using namespace raybundle::test;
 
-// How a process ends.
+// How a process ends: with the right error; with the right light; before it reached the allocation;
+// wrong.
 enum Outcome { FAILED_WELL, DID_WITHOUT, NOT_REACHED, WRONG };
 
-constexpr unsigned kHangs = 60;  // seconds; a bake takes some hundredths
+constexpr unsigned kHangs = 60;  // time limit, s; a bake takes some hundredths of a second
 
 bool holds(bool condition, const char* what, int64_t at) {
     if (!condition)
@@ -120,7 +124,8 @@ bool holds(bool condition, const char* what, int64_t at) {
     return condition;
 }
 
-// Bakes with a fault at an allocation. isFirst: it is the first bake of the process.
+// Bakes while one allocation fails. `isFirst` is whether this is the first bake of the process,
+// `at` the number of the allocation.
 Outcome bakeWithFault(const char* reconstruction, bool isFirst, int64_t at) {
     alarm(kHangs);
     const std::vector<float> wanted(told->wanted.begin(), told->wanted.end());
@@ -128,11 +133,11 @@ Outcome bakeWithFault(const char* reconstruction, bool isFirst, int64_t at) {
     const rb_bake bake = newBake(reconstruction);
     std::vector<float> before;
     if (!isFirst) {
-        // Its results another one replaces.
+        // The bake with the failing allocation replaces these results.
         if (!holds(rb_execute_bake(bake, first) == RB_ERROR_NONE, "the run before failed", at))
             return WRONG;
         before = lightOf(bake);
-        rb_set_bake_int(bake, "skip.geometry", 0);  // all of it, not a relighting
+        rb_set_bake_int(bake, "skip.geometry", 0);  // so that all stages run again
     }
     untilFault = at;
     isBaking = true;
@@ -151,7 +156,7 @@ Outcome bakeWithFault(const char* reconstruction, bool isFirst, int64_t at) {
                                    "a result without a bake", at)
                            : holds(lightOf(bake) == before, "the results before are gone", at));
     }
-    // Once with what is left of the lines, and once without.
+    // Bakes once with the lines that are left, and once without.
     for (int reuse : {1, 0}) {
         rb_set_bake_int(bake, "skip.geometry", reuse);
         isRight = isRight &&
@@ -167,7 +172,8 @@ Outcome bakeWithFault(const char* reconstruction, bool isFirst, int64_t at) {
                                     : FAILED_WELL;
 }
 
-// Runs something in a process of its own; WRONG if that does not end well.
+// Runs `run` in a process of its own and returns its outcome. Returns WRONG if the process cannot
+// be started or ends by a signal.
 template <class Run>
 Outcome inProcess(const Run& run, int64_t at) {
     std::fflush(stdout);
@@ -181,7 +187,7 @@ Outcome inProcess(const Run& run, int64_t at) {
     return WRONG;
 }
 
-// Returns whether all ended well.
+// Lets every `step`-th allocation fail in turn. Returns whether all bakes ended well.
 bool failEach(const char* reconstruction, bool isFirst, int64_t step, int64_t from) {
     const auto bakeWell = [&] {
         const rb_scene room = roomOf(20);

@@ -12,7 +12,8 @@
 
 namespace raybundle::test {
 
-// A closed room with a box and a lamp; `brightness` of the lamp.
+// Makes a closed room with a box and a lamp. `brightness` is the intensity of the lamp, W/sr. The
+// caller releases the scene.
 inline rb_scene roomOf(float brightness) {
     static const float kRoom[12] = {4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 3, 0};
     static const float kBox[12] = {-1, 0, 0, 2, 0, 1, 0, 1, 0, 0, 1, 0};
@@ -33,6 +34,7 @@ inline rb_scene roomOf(float brightness) {
     return scene;
 }
 
+// Returns the light at all corners of both objects, RGB.
 inline std::vector<float> lightOf(rb_bake bake) {
     std::vector<float> light(2 * 72);
     for (int32_t i = 0; i < 2; ++i)
@@ -40,6 +42,7 @@ inline std::vector<float> lightOf(rb_bake bake) {
     return light;
 }
 
+// Makes a bake with 8 bundles and the given reconstruction. The caller releases the bake.
 inline rb_bake newBake(const char* reconstruction) {
     rb_bake bake = nullptr;
     rb_new_bake(&bake);
@@ -51,7 +54,7 @@ inline rb_bake newBake(const char* reconstruction) {
     return bake;
 }
 
-// To the solver's tolerance.
+// Returns whether two results are equal within the tolerance of the solver.
 inline bool isLike(const std::vector<float>& light, const std::vector<float>& wanted) {
     return std::equal(light.begin(), light.end(), wanted.begin(), wanted.end(),
                       [](float a, float b) { return std::abs(a - b) <= 1e-4f * (1 + b); });

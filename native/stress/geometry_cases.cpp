@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Meshes as no one should make them. All stand in the light of a white furnace: the world has
-// radiance 1 / pi and both sides of every surface emit what they do not reflect, so that the
-// irradiance is 1 wherever a surface is, whatever its shape.
+// Badly made meshes. All are in a white furnace: the world has radiance 1 / pi, and both sides of
+// every surface emit what they do not reflect, so that the irradiance is 1 W/m^2 on every surface,
+// whatever its shape.
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
@@ -45,7 +45,7 @@ Mesh turned(Mesh mesh) {
     return mesh;
 }
 
-// Both as parts of one mesh.
+// Returns one mesh with the faces of both.
 Mesh joined(Mesh a, const Mesh& b) {
     const auto firstVertex = int32_t(a.vertices.size()), firstCorner = a.faceOffsets.back();
     a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
@@ -59,12 +59,12 @@ Mesh floorOf(float size) {
     return rectangle("floor", {-size / 2, -size / 2, -0.3f}, {size, 0, 0}, {0, size, 0});
 }
 
-// A metre long and a micrometre wide, side by side.
+// Returns faces of 1 m by 1 micrometre, side by side.
 Mesh slivers(int count) {
     return grid("slivers", {0, 0, 0}, {1, 0, 0}, {0, 1e-6f * float(count), 0}, 1, count);
 }
 
-// Triangles of `size` metres, anywhere in a ball of radius 1.
+// Returns triangles of `size` metres at random places in a ball of radius 1 m.
 Mesh dust(int count, float size) {
     std::mt19937_64 random(5);
     std::uniform_real_distribution<float> uniform(-1, 1);
@@ -81,10 +81,10 @@ Mesh dust(int count, float size) {
     return polygons("dust", std::move(vertices), faces);
 }
 
-// A bar of 2 x 0.2 x 0.2 m that rises along its length.
+// Returns a box of 2 x 0.2 x 0.2 m.
 Mesh bar() { return box("bar", {-1, -0.1f, -0.1f}, {1, 0.1f, 0.1f}, false); }
 
-// Each of three bars lies on the next: no order from back to front is right for all of them.
+// Returns three bars, each of which lies on the next. No order from back to front exists for them.
 Case interlockedBars() {
     Case made = furnace("three interlocked bars");
     for (int k = 0; k < 3; ++k) {
@@ -137,7 +137,7 @@ Mesh aligned() {
     return polygons("aligned boxes", std::move(vertices), faces);
 }
 
-// A star of ten corners, concave at every other.
+// Returns a star of ten corners, concave at every second one.
 Mesh star() {
     std::vector<glm::vec3> vertices;
     std::vector<int32_t> face;
@@ -149,7 +149,7 @@ Mesh star() {
     return polygons("star", std::move(vertices), {face});
 }
 
-// Instances that are mirrored, flattened and sheared.
+// Adds cases with mirrored, flattened and sheared instances.
 void addTransformed(std::vector<Case>& cases) {
     cases.push_back(transformed("mirrored", glm::scale(glm::dmat4(1), glm::dvec3(-1, 1, 1))));
     cases.push_back(
@@ -161,8 +161,8 @@ void addTransformed(std::vector<Case>& cases) {
                            glm::dmat4({1, 0, 0, 0}, {factor, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}));
     };
     cases.push_back(sheared("sheared tenfold", 10));
-    // A kilometre long and a millimetre wide, which few lines meet. The answer is exact with few of
-    // them; as many as the noise asks for take minutes.
+    // The box is a kilometre long and a millimetre wide, so that few lines meet it. The answer is
+    // exact with few lines. The number of lines that the noise would require takes minutes.
     cases.push_back(sheared("sheared a thousandfold, 64 bundles", 1000));
     cases.back().settings.maxBundles = 64;
 }

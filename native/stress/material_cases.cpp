@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Reflectance up to 1 and beyond, and emission over 24 orders of magnitude.
+// Cases of materials: reflectances up to 1 and beyond, emission over 24 orders of magnitude.
 #include "cases.h"
 #include "test_scenes.h"
 
@@ -9,7 +9,8 @@ namespace {
 
 using namespace test;
 
-// A closed room whose walls and boxes emit and reflect alike: the same light everywhere.
+// Returns a closed room whose walls and boxes all emit and reflect equally, so that the irradiance
+// is `light` everywhere, W/m^2.
 Case furnace(const std::string& name, float reflectance, float emission, double light) {
     Case made;
     made.group = "material";
@@ -36,7 +37,8 @@ std::vector<Case> materialCases() {
         cases.push_back(furnace("emission " + printed("%g", double(emission)) + " W/m^2", 0.5f,
                                 emission, 2 * double(emission)));
 
-    // A wall that is 24 orders brighter than the boxes: what these emit is lost in its light.
+    // A lamp that is 24 orders of magnitude brighter than the boxes. The emission of the boxes is
+    // lost in its light.
     Case mixed = furnace("emission 1e-12 beside 1e12 W/m^2", 0.5f, 0, 0);
     mixed.light.reset();
     auto bright = std::make_shared<Scene>(mixed.scene);

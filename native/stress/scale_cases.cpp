@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Sizes, places, and patches beside pixels: a lit room must look the same in all of them.
+// Cases of sizes, distances from the origin, and sizes of pixels relative to patches. A lit room
+// must look the same in all of them.
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "cases.h"
@@ -11,11 +12,13 @@ namespace {
 
 using namespace test;
 
-// Relative RMS difference of two bakes to 2 %, each of whose corners has some of that noise.
+// Tolerance of the relative RMS difference between two bakes to 2 %. Each corner has some of their
+// noise.
 constexpr double kNoise = 0.05;
 constexpr float kPatchSize = 0.25f;
 
-// A room with two boxes and a lamp below the ceiling, `scale` times as large, at `offset`.
+// Returns a room with two boxes and a lamp below the ceiling, `scale` times as large, at `offset`
+// (m).
 Scene litRoomAt(double scale, const glm::dvec3& offset) {
     Scene scene = roomWithBoxes(0.6f);
     const glm::dmat4 place = glm::scale(glm::translate(glm::dmat4(1), offset), glm::dvec3(scale));
@@ -51,15 +54,16 @@ std::vector<Case> scaleCases() {
     cases.push_back(
         room("offset", "0.01 times as large, 1e+06 m from the origin", 0.01, glm::dvec3(1e6)));
 
-    // Patches of 0.25 m: about 1000 of them, over which a bundle's lines are spread; or of 0.5 m,
-    // of which each gets the same with a quarter of the lines.
+    // The lines of a bundle are spread over about 1000 patches of 0.25 m. Patches of 0.5 m get as
+    // many lines each from a quarter of the lines.
     for (double pixels : {0.02, 0.2, 5.0, 50.0, 1000.0}) {
         const bool isWide = pixels >= 1000;
         Case made = room("pixels", printed("%g pixels a patch", pixels), 1, glm::dvec3(0));
         if (isWide) made.settings.patchSize = made.likeSettings.patchSize = 2 * kPatchSize;
         made.settings.linesPerBundle = int((isWide ? 250 : 1000) * pixels / 4);
-        // With fewer lines than patches these gather with local rays until they have some lines,
-        // which are noisier: the noise need not fall from the first.
+        // If there are fewer lines than patches, patches gather light with local rays until they
+        // have some lines. Lines are noisier than these rays, so that the noise need not fall at
+        // first.
         made.hasNoise = pixels > 1;
         cases.push_back(made);
     }

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bakes scenes that are hard on numbers and compares each with its exact answer, or with the same
-// room at another size or place. Prints the table of docs/stability.md; exit code 1 if a case
+// Bakes numerically difficult scenes and compares each with its exact answer, or with the same room
+// at another size or place. Prints the table of docs/stability.md. The exit code is 1 if a case
 // fails.
 //
-//   stability [--quick] [--only TEXT]     --only: of the names; --quick: without the long ones
+//   stability [--quick] [--only TEXT]
 //
-// Of every case:
-//   deviation   of the irradiance of the patches from an exact answer, the largest; or of the corners
-//               from those of the other scene, root mean square
-//   surface     deviation of the result, interpolated over the faces, root mean square by area
+// --quick leaves out the long cases. --only selects the cases with TEXT in their names.
+//
+// The columns of the table:
+//   deviation   largest relative deviation of the irradiance of the patches from an exact answer,
+//               or relative RMS difference of the light at the corners from that of the other scene
+//   surface     relative RMS deviation, by area, of the result interpolated over the faces
 //   stated      error that the report states
-//   balance     energy that is emitted and neither absorbed nor escapes, of what is emitted
-//   threads     one thread and two give the same light, to the last bit
-//   counts      lines between two sides are the same seen from both, and a side's lines end somewhere
-//   noise       by 64, 256 and 1024 bundles: relative RMS against 4096 with another seed, falling
+//   balance     share of the emitted energy that is neither absorbed nor escapes
+//   threads     whether bakes with one thread and with two give the same light to the last bit
+//   counts      whether both sides of a pair have the same number of lines between them, and all
+//               lines of a side end somewhere
+//   noise       relative RMS difference between 64, 256 and 1024 bundles and 4096 with another
+//               seed, which must fall
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -30,15 +34,15 @@ namespace raybundle::stress {
 namespace {
 
 using test::kPi;
-// Counts are compared pair by pair up to this many patches.
+// Counts are compared for all pairs of sides up to this number of patches.
 constexpr size_t kMostPairs = 20000;
-// Below this noise need not fall any more.
+// Noise below this value need not fall any more.
 constexpr double kNoNoise = 1e-4;
-// The true error may be so much larger than the stated one (docs/validation.md).
+// The true error may be up to kStatedShare times the stated one (docs/validation.md), or kExact.
 constexpr double kStatedShare = 1.25, kExact = 1e-3;
 
 struct Light {
-    std::vector<glm::vec3> corners;  // irradiance of all instances, W/m^2
+    std::vector<glm::vec3> corners;  // light at all corners of all instances, as irradiance, W/m^2
     nlohmann::json report;
 };
 
@@ -69,6 +73,7 @@ double rms(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
     return std::sqrt(difference / signal);
 }
 
+// The results of one case, a row of the table. NAN if not measured.
 struct Row {
     double deviation = NAN, surface = NAN, stated = NAN, balance = NAN;
     std::vector<double> noise;
@@ -80,8 +85,8 @@ struct Row {
     }
 };
 
-// Largest relative deviation of the irradiance from `light` on the patch sides that have a result
-// and of which no other surface covers more than half; elsewhere it may not be brighter.
+// Returns the largest relative deviation of the irradiance from `light` on the sides with a result.
+// If more than half of a side is covered, only brighter light counts as a deviation.
 double worstDeviation(const Bake& bake, const Scene& scene, double light) {
     const Patches& patches = bake.patches();
     double worst = 0;
@@ -97,8 +102,8 @@ double worstDeviation(const Bake& bake, const Scene& scene, double light) {
     return worst;
 }
 
-// The same of the light at the corners, interpolated to the middles of these sides: root mean
-// square by exposed area.
+// Returns the relative RMS deviation from `light`, by exposed area, of the light at the corners,
+// interpolated to the centres of the patches with a result.
 double surfaceDeviation(const Bake& bake, const Scene& scene, double light) {
     const Patches& patches = bake.patches();
     std::vector<std::vector<glm::vec3>> lit;
@@ -132,7 +137,7 @@ bool areCountsRight(const Patches& patches) {
         for (int half = 0; half < 2; ++half) {
             uint64_t sum = counts.sky[i][size_t(half)];
             for (const LineCount& c : rows[i]) {
-                // A line between two points of one side does not exist; it would count twice.
+                // No line joins two points of one plane side. It would count twice.
                 const auto& other = rows[c.side];
                 const auto back = std::find_if(other.begin(), other.end(),
                                                [&](const LineCount& o) { return o.side == i; });
@@ -148,7 +153,7 @@ Row measure(const Case& made) {
     Row row;
     Bake bake;
     bake.settings = made.settings;
-    bake.settings.threads = 2;  // which is compared with one
+    bake.settings.threads = 2;  // compared with one thread below
     try {
         bake.run(made.scene);
     } catch (const Error& error) {

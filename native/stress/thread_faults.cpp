@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A bake in a process that may start no other thread, one, two or three, of the four that were
-// asked for: it must give its light with those that it gets, and say so.
+// Checks that a bake for which the system starts fewer threads than asked for gives the right light
+// with the threads that it gets, and warns. It asks for four threads, the calling one included, and
+// gets 1 to 4.
 //
-// pthread_create is replaced. Each number of threads has a process of its own, since oneTBB keeps
-// the threads that it has started.
+// The program replaces pthread_create. Each number of threads has a process of its own, since
+// oneTBB keeps the threads that it has started.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <sys/mman.h>
@@ -23,7 +24,7 @@ namespace {
 
 constexpr int kAsked = 4;
 
-// Threads that live at once, without the first; beyond `most` none starts.
+// Number of running threads without the first one, and the number beyond which no thread starts.
 std::atomic<int> running{0}, most{1000};
 
 struct Start {
@@ -56,9 +57,10 @@ namespace {
 
 using namespace raybundle::test;
 
-// With as many threads: its light goes to `light`, or must be like it.
+// Bakes with at most `threads` threads. The first bake writes its light to `light`; the light of
+// others must be equal to it. Returns 0 if all is right, else the number of the check that failed.
 int bakeWith(int threads, float* light, bool isFirst) {
-    // What oneTBB takes at most, on however many cores.
+    // Largest number of threads of oneTBB, independent of the number of cores.
     const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, kAsked);
     const rb_scene room = roomOf(10);
     const rb_bake bake = newBake("LEAST_SQUARES");
@@ -73,7 +75,7 @@ int bakeWith(int threads, float* light, bool isFirst) {
         rb_get_report(bake, &report);
         const bool isSaid = std::strstr(report, "threads run") != nullptr;
         if (isSaid != (!isFirst && threads < kAsked)) return 3;
-        rb_set_bake_int(bake, "skip.geometry", 0);  // all of it, not a relighting
+        rb_set_bake_int(bake, "skip.geometry", 0);  // so that all stages run again
     }
     return 0;
 }
@@ -84,7 +86,8 @@ int main() {
     void* const shared =
         mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (shared == MAP_FAILED) return 1;
-    // First the light of one thread that is all that is asked for.
+    // The first bake asks for one thread only, and gives the light that the others are compared
+    // with.
     for (int threads : {0, 1, 2, 3, kAsked}) {
         const pid_t child = fork();
         if (child == 0)

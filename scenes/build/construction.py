@@ -1,6 +1,7 @@
-"""What the scenes are made of: shapes, shaders, objects, lights, camera, world, settings.
+"""Building blocks of the scenes: shapes, shaders, objects, lights, camera, world and settings.
 
-A `Shape` is plain numpy data; nothing touches Blender before `add_mesh`. Lengths are metres.
+A `Shape` consists of numpy arrays only. Nothing is added to Blender's data before `add_mesh`.
+Lengths are in metres.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ WHITE: Colour = (0.73, 0.73, 0.73)
 
 @dataclass(frozen=True)
 class FaceBlock:
-    """Faces with equal numbers of corners (one row each) and one material slot."""
+    """Faces with equal numbers of corners and one material slot.
+
+    corners: (faces, corners per face), indices of vertices.
+    """
 
     corners: np.ndarray
     slot: int = 0
@@ -31,17 +35,20 @@ class FaceBlock:
 
 @dataclass(frozen=True)
 class Shape:
-    """Vertices and the faces between them; a face's corners run anticlockwise from its front."""
+    """Vertices and the faces between them.
+
+    vertices: (n, 3), m. The corners of a face run anticlockwise as seen from its front.
+    """
 
     vertices: np.ndarray
     blocks: list[FaceBlock] = field(default_factory=list)
 
     def moved(self, offset: Point) -> Shape:
-        """The same shape, shifted."""
+        """Returns the shape moved by the offset."""
         return Shape(self.vertices + np.asarray(offset, dtype=float), self.blocks)
 
     def turned(self, degrees: float) -> Shape:
-        """The same shape, rotated anticlockwise about the z axis."""
+        """Returns the shape rotated anticlockwise about the z axis."""
         angle = math.radians(degrees)
         rotation = np.array([[math.cos(angle), -math.sin(angle), 0.0],
                              [math.sin(angle), math.cos(angle), 0.0],
@@ -49,16 +56,16 @@ class Shape:
         return Shape(self.vertices @ rotation.T, self.blocks)
 
     def flipped(self) -> Shape:
-        """The same shape with fronts and backs exchanged."""
+        """Returns the shape with fronts and backs exchanged."""
         return Shape(self.vertices,
                      [FaceBlock(block.corners[:, ::-1], block.slot) for block in self.blocks])
 
     def with_slot(self, slot: int) -> Shape:
-        """The same shape with all faces in one material slot."""
+        """Returns the shape with all faces in one material slot."""
         return Shape(self.vertices, [FaceBlock(block.corners, slot) for block in self.blocks])
 
     def welded(self) -> Shape:
-        """The same shape with vertices at one place (to a micrometre) made one."""
+        """Returns the shape with vertices in one place (to a micrometre) merged."""
         _, kept, index = np.unique(np.round(self.vertices, 6), axis=0,
                                    return_index=True, return_inverse=True)
         index = index.reshape(-1)
@@ -66,12 +73,12 @@ class Shape:
                      [FaceBlock(index[block.corners], block.slot) for block in self.blocks])
 
 
-# Of the cells along each edge of the grids that follow, those that are asked for times this.
+# Factor for the number of cells along each edge of the grids that are built from here on.
 density = 1.0
 
 
 def join(shapes: Sequence[Shape]) -> Shape:
-    """All shapes as one; nothing is welded."""
+    """Returns one shape with the faces of all shapes. No vertices are welded."""
     offsets = np.cumsum([0] + [len(shape.vertices) for shape in shapes])
     return Shape(np.concatenate([shape.vertices for shape in shapes]),
                  [FaceBlock(block.corners + offset, block.slot)
@@ -79,7 +86,10 @@ def join(shapes: Sequence[Shape]) -> Shape:
 
 
 def grid(origin: Point, along_u: Point, along_v: Point, cells_u: int, cells_v: int) -> Shape:
-    """A parallelogram of quads; its front looks along ``along_u`` x ``along_v``."""
+    """Returns a parallelogram of quads whose front faces along ``along_u`` x ``along_v``.
+
+    The numbers of cells are multiplied by `density`.
+    """
     cells_u, cells_v = (max(1, round(cells * density)) for cells in (cells_u, cells_v))
     start, edge_u, edge_v = (np.asarray(value, dtype=float)
                              for value in (origin, along_u, along_v))
@@ -92,7 +102,7 @@ def grid(origin: Point, along_u: Point, along_v: Point, cells_u: int, cells_v: i
 
 
 def box_sides(size: Point, cells: Sequence[int] = (1, 1, 1)) -> dict[str, Shape]:
-    """The six sides of a box whose base is centred on the origin, with outward fronts."""
+    """Returns the six sides of a box with outward fronts. The centre of its base is the origin."""
     (x, y, z), (nx, ny, nz) = size, cells
     east, north = x / 2, y / 2
     return {
@@ -107,7 +117,10 @@ def box_sides(size: Point, cells: Sequence[int] = (1, 1, 1)) -> dict[str, Shape]
 
 def box(size: Point, cells: Sequence[int] = (1, 1, 1), at: Point = (0, 0, 0),
         slots: dict[str, int] | None = None) -> Shape:
-    """A closed box with outward fronts standing at ``at``; ``slots`` maps sides to materials."""
+    """Returns a closed box with outward fronts, which stands on ``at``.
+
+    slots: material slots by names of sides; 0 by default.
+    """
     sides = box_sides(size, cells)
     slots = slots or {}
     shape = join([side.with_slot(slots.get(name, 0)) for name, side in sides.items()])
@@ -115,7 +128,10 @@ def box(size: Point, cells: Sequence[int] = (1, 1, 1), at: Point = (0, 0, 0),
 
 
 def room(size: Point, cells: Sequence[int]) -> dict[str, Shape]:
-    """Floor, ceiling and four walls of a room about the origin, fronts to the inside."""
+    """Returns floor, ceiling and four walls of a room, with the fronts inside.
+
+    The centre of the floor is the origin.
+    """
     names = {"bottom": "floor", "top": "ceiling", "south": "wall_south", "north": "wall_north",
              "west": "wall_west", "east": "wall_east"}
     return {names[name]: side.flipped() for name, side in box_sides(size, cells).items()}
@@ -123,7 +139,7 @@ def room(size: Point, cells: Sequence[int]) -> dict[str, Shape]:
 
 def cylinder(radius: float, height: float, sides: int, at: Point = (0, 0, 0),
              bottom_slot: int = 0, top_slot: int = 0) -> Shape:
-    """A closed cylinder standing at ``at``; its two ends are one n-gon each."""
+    """Returns a closed cylinder that stands on ``at``. Each of its ends is one n-gon."""
     angle = 2 * np.pi * np.arange(sides) / sides
     ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(sides)], axis=1)
     index = np.arange(sides)
@@ -136,7 +152,7 @@ def cylinder(radius: float, height: float, sides: int, at: Point = (0, 0, 0),
 
 
 def uv_sphere(radius: float, segments: int, rings: int, at: Point = (0, 0, 0)) -> Shape:
-    """A sphere of quads between triangle fans at the two poles, fronts outward."""
+    """Returns a sphere with outward fronts: quads, and triangle fans at the two poles."""
     longitude, colatitude = np.meshgrid(2 * np.pi * np.arange(segments) / segments,
                                         np.pi * np.arange(1, rings) / rings)
     belt = np.stack([np.sin(colatitude) * np.cos(longitude),
@@ -166,7 +182,7 @@ class Diffuse:
 
 @dataclass(frozen=True)
 class Emission:
-    """A surface that emits the radiance ``colour * strength`` and reflects nothing."""
+    """A surface that emits the radiance ``colour * strength``, W/(m^2 sr), and reflects nothing."""
 
     colour: Colour
     strength: float
@@ -174,14 +190,14 @@ class Emission:
 
 @dataclass(frozen=True)
 class Principled:
-    """A Principled BSDF without any specular part: Lambertian."""
+    """A Principled BSDF without a specular part, which is Lambertian."""
 
     colour: Colour
 
 
 @dataclass(frozen=True)
 class Sum:
-    """Both shaders at once (Add Shader)."""
+    """The sum of two shaders (Add Shader)."""
 
     first: Shader
     second: Shader
@@ -189,7 +205,7 @@ class Sum:
 
 @dataclass(frozen=True)
 class OneSided:
-    """One shader on the front and another one on the back (Mix Shader by Backfacing)."""
+    """A shader on the front and another one on the back (Mix Shader by Backfacing)."""
 
     front: Shader
     back: Shader
@@ -199,7 +215,7 @@ Shader = Union[Diffuse, Emission, Principled, Sum, OneSided]
 
 
 def material(name: str, shader: Shader) -> bpy.types.Material:
-    """A new material of that shader."""
+    """Returns a new material with this shader."""
     result = bpy.data.materials.new(name)
     result.use_nodes = True
     tree = result.node_tree
@@ -212,7 +228,7 @@ def material(name: str, shader: Shader) -> bpy.types.Material:
 
 def _shader_socket(tree: bpy.types.NodeTree, shader: Shader, x: float, y: float
                    ) -> bpy.types.NodeSocket:
-    """Adds the shader's nodes at that place of the node editor; returns their output."""
+    """Adds the nodes of a shader at this place in the node editor. Returns their output socket."""
     if isinstance(shader, Diffuse):
         node = tree.nodes.new("ShaderNodeBsdfDiffuse")
         node.inputs["Color"].default_value = (*shader.colour, 1.0)
@@ -242,7 +258,7 @@ def _shader_socket(tree: bpy.types.NodeTree, shader: Shader, x: float, y: float
 
 
 def _display_colour(shader: Shader) -> Colour:
-    """The colour the solid view shows."""
+    """Returns the colour that the solid view shows."""
     if isinstance(shader, Sum):
         return _display_colour(shader.first)
     if isinstance(shader, OneSided):
@@ -254,7 +270,7 @@ def _display_colour(shader: Shader) -> Colour:
 
 def new_mesh(name: str, shape: Shape, materials: Sequence[bpy.types.Material]
              ) -> bpy.types.Mesh:
-    """A mesh datablock of the shape, flat-shaded."""
+    """Returns a new flat-shaded mesh with the faces of the shape."""
     mesh = bpy.data.meshes.new(name)
     faces = [corners for block in shape.blocks for corners in block.corners.tolist()]
     mesh.from_pydata(shape.vertices.tolist(), [], faces)
@@ -270,7 +286,7 @@ def new_mesh(name: str, shape: Shape, materials: Sequence[bpy.types.Material]
 
 def add_object(name: str, data: bpy.types.ID | None,
                collection: bpy.types.Collection | None = None) -> bpy.types.Object:
-    """An object with that data, linked to the collection (the scene's own by default)."""
+    """Returns a new object with this data, linked to the collection or else to the scene's."""
     result = bpy.data.objects.new(name, data)
     (collection or bpy.context.scene.collection).objects.link(result)
     return result
@@ -278,12 +294,12 @@ def add_object(name: str, data: bpy.types.ID | None,
 
 def add_mesh(name: str, shape: Shape, *materials: bpy.types.Material,
              collection: bpy.types.Collection | None = None) -> bpy.types.Object:
-    """An object with a mesh of its own."""
+    """Returns a new object with a mesh of its own."""
     return add_object(name, new_mesh(name, shape, materials), collection)
 
 
 def smooth(mesh: bpy.types.Mesh) -> None:
-    """Shades all faces smooth; edges marked sharp stay sharp."""
+    """Shades all faces smooth. Edges that are marked sharp stay sharp."""
     mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), dtype=bool))
     if hasattr(mesh, "use_auto_smooth"):
         mesh.use_auto_smooth = True
@@ -292,7 +308,10 @@ def smooth(mesh: bpy.types.Mesh) -> None:
 
 
 def mark_sharp(mesh: bpy.types.Mesh, *groups: np.ndarray) -> None:
-    """Marks the edges sharp that have both vertices in one group (a mask of the vertices)."""
+    """Marks the edges sharp whose two vertices are both in one of the groups.
+
+    groups: (vertices,) masks.
+    """
     ends = np.empty(2 * len(mesh.edges), dtype=np.int32)
     mesh.edges.foreach_get("vertices", ends)
     inside = [group[ends].reshape(-1, 2).all(axis=1) for group in groups]
@@ -301,7 +320,7 @@ def mark_sharp(mesh: bpy.types.Mesh, *groups: np.ndarray) -> None:
 
 
 def point_at(item: bpy.types.Object, location: Point, target: Point) -> None:
-    """Places a camera or a light and turns it to the target."""
+    """Places a camera or a light and turns it towards the target."""
     item.location = location
     direction = Vector(target) - Vector(location)
     item.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
@@ -309,7 +328,7 @@ def point_at(item: bpy.types.Object, location: Point, target: Point) -> None:
 
 def set_camera(location: Point, target: Point, lens: float = 24.0,
                clip_start: float = 0.1) -> bpy.types.Object:
-    """The scene's camera; what is nearer than ``clip_start`` is cut away from its picture."""
+    """Adds the scene's camera. Surfaces nearer than ``clip_start`` (m) are not in its picture."""
     data = bpy.data.cameras.new("camera")
     data.lens = lens
     data.clip_start = clip_start
@@ -321,7 +340,7 @@ def set_camera(location: Point, target: Point, lens: float = 24.0,
 
 def add_point_light(name: str, location: Point, power: float, radius: float
                     ) -> bpy.types.Object:
-    """A point light; power in watts."""
+    """Adds a point light. Its power is in W, its radius in m."""
     data = bpy.data.lights.new(name, "POINT")
     data.energy = power
     data.shadow_soft_size = radius
@@ -332,7 +351,7 @@ def add_point_light(name: str, location: Point, power: float, radius: float
 
 def add_area_light(name: str, location: Point, target: Point, size: tuple[float, float],
                    power: float) -> bpy.types.Object:
-    """A rectangular area light; power in watts."""
+    """Adds a rectangular area light that faces the target. Its power is in W, its size in m."""
     data = bpy.data.lights.new(name, "AREA")
     data.shape = "RECTANGLE"
     data.size, data.size_y = size
@@ -343,7 +362,11 @@ def add_area_light(name: str, location: Point, target: Point, size: tuple[float,
 
 
 def add_sun(name: str, towards: Point, irradiance: float, colour: Colour) -> bpy.types.Object:
-    """A sun as wide as the real one; ``towards`` points from the scene to it."""
+    """Adds a sun with the angular diameter of the real one, 0.53 degrees.
+
+    towards: direction from the scene to the sun. irradiance: W/m^2, on a surface that faces the
+    sun.
+    """
     data = bpy.data.lights.new(name, "SUN")
     data.energy = irradiance
     data.color = colour
@@ -354,7 +377,7 @@ def add_sun(name: str, towards: Point, irradiance: float, colour: Colour) -> bpy
 
 
 def set_world(colour: Colour = (0, 0, 0), strength: float = 1.0) -> None:
-    """A world of one radiance, ``colour * strength``."""
+    """Gives the scene a world of the constant radiance ``colour * strength``."""
     world = bpy.data.worlds.new("world")
     world.use_nodes = True
     tree = world.node_tree
@@ -370,7 +393,7 @@ def set_world(colour: Colour = (0, 0, 0), strength: float = 1.0) -> None:
 
 
 def set_render_settings(scene: bpy.types.Scene) -> None:
-    """Cycles without denoising, all diffuse bounces that matter, plain sRGB output."""
+    """Sets up Cycles without denoising, with all diffuse bounces that matter and sRGB output."""
     scene.render.engine = "CYCLES"
     scene.render.filepath = "//"
     scene.render.resolution_x, scene.render.resolution_y = 960, 720
@@ -387,7 +410,7 @@ def set_render_settings(scene: bpy.types.Scene) -> None:
 
 
 def show_vertex_colours(screens: Sequence[bpy.types.Screen]) -> None:
-    """Lets every 3D view of the file open on the camera, in vertex colours without shading."""
+    """Makes every 3D view of the file open on the camera, with vertex colours without shading."""
     for screen in screens:
         for area in screen.areas:
             for space in area.spaces:

@@ -11,7 +11,7 @@ GREY = (0.5, 0.5, 0.5)
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene. The lamp's edges (0.25 m) lie between the grid lines (0.1 m apart)."""
+    """Fills the scene. The edges of the lamp (0.25 m) lie between the grid lines (0.1 m apart)."""
     white = material("white", Diffuse(WHITE))
     red = material("red", Diffuse((0.63, 0.06, 0.05)))
     green = material("green", Diffuse((0.14, 0.45, 0.09)))

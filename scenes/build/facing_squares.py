@@ -7,11 +7,11 @@ import bpy
 from .construction import (Diffuse, Emission, add_mesh, grid, material, set_camera, set_world)
 
 FORM_FACTOR = 0.19982489569838746
-"""From one square to the other: parallel squares of side a at the distance a."""
+"""The form factor from one square to the other: parallel squares of side a at a distance of a."""
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; the receiver's exact mean light (irradiance / pi) is kept in it."""
+    """Fills the scene, and stores the exact mean light (irradiance / pi) of the receiver in it."""
     emitter = material("emitter", Emission((1, 1, 1), 1.0))
     receiver = material("receiver", Diffuse((0.8, 0.8, 0.8)))
     add_mesh("receiver", grid((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0), 10, 10), receiver)

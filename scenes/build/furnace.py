@@ -1,4 +1,4 @@
-"""The furnace: a closed box whose walls all emit and reflect alike, so its light is uniform."""
+"""The furnace: a closed box whose walls emit and reflect equally, so that its light is uniform."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ EMITTED, REFLECTANCE = 0.5, 0.5
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; the exact light (irradiance / pi) is kept as a property of it."""
+    """Fills the scene, and stores the exact light (irradiance / pi) as a property of it."""
     walls = material("walls", Sum(Emission((1, 1, 1), EMITTED), Diffuse((REFLECTANCE,) * 3)))
     add_mesh("walls", box((3, 2, 2), (12, 8, 8)).flipped(), walls)
     context.scene["exact_lighting"] = [EMITTED / (1 - REFLECTANCE)] * 3

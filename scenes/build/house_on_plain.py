@@ -10,12 +10,15 @@ from .construction import (Diffuse, FaceBlock, Shape, add_mesh, add_sun, box, gr
 from .furniture import chair, shelf, table
 
 LENGTH, DEPTH, HEIGHT, THICK = 10.0, 7.0, 3.0, 0.3
-BASE = 0.1  # top of the floor slab above the plain
-CELL = 0.5  # edge of the walls' faces
+BASE = 0.1  # top of the floor slab above the plain, m
+CELL = 0.5  # edge of the faces of the walls, m
 
 
 def plain(reach: float, fine: float, cell: float, growth: float) -> Shape:
-    """A square of 2 ``reach``; faces of ``cell`` up to ``fine`` from its centre, growing beyond."""
+    """Returns a square of edge 2 ``reach``, m.
+
+    Its faces have the edge ``cell`` up to the distance ``fine`` from its centre, and grow beyond.
+    """
     steps = [cell]
     while fine + sum(steps) < reach:
         steps.append(steps[-1] * growth)
@@ -30,7 +33,10 @@ def plain(reach: float, fine: float, cell: float, growth: float) -> Shape:
 
 
 def wall(length: float, openings: list[tuple[float, float, float, float]]) -> Shape:
-    """A wall along x about the origin; an opening is (left, right, sill, top) in the wall."""
+    """Returns a wall along x, centred on the origin.
+
+    openings: (left, right, sill, top) of each opening in the wall, m.
+    """
     def piece(left: float, right: float, low: float, high: float) -> Shape:
         cells = (max(1, round((right - left) / CELL)), 1, max(1, round((high - low) / CELL)))
         return box((right - left, THICK, high - low), cells, at=((left + right) / 2, 0, low))
@@ -47,7 +53,7 @@ def wall(length: float, openings: list[tuple[float, float, float, float]]) -> Sh
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; the small things are all objects but ``plain``."""
+    """Fills the scene. The small objects are all objects except ``plain``."""
     grass = material("grass", Diffuse((0.3, 0.36, 0.2)))
     lime = material("lime", Diffuse((0.75, 0.72, 0.65)))
     tiles = material("tiles", Diffuse((0.55, 0.24, 0.15)))

@@ -21,7 +21,7 @@ def build(context: bpy.types.Context) -> None:
     add_mesh("floor", grid((-4, -4, 0), (8, 0, 0), (0, 8, 0), 40, 40), white)
     add_mesh("wall", grid((-4, 4, 0), (8, 0, 0), (0, 0, 3), 40, 15), white)
 
-    # An unsymmetrical step, so that a mirrored one is not the same.
+    # An asymmetric step, so that its mirror image differs from it.
     step = new_mesh("step", join([box((0.8, 0.4, 0.3), (8, 4, 3), at=(0, -0.2, 0)),
                                   box((0.3, 0.4, 0.7), (3, 4, 7), at=(-0.25, 0.2, 0))]),
                     [orange])

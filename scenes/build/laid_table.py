@@ -1,4 +1,4 @@
-"""A hall of 20 x 30 x 8 m; in it a table for four, laid with plates, cups and cutlery."""
+"""A hall of 20 x 30 x 8 m with a table for four, laid with plates, cups and cutlery."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from .construction import (Diffuse, Emission, FaceBlock, Shape, add_mesh, box, c
                            material, room, set_camera, set_world)
 from .furniture import chair, hanging_lamp, table
 
-WIDTH, DEPTH, HEIGHT = 1.6, 1.0, 0.75  # of the table, metres
-# Outlines from the axis outside and back to it: (radius, height), metres.
+WIDTH, DEPTH, HEIGHT = 1.6, 1.0, 0.75  # of the table, m
+# Outlines of solids of revolution, from the axis outwards and back to it: (radius, height), m.
 PLATE = ((0.0, 0.006), (0.08, 0.006), (0.125, 0.02), (0.13, 0.018), (0.085, 0.001), (0.0, 0.001))
 CUP = ((0.0, 0.008), (0.032, 0.012), (0.038, 0.08), (0.042, 0.08), (0.036, 0.006), (0.03, 0.001),
        (0.0, 0.001))
@@ -18,7 +18,7 @@ SEATS = ((-0.4, -0.33, 0), (0.4, -0.33, 0), (-0.4, 0.33, 180), (0.4, 0.33, 180))
 
 
 def turned_shape(outline: tuple[tuple[float, float], ...], segments: int) -> Shape:
-    """A closed solid of revolution about the z axis; the outline ends on the axis twice."""
+    """Returns a closed solid of revolution about the z axis; both ends of the outline are on it."""
     angle = 2 * np.pi * np.arange(segments) / segments
     rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(segments, z)], axis=1)
              for r, z in outline[1:-1]]
@@ -35,7 +35,7 @@ def turned_shape(outline: tuple[tuple[float, float], ...], segments: int) -> Sha
 
 
 def fork() -> Shape:
-    """A fork along y: a handle, a root and four tines of 2 mm."""
+    """Returns a fork along y: a handle, a root and four tines of 2 mm."""
     tines = [box((0.002, 0.05, 0.002), (1, 4, 1), at=(0.006 * k - 0.009, 0.075, 0.001))
              for k in range(4)]
     return join([box((0.009, 0.12, 0.002), (1, 8, 1), at=(0, -0.03, 0.001)),
@@ -43,13 +43,16 @@ def fork() -> Shape:
 
 
 def knife() -> Shape:
-    """A knife along y: a handle and a blade."""
+    """Returns a knife along y: a handle and a blade."""
     return join([box((0.014, 0.1, 0.008), (1, 6, 1), at=(0, -0.05, 0.001)),
                  box((0.018, 0.1, 0.0015), (1, 6, 1), at=(0, 0.05, 0.004))])
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; the small things are the plates, cups, forks, knives and the candlestick."""
+    """Fills the scene.
+
+    The small objects are the plates, cups, forks, knives and the candlestick.
+    """
     plaster = material("plaster", Diffuse((0.7, 0.68, 0.62)))
     ceiling = material("ceiling", Diffuse((0.8, 0.8, 0.8)))
     stone = material("stone", Diffuse((0.45, 0.38, 0.32)))
@@ -71,7 +74,7 @@ def build(context: bpy.types.Context) -> None:
     for index, (x, y, angle) in enumerate(SEATS):
         add_mesh(f"chair_{index + 1}",
                  chair().turned(180 + angle).moved((x, 2.2 * y, 0)), cloth)
-        # On the left of each plate the fork, on its right the knife, behind it the cup.
+        # The fork lies left of each plate, the knife right of it, and the cup stands behind it.
         for name, shape, paint in (
                 ("plate", turned_shape(PLATE, 24), china),
                 ("cup", turned_shape(CUP, 16).moved((0.14, 0.14, 0)), glaze),

@@ -1,6 +1,6 @@
-"""An office of 6 x 5 x 2.8 m; its lamps point at the floor or at the ceiling.
+"""An office of 6 x 5 x 2.8 m whose lamps face the floor or the ceiling.
 
-The collections ``lamps_down`` and ``lamps_up`` are the switch: one is shown at a time, the other
+The collections ``lamps_down`` and ``lamps_up`` select the lamps: one of them is shown, the other
 one is excluded from the view layer.
 """
 
@@ -19,7 +19,7 @@ LAMPS_UP = ((-2.7, 2.2), (2.6, 1.9), (-2.7, -0.1), (0.4, -2.2))
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene: 1166 faces with the lamps that point at the floor."""
+    """Fills the scene: 1166 faces with the lamps that face the floor."""
     paint = material("paint", Principled((0.75, 0.73, 0.68)))
     accent = material("accent", Principled((0.25, 0.42, 0.55)))
     ceiling = material("ceiling", Diffuse((0.85, 0.85, 0.85)))

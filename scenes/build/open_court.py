@@ -8,7 +8,7 @@ from .construction import Diffuse, add_mesh, add_sun, box, grid, material, set_c
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; the walls touch each other and stand on the ground."""
+    """Fills the scene. The walls touch each other and stand on the ground."""
     sand = material("sand", Diffuse((0.5, 0.43, 0.32)))
     lime = material("lime", Diffuse((0.75, 0.72, 0.65)))
     clay = material("clay", Diffuse((0.62, 0.25, 0.14)))

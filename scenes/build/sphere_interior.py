@@ -1,7 +1,7 @@
-"""The inside of a sphere: a cap emits, two belts reflect; the light is the same everywhere.
+"""The inside of a sphere: a cap emits, two belts reflect, and the light is uniform.
 
-Inside a sphere every pair of patches has the form factor F_ij = A_j / A, hence
-H = (sum A_j E_j / A) / (1 - sum A_j rho_j / A), uniform for any E and rho.
+Inside a sphere every pair of patches has the form factor F_ij = A_j / A. Therefore
+H = (sum A_j E_j / A) / (1 - sum A_j rho_j / A), which is uniform for any E and rho.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ LOWER = np.array((0.3, 0.4, 0.5))
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; the exact light (irradiance / pi) of the tessellation's areas is kept."""
+    """Fills the scene, and stores the exact light (irradiance / pi) for its tessellation."""
     strength = float(RADIANCE.max())
     mesh = bpy.data.meshes.new("sphere")
     shape = bmesh.new()

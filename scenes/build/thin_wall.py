@@ -1,8 +1,8 @@
 """A closed room of 6 x 4 x 2.6 m divided by a wall without thickness, lit on one side only.
 
-Floor and long walls are two objects each, one per half; the ceiling is one mesh with sharp edges
-along the divider. So the exact light of the eastern half, zero, can be stored everywhere. The
-camera stands outside and its near clipping plane cuts the southern wall away.
+The floor and the long walls are two objects each, one for each half. The ceiling is one mesh with
+sharp edges along the divider. The exact light of the eastern half, zero, can therefore be stored at
+all its corners. The camera stands outside, and its near clipping plane cuts the southern wall away.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ BLACK = (0.0, 0.0, 0.0)
 
 
 def divider(south: float, north: float, cells: int) -> Shape:
-    """A piece of the dividing wall x = 0; its front looks west, into the light."""
+    """Returns a piece of the dividing wall x = 0. Its front faces west, where the light is."""
     return grid((0, north, 0), (0, south - north, 0), (0, 0, HEIGHT), cells, 13)
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; cabinets stand flush against walls, floor and the divider."""
+    """Fills the scene. Cabinets stand flush against walls, floor and divider."""
     white = material("white", Diffuse(WHITE))
     red = material("red", Diffuse((0.6, 0.15, 0.1)))
     wood = material("wood", Diffuse((0.55, 0.38, 0.22)))

@@ -1,4 +1,4 @@
-"""Two rooms of 4 x 4 x 2.6 m with a doorway between them; only the western one has a lamp."""
+"""Two rooms of 4 x 4 x 2.6 m with a doorway between them. Only the western room has a lamp."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ HEIGHT, DOOR_WIDTH, DOOR_HEIGHT, THICKNESS = 2.6, 1.0, 2.1, 0.2
 
 
 def build(context: bpy.types.Context) -> None:
-    """Fills the scene; floor, ceiling and long walls run through under the dividing wall."""
+    """Fills the scene. Floor, ceiling and long walls continue under the dividing wall."""
     white = material("white", Diffuse(WHITE))
     warm = material("warm", Diffuse((0.7, 0.4, 0.2)))
     cool = material("cool", Diffuse((0.25, 0.4, 0.65)))

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The bake as its stages: patches, first shot, bundles and solve, reconstruction.
-// Sources: the two-step structure is that of thesis section 5.2 (first shot, then bundles).
+// The stages of a bake: patches, first shot, bundles and solve, reconstruction.
+//
+// Source: thesis section 5.2, for the two steps of a first shot followed by bundles.
 // Differs: see the heads of the stages' files.
 #include "bake/bake.h"
 
@@ -34,8 +35,8 @@
 namespace raybundle {
 namespace {
 
-// Whether no light is left after the first shot: nothing reflects it, and lines bring none of the
-// world's or of dim emission.
+// Returns whether the first shot has distributed all light: surfaces neither reflect nor transmit
+// any, and there is no light of a constant world or of dim emission for lines to carry.
 bool isFirstShotAll(const Patches& patches, const SetLights& lights) {
     auto isBlack = [](const glm::vec3& v) { return v == glm::vec3(0.0f); };
     auto areBlack = [&](const std::vector<glm::vec3>& values) {
@@ -47,7 +48,8 @@ bool isFirstShotAll(const Patches& patches, const SetLights& lights) {
            });
 }
 
-// Whether no light reaches any surface; says so, also of single light sets.
+// Returns whether there are no surfaces or no light reaches any of them. Adds warnings about this,
+// and about each light set whose light reaches no surface.
 bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
     const bool isEmpty = lights.front().shot.irradiance.empty();
     const bool isDark = std::all_of(lights.begin(), lights.end(),
@@ -68,8 +70,8 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
     return isEmpty || isDark;
 }
 
-// What is bright by itself is refused by Scene; what adds up to too much, or shines from nearly no
-// distance, is seen only in the end.
+// Throws if a baked value is not finite. Single inputs are bounded when they are added to the
+// scene. Only their sum, or the light of a source at almost no distance, can still overflow.
 void checkFinite(const std::vector<InstanceLight>& instances) {
     for (const InstanceLight& instance : instances)
         for (size_t c = 0; c < instance.direct.size(); ++c) {
@@ -82,18 +84,18 @@ void checkFinite(const std::vector<InstanceLight>& instances) {
 
 }  // namespace
 
-// What the exchange of light between patches leaves to the stages after it.
+// The results of the exchange of light that later stages use.
 struct Bake::Exchanged {
     SideNoise noise;
-    std::vector<float> exposed;  // per side: the share that nothing covers
+    std::vector<float> exposed;  // per side: share of its area that nothing covers
 };
 
 Bake::Bake() = default;
 Bake::~Bake() = default;
 
-// Where memory runs out or a cancel comes anywhere, patches, lines and solutions may be left
-// half-made, and none of them goes to the next bake. After a cancel between two steps
-// Trace::isWhole tells.
+// If memory runs out, or if a cancellation stops the work at any point, patches, lines and
+// solutions may be half-made. The next bake then uses none of them. After a cancellation between
+// two steps, Trace::isWhole() decides whether the next bake can use them.
 void Bake::run(const Scene& scene) {
     checkCombination(settings, scene.lightSets.size());
     makeRoomForTreeBuilders();
@@ -125,7 +127,7 @@ void Bake::run(const Scene& scene) {
 
 void Bake::runStages(const Scene& scene, const Threads& threads) {
     Report report;
-    std::vector<InstanceLight> made;  // kept once nothing can fail any more
+    std::vector<InstanceLight> made;  // moved to `light` when nothing can fail any more
     {
         Stopwatch total(report.totalSeconds);
         noteWhatIsGiven(scene, threads, report);
@@ -194,8 +196,8 @@ void Bake::makePatches(const Scene& scene, Report& report) {
     progress.report(RB_STAGE_PATCHES, 1);
 }
 
-// Where lines are not traced yet: cuts the patches, and makes ready to trace. Returns as
-// cutPatches.
+// Cuts the patches and prepares the tracing of lines, unless an earlier bake has done so. Returns
+// the coarse shots of cutPatches().
 std::vector<CoarseShot> Bake::startLines(const Scene& scene, Report& report) {
     if (trace->tracer) return {};
     std::vector<CoarseShot> coarse = cutPatches(scene, report);
@@ -205,8 +207,8 @@ std::vector<CoarseShot> Bake::startLines(const Scene& scene, Report& report) {
     return coarse;
 }
 
-// Cuts the patches where that pays. Returns the coarse shot of each light set, for the first shot
-// to go on with; empty if it is to make its own.
+// Cuts the patches where a cut pays. Returns the coarse shot of each light set, from which the
+// first shot starts. If the result is empty, the first shot makes its own coarse shot.
 std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     Patches& patches = trace->patches;
     Cuts cuts;
@@ -214,8 +216,9 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
         cuts = contactCuts(patches, trace->visibility, size_t(settings.maxPatches));
     }
-    // Other solvers follow the lines of single patches and other first shots meet them with rays:
-    // smaller ones are noisier.
+    // With other methods, cut patches are noisier: other solvers follow the lines of single
+    // patches, and other first shots send rays from the sources to patches. Smaller patches get
+    // fewer of both.
     if (!settings.countsLines() || !settings.gathersFirstShot()) {
         trace->uncutGaps = cuts.contacts;
         return {};
@@ -239,7 +242,7 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     return shots;
 }
 
-// Brings light from patch to patch, as far as there is any to bring.
+// Exchanges light between the patches, unless there is none to exchange.
 Bake::Exchanged Bake::exchange(const SolveInput& in, SetLights& lights, Report& report) {
     const Patches& patches = trace->patches;
     Exchanged result{SideNoise(in.tiles.sideCount()),
@@ -281,7 +284,7 @@ Transports Bake::transportsOf(const SetLights& lights, const ShownLight& shown) 
     return makeTransports(settings.solver, inputs);
 }
 
-// The light at the corners of each instance, and the error that is stated of it.
+// Returns the light at the corners of each instance, with its stated error.
 std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lights,
                                       const Exchanged& exchanged, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);

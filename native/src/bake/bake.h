@@ -28,8 +28,8 @@ class Threads;
 struct SolveInput;
 struct Trace;
 
-// One bake: settings in, light per corner and a report out. Keeps patches and traced lines for the
-// next run on the same geometry.
+// A bake: takes settings, and computes the light at the corners of the scene's meshes and a report.
+// Keeps the patches and the traced lines, which the next run uses if its geometry is equal.
 class Bake {
   public:
     Bake();
@@ -38,21 +38,26 @@ class Bake {
     Settings settings;
     Progress progress;
 
-    // The whole method, stage by stage.
+    // Runs all stages of the bake. The results of the previous run remain if the run fails. Throws
+    // Error(INVALID_ARGUMENT) if the settings or the scene cannot be baked, Error(CANCELLED) if the
+    // caller cancels through `progress`, and std::bad_alloc if memory runs out.
     void run(const Scene& scene);
 
     bool hasRun() const { return ran; }
     const std::string& reportJson() const { return json; }
 
-    // Patches of the last run and the light on them, for comparison of methods. Only after a run.
+    // Return the patches of the last run and the irradiance per patch side, W/m^2. They serve to
+    // compare methods. Call them only after a run.
     const Patches& patches() const;
     const Irradiance& patchIrradiance() const { return irradiance; }
-    // Per side: the share of it that nothing covers.
+    // Returns per side the share of its area that no other surface covers, 0 to 1.
     const std::vector<float>& exposedShare() const { return exposed; }
 
-    // The result of an instance with role BAKE; throws Error if there is none.
+    // Returns the result of an instance with role BAKE. Throws Error(INVALID_OPERATION) before the
+    // first run, and Error(INVALID_ARGUMENT) if there is no such instance or it has another role.
     const InstanceLight& instanceLight(int32_t instance) const;
-    // The same by the light of one light set.
+    // Returns the result of an instance by the light of one light set. Throws as instanceLight()
+    // does, and Error(INVALID_ARGUMENT) if the last run had no such light set.
     const CornerLight& setLight(int32_t set, int32_t instance) const;
 
   private:
@@ -69,8 +74,8 @@ class Bake {
                                     const Exchanged& exchanged, Report& report);
     void noteWhatWasTraced(Report& report) const;
 
-    std::unique_ptr<Trace> trace;  // of the last run's geometry
-    // Of the last run, per side: see patchIrradiance and exposedShare.
+    std::unique_ptr<Trace> trace;  // for the geometry of the last run
+    // Results of the last run per side, see patchIrradiance() and exposedShare().
     Irradiance irradiance;
     std::vector<float> exposed;
     std::vector<InstanceLight> light;

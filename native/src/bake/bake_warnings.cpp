@@ -9,11 +9,11 @@
 namespace raybundle {
 namespace {
 
-// Relative; above it the energy balance is worth a warning.
+// Relative error of the energy balance above which a warning is given.
 constexpr double kMostImbalance = 0.01;
-// With fewer lines a patch than this two halves of them may agree by chance.
+// With fewer lines per patch than this, the estimates of the two halves may agree by chance.
 constexpr double kFewLines = 16;
-constexpr size_t kMostNamed = 20;
+constexpr size_t kMostNamed = 20;  // number of objects that a warning names
 
 std::string percent(double share) {
     std::ostringstream text;
@@ -86,7 +86,7 @@ void warnOfGaps(size_t patches, Report& report) {
 
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
                     const Settings& settings, Report& report) {
-    // Counted lines are denser where patches are small; local rays are no bundles.
+    // Counted lines are denser where patches are small. Local rays are not lines of bundles.
     if (settings.countsLines() || !can(settings.solver, SolverCan::TRACE_BUNDLES)) return;
     std::vector<double> area(scene.instances.size(), 0.0), count(area.size(), 0.0);
     for (const Parent& parent : patches.parents) {
@@ -97,7 +97,7 @@ void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize,
     size_t few = 0;
     for (size_t i = 0; i < area.size(); ++i) {
         if (scene.instances[i].role != RB_ROLE_BAKE || !(count[i] > 0)) continue;
-        // The mean shadow of a flat patch is half of its area.
+        // The projected area of a flat patch is half of its area, in the mean over all directions.
         const double lines =
             bundles * area[i] / count[i] / (2 * double(pixelSize) * double(pixelSize));
         if (lines < kFewLines && ++few <= kMostNamed)

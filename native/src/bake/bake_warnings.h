@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// What a bake says of its result where that is limited or approximated, each with what to do.
+// Warnings about results of a bake that are limited or approximate. Each function decides whether
+// its warning applies, and adds it to the report with a remedy.
 #pragma once
 
 #include <string>
@@ -15,48 +16,53 @@
 
 namespace raybundle {
 
-// Names the instances whose visibility is only approximated.
+// Names the objects for which blocking of light, or the exchange of light, is only approximated.
 void warnOfVisibility(const Scene& scene, const SetLights& lights, const Settings& settings,
                       Report& report);
 
-// Names the materials whose light through them the solver does not carry.
+// Names the translucent materials if the solver does not carry the light that passes through them.
 void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& report);
 
-// Where materials reflect by angle: names the first shot and the solver that do not.
+// If any material reflects light depending on its angle, names the first shot and the solver that
+// ignore the angle.
 void warnOfAngles(const Patches& patches, const Settings& settings, Report& report);
 
-// Of so many patches beside narrow gaps that are left whole.
+// Warns of patches beside narrow gaps that were not cut. `patches` is their number.
 void warnOfGaps(size_t patches, Report& report);
 
-// Names the objects whose patches about so few lines meet that nobody knows their noise. pixelSize:
-// edge of the pixels of `bundles` bundles, metres, the same everywhere.
+// Names the baked objects whose patches meet so few lines that their noise cannot be estimated.
+// `pixelSize` is the edge of the pixels of all `bundles` bundles, m.
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
                     const Settings& settings, Report& report);
 
-// Names the source and the object that most of the first shot's noise comes from and is on. area:
-// per side, of what is wanted.
+// Names the source that causes most of the noise of the first shot, and the object with most of
+// this noise. `area` is per side the area that has a result, m^2. `noise` and `target` are
+// relative.
 void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
                        const std::vector<float>& area, double noise, double target, Report& report);
 
-// A bake that ended above its target; noises are relative.
+// A bake that ended above its target. Noises are relative.
 struct MissedTarget {
-    Stop stop;  // why it ended
+    Stop stop;  // why the bake ended
     uint32_t bundles;
-    int32_t set;        // the light set with the most noise, or kNoLightSet
-    double noise;       // of that light on all patches
-    double ofNoisiest;  // of the noisiest parts of objects; 0: not known
+    int32_t set;        // light set with the most noise, or kNoLightSet
+    double noise;       // noise of the light of this set on all patches
+    double ofNoisiest;  // noise of the noisiest parts of objects; 0 if not known
     double target;
 };
+// Warns that the bake ended above its target, and why.
 void warnOfMissedTarget(const Scene& scene, const MissedTarget& missed, Report& report);
 
-// Of cycles of patches that each cover the next one, which a painter's order cannot have.
+// Warns of cycles of patches each of which covers the next one. No order from back to front, which
+// a painter needs, exists for them. `cycles` is the number of broken cycles.
 void warnOfBrokenCycles(uint64_t cycles, Report& report);
 
-// Of the share of all lines that met surfaces in a wrong order or passed through some, and the
-// relative error by them.
+// Warns of lines that met surfaces in the wrong order or passed through surfaces. `share` is their
+// share of all lines, `error` the relative error of the light that they cause.
 void warnOfWrongExchanges(double share, double error, Report& report);
 
-// First of all that is said: light that is lost or made is worse than noise.
+// Warns of an energy balance with a large error. The warning is put before all others, because
+// light that is lost or created is worse than noise.
 void warnOfImbalance(Report& report);
 
 }  // namespace raybundle

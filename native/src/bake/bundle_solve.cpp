@@ -14,14 +14,19 @@
 namespace raybundle {
 namespace {
 
-// Relative residual of the last solve: a share of the noise, within these bounds. The upper one
-// keeps a relit bake, whose solves start elsewhere, within 1e-5 of a new one.
+// Relative residual of the last solve: a share of the noise, within these bounds. A relighting
+// starts its solves from other values than a new bake. The upper bound keeps its result within 1e-5
+// of that of a new bake.
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
-constexpr float kHalfTolerance = 0.05f;  // of the halves' solves, times the target error
-// Rays of a side in the first pass, which each further pass may double.
+// Relative residual of the solves of the halves, in multiples of the target error.
+constexpr float kHalfTolerance = 0.05f;
+// Largest number of rays of a side in the first pass, which doubles with each further pass, and the
+// largest number of passes.
 constexpr uint32_t kRaysOfFirstPass = 512, kMostPasses = 5;
 
-// Each window of finer pixels is a projection of its own for what lies in it.
+// Returns the number of sheets and loose parents that each bundle projects if there are windows of
+// finer pixels, else 0. Each window projects the surfaces that lie in it once more, which takes
+// time.
 double projectionsOfFaces(const Trace& trace) {
     const Sheets& sheets = trace.patches.sheets;
     return trace.density.windows.empty() ? 0.0 : double(sheets.loose.size() + sheets.sheets.size());
@@ -43,7 +48,8 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       noise(input.trace.looks, errorOfSets, tileWeight, input.tiles.patches()),
       growth(cornerGrowth(input.scene, input.tiles.patches())),
       rule(input.settings, mostBundles(patches, input.trace.density), tracer.bundleCount()),
-      // Who fixes or limits the number of bundles wants what these tell.
+      // No extra rays if the caller fixes or limits the number of bundles, because the result of
+      // these bundles is then wanted.
       castsRays(input.settings.countsLines() && input.settings.skipBundles &&
                 input.settings.minBundles < input.settings.maxBundles),
       halves(lights.size()) {
@@ -71,7 +77,7 @@ void BundleSolve::trace(Report& report) {
     tracer.advance(rule.wanted() - tracer.bundleCount(), in.progress);
 }
 
-// Solves for each half of the bundles, and measures how far they differ.
+// Solves for the light of each half of the bundles, and measures the difference between the halves.
 void BundleSolve::look() {
     in.trace.measureExposedShare(uint32_t(in.settings.seed));
     const uint32_t bundles = tracer.bundleCount();
@@ -102,20 +108,20 @@ Stop BundleSolve::stopAfterLook() {
     return castsRays && stop == Stop::NOISE_AT_TARGET ? rule.afterRays(bundles, castRays()) : stop;
 }
 
-// The last solve for all bundles there are.
+// Makes the last solve, with all bundles traced so far.
 void BundleSolve::finish() {
     ofFinish = Report();
     const float tolerance =
         float(std::clamp(kFinalShare * errors.front(), kLeastTolerance, kMostTolerance));
     for (size_t k = 0; k < lights.size(); ++k) {
-        Report unsaid;  // of the lines, which the first has said for all
+        Report unsaid;  // dropped: its notes on the lines repeat those of the first light
         lights[k].irradiance =
             transports[k]->finish(tolerance, in.shown.sides(), k == 0 ? ofFinish : unsaid);
     }
 }
 
-// Noisy sides cast rays of their own, and more of them as long as that helps. Returns what is left,
-// see NoisyParts::lookWithRays.
+// Casts local rays from noisy sides, and more of them as long as they reduce the noise. Returns the
+// noise that remains, see NoisyParts::lookWithRays.
 double BundleSolve::castRays() {
     const uint32_t bundles = tracer.bundleCount();
     std::vector<std::array<float, 2>> samples = in.trace.linesByHalf();
@@ -138,7 +144,7 @@ double BundleSolve::castRays() {
     return left;
 }
 
-// What is seen of the halves, on tiles.
+// Returns the shown light of both halves, per side of the tiles.
 BundleSolve::Halves BundleSolve::seen() const {
     Halves result(lights.size());
     const std::vector<float> exposed = in.trace.exposedShare();
@@ -150,15 +156,16 @@ BundleSolve::Halves BundleSolve::seen() const {
     return result;
 }
 
-// At each look: the same light is to have the same rays, whatever was baked before; and rays leave
-// noise of another kind than lines.
+// Measures the noise that corners show. Each look does this anew instead of using the looks of
+// earlier bakes, so that equal light gets equal rays whatever was baked before. It is repeated
+// after extra rays, because their noise differs in kind from that of lines.
 void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen) {
     overForetold = shownOverForetold(
         in.scene, {in.tiles.patches(), in.tiles.mean(in.trace.exposedShare(), patches.sideAreas())},
         look.ofLights().front(), halvesSeen.front(), in.settings.regularization, growth);
 }
 
-// States the noise that is left, and says why no bundles were added.
+// States the noise that remains, and why no bundles were added.
 SideNoise BundleSolve::conclude(Stop stop, Report& report) {
     const double target = in.settings.targetError;
     const uint32_t bundles = tracer.bundleCount();
@@ -195,8 +202,8 @@ SideNoise BundleSolve::conclude(Stop stop, Report& report) {
     return result;
 }
 
-// What more bundles do not help: lines that a projector puts in a wrong order, or that leak through
-// surfaces. Returns the relative error by them.
+// Returns the relative error caused by lines that a projector puts in the wrong order or lets pass
+// through surfaces. More bundles do not reduce this error.
 double BundleSolve::errorOfWrongLines(Report& report) const {
     warnOfBrokenCycles(in.trace.tracer->cycleCount(), report);
     double share = in.trace.tracer->disorderedShare();

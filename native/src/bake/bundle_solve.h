@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Bundles and solves in turns, until the difference of the two halves' estimates says that the
-// noise is at its target, in the light of all sources and in that of each light set.
+// The iteration of bundles and solves. It ends when the difference between the estimates of the two
+// halves of the bundles shows that the noise is at its target, in the light of all sources and in
+// the light of each light set.
 //
-// Source: thesis section 4.3.3 (stop by a stated error). Differs: bake/stop_rule.h,
-// stated_error/noise.h, stated_error/noisy_parts.h.
+// Source: thesis section 4.3.3 (stop by a stated error).
+// Differs: see bake/stop_rule.h, stated_error/noise.h and stated_error/noisy_parts.h.
 #pragma once
 
 #include <array>
@@ -24,25 +25,27 @@
 
 namespace raybundle {
 
-// What a solve works on: what every stage does, and the tiles and the shown light of its patches.
+// The input of a solve: the input of every stage, and the tiles and the shown light of its patches.
 // All references must outlive it.
 struct SolveInput : StageInput {
     const Tiles& tiles;
     const ShownLight& shown;
 };
 
+// Traces bundles and solves for the light until the stop rule ends the iteration.
 class BundleSolve {
   public:
-    // lights, transports: of each light set, in the same order; run() leaves the solved irradiance
-    // in the lights. Both must outlive the object.
+    // `lights` and `transports` have one entry for each light set, in the same order. Both must
+    // outlive the object. run() writes the solved irradiance to the lights.
     BundleSolve(const SolveInput& input, SetLights& lights, const Transports& transports);
 
-    // Traces, solves and looks until the stop rule says enough. Adds the time of both stages, the
-    // noise, and what is to be said of them to the report.
+    // Traces and solves until the stop rule ends the iteration. Returns the noise per side of the
+    // tiles. Adds the time of both stages, the noise and the warnings about them to the report.
     SideNoise run(Report& report);
 
   private:
-    using Halves = std::vector<std::array<Irradiance, 2>>;  // of each light
+    // Per light: the estimates of the two halves of the bundles.
+    using Halves = std::vector<std::array<Irradiance, 2>>;
 
     void trace(Report& report);
     void look();
@@ -58,28 +61,30 @@ class BundleSolve {
     const Patches& patches;
     SetLights& lights;
     const Transports& transports;
-    Transport& tracer;  // the transport that traces for all
+    Transport& tracer;  // the first transport, which traces for all
 
-    const std::vector<float> area;  // per side: of those that have a result, m^2
+    const std::vector<float> area;  // per side: area if the side has a result, else 0, m^2
     const GatheredNoise gathered;
-    std::vector<float> weight;                    // per side: the exposed part of that area, m^2
-    std::vector<float> tileWeight;                // the same, per side of the tiles
-    std::vector<std::vector<float>> errorOfSets;  // of the first shot, per light and side of tiles
+    std::vector<float> weight;      // per side: exposed part of `area`, m^2
+    std::vector<float> tileWeight;  // per side of the tiles: sum of `weight`, m^2
+    // Per light and side of the tiles: standard error of the first shot, W/m^2.
+    std::vector<std::vector<float>> errorOfSets;
     SetNoise noise;
     const std::vector<double> growth;      // per instance, see cornerGrowth
     std::vector<double> overForetold;      // per instance, see shownOverForetold
-    std::optional<NoisyParts> noisyParts;  // of solvers that count the lines that meet each side
+    std::optional<NoisyParts> noisyParts;  // empty unless the solver counts lines
     StopRule rule;
     const bool castsRays;
 
-    Halves halves;               // as they arrive
-    std::vector<double> errors;  // relative: of the light of all, then of each light set
-    Report ofFinish;             // what the last solve says
+    Halves halves;               // light that arrives at sides, not the shown light
+    std::vector<double> errors;  // relative noise: of the sum of all lights, then of each light set
+    Report ofFinish;             // notes of the last solve
 };
 
-// The result where bundles have nothing to bring: the light of the first shot. Some bundles are
-// traced all the same, to tell what is covered. Adds their time and the noise to the report;
-// exposed: is given the share of each side that nothing covers.
+// Computes the result if bundles have no light to carry: the light of the first shot. Nevertheless
+// traces some bundles, to find out which sides are covered. Returns the noise per side of the
+// tiles. Adds the time and the noise to the report. `exposed` receives per side the share of its
+// area that no other surface covers.
 SideNoise keepFirstShot(const SolveInput& input, SetLights& lights, std::vector<float>& exposed,
                         Report& report);
 

@@ -11,7 +11,7 @@
 namespace raybundle {
 namespace {
 
-// Notes what the first shot of a light set did not need to do.
+// Adds the work that the first shot of a light set has skipped to the report.
 void noteSkips(const DirectLight& direct, const FirstShot& shot, Report& report) {
     report.skip(SkippedWork::LAMP_INSIDES, direct.unseenSides());
     report.skip(SkippedWork::WHOLLY_LIT, shot.unblockedSides);
@@ -21,7 +21,8 @@ void noteSkips(const DirectLight& direct, const FirstShot& shot, Report& report)
     report.skip(SkippedWork::STAND_INS, shot.sidesByOthers);
 }
 
-// The first shot of one light set; aims: shotHash. Of the last bake's it takes what still holds.
+// Returns the first shot of one light set. Uses the first shot of the last bake as far as it is
+// still valid. `aims` is the result of shotHash().
 FirstShot shootOrKeep(const StageInput& in, const FirstShotInput& input, uint64_t aims,
                       Trace::Shot& last, Report& report) {
     const bool isGather = in.settings.gathersFirstShot();

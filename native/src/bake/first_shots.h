@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The stage in which the sources shine: the first shot of each light set, kept from bake to bake
-// where lights and geometry stay the same.
+// The stage of the first shot: distributes the light of the sources of each light set once. The
+// result is kept for the next bake, which uses it if lights and geometry are unchanged.
 #pragma once
 
 #include <vector>
@@ -14,13 +14,14 @@
 
 namespace raybundle {
 
-// A few shadow rays from each tile, of what belongs to no light set and then of each set. It tells
-// which patches are worth cutting. Adds its time to the report.
+// Gathers light with a few shadow rays from each tile, from which worthwhileCuts() decides which
+// tiles are worth cutting. Returns the light of the sources that belong to no light set, then that
+// of each light set. Adds its time to the report.
 std::vector<CoarseShot> shootCoarsely(const StageInput& in, Report& report);
 
-// The first shot of what belongs to no light set and then of each set. coarse: what shootCoarsely
-// has found, for the shots to go on with; empty: they make their own. Adds its time, its rays and
-// what it skipped to the report.
+// Returns the first shot of the sources that belong to no light set, then that of each light set.
+// `coarse` is the result of shootCoarsely(), from which the shots start; if it is empty, they make
+// their own coarse shots. Adds the time, the number of rays and the skipped work to the report.
 SetLights shootSources(const StageInput& in, const ShownLight& shown,
                        const std::vector<CoarseShot>& coarse, Report& report);
 

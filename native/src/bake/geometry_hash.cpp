@@ -10,8 +10,8 @@
 namespace raybundle {
 namespace {
 
-// What decides which lines pass through surfaces, and where light gets in; nothing where all are
-// opaque.
+// Adds what determines which lines pass through surfaces and where light enters them. Adds nothing
+// if all materials are opaque.
 void addOpacity(const Scene& scene, Hasher& hasher) {
     if (std::all_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
             return material.isOpaque() && !material.isTranslucent();

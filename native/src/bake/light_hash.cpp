@@ -12,7 +12,7 @@ uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vecto
         for (const MaterialSide& side : material.sides)
             hasher.add(side.shownFromAbove, side.shownByAngle);
     hasher.add(hasDirections, settings.skipClusters);
-    // Clusters are of one material where directions matter.
+    // If directions are kept, a cluster consists of one material.
     for (const Mesh& mesh : scene.meshes)
         if (hasDirections) hasher.add(mesh.faceMaterials);
     hasher.add(std::vector<uint8_t>(isShown.begin(), isShown.end()));
@@ -24,7 +24,7 @@ uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vecto
 uint64_t lightHash(const DirectLight& light, uint64_t aims) {
     Hasher hasher;
     for (const auto& source : light.lightSources()) hasher.add(source->shape, source->magnitude);
-    // What is a source and what is not depends on reflectances too.
+    // The split of the emission into sources and the rest depends on the reflectances too.
     hasher.add(light.emission());
     hasher.add(light.bundledEmission());
     hasher.add(aims);

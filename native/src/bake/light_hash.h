@@ -9,14 +9,16 @@
 
 namespace raybundle {
 
-// Of what decides how many samples GATHER takes, and of which, and what it keeps of them, but for
-// the lights. isShown: per side; hasDirections: whether it keeps where light comes from.
+// Returns a hash of everything except the lights that determines how many samples GATHER takes, at
+// which sides, and which results it keeps. `isShown` is per side whether its light is shown
+// (ShownLight::sides). `hasDirections` is whether GATHER keeps the directions from which light
+// arrives.
 uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vector<bool>& isShown,
                   bool hasDirections);
 
-// A hash of all that the first shot GATHER of a light set depends on, on patches that stay as they
-// are: lights, emission, the image of the world and its shotHash. Equal hashes are taken to mean
-// equal light (64 bits).
+// Returns a hash of everything that the first shot GATHER of a light set depends on if the patches
+// are unchanged: lights, emission, the image of the world and `aims`, the result of shotHash().
+// First shots with equal hashes are assumed to be equal (64 bits).
 uint64_t lightHash(const DirectLight& light, uint64_t aims);
 
 }  // namespace raybundle

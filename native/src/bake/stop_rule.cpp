@@ -8,15 +8,17 @@
 namespace raybundle {
 namespace {
 
-// So many times the bundles are too many to be foretold.
+// If the predicted number of bundles is more than this many times the present number, the
+// prediction is not relied on.
 constexpr double kFarAway = 2.5;
-// So many times the target may be left where sides cast rays. If more is left, what these rays met
-// is too noisy, and more bundles are worth their time as long as they take what is left down to
-// kWorthMore of what it was. Where kOutOfReach times the target is left at first, as between the
-// books of a shelf, that would take dozens of times the bundles, and all rays again each time.
+// Multiples of the target that may remain after sides have cast rays. If more than kLeftWithRays
+// remains, the light that the rays met is too noisy. More bundles are then worth their time as long
+// as they reduce what remains to less than kWorthMore of its value. If kOutOfReach or more remains
+// at first, as between the books of a shelf, dozens of times as many bundles would be needed, and
+// all rays again after each look.
 constexpr double kLeftWithRays = 2, kWorthMore = 0.75, kOutOfReach = 12;
 
-// Halves have the same number of bundles.
+// Rounds up to an even number, since both halves have the same number of bundles.
 uint32_t even(uint32_t bundles) { return (bundles + 1) & ~1u; }
 
 }  // namespace
@@ -31,7 +33,8 @@ Stop StopRule::after(uint32_t bundles, double excess) {
     lastExcess = excess;
     if (excess <= 1 && settings.skipBundles) return Stop::NOISE_AT_TARGET;
     if (bundles >= mostBundles) return isCountable ? Stop::MAX_BUNDLES : Stop::UNCOUNTABLE_LINES;
-    // As many as the slope of the noise says; if that is far away, double only, and look again.
+    // Traces as many bundles as the slope of the noise predicts. If this number is far away,
+    // doubles the number of bundles and looks again.
     const double factor =
         settings.skipBundles ? 1.05 * std::pow(excess, 1 / kNoiseSlope) : INFINITY;
     wantedBundles =

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// When a bake has traced enough bundles, and how many to trace before the next look at its noise.
+// The rule that decides when a bake has traced enough bundles, and how many bundles it traces
+// before the next look at its noise.
 //
 // Source: thesis section 4.3.3, which adds bundles until an error estimate meets a target.
-// Differs: the number of bundles grows as the slope of the noise foretells instead of by a fixed
-// step; and where noisy sides cast rays of their own, what these leave is judged too.
+// Differs:
+// - The number of bundles grows as the known slope of the noise predicts, instead of by a fixed
+//   step.
+// - If noisy sides have cast rays of their own, the noise that remains after these rays is judged
+//   too.
 #pragma once
 
 #include <cmath>
@@ -14,38 +18,43 @@
 
 namespace raybundle {
 
-// Why a bake adds no more bundles, or that it does.
+// Why a bake traces no more bundles, or NOT_YET if it traces more.
 enum class Stop { NOT_YET, NOISE_AT_TARGET, MAX_BUNDLES, UNCOUNTABLE_LINES };
 
+// Decides the number of bundles of one bake.
 class StopRule {
   public:
-    // countable: the most bundles whose lines can be counted (mostBundles in
-    // bundles/line_windows.h). traced: bundles of earlier bakes with the same lines.
+    // `countable` is the largest number of bundles whose lines can be counted (mostBundles in
+    // bundles/line_windows.h). `traced` is the number of bundles that earlier bakes have traced
+    // with the same lines. Keeps a reference to `settings`.
     StopRule(const Settings& settings, uint32_t countable, uint32_t traced);
 
-    // How many bundles, those of earlier bakes included, are to be traced before the next look.
+    // Returns how many bundles must be traced before the next look, those of earlier bakes
+    // included.
     uint32_t wanted() const { return wantedBundles; }
-    // The most bundles that this bake may use.
+    // Returns the largest number of bundles that this bake may use.
     uint32_t most() const { return mostBundles; }
 
-    // After a look at so many bundles whose noise is `excess` times the target.
+    // Decides after a look at `bundles` bundles, whose noise is `excess` times the target.
     Stop after(uint32_t bundles, double excess);
-    // After Stop::NOISE_AT_TARGET, once noisy sides have cast rays, on whose objects the noise is
-    // still `left` times the target: NOT_YET where more bundles are worth their time.
+    // Decides after Stop::NOISE_AT_TARGET, when noisy sides have cast rays. `left` is the noise
+    // that remains on their objects, in multiples of the target. Returns NOT_YET if more bundles
+    // are worth their time.
     Stop afterRays(uint32_t bundles, double left);
 
-    // So many times too large for the target was the noise by the last judgement.
+    // Returns the noise of the last decision in multiples of the target.
     double excess() const { return lastExcess; }
-    // Whether rays have left more than twice the target, which more bundles hardly help.
+    // Returns whether rays have left more than twice the target, which further bundles would hardly
+    // reduce.
     bool isOutOfReach() const;
 
   private:
     const Settings& settings;
-    const bool isCountable;  // all of max_bundles
+    const bool isCountable;  // whether the lines of max_bundles bundles can be counted
     const uint32_t mostBundles;
     uint32_t wantedBundles;
     double lastExcess = 0;
-    double leftByRays = INFINITY;  // times the target, at the last afterRays
+    double leftByRays = INFINITY;  // noise at the last afterRays(), in multiples of the target
 };
 
 }  // namespace raybundle

@@ -5,7 +5,7 @@
 
 namespace raybundle {
 
-// Adds the time for which it exists to a number of seconds, which must outlive it.
+// Adds the time from its construction to its destruction to `seconds`, which must outlive it.
 class Stopwatch {
   public:
     explicit Stopwatch(double& seconds) : seconds(seconds), start(Clock::now()) {}

@@ -12,28 +12,32 @@
 namespace raybundle {
 namespace {
 
-// Pixels per mean patch area. The time to 2 % noise is flat from 1 to 4, with its least here
-// (cornell_box and big_room, 5 seeds).
+// Pixels per mean patch area. The time to 2 % noise is nearly constant from 1 to 4, with its
+// minimum at this value (cornell_box and big_room, 5 seeds).
 constexpr float kPixelsPerPatch = 2.0f;
-// The same outside of windows of finer pixels: most lines are to be in the windows.
+// Pixels per mean patch area outside of windows of finer pixels. Most lines should be in the
+// windows.
 constexpr float kPixelsPerPatchAround = 0.25f;
-constexpr int kMaxPlanePixels = 4096;  // along the scene's diameter
+constexpr int kMaxPlanePixels = 4096;  // along the diameter of the scene or the island
 
-// Edge of a pixel by the mean area of patches no larger than `size` times itself, metres.
+// Returns the edge of a pixel, m, from the mean area of `count` patches with the total area `area`
+// (m^2). The mean counts as size * size at most (`size` in m). `radius` is the radius of the scene
+// or the island, m.
 float pixelSize(double area, size_t count, float size, float radius) {
     const double mean =
         std::min(double(size) * double(size), area / double(std::max<size_t>(1, count)));
     return std::max(float(std::sqrt(mean / double(kPixelsPerPatch))), 2 * radius / kMaxPlanePixels);
 }
 
-// The same for all patches and bundles: power per line is the same for all only then.
+// Returns one edge for the pixels of all patches and bundles, m. Every line carries the same power
+// only if all pixels are equal.
 float pixelSize(const Patches& patches, int linesPerBundle) {
     if (linesPerBundle > 0)
         return patches.radius * std::sqrt(glm::pi<float>() / float(linesPerBundle));
     return pixelSize(patches.totalArea, patches.tileCount, patches.size, patches.radius);
 }
 
-// Small patches get windows of finer pixels.
+// Returns the density of lines, with windows of finer pixels around small patches.
 LineDensity densityOf(const Patches& patches) {
     std::vector<double> area(patches.islands.size(), 0);
     std::vector<size_t> count(area.size(), 0);
@@ -81,7 +85,7 @@ void Trace::startLines(const Settings& settings) {
     counts = LineCounts(clusters.patches().sideCount());
     tracer = std::make_unique<BundleTracer>(settings.projector, input, settings.directions,
                                             uint32_t(settings.seed), &clusters);
-    // Only line reuse on exact projection sees what lies against what while it traces.
+    // Only line reuse with exact projection finds out while it traces which surfaces touch.
     if (!settings.countsLines() || !settings.isProjectionExact())
         surrounding = surroundingsOf(settings);
 }
