@@ -142,6 +142,22 @@ TEST_F(Api, ImagesAndCornerColoursGiveReflectance) {
     expectFurnace(instance);
 }
 
+TEST_F(Api, PixelsThatAreNoColoursAreBlackAndCounted) {
+    std::vector<float> pixels(3 * 3, 0.5f);
+    pixels[1] = -0.1f;
+    pixels[5] = NAN;
+    int32_t image = -1;
+    ASSERT_EQ(rb_add_image(scene, "paint", 3, 1, pixels.data(), RB_IMAGE_REPEAT, &image),
+              RB_ERROR_NONE);
+    addFurnace();
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    const nlohmann::json said = report();
+    ASSERT_EQ(said["warnings"].size(), 1u);
+    EXPECT_EQ(said["warnings"][0],
+              "image \"paint\": 2 of its 3 pixels are negative or no number; they count as black");
+    EXPECT_EQ(said["warning_ids"][0], "BLACK_PIXELS");
+}
+
 TEST_F(Api, ASurfaceIsByDefaultThatOfFacesWithoutAMaterial) {
     const float centre[3] = {0.5f, 0.5f, 0.5f};
     auto lightWith = [&](const std::vector<int32_t>& materials) {

@@ -99,7 +99,8 @@ typedef enum rb_image_extension RB_INT {
 } rb_image_extension;
 
 /* Adds an image of width * height linear RGB pixels, bottom row first as in Blender, and writes its
- * id to *image. Pixels that are negative or not finite count as black. */
+ * id to *image. Pixels that are negative or not finite count as black, with a warning in the
+ * report. */
 RB_API rb_error rb_add_image(rb_scene scene, const char* name, int32_t width, int32_t height,
                              const float* rgb, rb_image_extension extension, int32_t* image);
 
@@ -182,6 +183,7 @@ typedef struct rb_lobe {
     float roughness;
 } rb_lobe;
 
+/* The model of diffuse reflection, as Blender's shaders have it. */
 typedef enum rb_diffuse_model RB_INT {
     RB_DIFFUSE_LAMBERT = 0,
     RB_DIFFUSE_BURLEY = 1,
@@ -365,6 +367,7 @@ RB_API rb_error rb_set_light_cone(rb_scene scene, int32_t light, const float wor
 RB_API rb_error rb_add_sun_light(rb_scene scene, const char* name, const float direction[3],
                                  const float irradiance[3], float angle, int32_t* light);
 
+/* The shape of an area light. */
 typedef enum rb_area_shape RB_INT { RB_AREA_RECTANGLE = 0, RB_AREA_ELLIPSE = 1 } rb_area_shape;
 
 /* Adds an area light and writes its id to *light. The light is the parallelogram centre +- axis_u

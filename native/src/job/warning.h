@@ -13,6 +13,7 @@ namespace raybundle {
 // released name never changes.
 enum class WarningId {
     CLAMPED_REFLECTANCE,
+    BLACK_PIXELS,
     DEGENERATE_FACES,
     DOUBLED_FACES,
     UNCUT_CROSSINGS,

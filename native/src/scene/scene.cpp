@@ -78,8 +78,17 @@ std::vector<float> cornerAngles(const Mesh& mesh) {
 int32_t Scene::addImage(Image image) {
     const std::string object = quoted("image", image.name);
     if (image.width <= 0 || image.height <= 0) throw invalidArgument(object + " has no pixels");
-    for (glm::vec3& pixel : image.pixels)
-        if (!isFiniteAndPositive(pixel)) pixel = glm::vec3(0.0f);
+    size_t black = 0;
+    for (glm::vec3& pixel : image.pixels) {
+        if (isFiniteAndPositive(pixel)) continue;
+        pixel = glm::vec3(0.0f);
+        ++black;
+    }
+    if (black > 0)
+        warnings.push_back({WarningId::BLACK_PIXELS,
+                            object + ": " + std::to_string(black) + " of its " +
+                                std::to_string(image.pixels.size()) +
+                                " pixels are negative or no number; they count as black"});
     images.push_back(std::move(image));
     return int32_t(images.size()) - 1;
 }
