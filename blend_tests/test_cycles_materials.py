@@ -32,6 +32,7 @@ MEAN_TOLERANCE, QUARTER_TOLERANCE = 0.01, 0.02
 SUN_TOLERANCE = 0.003
 CELLS = 16  # of the floor, along an edge
 TARGET_ERROR = 0.005
+PATCH_SIZE = 0.1  # half as fine as it would be, and enough for what hangs 0.6 m away or higher
 # In rooms, whose surfaces see all others, less changes the means by 0.2 %.
 ROOM_TARGET_ERROR = 0.01
 
@@ -327,7 +328,7 @@ def quarters(item, corners):
     return face_means(item, corners).reshape(2, half, 2, half, 3).mean(axis=(1, 3))
 
 
-def compare(floor, filter_glossy=0.0):
+def compare(floor, filter_glossy=0.0, patch_size=PATCH_SIZE):
     runs = [quarters(floor, bake_objects([floor], SAMPLES, seed,
                                          filter_glossy=filter_glossy)[floor.name])
             for seed in (0, 1)]
@@ -338,7 +339,8 @@ def compare(floor, filter_glossy=0.0):
     # Of the floor alone: the canopy, which the lamp lights without noise, would hide its noise.
     for item in bpy.context.view_layer.objects:
         item.raybundle.role = 'BAKE' if item == floor else 'OCCLUDE'
-    report = raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=8192)
+    report = raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=8192,
+                            patch_size=patch_size)
     light = quarters(floor, read_colors(floor))
     difference = light.mean(axis=(0, 1)) / mean - 1
     worst = np.abs(light - truth).max() / mean.max()
@@ -413,7 +415,8 @@ def test_canopy(floor, new_object, new_light, build):
     if build not in (image_emission, procedural_emission):
         # The floor sees it from behind.
         place_lamp_below(new_light)
-    compare(floor)
+    # The light of metals varies most: in a quarter 2.4 % off with those patches, 1.9 with finer.
+    compare(floor, patch_size=0.0 if build in METAL else PATCH_SIZE)
     if build in UNIFORM + DIRECTED:
         compare_sent(canopy)
 
