@@ -49,7 +49,7 @@ def open_scene(name: str, cells: int = lamp_rooms.FINE) -> None:
 
 
 def open_file(name: str, cells: int) -> None:
-    """cells: of rooms, along a metre; where they are COARSE, the Cornell box has wider faces too."""
+    """cells: of rooms, along a metre; where they are COARSE, the Cornell box is coarse too."""
     kind, _, room = name.partition(":")
     if kind == "room":
         lamp_rooms.build(room, cells)
