@@ -7,10 +7,12 @@ from pathlib import Path
 import bpy
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "addon"))
+REPOSITORY = Path(__file__).parent.parent
+sys.path[:0] = [str(REPOSITORY / "addon"), str(REPOSITORY / "scenes")]
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
+from build import construction, cornell_box  # noqa: E402
 
 # The furnace: E, reflectance and the side of the box.
 FURNACE_EMISSION_RADIANCE = 0.5
@@ -136,3 +138,13 @@ def closed_box(new_object, new_material):
     grey, radiance = FURNACE_REFLECTANCE, FURNACE_EMISSION_RADIANCE
     material = new_material("Furnace", (grey,) * 3, (radiance,) * 3)
     return new_object("Box", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES], material)
+
+
+def build_cornell_box(density: float) -> None:
+    """In an empty file: that of scenes/ with so many times the cells along each edge."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    construction.set_render_settings(bpy.context.scene)
+    construction.density, before = density, construction.density
+    cornell_box.build(bpy.context)
+    construction.density = before
+    bpy.context.view_layer.update()

@@ -14,11 +14,16 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Sequence
 
 import bpy
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from shared_corners import each_place_once  # noqa: E402
 
 ATTRIBUTE = "Cycles"
 BOUNCES = 128
@@ -104,15 +109,17 @@ def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int,
     prepare_scene(context.scene, samples, seed, filter_glossy)
     result: dict[str, np.ndarray] = {}
     for group in rounds_of_distinct_meshes(objects):
-        for item in context.view_layer.objects:
-            item.select_set(False)
         for item in group:
             target_attribute(item.data)
-            item.select_set(True)
-        context.view_layer.objects.active = group[0]
-        bpy.ops.object.bake(type=kind, pass_filter=set(passes),
-                            target="VERTEX_COLORS", use_selected_to_active=False,
-                            use_clear=True)
+        # Colour and gloss may differ between corners of one place.
+        has_places = kind == "DIFFUSE" and "COLOR" not in passes
+        with each_place_once(group, ATTRIBUTE) if has_places else nullcontext(group) as baked:
+            for item in context.view_layer.objects:
+                item.select_set(item in baked)
+            context.view_layer.objects.active = baked[0]
+            bpy.ops.object.bake(type=kind, pass_filter=set(passes),
+                                target="VERTEX_COLORS", use_selected_to_active=False,
+                                use_clear=True)
         result.update((item.name, corner_values(item.data)) for item in group)
     return result
 

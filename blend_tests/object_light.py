@@ -11,6 +11,7 @@ import bpy
 import lamp_rooms
 import numpy as np
 import raybundle
+from conftest import build_cornell_box
 from covered_faces import COVERED, covered_faces, mark_covered
 from scene_items import ORIGIN, ORIGINS, mesh_items
 from surface_error import corner_areas, face_sizes, read_colors
@@ -51,9 +52,13 @@ def open_scene(name: str, cells: int = lamp_rooms.FINE) -> None:
 
 
 def open_file(name: str, cells: int) -> None:
+    """cells: of rooms, along a metre; where they are COARSE, the Cornell box is coarse too."""
     kind, _, room = name.partition(":")
     if kind == "room":
         lamp_rooms.build(room, cells)
+        return
+    if name == "cornell_box" and cells == lamp_rooms.COARSE:
+        build_cornell_box(0.5)
         return
     path = SCENES / f"{name}.blend"
     bpy.ops.wm.open_mainfile(filepath=str(path if path.is_file() else Path(name).resolve()))

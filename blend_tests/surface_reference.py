@@ -24,7 +24,10 @@ class SurfaceReference:
     def __init__(self, objects: Sequence[bpy.types.Object], samples: int, seed: int = 0) -> None:
         self._weights = {item.name: corner_areas(item) for item in objects}
         self._sizes = {item.name: face_sizes(item.data) for item in objects}
-        twins = {item.name: _with_inner_points(item) for item in objects}
+        # Cycles bakes all corners of a mesh. So the inner faces, whose corners are the points, are
+        # an object of their own.
+        twins, rims = ({item.name: _with_inner_points(item, is_rim) for item in objects}
+                       for is_rim in (False, True))
         hidden = [item.hide_render for item in objects]
         for item in objects:
             item.hide_render = True
@@ -32,8 +35,8 @@ class SurfaceReference:
         self._values = {name: values[twin.name] for name, twin in twins.items()}
         for item, was_hidden in zip(objects, hidden):
             item.hide_render = was_hidden
-        covered = _covered_points(twins)
-        for twin in twins.values():
+        covered = _covered_points(twins, rims)
+        for twin in (*twins.values(), *rims.values()):
             bpy.data.meshes.remove(twin.data)
         for item in objects:
             # Faces that reflect nothing have no value. Covered points nobody sees, and what Cycles
@@ -70,8 +73,9 @@ class SurfaceReference:
         return np.where((sizes == 4)[face, None], bilinear, 0.5 * (corners + mean))
 
 
-def _with_inner_points(item: bpy.types.Object) -> bpy.types.Object:
-    """A copy whose faces have a smaller face in their middle: its vertices are the points."""
+def _with_inner_points(item: bpy.types.Object, is_rim: bool) -> bpy.types.Object:
+    """Of a copy whose faces have a smaller face in their middle, whose vertices are the points:
+    these inner faces, or all others. The vertices are those of all faces."""
     vertices, sizes = corner_vertices(item.data), face_sizes(item.data)
     positions = np.empty(3 * len(item.data.vertices), np.float32)
     item.data.vertices.foreach_get('co', positions)
@@ -84,11 +88,10 @@ def _with_inner_points(item: bpy.types.Object) -> bpy.types.Object:
         outside = list(polygon.vertices)
         inside = [len(positions) + corner for corner in polygon.loop_indices]
         count = len(outside)
-        faces.append(inside)
         faces += [[outside[k], outside[(k + 1) % count], inside[(k + 1) % count], inside[k]]
-                  for k in range(count)]
-        slots += [polygon.material_index] * (count + 1)
-    mesh = bpy.data.meshes.new(f"{item.name}.points")
+                  for k in range(count)] if is_rim else [inside]
+        slots += [polygon.material_index] * (count if is_rim else 1)
+    mesh = bpy.data.meshes.new(f"{item.name}.{'rim' if is_rim else 'points'}")
     mesh.from_pydata(np.concatenate([positions, inner]).tolist(), [], faces)
     for material in item.data.materials:
         mesh.materials.append(material)
@@ -104,18 +107,18 @@ def _with_inner_points(item: bpy.types.Object) -> bpy.types.Object:
     return twin
 
 
-def _covered_points(twins: dict[str, bpy.types.Object]) -> dict[str, np.ndarray]:
+def _covered_points(twins: dict[str, bpy.types.Object], rims: dict[str, bpy.types.Object]
+                    ) -> dict[str, np.ndarray]:
     """(points,) by name: whether a surface of another object lies against the point."""
     positions = {name: world_positions(twin) for name, twin in twins.items()}
-    counts = [len(twin.data.polygons) for twin in twins.values()]
     begins = dict(zip(twins, np.cumsum([0, *map(len, positions.values())]).tolist()))
-    polygons = [[begins[name] + vertex for vertex in polygon.vertices]
-                for name, twin in twins.items() for polygon in twin.data.polygons]
+    polygons = [(index, [begins[name] + vertex for vertex in polygon.vertices])
+                for index, name in enumerate(twins) for part in (twins[name], rims[name])
+                for polygon in part.data.polygons]
     every = np.concatenate(list(positions.values()))
-    tree = BVHTree.FromPolygons(every.tolist(), polygons)
-    owner = np.repeat(np.arange(len(twins)), counts)
+    tree = BVHTree.FromPolygons(every.tolist(), [vertices for _, vertices in polygons])
     reach = TOUCH * float(np.linalg.norm(np.ptp(every, axis=0)))
-    return {name: np.array([any(owner[face] != index
+    return {name: np.array([any(polygons[face][0] != index
                                 for _, _, face, _ in tree.find_nearest_range(point, reach))
                             for point in positions[name][twin["first_point"]:].tolist()], bool)
             for index, (name, twin) in enumerate(twins.items())}

@@ -32,6 +32,9 @@ MEAN_TOLERANCE, QUARTER_TOLERANCE = 0.01, 0.02
 SUN_TOLERANCE = 0.003
 CELLS = 16  # of the floor, along an edge
 TARGET_ERROR = 0.005
+PATCH_SIZE = 0.1  # half as fine as it would be, and enough for what hangs 0.6 m away or higher
+# In rooms, whose surfaces see all others, less changes the means by 0.2 %.
+ROOM_TARGET_ERROR = 0.01
 
 
 class Tree:
@@ -325,7 +328,7 @@ def quarters(item, corners):
     return face_means(item, corners).reshape(2, half, 2, half, 3).mean(axis=(1, 3))
 
 
-def compare(floor, filter_glossy=0.0):
+def compare(floor, filter_glossy=0.0, patch_size=PATCH_SIZE):
     runs = [quarters(floor, bake_objects([floor], SAMPLES, seed,
                                          filter_glossy=filter_glossy)[floor.name])
             for seed in (0, 1)]
@@ -336,7 +339,8 @@ def compare(floor, filter_glossy=0.0):
     # Of the floor alone: the canopy, which the lamp lights without noise, would hide its noise.
     for item in bpy.context.view_layer.objects:
         item.raybundle.role = 'BAKE' if item == floor else 'OCCLUDE'
-    report = raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=8192)
+    report = raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=8192,
+                            patch_size=patch_size)
     light = quarters(floor, read_colors(floor))
     difference = light.mean(axis=(0, 1)) / mean - 1
     worst = np.abs(light - truth).max() / mean.max()
@@ -411,7 +415,8 @@ def test_canopy(floor, new_object, new_light, build):
     if build not in (image_emission, procedural_emission):
         # The floor sees it from behind.
         place_lamp_below(new_light)
-    compare(floor)
+    # The light of metals varies most: in a quarter 2.4 % off with those patches, 1.9 with finer.
+    compare(floor, patch_size=0.0 if build in METAL else PATCH_SIZE)
     if build in UNIFORM + DIRECTED:
         compare_sent(canopy)
 
@@ -514,7 +519,7 @@ def test_room_of_one_facet(new_object, new_light, caustics):
 def compare_walls(walls):
     # Half the difference of two seeds is 0.08 % then, root mean square over the rooms, 0.13 % at most.
     references = [SurfaceReference(walls, SAMPLES // 8, seed) for seed in (0, 1)]
-    raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=1024)
+    raybundle.bake(bpy.context, target_error=ROOM_TARGET_ERROR, max_bundles=1024)
     found, truth = surface_means(references, {wall.name: read_colors(wall) for wall in walls})
     assert np.abs(found - truth).max() < MEAN_TOLERANCE * truth.max()
 
@@ -543,7 +548,7 @@ def test_clothed_room(new_object, new_light, build):
     white = Tree()
     floor.data.materials[0] = white.finish(white.add('BsdfDiffuse', Color=(0.8, 0.8, 0.8, 1.0)))
     references = [SurfaceReference([floor], SAMPLES, seed) for seed in (0, 1)]
-    raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=1024)
+    raybundle.bake(bpy.context, target_error=ROOM_TARGET_ERROR, max_bundles=1024)
     found, truth = surface_means(references, {floor.name: read_colors(floor)})
     assert np.abs(found - truth).max() < MEAN_TOLERANCE * truth.max()
 
@@ -566,7 +571,7 @@ def test_yard(new_object, new_world, metallic):
     new_world((0.4, 0.6, 0.9))
     bpy.context.view_layer.update()
     references = [SurfaceReference(items, SAMPLES // 4, seed) for seed in (0, 1)]
-    raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=1024)
+    raybundle.bake(bpy.context, target_error=ROOM_TARGET_ERROR, max_bundles=1024)
     for item in items:
         found, truth = surface_means(references, {item.name: read_colors(item)})
         assert np.abs(found - truth).max() < MEAN_TOLERANCE * truth.max()
@@ -575,9 +580,12 @@ def test_yard(new_object, new_world, metallic):
 def surface_means(references, light):
     """Of what is shown and of Cycles' light, whose noise is asserted."""
     (found, truth), (_, again) = (reference.means(light) for reference in references)
-    assert np.abs(truth - again).max() / 2 < NOISE * truth.max()
+    noise = np.abs(truth - again).max() / 2 / truth.max()
+    assert noise < NOISE
     truth = (truth + again) / 2
-    print(f"{', '.join(light)}: {np.round(100 * (found / truth - 1), 2)} %")
+    # Shown by pytest -s.
+    print(f"{', '.join(light)}: Cycles' noise {100 * noise:.2f} %; "
+          f"{np.round(100 * (found / truth - 1), 2)} %")
     return found, truth
 
 
@@ -595,7 +603,7 @@ def test_painted_cornell_box():
     items = [item for item in bpy.context.scene.objects
              if item.type == 'MESH' and item.name != "lamp"]
     references = [SurfaceReference(items, SAMPLES // 4, seed) for seed in (0, 1)]
-    raybundle.bake(bpy.context, target_error=TARGET_ERROR)
+    raybundle.bake(bpy.context, target_error=ROOM_TARGET_ERROR)
     for item in items:
         found, truth = surface_means(references, {item.name: read_colors(item)})
         assert np.abs(found - truth).max() < MEAN_TOLERANCE * truth.max()
