@@ -192,6 +192,41 @@ def test_a_set_without_lights_is_black_and_named(court):
     assert read_colors(court["items"][0]).max() > 0.0
 
 
+def emit_image(material):
+    image = bpy.data.images.new("Glow", 2, 2, float_buffer=True)
+    image.pixels[:] = [40.0, 20.0, 10.0, 1.0] * 4
+    tree = material.node_tree
+    texture = tree.nodes.new('ShaderNodeTexImage')
+    texture.image = image
+    tree.links.new(texture.outputs['Color'], tree.nodes["Emission"].inputs['Color'])
+
+
+def emit_attribute(material):
+    mesh = bpy.data.objects["Panel"].data
+    layer = mesh.color_attributes.new("Glow", 'FLOAT_COLOR', 'CORNER')
+    layer.data.foreach_set('color', [40.0, 20.0, 10.0, 1.0] * len(mesh.loops))
+    tree = material.node_tree
+    attribute = tree.nodes.new('ShaderNodeVertexColor')
+    attribute.layer_name = "Glow"
+    tree.links.new(attribute.outputs['Color'], tree.nodes["Emission"].inputs['Color'])
+
+
+@pytest.mark.parametrize("emit", (emit_image, emit_attribute))
+def test_objects_that_emit_an_image_or_an_attribute_belong_to_sets(court, emit):
+    """An even image gives the light of its colour."""
+    add_set("warm", court["warm"])
+    bpy.data.objects["Red"].hide_render = True
+    glow = bpy.data.materials["Glow"].node_tree.nodes["Emission"].inputs['Color']
+    glow.default_value = (40.0, 20.0, 10.0, 1.0)
+    # No point has more or less noise than another: the same lines and shadow rays.
+    bake()
+    expected = [read_colors(item, "Radiosity warm") for item in court["items"]]
+    emit(bpy.data.materials["Glow"])
+    bake()
+    for item, light in zip(court["items"], expected):
+        assert difference(read_colors(item, "Radiosity warm"), light) < 0.02
+
+
 def test_disabled_sets_are_not_baked(court):
     add_both(court)
     bpy.context.scene.raybundle.light_sets[0].enabled = False

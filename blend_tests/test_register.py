@@ -6,11 +6,12 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import pytest
 import raybundle
-from raybundle import native, properties
+from raybundle import native, panels, properties
 
 GROUPS = (properties.RaybundleSceneSettings, properties.RaybundleObjectSettings)
 
@@ -116,6 +117,30 @@ def test_choices_are_those_of_the_library_in_its_order():
             setting.choices
         # Files store the place of a choice.
         assert definition.enum_items.keys() == list(setting.choices), setting.name
+
+
+@pytest.mark.needs_library
+def test_the_method_panel_draws_the_settings_that_have_an_effect():
+    class Layout:
+        def __init__(self):
+            self.drawn = []
+
+        def prop(self, settings, name, **_options):
+            self.drawn.append(name)
+
+    settings = bpy.context.scene.raybundle
+    of_choices = {'solver': {"estimator"}, 'first_shot': {"local_rays"},
+                  'projector': {"plane_count", "plane_placement"}}
+    for choice, names in of_choices.items():
+        for value in native.settings()[choice].choices:
+            setattr(settings, choice, value)
+            panel = SimpleNamespace(layout=Layout())
+            panels.RAYBUNDLE_PT_method.draw(panel, bpy.context)
+            assert len(panel.layout.drawn) == len(set(panel.layout.drawn))
+            is_used = value in ('RANDOM_WALK', 'SHOOT', 'EXTENDED', 'PLANES')
+            assert (names <= set(panel.layout.drawn)) == is_used, value
+            assert names.isdisjoint(panel.layout.drawn) != is_used, value
+        settings.property_unset(choice)
 
 
 @pytest.mark.needs_library

@@ -11,12 +11,12 @@ raises RaybundleError. native/include/raybundle/raybundle.h describes the interf
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import enum
 import functools
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +136,8 @@ class _SettingInfo(ctypes.Structure):
         ('choice_count', _size),
         ('choices', _texts),
         ('choice_help', _texts),
+        ('used_with', _text),
+        ('used_with_choices', ctypes.c_uint32),
     )
 
 
@@ -318,7 +320,7 @@ def _fill(target: ctypes.Structure, data: object, name: str) -> None:
         for (member, _), row in zip(target._fields_, rows):
             getattr(target, member)[:] = row
         return
-    for item in fields(data):
+    for item in dataclasses.fields(data):
         member, value = getattr(target, item.name), getattr(data, item.name)
         path = f"{name}.{item.name}"
         if isinstance(member, ctypes.Structure):
@@ -551,7 +553,7 @@ class Scene(_Handle):
 # --------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Setting:
     """What the library says of a setting of a bake."""
 
@@ -563,13 +565,17 @@ class Setting:
     most: float
     default: int | float | str
     choices: dict[str, str]  # of a choice: help by name, in their lasting order; else empty
+    # The choice that decides whether the setting has an effect, and its values with which it has.
+    # An empty name: the setting always has an effect.
+    used_with: str = ""
+    used_with_choices: frozenset[str] = frozenset()
 
 
 @functools.cache
 def settings() -> dict[str, Setting]:
     """All settings of a bake by name. Raises RaybundleError without a library."""
     library = load()
-    result = {}
+    result, used_with = {}, {}
     for index in range(library.rb_get_setting_count()):
         info = _SettingInfo(size=ctypes.sizeof(_SettingInfo))
         library.rb_get_setting_info(index, ctypes.byref(info))
@@ -580,6 +586,12 @@ def settings() -> dict[str, Setting]:
         name = info.name.decode()
         result[name] = Setting(name, kind, info.help.decode(), info.unit.decode(), info.least,
                                info.most, default, choices)
+        if info.used_with:
+            used_with[name] = info.used_with.decode(), info.used_with_choices
+    for name, (choice, bits) in used_with.items():
+        values = frozenset(value for k, value in enumerate(result[choice].choices) if bits >> k & 1)
+        result[name] = dataclasses.replace(result[name], used_with=choice,
+                                           used_with_choices=values)
     return result
 
 

@@ -5,6 +5,7 @@ import json
 
 import bpy
 
+from . import native
 from .light_sets import attribute_of
 
 
@@ -13,6 +14,19 @@ def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
     panel.layout.use_property_split = True
     panel.layout.use_property_decorate = False
     return panel.layout
+
+
+def draw_used(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str,
+              **options) -> None:
+    """Draws a setting if it has an effect with the other settings. Without the library, which knows
+    that, every setting is drawn."""
+    try:
+        setting = native.settings()[name]
+    except native.RaybundleError:
+        setting = None
+    if setting is None or not setting.used_with or \
+            getattr(settings, setting.used_with) in setting.used_with_choices:
+        layout.prop(settings, name, **options)
 
 
 class RaybundleRenderPanel:
@@ -99,23 +113,12 @@ class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        layout.prop(settings, "solver")
-        if settings.solver == 'RANDOM_WALK':
-            layout.prop(settings, "estimator")
-        layout.prop(settings, "first_shot")
-        if settings.first_shot != 'GATHER':
-            layout.prop(settings, "local_rays")
-        layout.prop(settings, "directions")
-        layout.prop(settings, "projector")
-        if settings.projector == 'PLANES':
-            layout.prop(settings, "plane_count")
-            layout.prop(settings, "plane_placement", text="Placement")
-        layout.prop(settings, "small_patches")
-        layout.prop(settings, "reconstruction")
-        if settings.reconstruction == 'POINT':
-            layout.prop(settings, "final_gather")
-        layout.prop(settings, "seed")
-        layout.prop(settings, "threads")
+        for name in ("solver", "estimator", "first_shot", "local_rays", "directions", "projector",
+                     "plane_count"):
+            draw_used(layout, settings, name)
+        draw_used(layout, settings, "plane_placement", text="Placement")
+        for name in ("small_patches", "reconstruction", "final_gather", "seed", "threads"):
+            draw_used(layout, settings, name)
 
 
 class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):

@@ -160,9 +160,10 @@ class SceneData:
     light_sets: list[LightSetData] = field(default_factory=list)
 
     def emits(self, instance: int) -> bool:
-        """Whether an instance has a material that emits light."""
+        """Returns whether an instance has a material that may emit light. An image or corner colours
+        that emit may still be black."""
         used = np.unique(self.meshes[self.instances[instance].mesh].face_materials)
-        return any(np.any(side.emission.constant > 0.0) for index in used
+        return any(side.emission.may_be_positive() for index in used
                    for side in self.materials[index].sides)
 
     def diagonal(self) -> float:

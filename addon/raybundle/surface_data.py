@@ -37,6 +37,11 @@ class ColorData:
     image_weight: np.ndarray = field(default_factory=_black)
     corner_color_weight: np.ndarray = field(default_factory=_black)
 
+    def may_be_positive(self) -> bool:
+        """Returns whether some colour of the image and of the corners makes a channel positive."""
+        weights = (self.constant, self.image_weight, self.corner_color_weight)
+        return any(np.any(weight > 0.0) for weight in weights)
+
 
 @dataclass(frozen=True)
 class PartData:

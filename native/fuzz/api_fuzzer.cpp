@@ -275,23 +275,28 @@ void addInstance(Bytes& in, rb_scene scene) {
     if (in.flag()) expectMessage(rb_set_instance_light_set(scene, in.small(), in.small()));
 }
 
+// Returns all settings that are choices.
+std::vector<rb_setting_info> choices() {
+    std::vector<rb_setting_info> found;
+    for (size_t index = 0; index < rb_get_setting_count(); ++index) {
+        rb_setting_info info{};
+        info.size = sizeof info;
+        rb_get_setting_info(index, &info);
+        if (info.type == RB_SETTING_CHOICE) found.push_back(info);
+    }
+    return found;
+}
+
 void set(Bytes& in, rb_bake bake) {
     static const char* const kIntegers[] = {
         "refine",          "contacts", "seed",        "thesis_literal", "final_gather",
         "plane_coherence", "skip.lit", "skip.gather", "skip.sheets",    "skip.warm_start"};
-    static const std::pair<const char*, std::vector<const char*>> kChoices[] = {
-        {"solver", {"LINE_REUSE", "MULTIPATH", "STOCHASTIC_ITERATION", "RANDOM_WALK"}},
-        {"first_shot", {"GATHER", "SHOOT", "EXTENDED"}},
-        {"directions", {"LOW_DISCREPANCY", "RANDOM", "ADAPTIVE"}},
-        {"projector", {"FRAGMENT_LISTS", "PAINTER", "PAINTER_NEWELL", "PLANE", "PLANES"}},
-        {"reconstruction", {"LEAST_SQUARES", "AREA_AVERAGE", "POINT"}},
-        {"small_patches", {"CENTRE_SAMPLING", "ROULETTE"}},
-    };
+    static const std::vector<rb_setting_info> kChoices = choices();
     switch (in.below(4)) {
         case 0: {
-            const auto& [name, values] = kChoices[in.below(std::size(kChoices))];
-            expectMessage(
-                rb_set_bake_string(bake, name, values[in.below(uint32_t(values.size()))]));
+            const rb_setting_info& choice = kChoices[in.below(uint32_t(kChoices.size()))];
+            expectMessage(rb_set_bake_string(
+                bake, choice.name, choice.choices[in.below(uint32_t(choice.choice_count))]));
             break;
         }
         case 1:

@@ -4,6 +4,7 @@
 // with the table in docs/c_api.md.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
@@ -108,6 +109,26 @@ TEST_F(ApiSettings, ChoicesHaveTheirDefaultAndTakeEachName) {
             EXPECT_GT(std::strlen(info.choice_help[k]), 10u) << info.choices[k];
         }
     }
+}
+
+TEST_F(ApiSettings, TheChoiceThatASettingIsUsedWithExistsAndHasOtherValuesToo) {
+    const std::vector<rb_setting_info> all = allSettings();
+    size_t limited = 0;
+    for (const rb_setting_info& info : all) {
+        if (!info.used_with) {
+            EXPECT_EQ(info.used_with_choices, 0u) << info.name;
+            continue;
+        }
+        ++limited;
+        const auto choice = std::find_if(all.begin(), all.end(), [&](const rb_setting_info& other) {
+            return std::strcmp(other.name, info.used_with) == 0;
+        });
+        ASSERT_NE(choice, all.end()) << info.name;
+        EXPECT_EQ(choice->type, RB_SETTING_CHOICE) << info.name;
+        EXPECT_NE(info.used_with_choices, 0u) << info.name;
+        EXPECT_LT(info.used_with_choices, (1u << choice->choice_count) - 1) << info.name;
+    }
+    EXPECT_GE(limited, 6u);
 }
 
 TEST_F(ApiSettings, UnknownIndicesAndSizesAreRefused) {

@@ -447,6 +447,10 @@ typedef struct rb_setting_info {
     const char* const* choices;
     /* What each value of a choice does: choice_count lines; else NULL. */
     const char* const* choice_help;
+    /* The choice setting that decides whether this setting has an effect; NULL if it always has. */
+    const char* used_with;
+    /* Bit k is set if this setting has an effect with value k of the choice `used_with`. */
+    uint32_t used_with_choices;
 } rb_setting_info;
 
 /* Returns the number of settings of a bake. */

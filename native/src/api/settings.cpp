@@ -31,6 +31,8 @@ rb_setting_info describe(const Setting& setting) {
     info.name = setting.name;
     info.help = setting.help;
     info.unit = setting.unit;
+    info.used_with = setting.usedWith.choice;
+    info.used_with_choices = setting.usedWith.values;
     std::visit(
         [&](auto member) {
             using Value = ValueOf<decltype(member)>;

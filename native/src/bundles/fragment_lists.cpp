@@ -53,7 +53,7 @@ void sortFour(uint64_t* key) {
 
 FragmentLists::FragmentLists(const Patches& patches, float pixelSize, SmallPatches smallPatches,
                              std::vector<LineWindow> windows)
-    : contacts(patches),
+    : depthOrder(patches),
       hasLeaks(smallPatches == SmallPatches::ROULETTE),
       rasteriser(patches, pixelSize, smallPatches, std::move(windows)) {}
 
@@ -64,7 +64,7 @@ std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input) {
 
 void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
     rasteriser.begin(bundle);
-    contacts.begin(bundle.direction);
+    depthOrder.begin(bundle.direction);
     // ROULETTE draws patches by chance per pixel of the whole view, so it cannot be split into
     // regions.
     if (hasLeaks)
@@ -93,7 +93,8 @@ void FragmentLists::projectView(BundleLines& out) {
                  std::max(rasteriser.depthHigh() - depthLow, std::numeric_limits<double>::min());
     depthOffset = kIntegers + kFirstStep - depthLow * depthSteps;
     nearSteps =
-        uint32_t(std::min(contacts.zone(rasteriser.islandsInView()) * depthSteps, kDepthSteps)) + 1;
+        uint32_t(std::min(depthOrder.zone(rasteriser.islandsInView()) * depthSteps, kDepthSteps)) +
+        1;
     rasteriser.forEachRun([&](uint32_t pixel, int count, const double* depth,
                               const uint32_t* side) { keepRun(pixel, count, depth, side); });
     pairLists(out);
@@ -148,8 +149,9 @@ bool FragmentLists::areNear(uint64_t a, uint64_t b) const {
 
 void FragmentLists::orderCoinciding(uint64_t* first, uint64_t* last) const {
     for (uint64_t* a = first + 1; a < last; ++a)
-        for (uint64_t* b = a; b > first && areNear(b[-1], *b) &&
-                              contacts.belongBackwards(sideOf(b[-1]), sideOf(*b), along(b[-1], *b));
+        for (uint64_t* b = a;
+             b > first && areNear(b[-1], *b) &&
+             depthOrder.belongBackwards(sideOf(b[-1]), sideOf(*b), along(b[-1], *b));
              --b)
             std::swap(*b, b[-1]);
 }
@@ -196,12 +198,12 @@ void FragmentLists::pairLists(BundleLines& out) {
 void FragmentLists::pairNear(const uint64_t* first, const uint64_t* last, BundleLines& out) {
     for (const uint64_t* k = first; k + 1 < last; ++k) {
         const uint32_t i = opposite(sideOf(k[0])), j = sideOf(k[1]);
-        if (areNear(k[0], k[1]) && contacts.touches(opposite(i), j, along(k[0], k[1]))) {
+        if (areNear(k[0], k[1]) && depthOrder.touches(opposite(i), j, along(k[0], k[1]))) {
             out.touching.push_back(i);
             out.touching.push_back(j);
         } else {
             runs.add(size_t(k - first), i, j);
-            if (hasLeaks && contacts.passesIntoSolid(i, j)) ++out.disordered;
+            if (hasLeaks && depthOrder.passesIntoSolid(i, j)) ++out.disordered;
         }
     }
 }

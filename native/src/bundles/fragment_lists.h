@@ -19,7 +19,7 @@
 #include <memory>
 #include <vector>
 
-#include "bundles/contacts.h"
+#include "bundles/depth_order.h"
 #include "bundles/projector.h"
 #include "bundles/rasteriser.h"
 #include "bundles/run_lengths.h"
@@ -56,7 +56,7 @@ class FragmentLists : public Projector {
     // Appends the lines of an ordered list in which some neighbours may touch.
     void pairNear(const uint64_t* first, const uint64_t* last, BundleLines& out);
 
-    Contacts contacts;
+    DepthOrder depthOrder;
     // Whether lines may pass through the surface of a solid, as with ROULETTE.
     const bool hasLeaks;
     Rasteriser rasteriser;
@@ -74,7 +74,7 @@ class FragmentLists : public Projector {
     double depthSteps = 1;  // steps of quantised depth per metre
     // Constant that moves the digits of a quantised depth to the low half of a double.
     double depthOffset = 0;
-    uint32_t nearSteps = 0;  // Contacts::zone in steps
+    uint32_t nearSteps = 0;  // DepthOrder::zone in steps
     // The k-th fragment of a pixel lies in layer k, or in the pixel's chain if there is no such
     // layer.
     std::vector<uint32_t> counts;  // per pixel: number of its fragments

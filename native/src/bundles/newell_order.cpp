@@ -6,7 +6,7 @@
 #include <limits>
 #include <tuple>
 
-#include "bundles/contacts.h"
+#include "bundles/depth_order.h"
 
 namespace raybundle {
 namespace {
@@ -29,7 +29,7 @@ Interval interval(double corner, double da, double db, bool isTriangle) {
 
 NewellOrder::NewellOrder(const Patches& patches)
     : patches(patches),
-      coincidence(Contacts(patches).coincidence()),
+      coincidence(DepthOrder(patches).coincidence()),
       rounding(kRoundingOfRadius * double(patches.radius)),
       frames(patches.parents.size()) {}
 

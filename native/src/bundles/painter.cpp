@@ -51,14 +51,14 @@ std::unique_ptr<Projector> painterNewell(const ProjectorInput& input) {
 
 Painter::Painter(const ProjectorInput& input, std::unique_ptr<PatchOrder> order)
     : order(std::move(order)),
-      contacts(input.patches),
+      depthOrder(input.patches),
       hasLeaks(input.smallPatches == SmallPatches::ROULETTE),
       rasteriser(input.patches, input.pixelSize, input.smallPatches),
       place(input.patches.count()) {}
 
 void Painter::project(const Bundle& bundle, BundleLines& out) {
     rasteriser.begin(bundle);
-    contacts.begin(bundle.direction);
+    depthOrder.begin(bundle.direction);
     fragments.clear();
     drawn.clear();
     std::fill(place.begin(), place.end(), 0);
@@ -89,7 +89,7 @@ void Painter::paint(BundleLines& out) {
             // The far side of the previous patch sees the near side of the current one.
             const uint32_t i = opposite(pixel.side), j = f.side;
             const double along = f.depth - pixel.depth;
-            const bool touches = contacts.touches(pixel.side, j, along);
+            const bool touches = depthOrder.touches(pixel.side, j, along);
             if (touches) {
                 out.touching.push_back(i);
                 out.touching.push_back(j);
@@ -98,8 +98,8 @@ void Painter::paint(BundleLines& out) {
             }
             // A contact in the wrong order counts, too, since the surfaces before and behind it see
             // the wrong sides.
-            if (contacts.isDisordered(pixel.side, j, along) ||
-                (hasLeaks && !touches && contacts.passesIntoSolid(i, j)))
+            if (depthOrder.isDisordered(pixel.side, j, along) ||
+                (hasLeaks && !touches && depthOrder.passesIntoSolid(i, j)))
                 ++out.disordered;
         }
         pixel = {f.depth, f.side};

@@ -10,16 +10,16 @@
 //   scene are counted.
 // - Surfaces are two-sided. Each drawn patch has one line on its front and one on its back, and
 //   pixels are never cleared.
-// - Coverage and contacts are those of FRAGMENT_LISTS (Rasteriser, Contacts), so that the correct
-//   order gives the same exchanges line by line. Depth per pixel does not order anything. It only
-//   serves to find contacts and to count exchanges in the wrong order.
+// - Coverage and which surfaces touch are those of FRAGMENT_LISTS (Rasteriser, DepthOrder), so that
+//   the correct order gives the same exchanges line by line. Depth per pixel does not order
+//   anything. It only serves to find surfaces that touch and to count exchanges in the wrong order.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "bundles/contacts.h"
+#include "bundles/depth_order.h"
 #include "bundles/projector.h"
 #include "bundles/rasteriser.h"
 #include "bundles/run_lengths.h"
@@ -60,7 +60,7 @@ class Painter : public Projector {
     void paint(BundleLines& out);
 
     const std::unique_ptr<PatchOrder> order;
-    Contacts contacts;
+    DepthOrder depthOrder;
     // Whether lines may pass through the surface of a solid, as with ROULETTE.
     const bool hasLeaks;
     Rasteriser rasteriser;

@@ -84,7 +84,7 @@ class Planes::Runs {
 Planes::Planes(const ProjectorInput& input, int planeCount)
     : input(input),
       planeCount(uint32_t(planeCount)),
-      contacts(input.patches),
+      depthOrder(input.patches),
       rasteriser(input.patches, input.pixelSize, input.smallPatches),
       planes(size_t(planeCount)) {
     density.setUniform();
@@ -103,12 +103,12 @@ std::unique_ptr<Projector> planes(const ProjectorInput& input) {
 
 void Planes::project(const Bundle& bundle, BundleLines& out) {
     rasteriser.begin(bundle);
-    contacts.begin(bundle.direction);
+    depthOrder.begin(bundle.direction);
     const double depth = std::max(rasteriser.depthHigh() - rasteriser.depthLow(),
                                   kLeastDepth * double(input.patches.radius));
     depthLow = 0.5 * (rasteriser.depthLow() + rasteriser.depthHigh()) - (0.5 + kMargin) * depth;
     depthSteps = kRange / ((1 + 2 * kMargin) * depth);
-    zoneSteps = uint64_t(std::min(contacts.zone() * depthSteps, kRange));
+    zoneSteps = uint64_t(std::min(depthOrder.zone() * depthSteps, kRange));
 
     const uint64_t seed = lineName(bundle);
     if (input.planePlacement == PlanePlacement::CLOSE_DISTANCE) measureDensity();
@@ -153,8 +153,8 @@ bool Planes::isBefore(Key a, Key b) const {
     const bool isNearer = a < b;
     const uint64_t gap = isNearer ? b - a : a - b;
     if (depthOf(gap) > zoneSteps) return isNearer;
-    if (contacts.belongBackwards(sideOf(a), sideOf(b), along(a, b))) return false;
-    return isNearer || contacts.belongBackwards(sideOf(b), sideOf(a), along(b, a));
+    if (depthOrder.belongBackwards(sideOf(a), sideOf(b), along(a, b))) return false;
+    return isNearer || depthOrder.belongBackwards(sideOf(b), sideOf(a), along(b, a));
 }
 
 void Planes::keepFirst(Key& first, Key fragment) const {
@@ -233,7 +233,7 @@ void Planes::addPair(uint32_t pixel, uint32_t firstPlane, uint32_t crossings, Ke
         runs.add(pixel, firstPlane, sideOf(above), kSky, lines);
     } else if (above == kNone) {
         runs.add(pixel, firstPlane, opposite(sideOf(below)), kSky, lines);
-    } else if (!contacts.touches(sideOf(below), sideOf(above), along(below, above))) {
+    } else if (!depthOrder.touches(sideOf(below), sideOf(above), along(below, above))) {
         // The far side of the nearer surface sees the near side of the farther one.
         runs.add(pixel, firstPlane, opposite(sideOf(below)), sideOf(above), lines);
     }

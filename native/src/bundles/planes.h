@@ -26,7 +26,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "bundles/contacts.h"
+#include "bundles/depth_order.h"
 #include "bundles/plane_density.h"
 #include "bundles/projector.h"
 #include "bundles/rasteriser.h"
@@ -76,7 +76,7 @@ class Planes : public Projector {
 
     const ProjectorInput input;
     const uint32_t planeCount;
-    Contacts contacts;
+    DepthOrder depthOrder;
     Rasteriser rasteriser;
 
     double depthLow = 0, depthSteps = 1;  // start of the range of planes, metres; steps per metre

@@ -43,7 +43,7 @@ struct Range {
     bool isEnlarged;
 };
 
-struct Extent {
+struct Interval {
     double low = std::numeric_limits<double>::max(), high = -low;
     void add(double x) {
         low = std::min(low, x);
@@ -51,15 +51,15 @@ struct Extent {
     }
 };
 
-Extent extent(const glm::dvec2* corners, int count, int axis) {
-    Extent e;
+Interval extent(const glm::dvec2* corners, int count, int axis) {
+    Interval e;
     for (int k = 0; k < count; ++k) e.add(corners[k][axis]);
     return e;
 }
 
 // Returns the extent of the polygon along the other axis, where its coordinate `axis` equals c.
-Extent crossSection(const glm::dvec2* corners, int count, int axis, double c) {
-    Extent e;
+Interval crossSection(const glm::dvec2* corners, int count, int axis, double c) {
+    Interval e;
     for (int k = 0; k < count; ++k) {
         const glm::dvec2 &p = corners[k], &q = corners[(k + 1) % count];
         if ((p[axis] < c) == (q[axis] < c)) continue;
@@ -72,11 +72,11 @@ Extent crossSection(const glm::dvec2* corners, int count, int axis, double c) {
 
 const std::vector<Pixel>& PolygonFiller::fill(const glm::dvec2* corners, int count) {
     pixels.clear();
-    const Extent x = extent(corners, count, 0), y = extent(corners, count, 1);
+    const Interval x = extent(corners, count, 0), y = extent(corners, count, 1);
     const Range columns(x.low, x.high), rows(y.low, y.high);
     filledColumns.assign(size_t(columns.last - columns.first), false);
     for (int row = rows.first; row < rows.last; ++row) {
-        const Extent span = crossSection(corners, count, 1, rows.cut(row, y.low, y.high));
+        const Interval span = crossSection(corners, count, 1, rows.cut(row, y.low, y.high));
         if (span.low > span.high) continue;
         const Range filled(span.low, span.high);
         for (int column = filled.first; column < filled.last; ++column) {
@@ -87,7 +87,7 @@ const std::vector<Pixel>& PolygonFiller::fill(const glm::dvec2* corners, int cou
     }
     for (int column = columns.first; column < columns.last; ++column) {
         if (filledColumns[size_t(column - columns.first)]) continue;
-        const Extent span = crossSection(corners, count, 0, columns.cut(column, x.low, x.high));
+        const Interval span = crossSection(corners, count, 0, columns.cut(column, x.low, x.high));
         if (span.low > span.high) continue;
         pixels.push_back({column, int(std::floor(0.5 * (span.low + span.high)))});
     }

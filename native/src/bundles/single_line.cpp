@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "bundles/contacts.h"
+#include "bundles/depth_order.h"
 #include "bundles/projector.h"
 #include "patches/side.h"
 
@@ -23,7 +23,7 @@ namespace {
 
 class SingleLine : public Projector {
   public:
-    explicit SingleLine(const ProjectorInput& input) : input(input), contacts(input.patches) {}
+    explicit SingleLine(const ProjectorInput& input) : input(input), depthOrder(input.patches) {}
 
     void project(const Bundle& bundle, BundleLines& out) override {
         // Uniform on a disc with the radius of the sphere around the scene.
@@ -32,10 +32,10 @@ class SingleLine : public Projector {
         input.visibility.lineHits(r * (std::cos(phi) * bundle.right + std::sin(phi) * bundle.up),
                                   bundle.direction, hits);
         if (hits.empty()) return;
-        contacts.begin(bundle.direction);
+        depthOrder.begin(bundle.direction);
         for (size_t a = 1; a < hits.size(); ++a)
-            for (size_t b = a; b > 0 && contacts.belongBackwards(hits[b - 1].side, hits[b].side,
-                                                                 along(hits[b - 1], hits[b]));
+            for (size_t b = a; b > 0 && depthOrder.belongBackwards(hits[b - 1].side, hits[b].side,
+                                                                   along(hits[b - 1], hits[b]));
                  --b)
                 std::swap(hits[b], hits[b - 1]);
 
@@ -43,7 +43,7 @@ class SingleLine : public Projector {
         out.sky.push_back(hits.front().side);
         for (size_t k = 0; k + 1 < hits.size(); ++k) {
             const uint32_t i = opposite(hits[k].side), j = hits[k + 1].side;
-            if (contacts.touches(hits[k].side, j, along(hits[k], hits[k + 1]))) {
+            if (depthOrder.touches(hits[k].side, j, along(hits[k], hits[k + 1]))) {
                 out.touching.push_back(i);
                 out.touching.push_back(j);
             } else {
@@ -57,7 +57,7 @@ class SingleLine : public Projector {
     static double along(const LineHit& a, const LineHit& b) { return b.depth - a.depth; }
 
     const ProjectorInput input;
-    Contacts contacts;
+    DepthOrder depthOrder;
     std::vector<LineHit> hits;
 };
 

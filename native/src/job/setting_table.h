@@ -15,6 +15,33 @@
 
 namespace raybundle {
 
+// The values of a choice with which another setting has an effect.
+struct UsedWith {
+    const char* choice = nullptr;  // name of the choice; null if the setting always has an effect
+    uint32_t values = 0;           // bit k is set for value k of the choice
+};
+
+// Returns the values of a choice, by its table, for which `isUsed` returns true.
+template <class Row, size_t count, class IsUsed>
+constexpr UsedWith usedWith(const char* choice, const Row (&rows)[count], const IsUsed& isUsed) {
+    UsedWith used{choice, 0};
+    for (size_t k = 0; k < count; ++k)
+        if (isUsed(rows[k])) used.values |= 1u << k;
+    return used;
+}
+
+// Settings of one value of a choice alone.
+inline constexpr UsedWith kOfThesis = usedWith("solver", kSolvers, [](const SolverRow& row) {
+    return can(row.value, SolverCan::FOLLOW_THE_THESIS);
+});
+inline constexpr UsedWith kOfRandomWalk = usedWith(
+    "solver", kSolvers, [](const SolverRow& row) { return row.value == Solver::RANDOM_WALK; });
+inline constexpr UsedWith kOfShots =
+    usedWith("first_shot", kFirstShots, [](const FirstShotRow& row) { return !row.isGathered; });
+inline constexpr UsedWith kOfPlanes =
+    usedWith("projector", kProjectorKinds,
+             [](const ProjectorRow& row) { return row.value == ProjectorKind::PLANES; });
+
 // A row of the table of settings. All strings are static.
 struct Setting {
     const char* name;
@@ -25,6 +52,7 @@ struct Setting {
         member;
     double least = 0, most = 1;  // inclusive range of a number; a switch is an int from 0 to 1
     const char* unit = "";       // "" for a number without a unit
+    UsedWith usedWith{};
 };
 
 // The type of a member of Settings, from the type of the pointer to it.
@@ -61,22 +89,25 @@ inline constexpr Setting kSettings[] = {
 
     // Methods.
     {"solver", "How light is passed on between surfaces", &Settings::solver},
-    {"estimator", "What a walk of the solver Random Walk counts as light", &Settings::estimator},
+    {"estimator", "What a walk of the solver Random Walk counts as light", &Settings::estimator, 0,
+     1, "", kOfRandomWalk},
     {"thesis_literal",
      "The solver Multipath as the pseudo-code of the thesis has it, for comparison",
-     &Settings::thesisLiteral},
+     &Settings::thesisLiteral, 0, 1, "", kOfThesis},
     {"first_shot", "How the light of lamps and world is distributed", &Settings::firstShot},
     {"local_rays",
      "Rays from the lights, of a first shot that shoots; 0 is as many as the noise asks for",
-     &Settings::localRays, 0, INT32_MAX},
+     &Settings::localRays, 0, INT32_MAX, "", kOfShots},
     {"directions", "How the directions of the bundles are chosen", &Settings::directions},
     {"projector", "How a bundle's lines find the surfaces they meet", &Settings::projector},
-    {"plane_count", "Planes per direction, of the projector Planes", &Settings::planeCount, 1, 64},
-    {"plane_placement", "Where the projector Planes puts its planes", &Settings::planePlacement},
+    {"plane_count", "Planes per direction, of the projector Planes", &Settings::planeCount, 1, 64,
+     "", kOfPlanes},
+    {"plane_placement", "Where the projector Planes puts its planes", &Settings::planePlacement, 0,
+     1, "", kOfPlanes},
     {"plane_coherence",
      "The projector Planes makes the depth buffers of its planes from each other; 0 makes each "
      "anew, to measure what that saves",
-     &Settings::planeCoherence},
+     &Settings::planeCoherence, 0, 1, "", kOfPlanes},
     {"small_patches", "How patches smaller than a pixel are met", &Settings::smallPatches},
     {"reconstruction", "How patches become values at vertices", &Settings::reconstruction},
     {"regularization",

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 
 namespace raybundle {
 
@@ -23,7 +24,7 @@ std::vector<std::vector<glm::vec3>> areaAverage(
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(side);
             const auto [shares, all] = cornerWeights.of(p, k);
-            const double area = double(patches.area[index / 2]) *
+            const double area = double(patches.area[patchOf(index)]) *
                                 double(std::max(exposed[index], kLeastExposure)) * double(all);
             for (size_t a = 0; a < 4; ++a) {
                 if (cell.corner[a] < 0 || shares[a] <= 0) continue;

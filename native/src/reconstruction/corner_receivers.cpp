@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 
 namespace raybundle {
@@ -94,8 +95,8 @@ void leaveGap(CornerReceiver& corner, const Patches& patches, const Visibility& 
     corner.isBesideGap = true;
     receiver.point = glm::mix(corner.vertex, *receiver.point,
                               std::min(1.0f, kInsideGap * gap / std::max(inside, 1e-30f)));
-    receiver.side = 2 * patches.patchAt(patches.parentOf[receiver.side / 2], *receiver.point) +
-                    receiver.side % 2;
+    receiver.side = 2 * patches.patchAt(patches.parentOf[patchOf(receiver.side)], *receiver.point) +
+                    isBack(receiver.side);
 }
 
 }  // namespace raybundle

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -95,11 +96,11 @@ std::vector<float> exposedOutside(const LitSurfaces& surfaces, const Visibility&
         for (uint32_t k = 0; k < 2 * parent.patchCount(); ++k) {
             const uint32_t side = 2 * parent.firstPatch + k;
             float distance = 0;
-            const auto met = visibility.firstHit(side, patches.point(side / 2, kInside),
+            const auto met = visibility.firstHit(side, patches.point(patchOf(side), kInside),
                                                  patches.normal(side), &distance);
             if (!met) continue;
             const Parent& other = patches.parentAt(*met);
-            isInside[side] = other.isSolid && !other.isInward && *met % 2 == 1;
+            isInside[side] = other.isSolid && !other.isInward && isBack(*met);
         }
     });
     // Per cell and side: area inside of a solid, and whole area, m^2.
@@ -112,11 +113,11 @@ std::vector<float> exposedOutside(const LitSurfaces& surfaces, const Visibility&
         }
     };
     forEach([&](uint32_t side, uint32_t cell) {
-        all[cell][side % 2] += patches.area[side / 2];
-        if (isInside[side]) inside[cell][side % 2] += patches.area[side / 2];
+        all[cell][isBack(side)] += patches.area[patchOf(side)];
+        if (isInside[side]) inside[cell][isBack(side)] += patches.area[patchOf(side)];
     });
     forEach([&](uint32_t side, uint32_t cell) {
-        if (isInside[side] && inside[cell][side % 2] < kMostInside * all[cell][side % 2])
+        if (isInside[side] && inside[cell][isBack(side)] < kMostInside * all[cell][isBack(side)])
             exposed[side] = 0;
     });
     return exposed;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "patches/side.h"
 #include "sampling/sobol.h"
 #include "sampling/sphere_sampling.h"
 
@@ -134,7 +135,7 @@ bool FinalGather::isNear(const Receiver& receiver) const {
     if (parent.patchCount() >= kTellingPatches) return false;
     const float longest = std::ldexp(
         std::max(glm::length(parent.a) / parent.countA, glm::length(parent.b) / parent.countB),
-        -patches.level(receiver.side / 2));
+        -patches.level(patchOf(receiver.side)));
     const SobolPoints points(hash(receiver.seed, 0));
     for (uint32_t i = 0; i < kNearRays; ++i) {
         const glm::vec4 u = points[i];
@@ -146,7 +147,7 @@ bool FinalGather::isNear(const Receiver& receiver) const {
     return false;
 }
 
-float FinalGather::width(uint32_t side) const { return std::sqrt(patches.area[side / 2]); }
+float FinalGather::width(uint32_t side) const { return std::sqrt(patches.area[patchOf(side)]); }
 
 std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const SmoothRegions& regions,
                                         rb_side side, const std::vector<glm::vec3>& carriedAt,

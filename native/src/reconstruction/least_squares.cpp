@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "reconstruction/fit_terms.h"
 
 namespace raybundle {
@@ -256,7 +257,7 @@ class NormalEquations {
             const uint32_t index = 2 * (parent.firstPatch + k) + uint32_t(surface.side);
             const auto [w, all] = weights.of(p, k);
             const float open = std::max(exposed[index], kLeastExposure);
-            const double weight = double(patches.area[index / 2]) * open * double(all);
+            const double weight = double(patches.area[patchOf(index)]) * open * double(all);
             openness[parent.cell - surface.range.firstCell] += joined * weight / cell.area();
             for (int a = 0; a < 4; ++a) {
                 for (int b = 0; b < 4; ++b) square[a][b] += weight * w[a] * w[b];

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "reconstruction/area_average.h"
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/face_slopes.h"
@@ -16,6 +17,7 @@
 #include "reconstruction/node_light.h"
 #include "reconstruction/shown_light.h"
 #include "reconstruction/smooth_regions.h"
+#include "scene/channels.h"
 
 namespace raybundle {
 namespace {
@@ -26,8 +28,6 @@ constexpr double kInsideOut = 1e-3;
 constexpr size_t kTogether = 16;  // number of objects that are reconstructed at once
 
 using Field = std::vector<glm::vec3>;
-
-double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
 
 // The light of one light set on all patch sides, as input of a reconstruction. The exitance is that
 // of the output COMBINED, without gloss.
@@ -53,8 +53,8 @@ bool isInsideOut(const Patches& patches, const InstanceRange& range, rb_side sid
             for (const SideLight& light : lights) total += light.shown.all(at);
             // The emission of the other side counts as well: if the baked side is the dark inside
             // of a lamp, the user has probably chosen the wrong side.
-            if (at % 2 != uint32_t(side)) total += patches.emission[at];
-            lit[at % 2] += double(patches.area[at / 2]) * sum(total);
+            if (isBack(at) != uint32_t(side)) total += patches.emission[at];
+            lit[isBack(at)] += double(patches.area[patchOf(at)]) * sumOfChannels(total);
         }
     return lit[side] < kInsideOut * lit[1 - side];
 }
@@ -70,7 +70,7 @@ std::vector<SideLight> sideLights(const ReconstructionInput& input, bool gathers
             shown.of(light, exposed), light.direct.emission(), Field(patches.sideCount()), {}, {}};
         for (size_t side = 0; side < out.exitance.size(); ++side) {
             // Emission is relative to the whole patch, including the share that lets light through.
-            const float opacity = patches.opacityOf(uint32_t(side / 2));
+            const float opacity = patches.opacityOf(uint32_t(patchOf(side)));
             out.emission[side] *= opacity;
             out.exitance[side] = out.emission[side] + shown.color()[side] * out.shown.all(side);
         }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "patches/reflectance.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -16,7 +17,7 @@ std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
         const Parent& parent = patches.parentAt(uint32_t(side));
         const Instance& instance = scene.instances[parent.instance];
         isResult[side] = !anyBaked || (instance.hasResultOnFace(size_t(parent.face)) &&
-                                       side % 2 == size_t(instance.side));
+                                       isBack(side) == size_t(instance.side));
     }
     return isResult;
 }
@@ -32,7 +33,7 @@ std::vector<bool> shownSides(const Scene& scene, const Patches& patches, bool ga
             scene.instances[patches.parentAt(uint32_t(side)).instance].hasSparseResults)
             shown[side] = false;
     for (size_t side = 0; !patches.translucence.empty() && side < shown.size(); ++side)
-        if (results[side ^ 1] && !isOwnAlone(side ^ 1)) shown[side] = true;
+        if (results[opposite(side)] && !isOwnAlone(opposite(side))) shown[side] = true;
     return shown;
 }
 
@@ -45,12 +46,12 @@ ShownLight::ShownLight(const Scene& scene, const Patches& patches, bool gathersA
     if (std::any_of(scene.materials.begin(), scene.materials.end(),
                     [](const Material& material) { return material.showsByAngle(); }))
         for (size_t side = 0; side < shown.size(); ++side)
-            fromEverywhere.push_back(materialOf(side).sides[side % 2].shown(kEverywhere));
+            fromEverywhere.push_back(materialOf(side).sides[isBack(side)].shown(kEverywhere));
     if (isOwnAlone()) return;
     othersShare.resize(colors.size());
     for (size_t side = 0; side < colors.size(); ++side) {
         const glm::vec3 through =
-            patches.opacityOf(uint32_t(side / 2)) * patches.translucenceOf(side);
+            patches.opacityOf(uint32_t(patchOf(side))) * patches.translucenceOf(side);
         colors[side] += through;
         for (int c = 0; c < 3; ++c)
             if (through[c] > 0) othersShare[side][c] = through[c] / colors[side][c];
@@ -71,13 +72,13 @@ std::vector<float> ShownLight::resultArea() const {
 
 glm::vec3 ShownLight::byAngle(size_t side, const glm::vec4& angles) const {
     if (fromEverywhere.empty()) return glm::vec3(1.0f);
-    return materialOf(side).sides[side % 2].shown(angles);
+    return materialOf(side).sides[isBack(side)].shown(angles);
 }
 
 glm::vec3 ShownLight::of(size_t side, const glm::vec3& own, const glm::vec3& others,
                          const std::vector<float>& exposed) const {
     if (isOwnAlone()) return own;
-    return glm::mix(own, exposed[side ^ 1] * others, othersShare[side]);
+    return glm::mix(own, exposed[opposite(side)] * others, othersShare[side]);
 }
 
 Irradiance ShownLight::of(Irradiance light, const std::vector<float>& exposed) const {
@@ -108,7 +109,7 @@ void ShownLight::mixSides(Irradiance& own, const Irradiance& arriving,
                           const std::vector<float>& exposed) const {
     auto mix = [&](std::vector<glm::vec3>& shownOf, std::vector<glm::vec3> others) {
         for (size_t side = 0; side < shownOf.size(); ++side)
-            shownOf[side] = of(side, shownOf[side], others[side ^ 1], exposed);
+            shownOf[side] = of(side, shownOf[side], others[opposite(side)], exposed);
     };
     mix(own.direct, arriving.direct);
     mix(own.gathered, arriving.gathered);

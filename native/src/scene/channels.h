@@ -9,6 +9,7 @@ namespace raybundle {
 // Returns the largest channel.
 inline float brightest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
+// Returns the sum of the channels.
 inline double sumOfChannels(const glm::dvec3& v) { return v.x + v.y + v.z; }
 
 }  // namespace raybundle

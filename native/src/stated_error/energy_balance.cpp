@@ -5,16 +5,15 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "patches/side.h"
 #include "scene/channels.h"
 #include "surfaces/translucence.h"
 
 namespace raybundle {
 namespace {
 
-double sum(const glm::dvec3& v) { return v.x + v.y + v.z; }
-
 glm::dvec3 power(const Patches& patches, size_t side, const glm::vec3& perArea) {
-    return double(patches.area[side / 2]) * glm::dvec3(perArea);
+    return double(patches.area[patchOf(side)]) * glm::dvec3(perArea);
 }
 
 // Sums of what lines bring to the sides of one object that they met, to estimate the mean.
@@ -31,7 +30,7 @@ glm::vec3 byLines(const Irradiance& irradiance, size_t side) {
 
 // Returns the index of a side's object and orientation: 2 * instance, + 1 for backs.
 size_t objectSide(const Patches& patches, size_t side) {
-    return 2 * patches.parentAt(uint32_t(side)).instance + side % 2;
+    return 2 * patches.parentAt(uint32_t(side)).instance + isBack(side);
 }
 
 // Returns the sums per objectSide().
@@ -81,17 +80,17 @@ void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
         open = std::max(0.0f, open);
         glm::vec3 reflected = patches.reflectance[side] * ofLines +
                               shotReflectance(patches, shot, side) * irradiance.gathered[side] +
-                              passedOn(surfaces, side, irradiance.all(side ^ 1));
+                              passedOn(surfaces, side, irradiance.all(opposite(side)));
         if (!irradiance.byAngle.empty()) reflected += irradiance.byAngle[side];
         emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
         absorbed += exposed * power(patches, side, irradiance.gathered[side] + ofLines - reflected);
         escaped += exposed * power(patches, side, open * (shot.emission[side] + reflected));
     }
     // In a closed scene the redirected power is noise and stays in the balance.
-    if (sum(escaped) > sum(shot.escaped)) escaped -= irradiance.redirected;
-    report.emitted += sum(emitted);
-    report.absorbed += sum(absorbed);
-    report.escaped += sum(escaped);
+    if (sumOfChannels(escaped) > sumOfChannels(shot.escaped)) escaped -= irradiance.redirected;
+    report.emitted += sumOfChannels(emitted);
+    report.absorbed += sumOfChannels(absorbed);
+    report.escaped += sumOfChannels(escaped);
 }
 
 double leakedShare(const Scene& scene, const Patches& patches, const std::vector<float>& weight,
@@ -113,8 +112,8 @@ double errorByWrongExchanges(const Patches& patches, double share) {
     double reflectance = 0, area = 0;
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         const glm::vec3 rho = patches.reflectance[side] + patches.translucenceOf(side);
-        reflectance += double(patches.area[side / 2] * brightest(rho));
-        area += double(patches.area[side / 2]);
+        reflectance += double(patches.area[patchOf(side)] * brightest(rho));
+        area += double(patches.area[patchOf(side)]);
     }
     return area > 0 ? share / (1 - reflectance / area * (1 - share)) : 0;
 }

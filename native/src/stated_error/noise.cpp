@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "patches/side.h"
+
 namespace raybundle {
 namespace {
 
@@ -20,7 +22,7 @@ constexpr double kMemory = 0.5;
 std::vector<uint32_t> cellsOf(const Patches& tiles) {
     std::vector<uint32_t> cells(tiles.sideCount());
     for (uint32_t side = 0; side < cells.size(); ++side)
-        cells[side] = 2 * tiles.parentAt(side).cell + side % 2;
+        cells[side] = 2 * tiles.parentAt(side).cell + isBack(side);
     return cells;
 }
 

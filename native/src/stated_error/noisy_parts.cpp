@@ -7,6 +7,7 @@
 
 #include "job/cancellation.h"
 #include "patches/parts.h"
+#include "patches/side.h"
 #include "stated_error/object_noise.h"
 
 namespace raybundle {
@@ -78,7 +79,7 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
     for (size_t k = 0; k < sides.size(); ++k) {
         const uint32_t side = sides[k];
         const Parent& parent = patches.parentAt(side);
-        uint32_t& cell = cellNumbers[2 * parent.cell + side % 2];
+        uint32_t& cell = cellNumbers[2 * parent.cell + isBack(side)];
         if (cell == kNone) {
             // A cell belongs to the part of its first side.
             uint32_t& part = partNumbers[found.of[k]];
@@ -87,7 +88,7 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
                 parts.emplace_back();
             }
             cell = uint32_t(cells.size());
-            cells.push_back({2 * parent.cell + side % 2, part, parent.island,
+            cells.push_back({2 * parent.cell + isBack(side), part, parent.island,
                              patches.cells[parent.cell].area()});
         }
         partOf[side] = cells[cell].part;

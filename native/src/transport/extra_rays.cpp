@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 #include "sampling/sphere_sampling.h"
 #include "transport/sent_light.h"
@@ -130,7 +131,7 @@ class ExtraGather {
             const glm::vec3 direction = cosineDirection(patches.normal(own.side), {u.z, u.w});
             float distance = 0;
             const auto hit = input.visibility.firstHit(
-                own.side, patches.point(own.side / 2, {u.x, u.y}), direction, &distance);
+                own.side, patches.point(patchOf(own.side), {u.x, u.y}), direction, &distance);
             if (hit && isCovered(patches, own.side, *hit, direction, distance)) continue;
             if (hit && !(std::min(samples[*hit][0], samples[*hit][1]) > 0)) continue;
             // The first half of the Sobol points and the second half are each stratified.
@@ -147,7 +148,7 @@ class ExtraGather {
 
     // Returns the area of a side times the share of light that it absorbs, by channel, m^2.
     glm::dvec3 absorbing(uint32_t side) const {
-        return double(patches.area[side / 2] * exposed[side]) *
+        return double(patches.area[patchOf(side)] * exposed[side]) *
                glm::dvec3(1.0f - patches.reflectance[side]);
     }
 

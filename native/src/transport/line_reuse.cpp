@@ -7,6 +7,7 @@
 #include <glm/gtc/constants.hpp>
 #include <utility>
 
+#include "patches/side.h"
 #include "surfaces/translucence.h"
 #include "transport/conjugate_gradients.h"
 #include "transport/line_system.h"
@@ -102,7 +103,7 @@ LineWeights LineReuse::lineWeights(Half half) const {
     double lines = 0, area = 0;
     for (size_t i = 0; i < n; ++i) {
         lines += linesOf(counts.total[i], half);
-        area += double(patches.area[i / 2] * exposed[i]);
+        area += double(patches.area[patchOf(i)] * exposed[i]);
     }
     const size_t steps = counts.hasDensities() ? std::size(kBalancePowers) : kBalanceSteps;
     for (size_t step = 0; step < steps; ++step) {
@@ -111,7 +112,7 @@ LineWeights LineReuse::lineWeights(Half half) const {
         forEachSide(n, [&](size_t i) {
             const float row = step == 0 ? float(linesOf(counts.total[i], half))  // all x are 1
                                         : weightedLines(counts, half, i, x);
-            const float wanted = float(patches.area[i / 2] * exposed[i] * lines / area);
+            const float wanted = float(patches.area[patchOf(i)] * exposed[i] * lines / area);
             next[i] = row > 0 ? std::clamp(x[i] * std::pow(wanted / (x[i] * row), power),
                                            1 / kMaxLineWeight, kMaxLineWeight)
                               : 1;
@@ -161,7 +162,7 @@ Irradiance LineReuse::solvePassed(Half half, float tolerance, LineSolution& gues
     Field next(n), change(n);
     auto passOn = [&](const Field& direct, const Field& indirect) {
         forEachSide(n, [&](size_t i) {
-            next[i] = passedOn({patches, exposed}, i, direct[i ^ 1] + indirect[i ^ 1]);
+            next[i] = passedOn({patches, exposed}, i, direct[opposite(i)] + indirect[opposite(i)]);
         });
     };
     if (passed.empty()) {
@@ -272,7 +273,7 @@ std::vector<glm::vec3> LineReuse::knownLight(LineSystem& lines, const Field& pas
 void LineReuse::addPower(const Field& light, const std::vector<float>& exposed,
                          glm::dvec3& power) const {
     for (size_t i = 0; i < light.size(); ++i)
-        power += double(patches.area[i / 2] * exposed[i]) * glm::dvec3(light[i]);
+        power += double(patches.area[patchOf(i)] * exposed[i]) * glm::dvec3(light[i]);
 }
 
 size_t LineReuse::gatherStarvedSides(const StarvedRays& rays, const std::vector<bool>& wanted,

@@ -18,6 +18,7 @@
 #include <algorithm>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 #include "scene/channels.h"
 #include "transport/line_reuse.h"
@@ -161,7 +162,7 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
     if (scattered.isNone()) return 0;
     double bent = 0, all = 0;
     for (uint32_t side = 0; side < n; ++side) {
-        const double area = double(patches.area[side / 2]);
+        const double area = double(patches.area[patchOf(side)]);
         all += area * double(brightest(reflected[side]));
         if (!scattered.isNone(side)) bent += area * double(scattered.contrast(side));
     }

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "surfaces/translucence.h"
 #include "transport/line_reuse.h"
 #include "transport/streaming_reuse.h"
@@ -158,7 +159,8 @@ class LineReuseTransport : public Transport {
             source[i] += input.patches.reflectance[i] * byDirection[i];
         }
         for (size_t i = 0; i < source.size(); ++i)
-            source[i] += passedOn(surfaces, i, first.gathered[i ^ 1] + first.indirect[i ^ 1]);
+            source[i] +=
+                passedOn(surfaces, i, first.gathered[opposite(i)] + first.indirect[opposite(i)]);
         for (uint32_t half = 0; half < 2; ++half) {
             const Irradiance start =
                 solver.solve(Half(half), kStartTolerance, last.of[half].reflected);

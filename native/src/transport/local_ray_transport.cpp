@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 
 namespace raybundle {
 namespace {
@@ -107,7 +108,7 @@ std::vector<float> LocalRayTransport::openShare() const {
         double rays = 0, escapes = 0;
     };
     std::vector<Count> ofFace(2 * patches.parents.size());  // per side of a parent
-    auto face = [&](size_t side) { return 2 * patches.parentOf[side / 2] + side % 2; };
+    auto face = [&](size_t side) { return 2 * patches.parentOf[patchOf(side)] + isBack(side); };
     std::vector<Count> ofSide(patches.sideCount());
     for (size_t side = 0; side < ofSide.size(); ++side) {
         for (const Sums& sums : halves) {

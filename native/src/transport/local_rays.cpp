@@ -6,6 +6,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "bundles/directions.h"
+#include "patches/side.h"
 #include "sampling/sphere_sampling.h"
 
 namespace raybundle {
@@ -70,10 +71,10 @@ bool LocalRays::isCovered(uint32_t side, const glm::vec3& point) const {
 
 std::optional<uint32_t> LocalRays::fromSide(uint32_t side, std::mt19937_64& random,
                                             RayLog& log) const {
-    glm::vec3 point = patches.point(side / 2, uniform2(random));
+    glm::vec3 point = patches.point(patchOf(side), uniform2(random));
     if (surfaces.exposed[side] < 1)
         for (int k = 1; k < kMostPoints && isCovered(side, point); ++k)
-            point = patches.point(side / 2, uniform2(random));
+            point = patches.point(patchOf(side), uniform2(random));
     const auto hit =
         visibility.firstHit(side, point, cosineDirection(patches.normal(side), uniform2(random)));
     log.rays.push_back(side);

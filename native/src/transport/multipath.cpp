@@ -36,6 +36,8 @@
 #include <glm/gtc/constants.hpp>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
+#include "scene/channels.h"
 #include "transport/transport.h"
 
 namespace raybundle {
@@ -51,8 +53,6 @@ constexpr float kWeightedShare = 0.3f;
 // light of later bounces. A larger value loses that light on sides that few lines have met so far.
 // A smaller value lights the outsides of rooms through their leaks.
 constexpr double kLit = 0.33;
-
-double sum(const glm::vec3& v) { return double(v.x) + double(v.y) + double(v.z); }
 
 // The independent estimate of one half of the bundles. All vectors except `met` are per side.
 // Powers are multiplied by the number of bundles.
@@ -103,7 +103,7 @@ class Multipath : public Transport {
         emission.resize(n);
         reflected.resize(n);
         for (size_t i = 0; i < n; ++i) {
-            const double area = double(input.patches.area[i / 2] * input.exposed[i]);
+            const double area = double(input.patches.area[patchOf(i)] * input.exposed[i]);
             for (Estimate& e : halves) e.perLine[i] = share * (area > s2 ? float(s2 / area) : 1.0f);
             emission[i] = float(2 * s2) * input.shot.emission[i];
             reflected[i] = float(2 * s2) * first.unshot[i];
@@ -168,10 +168,10 @@ class Multipath : public Transport {
             double ambient = 0, all = 0;
             const Later rest = later(estimate);
             for (size_t i = 0; i < estimate.unshot.size(); ++i) {
-                ambient += double(rest.area[i]) * sum(rest.irradiance);
-                all +=
-                    sum(estimate.direct[i] + estimate.indirect[i]) +
-                    estimate.bundles * exposedArea(i) * sum(first.gathered[i] + first.indirect[i]);
+                ambient += double(rest.area[i]) * sumOfChannels(rest.irradiance);
+                all += sumOfChannels(estimate.direct[i] + estimate.indirect[i]) +
+                       estimate.bundles * exposedArea(i) *
+                           sumOfChannels(first.gathered[i] + first.indirect[i]);
             }
             if (all > 0) worst = std::max(worst, 0.5 * ambient / all);
         }
@@ -221,7 +221,7 @@ class Multipath : public Transport {
         }
         double power = 0;
         for (uint32_t i : e.met) {
-            power += sum(e.arriving[i]);
+            power += sumOfChannels(e.arriving[i]);
             e.unshot[i] = e.unshot[i] * (1 - e.fraction[i] * float(e.inBundle[i])) +
                           input.patches.reflectance[i] * e.arriving[i];
             e.arriving[i] = glm::vec3(0.0f);
@@ -256,21 +256,21 @@ class Multipath : public Transport {
                 e.direct[x.j] += emission[x.i];
                 e.unshot[x.i] = rho[x.i] * (from2 + reflected[x.j] + emission[x.j]);
                 e.unshot[x.j] = rho[x.j] * (from1 + reflected[x.i] + emission[x.i]);
-                power += sum(from1) + sum(from2);
+                power += sumOfChannels(from1) + sumOfChannels(from2);
             }
         ++e.bundles;
         return power;
     }
 
     double exposedArea(size_t side) const {
-        return double(input.patches.area[side / 2] * input.exposed[side]);
+        return double(input.patches.area[patchOf(side)] * input.exposed[side]);
     }
 
     // Returns for each side the area on which light arrives that was reflected often, m^2, at most
     // its exposed area. This light is equal everywhere, except on sides that hardly receive any
     // light, such as the outsides of rooms.
     std::vector<float> reached(const Estimate& e) const {
-        auto received = [&](size_t i) { return sum(e.direct[i] + e.indirect[i]); };
+        auto received = [&](size_t i) { return sumOfChannels(e.direct[i] + e.indirect[i]); };
         // ofPower / power is the mean irradiance, weighted by the received power.
         double ofPower = 0, power = 0;
         for (size_t i = 0; i < e.unshot.size(); ++i) {

@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sphere_sampling.h"
 #include "scene/channels.h"
 #include "surfaces/lobe.h"
@@ -317,7 +318,7 @@ std::pair<glm::vec4, float> ScatteredLight::addSky(uint32_t side, const glm::vec
 
 void ScatteredLight::set(uint32_t side, const Cells& arriving) {
     const SideReflectance surface(patches, side);
-    const Transfer& transfer = *transfers[2 * patches.parentAt(side).scattering + side % 2];
+    const Transfer& transfer = *transfers[2 * patches.parentAt(side).scattering + isBack(side)];
     using Light = Eigen::Matrix<float, kCells, 3>;
     const Light light = Eigen::Map<const Light>(arriving.front().data());
     Light leaving = Light::Zero();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/sent_light.h"
 
+#include "patches/side.h"
 #include "surfaces/translucence.h"
 #include "transport/scattered_light.h"
 
@@ -24,7 +25,7 @@ SentLight::SentLight(const LitSurfaces& surfaces, const FirstShot& shot,
             sent = concentrated * shot.unshot[side];
         }
         mean[side] = sent + patches.reflectance[side] * arriving +
-                     passedOn(surfaces, side, irradiance.all(side ^ 1));
+                     passedOn(surfaces, side, irradiance.all(opposite(side)));
     }
     for (size_t side = 0; side < irradiance.byAngle.size(); ++side)
         mean[side] += irradiance.byAngle[side];

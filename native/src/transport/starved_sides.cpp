@@ -5,6 +5,7 @@
 #include <glm/gtc/constants.hpp>
 
 #include "job/cancellation.h"
+#include "patches/side.h"
 #include "sampling/sobol.h"
 #include "sampling/sphere_sampling.h"
 #include "surfaces/translucence.h"
@@ -37,7 +38,7 @@ void StarvedSides::find(const std::vector<bool>& wanted) {
     for (uint32_t i = 0; i < input.counts.sideCount(); ++i) {
         throwIfCancelledAt(i);
         // A patch of a cut tile needs only its share of the lines of a tile.
-        const uint32_t enough = std::max(1u, how.minLines >> (2 * input.patches.level(i / 2)));
+        const uint32_t enough = std::max(1u, how.minLines >> (2 * input.patches.level(patchOf(i))));
         const bool isStarved = input.counts.linesMetInAll(i) < enough;
         if (isStarved && wanted[i])
             starved.push_back(i);
@@ -77,8 +78,8 @@ void StarvedSides::castRaysOf(size_t k) {
         const uint32_t from = how.clusters ? how.clusters->memberOf(side, uint32_t(i)) : side;
         const glm::vec3 direction = cosineDirection(surface.normal(from), {u.z, u.w});
         float distance = 0;
-        auto hit = how.visibility.firstHit(from, surface.point(from / 2, {u.x, u.y}), direction,
-                                           &distance);
+        auto hit = how.visibility.firstHit(from, surface.point(patchOf(from), {u.x, u.y}),
+                                           direction, &distance);
         if (hit && isCovered(surface, from, *hit, direction, distance)) continue;
         if (hit && how.clusters) hit = how.clusters->sideOf(*hit);
         if (hit) {
@@ -103,7 +104,7 @@ void StarvedSides::addReflected(const std::vector<glm::vec3>& reflected) {
     std::vector<glm::vec3> sent = reflected, next(starved.size());
     if (!input.patches.translucence.empty())
         for (size_t i = 0; i < sent.size(); ++i)
-            sent[i] += passedOn(input, i, irradiance.all(i ^ 1));
+            sent[i] += passedOn(input, i, irradiance.all(opposite(i)));
     // Starved sides may see each other, so sweeps are repeated until their exitance has settled.
     for (int k = 0; k < kMaxSweeps; ++k)
         if (sweep(sent, next)) return;
@@ -127,7 +128,7 @@ bool StarvedSides::sweep(std::vector<glm::vec3>& sent, std::vector<glm::vec3>& n
     });
     glm::vec3 change(0.0f), most(0.0f);
     for (size_t k = 0; k < starved.size(); ++k) {
-        next[k] += passedOn(input, starved[k], irradiance.all(starved[k] ^ 1));
+        next[k] += passedOn(input, starved[k], irradiance.all(opposite(starved[k])));
         change = glm::max(change, glm::abs(next[k] - sent[starved[k]]));
         most = glm::max(most, next[k]);
         sent[starved[k]] = next[k];

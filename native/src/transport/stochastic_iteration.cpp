@@ -32,6 +32,7 @@
 
 #include "job/cancellation.h"
 #include "job/error.h"
+#include "patches/side.h"
 #include "scene/channels.h"
 
 namespace raybundle {
@@ -196,7 +197,7 @@ class BundleIteration : public Transport {
             glm::dvec3 fromShot(input.shot.irradiance[i]);
             if (!input.shot.indirect.empty()) fromShot += glm::dvec3(input.shot.indirect[i]);
             all += area * sumOfChannels(light) +
-                   double(input.patches.area[i / 2]) * sumOfChannels(fromShot);
+                   double(input.patches.area[patchOf(i)]) * sumOfChannels(fromShot);
         }
         const double n = halves[0].counted();
         if (!(arriving > 0) || n == 0) return 0;

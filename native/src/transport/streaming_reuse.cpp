@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "patches/side.h"
 #include "surfaces/translucence.h"
 
 namespace raybundle {
@@ -39,7 +40,7 @@ StreamingReuse::StreamingReuse(const LitSurfaces& surfaces, const StreamingStart
         directSum[i] = lines[i] * glm::dvec3(direct[i]);
         indirectSum[i] = lines[i] * glm::dvec3(indirect[i]);
         exitance[i] = source[i] + rho * (direct[i] + indirect[i]) +
-                      passedOn(surfaces, i, direct[i ^ 1] + indirect[i ^ 1]);
+                      passedOn(surfaces, i, direct[opposite(i)] + indirect[opposite(i)]);
     }
     steps = 1 / (1 - double(std::min(reflectance, kMostReflectance)));
 }
@@ -53,7 +54,7 @@ void StreamingReuse::meet(uint32_t side, double lineCount) {
 }
 
 void StreamingReuse::updateExitance(size_t side) {
-    const size_t other = side ^ 1;
+    const size_t other = opposite(side);
     exitance[side] = source[side] +
                      surfaces.patches.reflectance[side] * (direct(side) + indirect(side)) +
                      passedOn(surfaces, side, direct(other) + indirect(other));
@@ -81,7 +82,7 @@ void StreamingReuse::add(const BundleLines& bundle) {
     for (uint32_t side : met) {
         indirectSum[side] += newest * arriving[side];
         updateExitance(side);
-        if (!surfaces.patches.translucence.empty()) updateExitance(side ^ 1);
+        if (!surfaces.patches.translucence.empty()) updateExitance(opposite(side));
         arriving[side] = glm::dvec3(0.0);
         isMet[side] = false;
     }

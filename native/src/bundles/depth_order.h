@@ -19,11 +19,12 @@
 
 namespace raybundle {
 
-// Decides about contacts of surfaces along the lines of one bundle.
-class Contacts {
+// Decides in which order consecutive surfaces belong along the lines of one bundle, and which of
+// them touch.
+class DepthOrder {
   public:
     // `patches` must outlive the object.
-    explicit Contacts(const Patches& patches)
+    explicit DepthOrder(const Patches& patches)
         : patches(patches), touchDistance(double(patches.touchDistance)) {}
 
     // Sets the direction of the current bundle, a unit vector.
