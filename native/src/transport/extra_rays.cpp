@@ -81,8 +81,8 @@ using Samples = std::vector<std::array<float, 2>>;  // per side and half
 class ExtraGather {
   public:
     ExtraGather(const ExtraRaysInput& input, const Samples& samples, const SetLights& lights)
-        : patches(input.patches),
-          exposed(input.exposed),
+        : surfaces(input),
+          patches(input.patches),
           wanted(input.wanted),
           samples(samples),
           brought(wanted.size() * lights.size()),
@@ -104,7 +104,7 @@ class ExtraGather {
         for (size_t w = 0; w < wanted.size(); ++w) {
             const uint32_t side = wanted[w].side;
             const std::array<float, 2>&lines = samples[side], &rays = counted[w];
-            const glm::vec3 already = alreadyIndirect(shot, exposed, side);
+            const glm::vec3 already = alreadyIndirect(shot, surfaces.exposed, side);
             const glm::vec3 before = broughtTo(side, light, already);
             blend(light, side, of == 0 ? lines[0] + lines[1] : lines[of - 1],
                   brought[w * lightCount + k][of], of == 0 ? rays[0] + rays[1] : rays[of - 1],
@@ -148,8 +148,7 @@ class ExtraGather {
 
     // Returns the area of a side times the share of light that it absorbs, by channel, m^2.
     glm::dvec3 absorbing(uint32_t side) const {
-        return double(patches.area[patchOf(side)] * exposed[side]) *
-               glm::dvec3(1.0f - patches.reflectance[side]);
+        return surfaces.exposedArea(side) * glm::dvec3(1.0f - patches.reflectance[side]);
     }
 
     // Removes the power that the rays added beyond kMostMade, from each side in proportion to the
@@ -175,7 +174,7 @@ class ExtraGather {
         if (share == glm::vec3(0.0f)) return;
         for (size_t w = 0; w < wanted.size(); ++w) {
             const uint32_t side = wanted[w].side;
-            const glm::vec3 already = alreadyIndirect(shot, exposed, side);
+            const glm::vec3 already = alreadyIndirect(shot, surfaces.exposed, side);
             const glm::vec3 now = broughtTo(side, light, already);
             glm::vec3 factor(1.0f);
             for (int c = 0; c < 3; ++c)
@@ -187,8 +186,8 @@ class ExtraGather {
         }
     }
 
+    const LitSurfaces surfaces;
     const Patches& patches;
-    const std::vector<float>& exposed;
     const std::vector<ExtraRays>& wanted;
     const Samples& samples;
     double linesMet = 0;  // number of lines that met the wanted sides

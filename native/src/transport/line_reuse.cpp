@@ -100,10 +100,11 @@ LineWeights LineReuse::lineWeights(Half half) const {
         return weights;
     }
     const std::vector<float> exposed = exposedShare();
+    const LitSurfaces surfaces{patches, exposed};
     double lines = 0, area = 0;
     for (size_t i = 0; i < n; ++i) {
         lines += linesOf(counts.total[i], half);
-        area += double(patches.area[patchOf(i)] * exposed[i]);
+        area += surfaces.exposedArea(i);
     }
     const size_t steps = counts.hasDensities() ? std::size(kBalancePowers) : kBalanceSteps;
     for (size_t step = 0; step < steps; ++step) {
@@ -112,7 +113,7 @@ LineWeights LineReuse::lineWeights(Half half) const {
         forEachSide(n, [&](size_t i) {
             const float row = step == 0 ? float(linesOf(counts.total[i], half))  // all x are 1
                                         : weightedLines(counts, half, i, x);
-            const float wanted = float(patches.area[patchOf(i)] * exposed[i] * lines / area);
+            const float wanted = float(surfaces.exposedArea(i) * lines / area);
             next[i] = row > 0 ? std::clamp(x[i] * std::pow(wanted / (x[i] * row), power),
                                            1 / kMaxLineWeight, kMaxLineWeight)
                               : 1;
@@ -272,8 +273,9 @@ std::vector<glm::vec3> LineReuse::knownLight(LineSystem& lines, const Field& pas
 
 void LineReuse::addPower(const Field& light, const std::vector<float>& exposed,
                          glm::dvec3& power) const {
+    const LitSurfaces surfaces{patches, exposed};
     for (size_t i = 0; i < light.size(); ++i)
-        power += double(patches.area[patchOf(i)] * exposed[i]) * glm::dvec3(light[i]);
+        power += surfaces.exposedArea(i) * glm::dvec3(light[i]);
 }
 
 size_t LineReuse::gatherStarvedSides(const StarvedRays& rays, const std::vector<bool>& wanted,

@@ -36,7 +36,6 @@
 #include <glm/gtc/constants.hpp>
 
 #include "job/cancellation.h"
-#include "patches/side.h"
 #include "scene/channels.h"
 #include "transport/transport.h"
 
@@ -103,7 +102,7 @@ class Multipath : public Transport {
         emission.resize(n);
         reflected.resize(n);
         for (size_t i = 0; i < n; ++i) {
-            const double area = double(input.patches.area[patchOf(i)] * input.exposed[i]);
+            const double area = input.exposedArea(i);
             for (Estimate& e : halves) e.perLine[i] = share * (area > s2 ? float(s2 / area) : 1.0f);
             emission[i] = float(2 * s2) * input.shot.emission[i];
             reflected[i] = float(2 * s2) * first.unshot[i];
@@ -170,7 +169,7 @@ class Multipath : public Transport {
             for (size_t i = 0; i < estimate.unshot.size(); ++i) {
                 ambient += double(rest.area[i]) * sumOfChannels(rest.irradiance);
                 all += sumOfChannels(estimate.direct[i] + estimate.indirect[i]) +
-                       estimate.bundles * exposedArea(i) *
+                       estimate.bundles * input.exposedArea(i) *
                            sumOfChannels(first.gathered[i] + first.indirect[i]);
             }
             if (all > 0) worst = std::max(worst, 0.5 * ambient / all);
@@ -262,10 +261,6 @@ class Multipath : public Transport {
         return power;
     }
 
-    double exposedArea(size_t side) const {
-        return double(input.patches.area[patchOf(side)] * input.exposed[side]);
-    }
-
     // Returns for each side the area on which light arrives that was reflected often, m^2, at most
     // its exposed area. This light is equal everywhere, except on sides that hardly receive any
     // light, such as the outsides of rooms.
@@ -274,7 +269,7 @@ class Multipath : public Transport {
         // ofPower / power is the mean irradiance, weighted by the received power.
         double ofPower = 0, power = 0;
         for (size_t i = 0; i < e.unshot.size(); ++i) {
-            const double area = exposedArea(i);
+            const double area = input.exposedArea(i);
             if (area <= 0) continue;
             ofPower += received(i) * received(i) / area;
             power += received(i);
@@ -282,7 +277,8 @@ class Multipath : public Transport {
         std::vector<float> result(e.unshot.size(), 0.0f);
         if (!(ofPower > 0)) return result;
         for (size_t i = 0; i < result.size(); ++i)
-            result[i] = float(std::min(exposedArea(i), received(i) * power / (kLit * ofPower)));
+            result[i] =
+                float(std::min(input.exposedArea(i), received(i) * power / (kLit * ofPower)));
         return result;
     }
 
