@@ -5,8 +5,8 @@ The first scene is a room under a lamp with a smooth sphere and a block, which a
 the scene's area. Two bakes with different seeds determine the true noise of each object. The noise
 that the report states must be at least two thirds of the true noise, if that is above 0.75 %. The
 stated noise must be below the target, or a warning must name the object. The difference of the
-bakes at a corner, divided by the square root of 2 and relative to the light there, must be below 4
-% at its 95th percentile. Measured are 3.8 % on the sphere, most of it beside the point where the
+bakes at a corner, divided by the square root of 2 and relative to the light there, must be below
+4 % at its 95th percentile. Measured are 3.8 % on the sphere, most of it beside the point where the
 sphere touches the floor, and 0.5 to 3.3 % on other objects. cleanliness.py measures all scenes in
 this way, but against converged bakes.
 """
@@ -16,7 +16,7 @@ from __future__ import annotations
 import functools
 
 import bpy
-import lamp_rooms  # noqa: F401  (by which the construction of scenes is found)
+import lamp_rooms  # noqa: F401  (makes `build` importable)
 import numpy as np
 import pytest
 import raybundle
