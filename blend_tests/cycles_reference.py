@@ -38,8 +38,9 @@ def bakeable_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int,
                   filter_glossy: float = 0.0) -> None:
-    """Sets Cycles to an unbiased bake: all bounces, without clamping, denoising or adaptive
-    samples.
+    """Sets Cycles to an unbiased bake.
+
+    Traces all bounces. Does not clamp, denoise or adapt the number of samples.
 
     filter_glossy: the setting Filter Glossy. Values above 0 make gloss rougher; 1 is the default of
     new scenes.
@@ -64,8 +65,9 @@ def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int,
 
 
 def target_attribute(mesh: bpy.types.Mesh) -> bpy.types.Attribute:
-    """Returns the attribute of the mesh that the bake writes. Creates it if it is missing, and
-    makes it active.
+    """Returns the attribute of the mesh that the bake writes, and makes it active.
+
+    Creates the attribute if it is missing or has another type or domain.
     """
     attributes = mesh.color_attributes
     existing = attributes.get(ATTRIBUTE)

@@ -76,8 +76,9 @@ class _Twin:
 
 
 def _is_plain(item: bpy.types.Object) -> bool:
-    """Returns whether the object is rendered as its plain mesh, and whether the light of its faces
-    is independent of their neighbours (flat shading).
+    """Returns whether the object is rendered as its plain mesh, with flat shading only.
+
+    The light of each face is then independent of its neighbours.
     """
     mesh = item.data
     return not (item.modifiers or mesh.shape_keys or mesh.has_custom_normals or item.library

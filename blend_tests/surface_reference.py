@@ -75,8 +75,9 @@ class SurfaceReference:
         return joined_error(points, self._values, self._weights)
 
     def _interpolated(self, name: str, corners: np.ndarray) -> np.ndarray:
-        """Returns the light at the points: bilinear in quads, linear between corner and centre in
-        other faces.
+        """Returns (points, 3), the light at the points, in the order of the corners.
+
+        Interpolation is bilinear in quads. In other faces it is linear between corner and centre.
         """
         sizes = self._sizes[name]
         ends = np.cumsum(sizes)
@@ -130,9 +131,7 @@ def _with_inner_points(item: bpy.types.Object, is_rim: bool) -> bpy.types.Object
 
 def _covered_points(twins: dict[str, bpy.types.Object], rims: dict[str, bpy.types.Object]
                     ) -> dict[str, np.ndarray]:
-    """Returns (points,) masks by object name: whether the surface of another object touches the
-    point.
-    """
+    """Returns (points,) masks by object name: whether another object touches the point."""
     positions = {name: world_positions(twin) for name, twin in twins.items()}
     begins = dict(zip(twins, np.cumsum([0, *map(len, positions.values())]).tolist()))
     polygons = [(index, [begins[name] + vertex for vertex in polygon.vertices])

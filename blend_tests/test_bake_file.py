@@ -98,8 +98,10 @@ def save_edited(path):
 
 
 def save_bare(path):
-    """Saves a file without camera, light and materials, with an object that is linked from another
-    file, and an instance of a collection that contains it.
+    """Saves a file without camera, light and materials.
+
+    It contains an object that is linked from another file, and an instance of a collection that
+    contains this object.
     """
     item = bpy.data.objects["Box"]
     item.data.materials.clear()

@@ -92,8 +92,7 @@ def _house_bakes() -> tuple[raybundle.BakeReport, Light, Light]:
 
 
 def _house_on_plain() -> tuple[raybundle.BakeReport, Light, Light]:
-    """Opens the scene and returns _house_bakes(). The open scene provides the areas of its objects.
-    """
+    """Opens the scene, which provides the areas of objects, and returns _house_bakes()."""
     open_file('house_on_plain', 1)
     return _house_bakes()
 
