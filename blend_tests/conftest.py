@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on of the source tree, registered once; an empty file for each test."""
+"""Fixtures of all tests. The add-on of the source tree is registered once per run of pytest.
+
+Each test starts with an empty .blend file.
+"""
 
 import sys
 from pathlib import Path
@@ -14,10 +17,10 @@ sys.dont_write_bytecode = True
 import raybundle  # noqa: E402
 from build import construction, cornell_box  # noqa: E402
 
-# The furnace: E, reflectance and the side of the box.
+# Closed box whose exact solution is known: radiance of its emission in W/(m^2 sr), reflectance.
 FURNACE_EMISSION_RADIANCE = 0.5
 FURNACE_REFLECTANCE = 0.6
-# B = E / (1 - rho) in a closed box.
+# LIGHTING in the furnace, W/(m^2 sr): the exitance in a closed box is B = E / (1 - rho).
 FURNACE_LIGHT = FURNACE_EMISSION_RADIANCE / (1.0 - FURNACE_REFLECTANCE)
 
 
@@ -49,7 +52,10 @@ def empty_file():
 
 
 def create_material(name: str, reflectance=(0.8, 0.8, 0.8), emission=(0.0, 0.0, 0.0)):
-    """Of a Diffuse and an Emission shader; emission: radiance."""
+    """Returns a new material of a Diffuse shader and, if it emits, an Emission shader.
+
+    reflectance: RGB, 0 to 1. emission: RGB radiance, W/(m^2 sr).
+    """
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
@@ -76,7 +82,7 @@ def new_material():
 
 
 def create_object(name: str, vertices, faces, material=None, location=(0.0, 0.0, 0.0)):
-    """A mesh object in the scene."""
+    """Returns a new mesh object in the scene. faces: tuples of vertex indices."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(vertices, [], faces)
     if material is not None:
@@ -110,7 +116,7 @@ def new_light():
 
 
 def create_world(radiance=(0.05, 0.05, 0.05)):
-    """The Background node of the scene's new world, of strength 1."""
+    """Gives the scene a new world of this radiance, W/(m^2 sr). Returns its Background node."""
     world = bpy.data.worlds.new("World")
     if bpy.app.version < (5, 0, 0):
         world.use_nodes = True
@@ -127,21 +133,26 @@ def new_world():
 
 
 CUBE_VERTICES = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-# Normals point outwards.
+# Vertex indices of each face. Normals point outwards.
 CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
 
 @pytest.fixture
 def closed_box(new_object, new_material):
-    """A furnace: a box with inward normals, uniform emission and reflectance. Inside,
-    B = E / (1 - rho), so LIGHTING = H / pi = L_E / (1 - rho) with E = pi L_E."""
+    """Returns a furnace: a cube of 2 m with normals inwards, and uniform emission and reflectance.
+
+    Inside, B = E / (1 - rho). LIGHTING is therefore H / pi = L_E / (1 - rho), with E = pi L_E.
+    """
     grey, radiance = FURNACE_REFLECTANCE, FURNACE_EMISSION_RADIANCE
     material = new_material("Furnace", (grey,) * 3, (radiance,) * 3)
     return new_object("Box", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES], material)
 
 
 def build_cornell_box(density: float) -> None:
-    """In an empty file: that of scenes/ with so many times the cells along each edge."""
+    """Replaces the open file by the Cornell box of scenes/.
+
+    density: factor of the number of cells along each edge of the walls.
+    """
     bpy.ops.wm.read_homefile(use_empty=True)
     construction.set_render_settings(bpy.context.scene)
     construction.density, before = density, construction.density

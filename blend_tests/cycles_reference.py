@@ -1,12 +1,12 @@
-"""Cycles' own light at the corners of the meshes, as a reference.
+"""Bakes the light of Cycles at the corners of meshes, as a reference.
 
     blender -b FILE.blend -P blend_tests/cycles_reference.py -- \\
         --samples 8192 --seed 0 --out FILE.npz [--objects NAME ...]
 
-The values are those of Cycles' Diffuse bake with Direct and Indirect but without Color:
-irradiance / pi, scene-linear, sampled exactly at the corner's place. A surface that reflects
-nothing (pure emission, black) has no diffuse light in Cycles: its values are 0 whatever arrives.
-The .blend file is never saved.
+The values are those of the bake type Diffuse of Cycles with Direct and Indirect, but without Color:
+irradiance / pi, scene-linear, as point samples exactly at the corners. A surface that reflects
+nothing (black, or pure emission) has no diffuse light in Cycles. Its values are 0, however much
+light arrives. The .blend file is never saved.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ BOUNCES = 128
 
 
 def bakeable_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The mesh objects of the view layer that are rendered and have faces of their own."""
+    """Returns the mesh objects of the view layer that are rendered and have faces."""
     return [item for item in context.view_layer.objects
             if item.type == "MESH" and len(item.data.polygons) > 0
             and not item.hide_render and item.visible_get()]
@@ -38,9 +38,12 @@ def bakeable_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int,
                   filter_glossy: float = 0.0) -> None:
-    """Sets Cycles to an unbiased bake: every bounce, nothing clamped, denoised or adapted.
+    """Sets Cycles to an unbiased bake.
 
-    filter_glossy: what is not 0 makes gloss rougher, as a new scene's 1 does.
+    Traces all bounces. Does not clamp, denoise or adapt the number of samples.
+
+    filter_glossy: the setting Filter Glossy. Values above 0 make gloss rougher; 1 is the default of
+    new scenes.
     """
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
@@ -62,7 +65,10 @@ def prepare_scene(scene: bpy.types.Scene, samples: int, seed: int,
 
 
 def target_attribute(mesh: bpy.types.Mesh) -> bpy.types.Attribute:
-    """The mesh's attribute that the bake writes, made if it is missing, and active."""
+    """Returns the attribute of the mesh that the bake writes, and makes it active.
+
+    Creates the attribute if it is missing or has another type or domain.
+    """
     attributes = mesh.color_attributes
     existing = attributes.get(ATTRIBUTE)
     if existing is not None and (existing.data_type, existing.domain) != ("FLOAT_COLOR", "CORNER"):
@@ -75,7 +81,7 @@ def target_attribute(mesh: bpy.types.Mesh) -> bpy.types.Attribute:
 
 
 def corner_values(mesh: bpy.types.Mesh) -> np.ndarray:
-    """The baked values, one RGB row per corner."""
+    """Returns the baked values, (corners, 3) RGB."""
     attribute = mesh.color_attributes[ATTRIBUTE]
     values = np.empty(4 * len(attribute.data), dtype=np.float32)
     attribute.data.foreach_get("color", values)
@@ -84,7 +90,10 @@ def corner_values(mesh: bpy.types.Mesh) -> np.ndarray:
 
 def rounds_of_distinct_meshes(objects: Sequence[bpy.types.Object]
                               ) -> list[list[bpy.types.Object]]:
-    """Splits the objects so that no round has two that share a mesh: a bake overwrites it."""
+    """Splits the objects into rounds of which none contains two objects that share a mesh.
+
+    A second bake of a shared mesh would overwrite the values of the first.
+    """
     rounds: list[dict[bpy.types.Mesh, bpy.types.Object]] = []
     for item in objects:
         free = next((entry for entry in rounds if item.data not in entry), None)
@@ -98,12 +107,14 @@ def rounds_of_distinct_meshes(objects: Sequence[bpy.types.Object]
 def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int,
                  kind: str = "DIFFUSE", passes: frozenset[str] = frozenset({"DIRECT", "INDIRECT"}),
                  filter_glossy: float = 0.0) -> dict[str, np.ndarray]:
-    """Bakes the objects, irradiance / pi by default; RGB by corner, keyed by the object's name.
+    """Returns the values that Cycles bakes, (corners, 3) RGB by object name.
 
-    kind and passes are type and pass_filter of Blender's bake. "INDIRECT" alone is no reference:
-    without "DIRECT" Cycles (3.4) samples no lights at all, also not after a reflection.
+    By default the values are irradiance / pi. kind and passes are the arguments type and
+    pass_filter of Blender's bake operator. "INDIRECT" alone is no reference: without "DIRECT",
+    Cycles (3.4) does not sample lights at all, not even after a reflection.
 
-    The scene's render settings, the selection and the meshes' active colour attribute change.
+    The scene's render settings, the selection and the active colour attributes of the meshes are
+    changed.
     """
     context = bpy.context
     prepare_scene(context.scene, samples, seed, filter_glossy)
@@ -111,7 +122,7 @@ def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int,
     for group in rounds_of_distinct_meshes(objects):
         for item in group:
             target_attribute(item.data)
-        # Colour and gloss may differ between corners of one place.
+        # In other passes, values may differ between corners at one place: colour and gloss do.
         has_places = kind == "DIFFUSE" and "COLOR" not in passes
         with each_place_once(group, ATTRIBUTE) if has_places else nullcontext(group) as baked:
             for item in context.view_layer.objects:
@@ -126,9 +137,9 @@ def bake_objects(objects: Sequence[bpy.types.Object], samples: int, seed: int,
 
 def save(path: Path, values: dict[str, np.ndarray], samples: int, seed: int, seconds: float
          ) -> None:
-    """Writes the values, and how they came about, to a compressed .npz file.
+    """Writes the values, with the settings and the duration of the bake, to a compressed .npz file.
 
-    The objects' arrays have the key ``object:NAME``.
+    The array of an object has the key ``object:NAME``.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(path, samples=samples, seed=seed, seconds=round(seconds, 1),
@@ -137,14 +148,17 @@ def save(path: Path, values: dict[str, np.ndarray], samples: int, seed: int, sec
 
 
 def load(path: Path) -> dict[str, np.ndarray]:
-    """The values of a file that `save` wrote, by object name."""
+    """Returns the values in a file that `save` wrote, (corners, 3) by object name."""
     with np.load(path) as stored:
         return {key.partition(":")[2]: stored[key] for key in stored.files
                 if key.startswith("object:")}
 
 
 def sample_emissive_meshes(sampled: bool) -> None:
-    """Whether Cycles sends rays to the faces of all emissive materials, or only meets them."""
+    """Sets whether Cycles samples the faces of emissive materials like lamps.
+
+    Otherwise only rays that happen to meet the faces collect their light.
+    """
     for material in bpy.data.materials:
         if hasattr(material.cycles, 'emission_sampling'):  # from 3.5 on
             material.cycles.emission_sampling = 'AUTO' if sampled else 'NONE'
@@ -153,7 +167,7 @@ def sample_emissive_meshes(sampled: bool) -> None:
 
 
 def main(argv: Sequence[str]) -> None:
-    """The command."""
+    """Runs the command line. argv: the arguments after `--`."""
     parser = argparse.ArgumentParser(prog="cycles_reference.py", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--samples", type=int, default=8192)

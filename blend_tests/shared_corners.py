@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cycles' light at all corners of a mesh, of which those that have the same are baked once.
+"""Bakes the light of Cycles at all corners of a mesh, but corners with equal light only once.
 
-Cycles samples each corner, and those of one vertex with the same random numbers: where their faces
-lie in one plane they have the same light, noise included. Inside a flat grid that is four times the
-work. So a twin stands in for the object, in two parts: faces that have each place's light once,
-which are baked, and the rest.
+Cycles samples each corner separately. Corners at one vertex get the same random numbers, so that
+corners of faces in one plane get the same light, noise included. In a flat grid this is four times
+the work that is needed. During the bake, each object is therefore replaced by two parts: faces that
+contain each distinct corner, which are baked, and the remaining faces.
 """
 
 from __future__ import annotations
@@ -21,13 +21,17 @@ from surface_error import corner_vertices, face_sizes, read_colors
 @contextmanager
 def each_place_once(items: Sequence[bpy.types.Object], attribute: str
                     ) -> Iterator[list[bpy.types.Object]]:
-    """What to bake, into this attribute, for the light at all corners of these objects. They have
-    it afterwards."""
+    """Yields the objects to bake instead of `items` within a `with` statement.
+
+    At the end, the baked values of the attribute are copied to all corners of the items, and the
+    items are visible again. `attribute`: name of a colour attribute that all items have.
+    """
     twins: list[_Twin] = []
     baked: list[bpy.types.Object] = []
     for item in items:
         places = _places_of_corners(item.data)
-        # Single faces and boxes have little to share.
+        # Replaces only meshes with more than two corners per place. Single faces and boxes would
+        # gain little.
         if _is_plain(item) and 2 * (places.max() + 1) < len(places):
             twins.append(_Twin(item, places))
             baked.append(twins[-1].baked)
@@ -45,7 +49,10 @@ def each_place_once(items: Sequence[bpy.types.Object], attribute: str
 
 
 class _Twin:
-    """Of an object, which is hidden as long as its twin is there. places: by corner."""
+    """The two parts that replace an object, which is hidden as long as they exist.
+
+    places: (corners,) index of the place of each corner, see _places_of_corners().
+    """
 
     def __init__(self, item: bpy.types.Object, places: np.ndarray) -> None:
         self._item, self._places, self._was_hidden = item, places, item.hide_render
@@ -56,7 +63,7 @@ class _Twin:
         item.hide_render = True
 
     def hand_over(self, attribute: str) -> None:
-        """Writes what was baked to all corners of the object."""
+        """Copies the baked values of the attribute to all corners of the object."""
         by_place = np.ones((self._places.max() + 1, 4), np.float32)
         by_place[self._baked_places, :3] = read_colors(self.baked, attribute)
         self._item.data.color_attributes[attribute].data.foreach_set(
@@ -69,7 +76,10 @@ class _Twin:
 
 
 def _is_plain(item: bpy.types.Object) -> bool:
-    """Whether what is rendered is the mesh as it is, and no face depends on its neighbours."""
+    """Returns whether the object is rendered as its plain mesh, with flat shading only.
+
+    The light of each face is then independent of its neighbours.
+    """
     mesh = item.data
     return not (item.modifiers or mesh.shape_keys or mesh.has_custom_normals or item.library
                 or mesh.library or item.instance_type != 'NONE'
@@ -77,7 +87,11 @@ def _is_plain(item: bpy.types.Object) -> bool:
 
 
 def _places_of_corners(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(corners,) Equal for corners of one vertex whose faces lie in one plane, of one material."""
+    """Returns (corners,) the index of each corner's place.
+
+    Two corners have the same place if they have the same vertex, and their faces the same normal
+    (to 1e-4) and the same material.
+    """
     slots = np.empty(len(mesh.polygons), np.int32)
     normals = np.empty(3 * len(mesh.polygons), np.float32)
     mesh.polygons.foreach_get('material_index', slots)
@@ -90,11 +104,11 @@ def _places_of_corners(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def _faces_of_each_place(places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """(faces,) A choice of them that has every place, few of them twice."""
+    """Returns (faces,) a selection of faces that contains each place, and few places twice."""
     of_faces = [part.tolist() for part in np.split(places, np.cumsum(sizes)[:-1])]
     chosen = np.zeros(len(of_faces), bool)
     seen: set[int] = set()
-    # First those that bring the most.
+    # Greedy: selects the faces with the largest number of new places first.
     for wanted in range(int(sizes.max()), 0, -1):
         for face, corners in enumerate(of_faces):
             if not chosen[face] and len(set(corners) - seen) >= wanted:
@@ -104,7 +118,10 @@ def _faces_of_each_place(places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def _with_faces(item: bpy.types.Object, kept: np.ndarray) -> bpy.types.Object:
-    """A copy beside the object that has some of its faces, and all vertices."""
+    """Returns a copy of the object with only the faces in `kept`, and with all vertices.
+
+    kept: (faces,) bool. The copy is in the collections of the object.
+    """
     part = item.copy()
     part.data = item.data.copy()
     mesh = bmesh.new()

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cycles' light on the faces, between the corners: what baked values show is compared with it."""
+"""The light that Cycles computes inside faces, as a reference for the light that colours show.
+
+A renderer interpolates colours between the corners of a face, so that the error inside the face
+may differ from that at its corners.
+"""
 
 from __future__ import annotations
 
@@ -12,20 +16,23 @@ from mathutils.bvhtree import BVHTree
 from surface_error import (SurfaceError, corner_areas, corner_vertices, face_means, face_sizes,
                            read_colors, surface_error, world_positions)
 
-# Surfaces nearer to each other than this share of the scene's diagonal touch.
+# Surfaces touch if their distance is less than this share of the diagonal of the scene.
 TOUCH = 2e-5
 
-Light = dict[str, np.ndarray]  # by object name, RGB per corner or point
+Light = dict[str, np.ndarray]  # (corners, 3) or (points, 3) RGB, by object name
 
 
 class SurfaceReference:
-    """Cycles' light at points inside the faces, one half-way from each corner to the centre."""
+    """The light of Cycles at points inside faces: one point halfway from each corner to the centre.
+
+    Values are irradiance / pi, W/(m^2 sr). Points are in the order of the corners.
+    """
 
     def __init__(self, objects: Sequence[bpy.types.Object], samples: int, seed: int = 0) -> None:
         self._weights = {item.name: corner_areas(item) for item in objects}
         self._sizes = {item.name: face_sizes(item.data) for item in objects}
-        # Cycles bakes all corners of a mesh. So the inner faces, whose corners are the points, are
-        # an object of their own.
+        # Cycles bakes all corners of a mesh. The inner faces, whose corners are the points, are
+        # therefore an object of their own. The rims fill the rest, so that nothing is missing.
         twins, rims = ({item.name: _with_inner_points(item, is_rim) for item in objects}
                        for is_rim in (False, True))
         hidden = [item.hide_render for item in objects]
@@ -39,18 +46,26 @@ class SurfaceReference:
         for twin in (*twins.values(), *rims.values()):
             bpy.data.meshes.remove(twin.data)
         for item in objects:
-            # Faces that reflect nothing have no value. Covered points nobody sees, and what Cycles
-            # has there is arbitrary.
+            # Faces that reflect nothing have no value in Cycles. Points that another surface
+            # covers are invisible, and the value of Cycles there is arbitrary.
             self._weights[item.name] = (self._weights[item.name]
                                         * self._values[item.name].any(axis=1)
                                         * ~covered[item.name])
 
     def points(self, name: str, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """At an object's points: what is shown of its corners' values, Cycles' light, the area."""
+        """Returns, for the points of an object, the shown light, the light of Cycles, and weights.
+
+        corners: (corners, 3) baked light of the object. The shown light is its interpolation at the
+        points. The arrays are (points, 3), (points, 3) and (points,). Weights are areas in m^2, and
+        0 at points that are not compared.
+        """
         return self._interpolated(name, corners), self._values[name], self._weights[name]
 
     def means(self, light: Light) -> tuple[np.ndarray, np.ndarray]:
-        """RGB each, over the faces of all these objects: of what is shown and of Cycles' light."""
+        """Returns two RGB means over the area of all objects: of the shown light and of Cycles.
+
+        light: baked light per corner.
+        """
         shown, truth, area = (np.concatenate(parts) for parts in
                               zip(*(self.points(name, light[name]) for name in light)))
         return area @ shown / area.sum(), area @ truth / area.sum()
@@ -60,7 +75,10 @@ class SurfaceReference:
         return joined_error(points, self._values, self._weights)
 
     def _interpolated(self, name: str, corners: np.ndarray) -> np.ndarray:
-        """Bilinear in quads, linear in triangles, at the points in the order of the corners."""
+        """Returns (points, 3), the light at the points, in the order of the corners.
+
+        Interpolation is bilinear in quads. In other faces it is linear between corner and centre.
+        """
         sizes = self._sizes[name]
         ends = np.cumsum(sizes)
         starts = ends - sizes
@@ -74,8 +92,12 @@ class SurfaceReference:
 
 
 def _with_inner_points(item: bpy.types.Object, is_rim: bool) -> bpy.types.Object:
-    """Of a copy whose faces have a smaller face in their middle, whose vertices are the points:
-    these inner faces, or all others. The vertices are those of all faces."""
+    """Returns a new object in place of the item, in which each face has a smaller face inside.
+
+    The vertices of the smaller, inner faces are the points. The object has either only the inner
+    faces or, with is_rim, only the quads between each inner face and the edges of its original
+    face. In both cases it has all vertices: those of the item first, then the points.
+    """
     vertices, sizes = corner_vertices(item.data), face_sizes(item.data)
     positions = np.empty(3 * len(item.data.vertices), np.float32)
     item.data.vertices.foreach_get('co', positions)
@@ -102,14 +124,14 @@ def _with_inner_points(item: bpy.types.Object, is_rim: bool) -> bpy.types.Object
     twin = bpy.data.objects.new(mesh.name, mesh)
     twin.matrix_world = item.matrix_world
     bpy.context.scene.collection.objects.link(twin)
-    # How many vertices come before the points.
+    # Index of the first vertex that is a point.
     twin["first_point"] = len(positions)
     return twin
 
 
 def _covered_points(twins: dict[str, bpy.types.Object], rims: dict[str, bpy.types.Object]
                     ) -> dict[str, np.ndarray]:
-    """(points,) by name: whether a surface of another object lies against the point."""
+    """Returns (points,) masks by object name: whether another object touches the point."""
     positions = {name: world_positions(twin) for name, twin in twins.items()}
     begins = dict(zip(twins, np.cumsum([0, *map(len, positions.values())]).tolist()))
     polygons = [(index, [begins[name] + vertex for vertex in polygon.vertices])
@@ -139,6 +161,9 @@ def _bake_points(twins: Sequence[bpy.types.Object], samples: int, seed: int) -> 
 
 
 def joined_error(light: Light, reference: Light, weights: dict[str, np.ndarray]) -> SurfaceError:
-    """Of all objects together."""
+    """Returns the error of all objects together.
+
+    light, reference: RGB by object name. weights: areas in the same order, by object name.
+    """
     return surface_error(*(np.concatenate([entry[name] for name in light])
                            for entry in (light, reference, weights)))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lights in place of emissive faces give the same light where Cycles samples the faces well."""
+"""Area lights that replace emissive faces give the same light (area_lamps.py).
+
+The lamp is far from the floor, where Cycles samples emissive faces without a bias.
+"""
 
 import bpy
 import numpy as np
@@ -16,7 +19,7 @@ SAMPLES = 1024
 @pytest.mark.parametrize("sides", [4, 24])
 def test_far_from_a_lamp(new_object, new_material, sides, looks_down):
     floor = new_object("Floor", *square(2.0, 4), new_material("White", (0.8, 0.8, 0.8)))
-    # Both sides shine, and one of them on the floor.
+    # The face emits on both sides, and one of them faces the floor.
     corners = [(0.2 * np.cos(angle), 0.2 * np.sin(angle), 2.0)
                for angle in 2.0 * np.pi * np.arange(sides) / sides][::-1 if looks_down else 1]
     material = bpy.data.materials.new("Lamp")
@@ -29,7 +32,8 @@ def test_far_from_a_lamp(new_object, new_material, sides, looks_down):
     meshes = bake_objects([floor], SAMPLES, 0)["Floor"].mean(axis=0)
     with area_lamps():
         lights = bake_objects([floor], SAMPLES, 1)["Floor"].mean(axis=0)
-    # Noise of each: about 0.1 %. A disk for 24 corners: less than that.
+    # Each mean has a noise of about 0.1 %. A disk replaces the lamp of 24 corners, which makes a
+    # smaller difference.
     assert np.allclose(lights, meshes, rtol=0.005)
     assert np.allclose(bake_objects([floor], SAMPLES, 0)["Floor"].mean(axis=0), meshes, rtol=1e-6)
     assert not [item for item in bpy.data.objects if item.type == 'LIGHT']

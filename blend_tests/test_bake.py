@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes through the add-on: exact answers, the operators, bad input, what is left untouched."""
+"""Bakes through the add-on: exact results, operators, invalid input, and data left unchanged."""
 
 import importlib
 import json
@@ -19,8 +19,8 @@ pytestmark = pytest.mark.needs_library
 
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
-# The rows of the counted form factors sum to 1 by construction, so only the tolerance of the solver
-# and single precision remain.
+# Rows of form factors that are counted from lines sum to 1 by construction. The remaining errors
+# are the tolerance of the solver and single precision.
 FURNACE_TOLERANCE = 1e-4
 
 REPORT_KEYS = {"seconds", "patches", "bundles", "lines", "exchanges", "estimated_error", "error",
@@ -30,7 +30,7 @@ SECONDS_KEYS = {"total", "export", "patches", "first_shot", "bundles", "solve", 
 
 
 def bake(**overrides):
-    # Few patches and one thread's worth of work: the answers here do not depend on them.
+    # Few patches and bundles, to save time. The tested results do not depend on them.
     overrides = {"max_patches": 2000, "max_bundles": 128, **overrides}
     return raybundle.bake(bpy.context, **overrides)
 
@@ -41,14 +41,17 @@ def statuses(report):
 
 @pytest.fixture
 def floor_and_lamp(new_object, new_light, new_material):
-    """A square of 1 m under a point light on its left side."""
+    """Returns a square of 1 m in the plane z = 0, under a point light near its left edge."""
     item = new_object("Floor", SQUARE, [(0, 1, 2, 3)], new_material("White", (0.5, 0.5, 0.5)))
     new_light("Lamp", 'POINT', 10.0, (0.1, 0.5, 0.5), shadow_soft_size=0.0)
     return item
 
 
 def point_light_on_floor(x, y):
-    """H / pi of the lamp over floor_and_lamp, W/(m^2 sr): H = I cos / d^2, I = P / (4 pi)."""
+    """Returns H / pi, W/(m^2 sr), of the lamp of floor_and_lamp at points (x, y) of the floor, m.
+
+    H = I cos / d^2 with I = P / (4 pi).
+    """
     squared = (x - 0.1) ** 2 + (y - 0.5) ** 2 + 0.25
     return 10.0 / (4.0 * np.pi) * 0.5 / squared ** 1.5 / np.pi
 
@@ -60,7 +63,7 @@ def point_light_on_floor(x, y):
 
 @pytest.mark.parametrize("output, expected", [
     ('LIGHTING', FURNACE_LIGHT),
-    # (E + rho H) / pi = B / pi, which in a furnace is the same again.
+    # (E + rho H) / pi = B / pi, which equals LIGHTING in a furnace.
     ('COMBINED', FURNACE_LIGHT),
     ('DIRECT', FURNACE_EMISSION_RADIANCE),
     ('INDIRECT', FURNACE_LIGHT - FURNACE_EMISSION_RADIANCE),
@@ -94,10 +97,11 @@ def test_faces_of_a_modifier_that_no_written_corner_touches_are_spared(floor_and
     bpy.ops.object.modifier_apply(modifier=modifier.name)
     whole = bake(output='LIGHTING', domain=domain)
     assert spared.patches == whole.patches
-    # Three of the four vertices of each of four faces are not written, and 252 faces.
+    # The subdivided face has 256 faces with 4 corners each. Only 4 of these corners are written.
     assert {item['why']: item['count'] for item in spared.skipped}[
         "their light is not asked for"] == 4 * 256 - 4
-    # So few corners gather their light, a hundredth of a face inside of it.
+    # With so few written corners, the light is gathered for each of them, at a point that lies
+    # inside the face by a hundredth of the face's width. The tolerance covers this distance.
     exact = np.array([point_light_on_floor(x, y) for x, y, _ in SQUARE])
     assert found == pytest.approx(np.repeat(exact[:, None], 3, axis=1), rel=2e-3)
 
@@ -115,12 +119,13 @@ def test_outward_normals_are_named_and_the_back_side_can_be_baked(closed_box):
 
 
 def test_irradiance_under_a_point_light(floor_and_lamp):
-    # A flat square sees nothing of itself. The least-squares values of four corners keep the
-    # integral over the square; compare it with a fine sum.
+    # A flat square gets no light that it reflects itself. Least squares preserve the integral of
+    # the light over the square, which is compared with a fine sum.
     bake(output='LIGHTING', max_patches=20_000)
     grid = (np.arange(400) + 0.5) / 400
     x, y = np.meshgrid(grid, grid)
-    # The regularisation does not change the mean of one face; patches are 1 % of the square.
+    # The regularisation does not change the mean over a single face. Patches are
+    # 1 % of the square.
     assert read_colors(floor_and_lamp).mean() == pytest.approx(point_light_on_floor(x, y).mean(),
                                                                rel=1e-2)
 
@@ -150,7 +155,7 @@ def test_scene_settings_and_overrides(closed_box):
     report = bake()
     attribute = closed_box.data.color_attributes["Light"]
     assert (attribute.data_type, attribute.domain) == ('BYTE_COLOR', 'POINT')
-    # 1.25 does not fit in 8 bits.
+    # The light is 1.25, which 8 bits cannot represent.
     assert any("brighter than 1" in text for text in report.warnings)
     bake(attribute="Other", data_type='FLOAT_COLOR')
     assert "Other" in closed_box.data.color_attributes
@@ -183,7 +188,7 @@ def test_cancel_leaves_the_mesh_unchanged(closed_box, stage):
     assert caught.value.code == ErrorCode.CANCELLED
     assert len(closed_box.data.color_attributes) == 0
     assert bpy.context.scene.raybundle.report == ""
-    # And the next bake is as if nothing had been.
+    # The cancelled bake must not affect the next one.
     bake()
     assert np.abs(read_colors(closed_box) / FURNACE_LIGHT - 1.0).max() < FURNACE_TOLERANCE
 
@@ -242,13 +247,14 @@ def test_error_attribute(floor_and_lamp, domain, count):
     assert (attribute.domain, attribute.data_type) == (domain, 'FLOAT')
     errors = np.empty(count, np.float32)
     attribute.data.foreach_get('value', errors)
-    # One face below a lamp: in all the error of the corners is that of the report, relative to the
-    # light, which is not far from evenly spread over the corners' shares.
+    # The scene is one face under a lamp. The error of the report is relative to the light. The
+    # corners' errors agree with it within a factor of 3, because the light and its error are spread
+    # over the shares of the corners almost evenly.
     light = read_colors(floor_and_lamp)
     relative = np.sqrt((errors ** 2).mean() / (light ** 2).mean())
     assert 0.3 < relative / report.error['total'] < 3.0
     assert any('"Floor"' in text and "too coarse" in text for text in report.warnings)
-    # It goes when it is not asked for again, and with the light.
+    # A bake without write_error removes the attribute, and so does the operator Clear.
     bake(domain=domain)
     assert "Radiosity Error" not in mesh.attributes
     bake(domain=domain, write_error=True)
@@ -292,7 +298,7 @@ def test_selected_scope(floor_and_lamp, new_object):
     report = bake(scope='SELECTED')
     assert statuses(report) == {"Other": "baked"}
     assert len(floor_and_lamp.data.color_attributes) == 0
-    # The floor above still casts its shadow: the centre below it is darker than without.
+    # The floor still casts its shadow on the other square: without the floor there is more light.
     shadowed = read_colors(other).mean()
     floor_and_lamp.raybundle.role = 'IGNORE'
     bake(scope='SELECTED')
@@ -300,7 +306,7 @@ def test_selected_scope(floor_and_lamp, new_object):
 
 
 def shared_squares(floor):
-    """A second user of the floor's mesh, 2 m further away from the lamp."""
+    """Returns a second object with the floor's mesh, 2 m further away from the lamp."""
     other = bpy.data.objects.new("Far", floor.data)
     other.location = (2.0, 0.0, 0.0)
     bpy.context.scene.collection.objects.link(other)
@@ -314,10 +320,10 @@ def test_single_user_copies_have_their_own_light(floor_and_lamp):
     assert far.data != floor_and_lamp.data
     assert read_colors(floor_and_lamp).mean() > 3.0 * read_colors(far).mean() > 0.0
     assert any("shared by 2" in text for text in report.warnings)
-    # The copy has the same geometry: nothing is traced again.
+    # The second bake has the same geometry, because each object has its copy: no lines are traced.
     report = bake(shared_meshes='SINGLE_USER')
     assert report.seconds['bundles'] == 0.0
-    # One face is too coarse for a lamp so near, which is said; nothing else is.
+    # The only warnings are that one face is too coarse for a lamp so near.
     assert all("too coarse" in text for text in report.warnings)
 
 
@@ -329,7 +335,7 @@ def test_averaged_instances_show_their_mean(floor_and_lamp):
     assert any("mean light" in text for text in report.warnings)
     bake(shared_meshes='SINGLE_USER')
     mean = 0.5 * (read_colors(floor_and_lamp) + read_colors(far))
-    # The same lines, so only rounding differs.
+    # Both bakes use the same lines, so that only rounding differs.
     assert averaged == pytest.approx(mean, rel=1e-4)
 
 
@@ -367,12 +373,12 @@ def test_subdivided_copy_stands_in_for_the_original(floor_and_lamp, new_material
     assert copy.parent == parent and copy.users_collection == original.users_collection
     assert np.array(copy.matrix_world) == pytest.approx(np.array(original.matrix_world), abs=1e-6)
     assert [item.name for item in mesh.materials] == ["White", "Second"]
-    # 2 m by 1 m in edges of at most 0.2 m, all of the area.
+    # The object is 2 m by 1 m in the world. The copy has edges of at most 0.2 m and the whole area.
     points = np.array([copy.matrix_world @ item.co for item in mesh.vertices])
     edges = np.array([item.vertices for item in mesh.edges])
     assert np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).max() <= 0.2 + 1e-6
     assert sum(item.area for item in mesh.polygons) == pytest.approx(1.0, rel=1e-5)
-    # UVs are linear over the square, and the front side is still up.
+    # UVs are interpolated linearly over the square, and the front side still faces up.
     corner_vertices = [item.vertex_index for item in mesh.loops]
     local = np.array([item.co for item in mesh.vertices])[corner_vertices]
     carried = np.array([item.uv for item in mesh.uv_layers["Chart"].data])
@@ -385,10 +391,10 @@ def test_subdivided_copy_is_replaced_and_cleared(floor_and_lamp):
         bake(topology='SUBDIVIDE', patch_size=0.1)
         assert sorted(item.name for item in bpy.data.objects) == [
             "Floor", "Floor (Radiosity)", "Lamp"]
-    # A light close to the left edge: the finer mesh follows it.
+    # The lamp is close to the left edge, and the finer mesh shows the variation of its light.
     copy = bpy.data.objects["Floor (Radiosity)"]
     assert read_colors(copy).max() > 4.0 * read_colors(copy).min()
-    # A failing bake leaves the copy in place.
+    # A bake that fails leaves the copy in place.
     with pytest.raises(raybundle.RaybundleError):
         bake(topology='SUBDIVIDE', patch_size=0.1, progress=lambda *_: False)
     assert copy.visible_get() and not floor_and_lamp.visible_get()
@@ -458,7 +464,8 @@ def test_reflectance_of_one_is_clamped_and_named(closed_box, new_material):
     closed_box.data.materials[0] = new_material("Snow", (1.0, 1.0, 1.0), (0.01, 0.01, 0.01))
     report = bake()
     assert any('Snow' in text for text in report.warnings)
-    # Clamped to 0.999: L_E / 0.001, to the tolerance of a solver whose answer is 1000 times E.
+    # Reflectance is clamped to 0.999, so that the light is L_E / 0.001. The tolerance is that of
+    # the solver, with a solution of 1000 times the emission.
     assert read_colors(closed_box) == pytest.approx(np.full((24, 3), 10.0), rel=1e-2)
 
 
@@ -490,7 +497,7 @@ def test_linked_data_is_lit_but_not_written(closed_box, new_object, tmp_path):
     report = bake()
     assert "linked" in statuses(report)["Box"] and statuses(report)["Inside"] == "baked"
     assert len(bpy.data.objects["Box"].data.color_attributes) == 0
-    # The emission of the box reaches the square inside it.
+    # The light that the linked box emits reaches the square inside the box.
     assert read_colors(inside).min() > 0.0
 
 

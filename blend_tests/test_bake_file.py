@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The script behind the ./bake command, run as the command runs it: in a Blender of its own."""
+"""The script of the ./bake command (bake_file.py), run in a Blender process of its own."""
 
 import json
 import os
@@ -25,7 +25,7 @@ def bake_file(path, *arguments):
 
 @pytest.fixture
 def saved_box(closed_box, tmp_path):
-    # Without a camera: the script places one.
+    # The file has no camera, so that the script must place one.
     path = tmp_path / "box.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
@@ -47,20 +47,20 @@ def test_writes_blend_picture_and_report(saved_box, tmp_path):
     picture = bpy.data.images.load(str(out / "box.png"))
     assert picture.size[0] <= 960 and picture.size[1] <= 720
     pixels = np.array(picture.pixels[:]).reshape(-1, 4)[:, :3]
-    # The background is black, the box is lit.
+    # The background of the picture is black, and the box is lit.
     assert pixels.min() < 0.1 and pixels.max() > 0.5
 
     bpy.ops.wm.open_mainfile(filepath=str(out / "box.baked.blend"))
     item = bpy.data.objects["Box"]
     attribute = item.data.color_attributes["Light"]
     assert (attribute.domain, attribute.data_type) == ('POINT', 'FLOAT_COLOR')
-    # What the picture needs is not in the file.
+    # The file must not contain the camera and the material with which the picture is rendered.
     assert [material.name for material in bpy.data.materials] == ["Furnace"]
     assert len(bpy.data.cameras) == 0
     assert json.loads(bpy.context.scene.raybundle.report)["patches"] == report["patches"]
 
 
-# Said by Blender where /etc/mtab is missing, as in a bare container.
+# Blender prints this line where /etc/mtab is missing, as in a minimal container.
 BLENDERS_OWN_LINE = "could not get a list of mounted file-systems"
 
 
@@ -87,7 +87,7 @@ def test_a_file_with_nothing_to_bake(tmp_path):
 
 
 # --------------------------------------------------------------------------------------------------
-# Files as people have them
+# Typical files of users
 # --------------------------------------------------------------------------------------------------
 
 
@@ -98,7 +98,11 @@ def save_edited(path):
 
 
 def save_bare(path):
-    """No camera, no light, no materials; an object of another file, and one that instances it."""
+    """Saves a file without camera, light and materials.
+
+    It contains an object that is linked from another file, and an instance of a collection that
+    contains this object.
+    """
     item = bpy.data.objects["Box"]
     item.data.materials.clear()
     library = path.with_name("library.blend")
@@ -127,7 +131,7 @@ def test_a_picture_of_files_as_people_have_them(closed_box, tmp_path, save):
 
 def test_a_picture_that_cannot_be_made_is_a_line(saved_box, tmp_path):
     out = tmp_path / "out"
-    # Nobody can write a file where a folder is.
+    # A folder of this name prevents the picture from being written.
     (out / "box.png").mkdir(parents=True)
     result = bake_file(saved_box, "--out", out, "--set", "max_patches=500")
     assert result.returncode == 0, result.stderr
@@ -148,7 +152,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_bake(saved_box):
 
 
 def test_blender_starts_in_a_shell_with_another_python(tmp_path):
-    # Another Python first on PATH that has nothing, as an active virtual environment has it.
+    # An empty Python environment comes first on PATH, like an active virtual environment.
     folder = tmp_path / "venv" / "bin"
     folder.mkdir(parents=True)
     (folder.parent / "pyvenv.cfg").write_text("home = /usr/bin\nversion = 3.11\n")

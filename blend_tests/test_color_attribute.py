@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colour attributes: name, domain, type, colour space, alpha, and what a saved file keeps."""
+"""Writing of colour attributes: name, domain, data type, colour space, alpha, and saved files."""
 
 import bpy
 import numpy as np
@@ -38,7 +38,8 @@ def test_values_survive_save_and_reload(box, tmp_path, domain, data_type):
     attribute = mesh.color_attributes["Radiosity"]
     assert (attribute.domain, attribute.data_type) == (domain, data_type)
     colors = read_colors(mesh)
-    # 8 bits of sRGB: half a step of 1/255, and the curve is nowhere steeper than 2.3 in linear.
+    # Rounding to 8 bits of sRGB is off by at most half a step of 1/255, times the largest slope of
+    # the curve from sRGB to linear values, 2.3.
     tolerance = 0.0 if data_type == 'FLOAT_COLOR' else 0.5 / 255 * 2.3
     assert np.abs(colors[:, :3] - light).max() <= tolerance
     assert (colors[:, 3] == 1.0).all()
@@ -58,7 +59,7 @@ def test_bytes_are_srgb_and_cut_off(box):
     light[0] = 7.0
     color_attribute.write_light(box.data, "Radiosity", 'BYTE_COLOR', 'CORNER', light)
     if hasattr(box.data.color_attributes["Radiosity"].data[1], "color_srgb"):
-        # sRGB of 0.5 is 0.7354, stored as 188/255.
+        # 0.5 is 0.7354 in sRGB, stored as 188/255.
         stored = box.data.color_attributes["Radiosity"].data[1].color_srgb
         assert stored[0] == pytest.approx(188 / 255, abs=1e-3)
     colors = read_colors(box.data)

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every combination of solver, first shot, directions, projector and small patches, through the
-add-on: the legal ones agree with what is known within the error that they state, the others are
-refused with the reason.
+"""Bakes with every combination of solver, first shot, directions, projector and small patches.
 
-What is compared: the root mean square error of the corners, weighted by area and relative to the
-light, over SEEDS bakes, with the root mean square of the errors that these bakes state. A stated
-error is half the difference of two independent halves, the true one that of their mean. Both have
-the same distribution, but neither is exact: a bundle moves the light on all surfaces at once, so
-that one bake has some ten independent errors, not one per corner. Their ratio over 4 bakes then
-follows sqrt(F(40, 40)): beyond 2 once in 1e5. A method without a fault stays below, and one whose
-stated error leaves out half of its true error does not.
+Valid combinations agree with a known result within the error that they state. Invalid combinations
+are refused with the reason.
+
+The test compares two errors, each as a root mean square over SEEDS bakes. The true error is the
+root mean square error of the corners, weighted by area and relative to the light. The stated error
+is half the difference between two independent halves of a bake, whereas the true error is that of
+the mean of the halves. Both have the same distribution, but each is only an estimate: a bundle
+changes the light on all surfaces at once, so that a bake has about ten independent errors, and not
+one per corner. The ratio of the two errors over 4 bakes follows sqrt(F(40, 40)), which exceeds 2
+once in 1e5. A correct method stays below 2. A method whose stated error omits half of its true
+error does not.
 """
 
 from __future__ import annotations
@@ -30,28 +32,28 @@ pytestmark = pytest.mark.needs_library
 
 SEEDS = 4
 TIMES_STATED = 2.0
-# At this noise a bake takes some tenths of a second.
+# Relative noise at which a bake takes some tenths of a second.
 TARGET = 0.1
 COARSE = {'output': 'LIGHTING', 'target_error': TARGET, 'max_bundles': 4096}
-# Bundles stop when their noise is low enough; what a wrong order of patches (PAINTER) and lines
-# through surfaces (ROULETTE) add is stated, but stays. Roulette covers pixels twice and misses
-# others along all edges of patches: finer pixels lower that. A statement of more than MOST_STATED
-# would say nothing any more.
+# Bundles stop when the noise is low enough. The errors of a wrong order of patches (PAINTER) and of
+# lines that pass through surfaces (ROULETTE) are stated, but more bundles do not reduce them.
+# Roulette counts some pixels along the edges of patches twice and misses others. Finer pixels
+# reduce this error. A stated error above MOST_STATED would carry no information.
 ROULETTE_LINES = 20_000  # per bundle
 MOST_STATED = 0.5
 
-# What no stated error has to cover: in the furnace single precision and the solver's tolerance, and
-# for LINE_REUSE there is nothing else.
+# Errors that need not be stated. In the furnace these are single precision and the tolerance of the
+# solver. LINE_REUSE has no other error there.
 FURNACE_FLOOR = 1e-4
-# In the Cornell box also the reference's own noise (0.5 %) and, since stated errors are those of
-# patches, what reconstruction adds to it (at most as much).
+# In the Cornell box, the noise of the reference (0.5 %) is added, and at most as much by
+# reconstruction, because stated errors are those of patches.
 CORNELL_FLOOR = 0.01
-# Coarser than the faces: each is one patch.
+# Patch size in m. Faces are smaller, so that each is one patch.
 CORNELL_PATCH = 0.5
 
 SETTINGS = ('solver', 'first_shot', 'directions', 'projector', 'small_patches')
 
-# What each solver works with, besides every first shot.
+# Choices that each solver supports. All solvers support every first shot.
 WHOLE_LINES = {'AUTO', 'FRAGMENT_LISTS', 'PAINTER', 'PAINTER_NEWELL'}
 PROJECTORS = WHOLE_LINES | {'PLANE', 'PLANES'}
 SMALL_PATCHES = {'CENTRE_SAMPLING', 'ROULETTE'}
@@ -63,7 +65,7 @@ LEGAL = {
     'RANDOM_WALK': ({'RANDOM'}, {'AUTO'}, {'CENTRE_SAMPLING'}),
 }
 
-Combination = tuple[str, ...]  # in the order of SETTINGS
+Combination = tuple[str, ...]  # values in the order of SETTINGS
 
 
 def choices(name: str) -> list[str]:
@@ -96,7 +98,7 @@ def check(combination: Combination, true_errors: list[float], stated_errors: lis
 
 
 # --------------------------------------------------------------------------------------------------
-# Which ones there are
+# Valid and invalid combinations
 # --------------------------------------------------------------------------------------------------
 
 
@@ -114,7 +116,7 @@ def test_illegal_combinations_are_refused_with_the_reason(closed_box, solver):
             bake(combination)
         assert caught.value.code == ErrorCode.INVALID_ARGUMENT
         message = caught.value.message
-        # "solver A does not work with directions B: the reason; choose ..."
+        # Format: "solver A does not work with directions B: the reason; choose ...".
         what, _, rest = message.partition(": ")
         why, _, remedy = rest.partition("; choose ")
         offending = [value for value, allowed in zip(combination[2:], LEGAL[solver])
@@ -125,19 +127,20 @@ def test_illegal_combinations_are_refused_with_the_reason(closed_box, solver):
 
 
 # --------------------------------------------------------------------------------------------------
-# That they are right
+# Errors of valid combinations
 # --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("combination", ALL_LEGAL, ids="-".join)
 def test_furnace(closed_box, combination):
-    # LINE_REUSE has no noise here: what roulette adds is all that it is off.
+    # LINE_REUSE has no noise in a furnace, so that roulette causes its whole error, which is
+    # tested with all lines. For the other solvers, a quarter of the lines saves time.
     roulette_lines = ROULETTE_LINES if 'LINE_REUSE' in combination else ROULETTE_LINES // 4
     true_errors, stated_errors = [], []
     for seed in range(SEEDS):
         report = bake(combination, roulette_lines, seed=seed, patch_size=0.5)
         light = read_colors(closed_box) / FURNACE_LIGHT
-        # Six equal faces: all corners weigh the same.
+        # The faces are six equal squares, so that all corners have equal weights.
         true_errors.append(float(np.sqrt(np.mean((light - 1.0) ** 2))))
         stated_errors.append(report.estimated_error)
     check(combination, true_errors, stated_errors, FURNACE_FLOOR)
@@ -148,15 +151,21 @@ def cornell_objects(report) -> list[bpy.types.Object]:
 
 
 def cornell_density(combination: Combination) -> float:
-    """Faces of 0.2 m. Where those hide each other in PAINTER's wrong order, STOCHASTIC_ITERATION
-    finds more light with each step: half as wide for these two."""
+    """Returns the density of build_cornell_box(): 0.5, which makes faces 0.2 m wide, or 1.0.
+
+    With PAINTER, faces may be in the wrong order of depth. If such faces are 0.2 m wide, the light
+    of STOCHASTIC_ITERATION grows with each step. This pair gets faces half as wide.
+    """
     return 1.0 if {'STOCHASTIC_ITERATION', 'PAINTER'} <= set(combination) else 0.5
 
 
 @functools.lru_cache(maxsize=None)
 def cornell_reference(density: float) -> tuple[np.ndarray, np.ndarray]:
-    """Light of all corners in the order of the report, and their areas. Corners at contact edges
-    weigh nothing: where a box stands on the floor they lie on patches that nobody sees."""
+    """Returns the light of all corners in the order of the report, and their areas in m^2.
+
+    The area of corners at contact edges is 0. Where a box stands on the floor, these corners lie on
+    invisible patches.
+    """
     build_cornell_box(density)
     report = raybundle.bake(bpy.context, output='LIGHTING', target_error=0.005, seed=1000,
                             max_bundles=8192, patch_size=CORNELL_PATCH)
@@ -171,7 +180,7 @@ def test_cornell_box(combination):
     density = cornell_density(combination)
     reference, areas = cornell_reference(density)
     build_cornell_box(density)
-    # As many pixels in a face.
+    # Keeps the number of pixels per face equal for both densities.
     roulette_lines = round(ROULETTE_LINES * density ** 2)
     true_errors, stated_errors = [], []
     for seed in range(SEEDS):

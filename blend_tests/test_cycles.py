@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked light against Cycles: two rooms, and each kind of light with a shadow.
+"""Baked light compared with Cycles: two rooms, and a shadow under each kind of light.
 
 The rooms are compared with the stored references of scenes/README.md at vertices off contact edges
-(surface_error.py says which those are). The rest is baked by the running Blender's Cycles.
+(defined in surface_error.py). All other references are baked by Cycles of the running Blender.
 """
 
 from __future__ import annotations
@@ -29,22 +29,26 @@ SCENES = Path(__file__).parent.parent / "scenes"
 # The Cornell box
 # --------------------------------------------------------------------------------------------------
 
-# Relative RMSE. Walls and floor: 2 %, of which the default target_error leaves up to 1.5 % noise
-# and the reference has 0.3 %. The ceiling's light jumps at the edges of the lamp 2 cm below it,
-# within faces of 10 cm: point samples and the nearest linear function differ there; 10 %. The boxes
-# are lit evenly, and their vertices off contacts lie on convex edges only: as good as the walls.
+# Largest relative RMSE by object. Walls and floor: 2 %, of which noise at the default target_error
+# causes up to 1.5 %, and that of the reference 0.3 %. The light of the ceiling jumps at the edges
+# of the lamp 2 cm below it, inside faces of 10 cm, where point samples differ from the nearest
+# linear function: 10 %. The boxes have the tolerance of the walls, because they are lit evenly, and
+# their vertices off contact edges lie only on convex edges.
 CORNELL_TOLERANCE = {"floor": 0.02, "wall_back": 0.02, "wall_left": 0.02, "wall_right": 0.02,
                      "ceiling": 0.10, "box_tall": 0.02, "box_short": 0.02}
 CORNELL_BIAS = 0.01
-# The patches of an object share the bundles' directions, so their noise does not average out in
-# its mean: at the default 2 % the ceiling's, which has no direct light, varies by 0.7 % (standard
-# deviation, 8 seeds). The bias shows at a noise that leaves it alone.
+# The patches of an object share the directions of the bundles, so that their noise does not average
+# out over the object. At the default target of 2 %, the mean of the ceiling, which has no direct
+# light, has a standard deviation of 0.7 % (8 seeds). A bias of 1 % needs this lower noise to show.
 BIAS_TARGET_ERROR = 0.005
 
 
 @functools.lru_cache(maxsize=None)
 def cornell_errors(target_error: float | None = None) -> dict[str, SurfaceError]:
-    """By object, at vertices off contact edges, with default settings but perhaps target_error."""
+    """Returns the errors by object name, at vertices off contact edges.
+
+    All settings are defaults, except target_error if it is given.
+    """
     bpy.ops.wm.open_mainfile(filepath=str(SCENES / "cornell_box.blend"))
     references = load(SCENES / "cornell_box.cycles.npz")
     if target_error is not None:
@@ -70,7 +74,8 @@ def test_cornell_box_has_no_bias(name):
 
 
 def test_most_of_the_cornell_box_is_off_contact_edges():
-    # Of 400 faces with 4 corners a room's side loses the 4 edges; the floor also the boxes' feet.
+    # A wall has 400 faces with 4 corners each, and loses the corners at its 4 edges. The floor also
+    # loses those at the feet of the boxes.
     for name, error in cornell_errors().items():
         assert error.corners > (900 if name == "floor" else 600), name
 
@@ -80,9 +85,10 @@ def test_most_of_the_cornell_box_is_off_contact_edges():
 # --------------------------------------------------------------------------------------------------
 
 FINE_TARGET_ERROR = 0.005
-FINE_TOLERANCE = 0.01  # at vertices off contact edges, where POINT has point samples as Cycles does
-CONTACT_TOLERANCE = 0.03  # of the mean over an object's faces at contact edges
-# Of the reference inside the faces: a mean over 58 faces or more then has 0.4 % noise.
+# RMSE at vertices off contact edges, where POINT has point samples, as Cycles does.
+FINE_TOLERANCE = 0.01
+CONTACT_TOLERANCE = 0.03  # relative, of the mean over the faces of an object at contact edges
+# Samples of the reference inside faces. The mean over 58 faces or more then has 0.4 % noise.
 CONTACT_SAMPLES = 128
 
 
@@ -115,7 +121,7 @@ def test_contacts_of_the_cornell_box_by_area():
         found, expected = weights @ shown, weights @ truth
         print(item.name, np.round(100 * (found / expected - 1), 2))
         assert found == pytest.approx(expected, rel=CONTACT_TOLERANCE), item.name
-        # Neither black nor leaking: no face is far from what Cycles sees on it.
+        # No face is black, and no light leaks: the light at each point is near that of Cycles.
         lit = weights > 0
         assert (np.abs(shown - truth)[lit].max() < 0.5 * truth[lit].max()), item.name
 
@@ -124,8 +130,8 @@ def test_contacts_of_the_cornell_box_by_area():
 # The big room, whose faces are up to 1 m wide
 # --------------------------------------------------------------------------------------------------
 
-# Relative RMSE of all objects together. POINT has the same point samples as Cycles and 2 % noise.
-# Least squares differ from point samples on wide faces: 2.7 %.
+# Relative RMSE of all objects together. POINT has point samples, as Cycles does, and 2 % noise.
+# Least squares would differ from point samples on wide faces, by 2.7 %.
 POINT_TOLERANCE = 0.025
 
 
@@ -148,30 +154,31 @@ def test_point_reconstruction_meets_point_samples():
 # Each kind of light, with a blocker
 # --------------------------------------------------------------------------------------------------
 
-# A receiver of 24 x 24 quads under a smaller blocker. Both bake its vertices; the light is compared
-# as the mean over each of 4 x 4 blocks of quads, because single vertices in a shadow's edge differ
-# by what a linear function over a quad cannot follow (Cycles has point samples, Raybundle the
-# nearest function).
+# A receiver of 24 x 24 quads lies under a smaller blocker. Cycles and Raybundle bake its vertices.
+# The test compares means over 4 x 4 blocks of quads, because at single vertices in the edge of a
+# shadow, point samples (Cycles) differ from the nearest function that is linear over each quad
+# (Raybundle).
 BLOCKS, CELLS, SIZE = 4, 24, 2.0
 
-# Cycles' noise at 256 samples, from two seeds, is under 1 % of the mean at a vertex (asserted) and
-# a sixth of that in a block. Raybundle adds target_error, 1 % at a patch. So most of 3 % of the
-# mean, at the worst block, is left for units, shape and position of lights and shadows.
+# With 256 samples, the noise of Cycles, from two seeds, is below 1 % of the mean at a vertex (which
+# is asserted), and a sixth of that in a block. Raybundle adds the noise of target_error, 1 % at a
+# patch. Most of the tolerance of 3 % of the mean, at the worst block, is thus left for errors of
+# units and of the shape and position of lights and shadows.
 SAMPLES = 256
 NOISE_LIMIT = 0.01
 BLOCK_TOLERANCE = 0.03
-# Noise cancels in the mean over the receiver, a wrong unit does not.
+# In the mean over the receiver, noise averages out, but a wrong unit does not.
 MEAN_TOLERANCE = 0.01
 
 
 def block_means(item: bpy.types.Object, corners: np.ndarray) -> np.ndarray:
-    """(4, 4, 3) of values per corner of the receiver."""
+    """Returns (4, 4, 3) means over blocks. corners: values per corner of the receiver."""
     inside = CELLS // BLOCKS
     return face_means(item, corners).reshape(BLOCKS, inside, BLOCKS, inside, 3).mean(axis=(1, 3))
 
 
 class Stage:
-    """The receiver, and what may stand above it."""
+    """A scene with a receiver, above which tests place lights and a blocker."""
 
     def __init__(self, new_object, new_material) -> None:
         self._new_object, self._new_material = new_object, new_material
@@ -196,7 +203,7 @@ class Stage:
         light = read_colors(receiver)
         blocks = block_means(receiver, light)
         worst = np.abs(blocks - block_means(receiver, truth)).max() / mean.mean()
-        # Shown by pytest -s.
+        # `pytest -s` shows this.
         print(f"Cycles' noise {100 * noise:.2f} %; mean "
               f"{100 * (blocks.mean() / mean.mean() - 1):+.2f} %, worst block {100 * worst:.2f} %; "
               f"vertices: {surface_error(light, truth, corner_areas(receiver))}")
@@ -241,13 +248,14 @@ def test_emission_of_either_side(stage, new_object, new_material, looks_down):
 
 
 def test_base_colour_of_principled(stage, new_object, new_light):
-    # A coloured wall beside the receiver, lit from the front: what it reflects is a large part of
-    # the receiver's light. Without specular reflection: Raybundle's surfaces are diffuse.
+    # A coloured wall stands beside the receiver, lit from its front, and reflects a large part of
+    # the receiver's light. It has no specular reflection, because only the diffuse base colour is
+    # tested.
     material = bpy.data.materials.new("Principled")
     material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
     shader.inputs['Base Color'].default_value = (0.9, 0.3, 0.1, 1.0)
-    # The name of 4.0 and later, and the one before.
+    # Blender 4.0 renamed this socket.
     specular = shader.inputs.get('Specular IOR Level') or shader.inputs['Specular']
     specular.default_value = 0.0
     wall = new_object("Wall", [(-1.1, 1, 0), (-1.1, -1, 0), (-1.1, -1, 1.5), (-1.1, 1, 1.5)],
@@ -256,7 +264,7 @@ def test_base_colour_of_principled(stage, new_object, new_light):
     light = new_light("Light", 'AREA', 60.0, (0.6, 0.0, 1.0), shape='SQUARE', size=0.6)
     light.rotation_euler = (0.0, np.pi / 2, 0.0)
     bpy.context.view_layer.update()
-    # Reflected light has more noise than that of lamps.
+    # Reflected light has more noise in Cycles than the light of lamps.
     stage.compare(1024)
 
 
@@ -264,7 +272,7 @@ def test_base_colour_of_principled(stage, new_object, new_light):
 # Meshes that a modifier makes finer
 # --------------------------------------------------------------------------------------------------
 
-# RMS over the corners: the target of 2 % and the noise of 1024 samples, which leave 1.3 to 2.4 %.
+# Relative RMS over the corners. The target of 2 % and the noise of 1024 samples cause 1.3 to 2.4 %.
 SUBDIVIDED_TOLERANCE = 0.035
 
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each kind of light and option against Cycles of the running Blender: units, shapes, orientation,
-shadows and visibility.
+"""Each kind of light with its options, compared with Cycles of the running Blender.
 
-A floor of 4 m, nothing in the way of the light: what Cycles bakes (Diffuse without Color, see
-cycles_reference.py) is LIGHTING. 256 samples of Cycles have under 0.5 % noise in the mean of 441
-vertices, in which a wrong factor or orientation shows at once: 1 %. At single vertices both have
-noise (2 % here), and the least-squares values differ from point samples by the curvature of the
-light over a square of 20 cm: 5 % RMSE.
+The tests check units, shapes, orientation, shadows and visibility. A lamp shines on a floor of 4 m
+with nothing in between, and LIGHTING is compared with the bake type Diffuse without Color
+(cycles_reference.py). With 256 samples, the mean of Cycles over 441 vertices has less than 0.5 %
+noise. A wrong factor or orientation changes this mean by more than the tolerance, 1 %. Single
+vertices have noise from both programs (2 %), and least-squares values differ from point samples by
+the curvature of the light over a square of 20 cm. The tolerance of the RMSE is therefore 5 %.
 
-Spots: their edges are narrower than the squares of the floor. Blender 3.4 also dims them by the
-cosine to the axis, for which the export takes the mean. So 2 % and 10 %.
+Spots have tolerances of 2 % and 10 %. Their edges are narrower than the squares of the floor, and
+Blender 3.4 dims them by the cosine to the axis, which the export approximates by its mean.
 """
 
 import bpy
@@ -32,7 +32,8 @@ def floor(new_object, new_material):
     row = DIVISIONS + 1
     faces = [(i, i + 1, i + row + 1, i + row)
              for y in range(DIVISIONS) for i in range(y * row, y * row + DIVISIONS)]
-    # Cycles needs some reflectance to bake a diffuse surface; nothing here sees anything lit.
+    # Cycles bakes diffuse light only on surfaces with some reflectance. The floor reflects light to
+    # no other surface.
     return new_object("Floor", vertices, faces, new_material("White", (0.8, 0.8, 0.8)))
 
 
@@ -71,7 +72,7 @@ def test_light(floor, new_light, kind, energy, values, rotation, scale):
     compare(floor, *((0.02, 0.10) if kind == 'SPOT' else ()))
 
 # --------------------------------------------------------------------------------------------------
-# Shapes and options, at the same points as Cycles
+# Shapes and options, with point samples at the vertices, as Cycles has them
 # --------------------------------------------------------------------------------------------------
 
 
@@ -96,7 +97,7 @@ def test_option(floor, new_light, kind, energy, values, rotation, scale):
     assert_same_mean(raybundle_light([floor]), cycles_light([floor]))
 
 
-# Of 4.5 and later.
+# Options of Blender 4.5 and later.
 @pytest.mark.parametrize("name, value", [
     ('exposure', 1.5), ('normalize', False), ('use_temperature', True)])
 def test_newer_option(floor, new_light, name, value):
@@ -110,7 +111,8 @@ def test_newer_option(floor, new_light, name, value):
 @pytest.mark.parametrize("first_shot", ['GATHER', 'SHOOT'])
 def test_spread_shoots_what_it_gathers(floor, new_light, first_shot):
     new_light("Light", 'AREA', 50.0, (0.3, -0.2, 1.5), size=1.0, spread=1.0)
-    # POINT would gather at the vertices anyway. 2 % of noise at patches is little in the mean.
+    # With POINT, the vertices would gather direct light whatever the first shot is. The mean over
+    # the floor averages out most of the 2 % noise of the patches.
     actual = raybundle_light([floor], first_shot=first_shot, reconstruction='LEAST_SQUARES',
                              target_error=0.02)
     assert_same_mean(actual, cycles_light([floor]))
@@ -123,7 +125,7 @@ def test_spread_shoots_what_it_gathers(floor, new_light, first_shot):
 
 @pytest.fixture
 def room(floor, new_object, new_material):
-    """A floor, a wall beside it and a board above it, which touch nothing."""
+    """Returns a floor, a wall beside it and a board above it, none of which touch."""
     white = new_material("Bright", (0.8, 0.8, 0.8))
     wall = new_object("Wall", *square(2.4, 8), white, (-1.5, 0.0, 1.4))
     wall.rotation_euler = (0.0, np.pi / 2, 0.0)
@@ -179,7 +181,11 @@ def is_black_in_cycles(item):
 
 
 def compare_named(items, black, what):
-    """Cycles bakes one of the objects black; to the others it is an object like others."""
+    """Compares the light of `items`, of which Cycles bakes one, `black`, as black.
+
+    To the other objects, Cycles treats `black` as an ordinary object. Raybundle must name `black`
+    in a warning that contains `what`.
+    """
     report = raybundle.bake(bpy.context)
     assert any(f'"{black.name}"' in text and what in text for text in report.warnings)
     expected = cycles_light(items)
@@ -198,7 +204,7 @@ def test_holdout_is_named(room, new_light):
     lambda light: setattr(light, 'hide_render', True),
     lambda light: setattr(light.data.cycles, 'is_portal', True)])
 def test_light_that_gives_no_light(floor, new_light, change):
-    # Another light, since Cycles (4.2, 5.0) crashes on bakes without any.
+    # The second lamp is needed because Cycles (4.2, 5.0) crashes if it bakes without any light.
     new_light("Other", 'POINT', 10.0, (0.5, 0.0, 1.5), shadow_soft_size=0.1)
     change(new_light("Light", 'AREA', 10.0, (0.0, 0.0, 1.5)))
     bpy.context.view_layer.update()
@@ -247,11 +253,12 @@ def test_emission_of_a_mesh_has_two_sides(floor, new_object, new_material, flipp
     compare(floor)
 
 
-# The small one is gathered as a lamp, the light of the large one travels with the reflected.
+# The small lamp is gathered like a light source. The light of the large one is left to the bundles,
+# as reflected light is.
 @pytest.mark.parametrize("size", [0.8, 2.2])
 @pytest.mark.parametrize("flipped", [False, True])
 def test_emission_of_one_side(floor, new_object, new_material, flipped, size):
-    # Mixed by Backfacing: the front emits, the back is black.
+    # A Mix shader with Backfacing as its factor: the front emits, and the back is black.
     material = new_material("Lamp", (0, 0, 0), (4.0, 2.0, 1.0))
     nodes, links = material.node_tree.nodes, material.node_tree.links
     output = next(node for node in nodes if node.type == 'OUTPUT_MATERIAL')
@@ -270,15 +277,16 @@ def test_emission_of_one_side(floor, new_object, new_material, flipped, size):
     ceiling = new_object("Ceiling", *square(SIZE, DIVISIONS), floor.data.materials[0],
                          (0.0, 0.0, 2.6))
     ceiling.data.flip_normals()
-    # One of them gets the lamp's light, the other what that one reflects past the lamp.
-    # Dark beside the other, that one needs more samples than most: the mean of two seeds has 0.10 %
-    # (standard deviation) under the small lamp; the large one needs still more for it.
+    # One of the floor and the ceiling gets the light of the lamp. The other one, which is dark,
+    # only gets light that is reflected past the lamp, and needs more samples than in other tests.
+    # With 900 samples under the small lamp, the mean of two seeds has a standard deviation of
+    # 0.10 %. Under the large lamp, 3600 samples are needed.
     lit, dark = (ceiling, floor) if flipped else (floor, ceiling)
     expected = {**cycles_light([lit]), **cycles_light([dark], samples=900 if size < 1 else 3600)}
     means = {name: light.mean() for name, light in expected.items()}
     assert (means["Floor"] > 3 * means["Ceiling"]) != flipped
     assert (means["Ceiling"] > 3 * means["Floor"]) == flipped
-    # Raybundle's noise in the mean of the dark one is 0.04 % then.
+    # The noise of Raybundle in the mean of the dark object is 0.04 %.
     assert_same_mean(raybundle_light([floor, ceiling]), expected)
 
 

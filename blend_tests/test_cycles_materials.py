@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each kind of material against Cycles of the running Blender.
+"""Each kind of material, compared with Cycles of the running Blender.
 
-A canopy of the material hangs over a floor. A lamp on the floor shines up, so that all light of the
-floor comes from the canopy; surfaces that let light through hang over the floor under a lamp.
-Compared is what the floor gets (LIGHTING against Diffuse without Color), as the mean over it and
-over each of its quarters, and for one colour what the canopy sends (COMBINED).
+A canopy of the material hangs over a floor, and a lamp on the floor shines up, so that all light of
+the floor comes from the canopy. Surfaces that transmit light hang between the floor and a lamp. The
+tests compare the light of the floor (LIGHTING with Diffuse without Color), as the mean over the
+floor and over each of its quarters. For materials of one colour they also compare the light that
+the canopy sends (COMBINED).
 
-Cycles' noise in the means, from two seeds, is asserted to be below 0.3 %. Raybundle's means differ
-by 1 % at most; in a quarter, where the noise is larger and light that varies over a patch counts
-with its mean, by 2 %. Materials that are not Lambert's (DIRECTED) send light to some sides more
-than to others. They are also tested in rooms, by the mean over their surfaces, and under a sun.
+The noise of the means of Cycles, from two seeds, is asserted to be below 0.3 %. Means over the
+floor differ by at most 1 %. Means over a quarter differ by at most 2 %, because their noise is
+larger, and light that varies over a patch counts with its mean. Materials that are not Lambert's
+(DIRECTED) send more light in some directions than in others. They are also tested in rooms, by the
+mean over the surfaces, and under a sun.
 """
 
 from pathlib import Path
@@ -30,15 +32,16 @@ SAMPLES = 512
 NOISE = 0.003
 MEAN_TOLERANCE, QUARTER_TOLERANCE = 0.01, 0.02
 SUN_TOLERANCE = 0.003
-CELLS = 16  # of the floor, along an edge
+CELLS = 16  # number of cells of the floor along an edge
 TARGET_ERROR = 0.005
-PATCH_SIZE = 0.1  # half as fine as it would be, and enough for what hangs 0.6 m away or higher
-# In rooms, whose surfaces see all others, less changes the means by 0.2 %.
+# Patch size in m, twice the automatic one. It suffices for objects at a height of 0.6 m or more.
+PATCH_SIZE = 0.1
+# In rooms, each surface gets light from all others, and a lower target changes the means by 0.2 %.
 ROOM_TARGET_ERROR = 0.01
 
 
 class Tree:
-    """The node tree of a new material, with nodes by kind and inputs by name."""
+    """The node tree of a new material. Methods refer to nodes by kind and to inputs by name."""
 
     def __init__(self) -> None:
         self.material = bpy.data.materials.new("Material")
@@ -48,7 +51,11 @@ class Tree:
         self.output = self.add('OutputMaterial')
 
     def add(self, kind, properties=None, **inputs):
-        """inputs: values, or outputs to link; _ stands for a space, a digit for a position."""
+        """Returns a new node of the type 'ShaderNode' + kind.
+
+        properties: attributes of the node. inputs: values of its inputs, or nodes or sockets to
+        link. In the name of an input, _ stands for a space; _0, _1, ... are positions.
+        """
         node = self.nodes.new('ShaderNode' + kind)
         for name, value in (properties or {}).items():
             setattr(node, name, value)
@@ -71,11 +78,11 @@ class Tree:
         return self.material
 
     def principled(self, **inputs):
-        """Without specular reflection."""
+        """Returns a Principled shader without specular reflection."""
         node = self.add('BsdfPrincipled', Roughness=0.5)
         specular_socket(node).default_value = 0.0
         for name, value in inputs.items():
-            # Sockets were renamed in 4.0.
+            # Blender 4.0 renamed sockets.
             if name == 'Diffuse_Roughness' and bpy.app.version < (4, 3, 0):
                 pytest.skip("Principled has no rough diffuse part yet")
             new = {'Emission': 'Emission_Color', 'Transmission': 'Transmission_Weight',
@@ -86,7 +93,7 @@ class Tree:
         return node
 
     def image(self, colors, coordinates=None):
-        """colors: (height, width, 4), linear."""
+        """Returns an image texture. colors: (height, width, 4) RGBA, linear."""
         height, width, _ = colors.shape
         image = bpy.data.images.new("Image", width, height, alpha=True, float_buffer=True,
                                     is_data=True)
@@ -129,7 +136,8 @@ def transmission(tree):
 
 
 def emission(tree):
-    # The roughness before 4.0 whose mean over all angles is the base colour.
+    # At this roughness, the mean over all angles of the reflectance of Principled before 4.0 is the
+    # base colour.
     return tree.principled(Base_Color=RED, Emission=BLUE, Emission_Strength=0.2, Roughness=0.43)
 
 
@@ -213,7 +221,7 @@ def rough_base(tree):
 
 
 def paint(tree):
-    """As the shader is made."""
+    """A Principled shader with its default specular reflection."""
     return tree.add('BsdfPrincipled', Base_Color=RED, Roughness=0.5)
 
 
@@ -223,7 +231,7 @@ def glossy_mix(tree):
 
 
 def glossy(tree):
-    """Of a roughness that is no round number."""
+    """A Glossy shader with a roughness that is no round number."""
     return tree.add('BsdfGlossy', Color=RED, Roughness=0.63)
 
 
@@ -236,14 +244,17 @@ def rough_metal(tree):
 
 
 def of_facets(shader):
-    """Several of which light may meet, from where on that is not a matter of noise."""
+    """Returns the shader, from Blender 4.0 on with light that several facets reflect in turn.
+
+    Before 4.0, Cycles samples these reflections with much noise.
+    """
     if bpy.app.version >= (4, 0, 0):
         shader.distribution = 'MULTI_GGX'
     return shader
 
 
 def dark_metal(tree):
-    """One facet alone, so that more of the light is that of the edge."""
+    """A metal with single reflections, so that the colour of its edges has more influence."""
     shader = tree.principled(Base_Color=(0.3, 0.2, 0.1, 1.0), Metallic=1.0, Roughness=0.7)
     shader.distribution = 'GGX'
     return shader
@@ -282,7 +293,7 @@ def tinted_sheen(tree):
 
 
 def checkered_sheen(tree):
-    """Which no node reader can tell."""
+    """A sheen on a colour that cannot be read from nodes, but only baked by Cycles."""
     where = tree.add('TexCoord').outputs['Object']
     return tree.principled(Sheen=1.0, Base_Color=tree.add(
         'TexChecker', Vector=where, Color1=RED, Color2=BLUE, Scale=5.0).outputs['Color'])
@@ -292,7 +303,7 @@ def coated(tree):
     shader = tree.principled(Base_Color=RED, Clearcoat=1.0)
     if 'Coat Tint' in shader.inputs:
         tree.set(shader, 'Coat_Tint', (0.9, 0.7, 0.4, 1.0))
-    # Smoother, Cycles' light on other surfaces is noisy.
+    # With less roughness, the light of Cycles on other surfaces would be noisy.
     rough = 'Coat Roughness' if 'Coat Roughness' in shader.inputs else 'Clearcoat Roughness'
     shader.inputs[rough].default_value = 0.5
     return shader
@@ -310,7 +321,7 @@ def velvet(tree):
 UNIFORM = (diffuse, principled, transmission, emission, alpha, mix, add)
 DIRECTED = (rough_diffuse, half_rough_diffuse, rough_base, smooth_principled, rough_principled,
             paint, tinted_specular, glossy_mix, coated, sheen, tinted_sheen, velvet)
-# Which Cycles' diffuse pass does not show.
+# Materials that the diffuse pass of Cycles does not show.
 METAL = (glossy, metal, rough_metal, dark_metal, tinted_metal, metallic)
 CLOTH = (sheen, tinted_sheen, checkered_sheen, velvet)
 VARYING = (image, color_attribute, noise_by_generated, checker_by_object, ramp_on_image,
@@ -323,7 +334,7 @@ def floor(new_object, new_material):
 
 
 def quarters(item, corners):
-    """(2, 2, 3) of values per corner of the floor."""
+    """Returns (2, 2, 3) means over quarters. corners: values per corner of the floor."""
     half = CELLS // 2
     return face_means(item, corners).reshape(2, half, 2, half, 3).mean(axis=(1, 3))
 
@@ -336,7 +347,8 @@ def compare(floor, filter_glossy=0.0, patch_size=PATCH_SIZE):
     mean = truth.mean(axis=(0, 1))
     noise = np.abs(runs[0].mean(axis=(0, 1)) - runs[1].mean(axis=(0, 1))).max() / 2 / mean.max()
     assert noise < NOISE
-    # Of the floor alone: the canopy, which the lamp lights without noise, would hide its noise.
+    # Bakes only the floor. The canopy, which the lamp lights without noise, would lower the noise
+    # of all objects together, on which the bake stops, and hide the noise of the floor.
     for item in bpy.context.view_layer.objects:
         item.raybundle.role = 'BAKE' if item == floor else 'OCCLUDE'
     report = raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=8192,
@@ -344,10 +356,11 @@ def compare(floor, filter_glossy=0.0, patch_size=PATCH_SIZE):
     light = quarters(floor, read_colors(floor))
     difference = light.mean(axis=(0, 1)) / mean - 1
     worst = np.abs(light - truth).max() / mean.max()
-    # Shown by pytest -s.
+    # `pytest -s` shows this.
     print(f"Cycles' noise {100 * noise:.2f} %; mean {np.round(100 * difference, 2)} %, "
           f"worst quarter {100 * worst:.2f} %; {report.warnings}")
-    # Channels that are nearly black are compared with the brightest.
+    # The tolerance is relative to the brightest channel, because other channels may be almost
+    # black.
     assert np.abs(light.mean(axis=(0, 1)) - mean).max() < MEAN_TOLERANCE * mean.max()
     assert worst < QUARTER_TOLERANCE
     return report
@@ -372,7 +385,7 @@ def compare_sent(canopy):
 
 
 def compare_lighting(item):
-    """Without colour, as the mean over the corners that are not near the edge."""
+    """Compares the light without colour, as the mean over the corners away from the edge."""
     inside = np.abs(corner_positions(item)).max(axis=1) < 0.9
     truth = bake_objects([item], SAMPLES, 0)[item.name][inside].mean(axis=0)
     raybundle.bake(bpy.context, target_error=TARGET_ERROR, max_bundles=1024)
@@ -387,7 +400,7 @@ def corner_positions(item):
 
 def place_canopy(new_object, build):
     tree = Tree()
-    # Its corners run from -1 to 1, as do its UVs from 0 to 1.
+    # Positions of corners run from -1 to 1, and UVs from 0 to 1.
     canopy = new_object("Canopy", *square(2.0, 20), tree.finish(build(tree)), (0.0, 0.0, 1.0))
     canopy.rotation_euler, canopy.scale = (np.pi, 0.0, 0.0), (1.5, 1.5, 1.0)
     positions = corner_positions(canopy)
@@ -402,7 +415,7 @@ def place_canopy(new_object, build):
 
 
 def place_lamp_below(new_light):
-    """On the floor, and shines up."""
+    """Adds an area light on the floor that shines up."""
     lamp = new_light("Lamp", 'AREA', 30.0, (0.2, 0.1, 0.02), shape='SQUARE', size=1.5)
     lamp.rotation_euler = (np.pi, 0.0, 0.0)
     bpy.context.view_layer.update()
@@ -413,9 +426,10 @@ def place_lamp_below(new_light):
 def test_canopy(floor, new_object, new_light, build):
     canopy = place_canopy(new_object, build)
     if build not in (image_emission, procedural_emission):
-        # The floor sees it from behind.
+        # The lamp faces up, so that the floor gets none of its light directly.
         place_lamp_below(new_light)
-    # The light of metals varies most: in a quarter 2.4 % off with those patches, 1.9 with finer.
+    # The light of metals varies most. In a quarter it is off by 2.4 % with patches of PATCH_SIZE,
+    # and by 1.9 % with automatic ones.
     compare(floor, patch_size=0.0 if build in METAL else PATCH_SIZE)
     if build in UNIFORM + DIRECTED:
         compare_sent(canopy)
@@ -423,8 +437,10 @@ def test_canopy(floor, new_object, new_light, build):
 
 @pytest.mark.parametrize("roughness", [0.1, 0.5])
 def test_filter_glossy(floor, new_object, new_light, roughness):
-    """As new scenes have it: smooth gloss too is as rough as about 0.67. Otherwise the light would
-    be up to 2 % more."""
+    """Filter Glossy at the default of new scenes, 1.0: smooth gloss gets a roughness of about 0.67.
+
+    Without it there would be up to 2 % more light.
+    """
     place_canopy(new_object, lambda tree: tree.add('BsdfPrincipled', Base_Color=RED,
                                                    Roughness=roughness))
     place_lamp_below(new_light)
@@ -436,7 +452,7 @@ def test_filter_glossy(floor, new_object, new_light, roughness):
                                   'BY_CYCLES'])
 @pytest.mark.parametrize("roughness", [0.0, 0.5, 1.0])
 def test_sun(floor, new_light, kind, roughness, angle):
-    """What is seen of light from one direction, which has no noise."""
+    """The light that a floor reflects upwards from a sun at one angle, which has no noise."""
     tree = Tree()
     floor.data.materials.clear()
     if kind == 'DIFFUSE':
@@ -446,7 +462,7 @@ def test_sun(floor, new_light, kind, roughness, angle):
     elif kind == 'DIFFUSE_ROUGHNESS':
         shader = tree.principled(Base_Color=RED, Diffuse_Roughness=roughness)
     elif kind == 'BY_CYCLES':
-        # Which no node reader can tell, and is one colour all the same.
+        # The colour cannot be read from nodes, although it is uniform.
         where = tree.add('TexCoord').outputs['Object']
         color = tree.add('TexChecker', Vector=where, Color1=RED, Color2=RED).outputs['Color']
         shader = tree.add('BsdfDiffuse', Color=color, Roughness=roughness)
@@ -472,7 +488,7 @@ def test_sun(floor, new_light, kind, roughness, angle):
 @pytest.mark.parametrize("weight, roughness, metallic", [
     (1.0, 0.03, 0.0), (0.5, 0.5, 0.0), (1.0, 0.03, 0.5)])
 def test_coat(floor, new_light, weight, roughness, metallic):
-    """What it leaves of the diffuse colour, seen from straight above."""
+    """The share of the diffuse colour that a coat lets through, in a view from straight above."""
     tree = Tree()
     floor.data.materials.clear()
     floor.data.materials.append(tree.finish(tree.add(
@@ -488,10 +504,10 @@ def test_coat(floor, new_light, weight, roughness, metallic):
 
 
 @pytest.mark.parametrize("roughness, specular, metallic", [
-    # Diffuse.
+    # Diffuse surfaces.
     (0.5, None, None), (1.0, None, None),
     (0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (1.0, 0.0, 0.0),
-    # As the shader is made.
+    # Principled with default settings.
     (0.5, 0.5, 0.0),
     (0.2, 0.5, 0.0), (0.5, 0.5, 0.5)])
 def test_room(new_object, new_light, roughness, specular, metallic):
@@ -507,8 +523,11 @@ def test_room(new_object, new_light, roughness, specular, metallic):
 
 @pytest.mark.parametrize("caustics", [True, False])
 def test_room_of_one_facet(new_object, new_light, caustics):
-    """Without light that meets several, a rough layer takes more from what lies beneath than it
-    mirrors; without caustics there is no layer to diffuse light at all."""
+    """A Principled layer with single reflections (GGX) in a room.
+
+    A rough layer blocks more light from the diffuse part beneath than it reflects itself. Without
+    reflective caustics, diffuse light meets no layer at all.
+    """
     tree = Tree()
     shader = tree.add('BsdfPrincipled', Base_Color=(0.6, 0.5, 0.3, 1.0), Roughness=0.8)
     shader.distribution = 'GGX'
@@ -517,7 +536,8 @@ def test_room_of_one_facet(new_object, new_light, caustics):
 
 
 def compare_walls(walls):
-    # Half the difference of two seeds is 0.08 % then, root mean square over the rooms, 0.13 % at most.
+    # With so few samples, half the difference of two seeds is 0.08 %, as a root mean square over
+    # the rooms, and 0.13 % at most.
     references = [SurfaceReference(walls, SAMPLES // 8, seed) for seed in (0, 1)]
     raybundle.bake(bpy.context, target_error=ROOM_TARGET_ERROR, max_bundles=1024)
     found, truth = surface_means(references, {wall.name: read_colors(wall) for wall in walls})
@@ -529,7 +549,7 @@ def make_room(new_object, new_light, material):
     for k in range(6):
         wall = new_object(f"Wall {k}", *square(2.0, 8), material)
         wall.rotation_euler = (np.pi * k / 2, 0.0, 0.0) if k < 4 else (0.0, np.pi * (k - 4.5), 0.0)
-        # Its front looks at the middle.
+        # Turns the front to the centre of the room.
         wall.location = -wall.rotation_euler.to_matrix().col[2]
         walls.append(wall)
     new_light("Lamp", 'POINT', 30.0, (0.3, 0.2, 0.1), shadow_soft_size=0.1)
@@ -539,8 +559,11 @@ def make_room(new_object, new_light, material):
 
 @pytest.mark.parametrize("build", CLOTH + (coated,), ids=lambda build: build.__name__)
 def test_clothed_room(new_object, new_light, build):
-    """By the light of its floor, which is Diffuse: before 4.0 Cycles divides the light on sheen by
-    a colour that is not its own."""
+    """Cloth on the walls of a room, measured by the light of a diffuse floor.
+
+    The light on the cloth cannot be compared: before 4.0, Cycles divides the light on sheen by a
+    colour that is not that of the sheen.
+    """
     if build is coated and bpy.app.version < (4, 0, 0):
         pytest.skip("Cycles' rays do not meet clearcoat with its own density")
     tree = Tree()
@@ -555,8 +578,11 @@ def test_clothed_room(new_object, new_light, build):
 
 @pytest.mark.parametrize("metallic", [0.0, 0.5])
 def test_yard(new_object, new_world, metallic):
-    """An even sky, which painted walls mirror: as if they were Lambert's, 2.5 % would be missing on
-    the ground, and 9 % with half metal."""
+    """Painted walls in a yard, which reflect a uniform sky.
+
+    If the walls were Lambert's surfaces, the ground would have 2.5 % less light, and 9 % less with
+    a metallic of 0.5.
+    """
     tree = Tree()
     paint_of_walls = tree.finish(tree.add('BsdfPrincipled', Base_Color=RED, Roughness=0.5,
                                           Metallic=metallic))
@@ -578,20 +604,25 @@ def test_yard(new_object, new_world, metallic):
 
 
 def surface_means(references, light):
-    """Of what is shown and of Cycles' light, whose noise is asserted."""
+    """Returns the RGB means of the shown light and of Cycles. Asserts the noise of Cycles.
+
+    references: two SurfaceReference with different seeds. light: (corners, 3) by object name.
+    """
     (found, truth), (_, again) = (reference.means(light) for reference in references)
     noise = np.abs(truth - again).max() / 2 / truth.max()
     assert noise < NOISE
     truth = (truth + again) / 2
-    # Shown by pytest -s.
+    # `pytest -s` shows this.
     print(f"{', '.join(light)}: Cycles' noise {100 * noise:.2f} %; "
           f"{np.round(100 * (found / truth - 1), 2)} %")
     return found, truth
 
 
 def test_painted_cornell_box():
-    """All its surfaces of Principled as it is made: without what they mirror it would be 8 to 13 %
-    darker."""
+    """The Cornell box with Principled shaders at their defaults on all surfaces.
+
+    Without specular reflection it would be 8 to 13 % darker.
+    """
     bpy.ops.wm.open_mainfile(filepath=str(SCENES / "cornell_box.blend"))
     for material in bpy.data.materials:
         tree = material.node_tree
@@ -610,7 +641,7 @@ def test_painted_cornell_box():
 
 
 # --------------------------------------------------------------------------------------------------
-# Light through a surface
+# Transmission
 # --------------------------------------------------------------------------------------------------
 
 

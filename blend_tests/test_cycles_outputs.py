@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each output against its counterpart in Cycles, and how it is written.
+"""Each output, compared with its counterpart in Cycles, and the ways to write it.
 
-| output | Cycles' bake |
+| output | bake of Cycles |
 |---|---|
-| LIGHTING | Diffuse, Direct and Indirect, without Color |
-| DIRECT | Diffuse, Direct |
-| INDIRECT | the difference: alone, Indirect leaves out what lights give after a reflection |
+| LIGHTING | Diffuse with Direct and Indirect, without Color |
+| DIRECT | Diffuse with Direct, without Color |
+| INDIRECT | LIGHTING less DIRECT: Indirect alone omits the light of lamps after a reflection |
 | COMBINED | Combined: emission, and diffuse light with colour |
 """
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.needs_library
 
 @pytest.fixture
 def room(new_object, new_material, new_light):
-    """Coloured, with a lamp and a glowing board."""
+    """Returns coloured objects: a floor, a wall and a board that emits. Adds a lamp."""
     floor = new_object("Floor", *square(3.0, 12), new_material("Green", (0.3, 0.8, 0.4)))
     wall = new_object("Wall", *square(2.4, 8), new_material("Red", (0.8, 0.2, 0.1)),
                       (-1.6, 0.0, 1.4))
@@ -50,7 +50,8 @@ def counterpart(output, items):
 @pytest.mark.parametrize("output", ['LIGHTING', 'DIRECT', 'INDIRECT', 'COMBINED'])
 def test_output(room, output):
     expected = counterpart(output, room)
-    # Of all light: a difference of two noisy bakes has more noise than its size allows.
+    # INDIRECT is a difference of two noisy bakes, with more noise than 1 % of its own size. Its
+    # tolerance is relative to all light.
     scale = counterpart('LIGHTING', room) if output == 'INDIRECT' else None
     assert_same_mean(raybundle_light(room, output), expected, scale=scale)
 
@@ -63,7 +64,7 @@ def test_parts_sum_up_to_the_whole(room):
 
 
 # --------------------------------------------------------------------------------------------------
-# Writing
+# Ways to write the light
 # --------------------------------------------------------------------------------------------------
 
 
@@ -74,7 +75,8 @@ def read(item):
     return values.reshape(-1, 4)
 
 
-# Bakes again with other ways to write; coarse noise does, since the same seed has the same.
+# For bakes that differ only in the way they are written. Coarse noise suffices, because equal seeds
+# give equal noise.
 bake_quickly = functools.partial(raybundle.bake, target_error=0.05)
 
 
@@ -85,7 +87,8 @@ def test_bytes_hold_what_floats_hold(room, domain):
     assert len(floats) == (576 if domain == 'CORNER' else 169)
     bake_quickly(bpy.context, domain=domain, exposure=-3.0, data_type='BYTE_COLOR')
     assert 0.0 < floats[:, :3].max() < 1.0
-    # Half a step of 1/255, and the curve of sRGB is nowhere steeper than 2.3 in linear.
+    # Rounding to 8 bits of sRGB is off by at most half a step of 1/255, times the largest slope of
+    # the curve from sRGB to linear values, 2.3.
     assert np.abs(read(room[0]) - floats).max() <= 0.5 / 255 * 2.3
 
 
@@ -123,7 +126,7 @@ def test_bytes_that_clip_are_named(room):
     texts = clipping(bake_quickly(bpy.context, data_type='BYTE_COLOR'))
     assert any(f'"Board": {100.0 * share:.3g} %' in text for text in texts)
     assert not clipping(bake_quickly(bpy.context, data_type='BYTE_COLOR', exposure=-6.0))
-    # Whoever clamps wants it so.
+    # With `clamp`, the user has asked for this, so that no warning is needed.
     assert not clipping(bake_quickly(bpy.context, data_type='BYTE_COLOR', clamp=True))
 
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Worlds of every kind against Cycles of the running Blender.
+"""Worlds of every kind, compared with Cycles of the running Blender.
 
-A box stands on a floor under the open sky; what Cycles bakes (Diffuse without Color, see
-cycles_reference.py) is LIGHTING. Compared are means over the quarters of the floor and the faces of
-the box, so that a wrong direction shows, at corners off the contact edge: at most 1 % of the mean
-over all of them. Raybundle takes the light at the same points (POINT). Both have noise of less than
-0.3 % in such a mean: of Cycles, 1024 samples at 36 vertices or more, of which each has about 1 %.
+A box stands on a floor under the open sky. LIGHTING is compared with the bake type Diffuse without
+Color (cycles_reference.py). The tests compare means over the quarters of the floor and the faces of
+the box, so that a wrong direction shows, at corners off the contact edge. The tolerance is 1 % of
+the mean over all of them. Raybundle computes the light at the vertices too (POINT). The noise of
+both is below 0.3 % in each mean: Cycles has 1024 samples at 36 vertices or more, each with about
+1 % noise.
 """
 
 import math
@@ -21,7 +22,7 @@ needs_library = pytest.mark.needs_library
 
 SAMPLES = 1024
 SIZE, DIVISIONS = 4.0, 12
-BOX = 0.5  # half the edge
+BOX = 0.5  # half the length of an edge, m
 
 
 def grid(origin, a, b, count):
@@ -36,7 +37,7 @@ def grid(origin, a, b, count):
 
 @pytest.fixture
 def court(new_object, new_material):
-    """Objects of the scene, each with groups of corners to compare the means of."""
+    """Returns the objects of the scene: the floor and the faces of the box."""
     half = SIZE / 2.0
     grey = new_material("Grey", (0.5, 0.5, 0.5))
     made = [new_object("Floor", *grid((-half, -half, 0), (SIZE, 0, 0), (0, SIZE, 0), DIVISIONS),
@@ -52,7 +53,7 @@ def court(new_object, new_material):
 
 
 def groups(item):
-    """Name -> mask of corners, off the contact of box and floor."""
+    """Returns masks of corners off the contact of box and floor, by the name of the group."""
     indices = np.empty(len(item.data.loops), np.int32)
     item.data.loops.foreach_get('vertex_index', indices)
     positions = np.empty(3 * len(item.data.vertices), np.float32)
@@ -94,13 +95,14 @@ def compare(court):
 
 
 class Tree:
-    """The node tree of a new world of the scene."""
+    """The node tree of a new world, which becomes that of the scene."""
 
     def __init__(self):
         self.world = bpy.data.worlds.new("World")
         self.world.use_nodes = True
         bpy.context.scene.world = self.world
-        # Building Cycles' own map of where a world is bright takes far longer than the bake.
+        # By default Cycles builds a map of the bright parts of a world, which takes far longer than
+        # the bake.
         self.world.cycles.sampling_method = 'MANUAL'
         self.world.cycles.sample_map_resolution = 512
         self.tree = self.world.node_tree
@@ -115,7 +117,7 @@ class Tree:
 
 
 def hdri():
-    """A gradient with a spot of 3 pixels that gives half of the light."""
+    """Returns an environment image: a gradient, and a spot of 3 pixels with half of the light."""
     height, width = 64, 128
     values = np.ones((height, width, 4), np.float32)
     rise = np.linspace(0.1, 1.0, height)[:, None]
@@ -150,7 +152,7 @@ def test_environment_image(court, rotation):
 @needs_library
 def test_gradient_that_the_camera_does_not_see(court):
     tree = Tree()
-    # White for the camera, else a ramp over the elevation with noise in it.
+    # The world is white for camera rays. For other rays it is a colour ramp over the elevation.
     mix = tree.add('ShaderNodeMixRGB', Color2=(9.0, 9.0, 9.0, 1.0))
     path = tree.tree.nodes.new('ShaderNodeLightPath')
     tree.tree.links.new(path.outputs['Is Camera Ray'], mix.inputs['Fac'])
@@ -166,7 +168,7 @@ def test_gradient_that_the_camera_does_not_see(court):
 
 def new_sky(tree, elevation, **values):
     sky = tree.add('ShaderNodeTexSky')
-    # 5.0 has two kinds in place of this one.
+    # Blender 5.0 replaced this type of sky by two others.
     kinds = [item.identifier for item in sky.bl_rna.properties['sky_type'].enum_items]
     sky.sky_type = 'NISHITA' if 'NISHITA' in kinds else 'MULTIPLE_SCATTERING'
     sky.sun_elevation, sky.sun_rotation = elevation, 2.2
@@ -188,12 +190,12 @@ def test_world_that_diffuse_surfaces_do_not_see(court, new_light):
     tree = Tree()
     tree.world.cycles_visibility.diffuse = False
     new_light("Sun", 'SUN', 1.0).rotation_euler = (0.5, 0.3, 0.0)
-    # The floor alone: the walls have little but what it reflects.
+    # Compares only the floor. The walls get little other light than it reflects.
     compare(court[:1])
 
 
 # --------------------------------------------------------------------------------------------------
-# The evaluation itself
+# The evaluation of a world
 # --------------------------------------------------------------------------------------------------
 
 
@@ -203,7 +205,7 @@ def exported():
 
 
 def mean_radiance(scene):
-    """(3,) over all directions, the image's part included."""
+    """Returns (3,) the mean radiance over all directions, including that of the image."""
     image = scene.world_image
     angles = world_panorama.solid_angles(*image.shape[:2])
     return scene.world + (image * angles[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi)
@@ -219,7 +221,7 @@ def test_an_image_keeps_its_mean_and_place():
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(64, 128, 4)[:, :, :3]
     expected = (pixels * world_panorama.solid_angles(64, 128)[..., None]).sum(axis=(0, 1))
-    # Cycles interpolates between the pixels, whose solid angles differ a little.
+    # Cycles interpolates between pixels, whose solid angles differ slightly.
     assert mean_radiance(result.scene) == pytest.approx(expected / (4.0 * np.pi), rel=2e-3)
     row, column = np.unravel_index(result.scene.world_image.sum(axis=2).argmax(),
                                    result.scene.world_image.shape[:2])
@@ -243,8 +245,8 @@ def test_the_sun_of_a_sky_is_a_light(elevation):
     sun, = scene.lights
     assert math.asin(sun.direction[2]) == pytest.approx(elevation, abs=5e-4)
     assert sun.angle == pytest.approx(math.radians(0.545), rel=1e-3)
-    # What is left is smooth; the sky of 5.0 glows more about a low sun. The disc would be 1e5 times
-    # as bright as the mean.
+    # The remaining sky is smooth, but that of 5.0 is brighter around a low sun. A disc would be 1e5
+    # times as bright as the mean.
     brightest = 100.0 if bpy.app.version < (5, 0, 0) else 200.0
     assert scene.world_image.max() < brightest * mean_radiance(scene).max()
 
@@ -266,7 +268,8 @@ def test_bright_parts_of_a_sky_are_rendered_together(monkeypatch):
     assert 1 <= len(fine) <= 3
     monkeypatch.setattr(world_panorama, '_joined', lambda parts: parts)
     tiles = world_panorama.evaluate(bpy.context.scene.world, 1).pixels
-    # What lies between the tiles is rendered finer now: its own noise and no more.
+    # Joining renders the parts between the tiles with finer pixels as well. The result may differ
+    # only by their noise.
     assert np.allclose(together, tiles, rtol=0.05)
     angles = world_panorama.solid_angles(*tiles.shape[:2])[..., None]
     assert (together * angles).sum() == pytest.approx((tiles * angles).sum(), rel=1e-3)
@@ -294,7 +297,7 @@ def test_nothing_is_left_behind_and_the_evaluation_is_kept(monkeypatch):
     monkeypatch.setattr(world_panorama, 'evaluate', refuse)
     tree.background.location.x += 10.0
     assert exported().scene.world_image is first
-    # A change shows, and what cannot be evaluated is said.
+    # A change causes a new evaluation. A world that cannot be evaluated causes a warning.
     sky.air_density = 2.0
     result = exported()
     assert result.scene.world_image is None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What goes wrong outside of the add-on, and scenes as no one should make them: nothing is lost."""
+"""Faults outside of the add-on, and badly made scenes: no data of the user is lost."""
 
 import resource
 import signal
@@ -26,7 +26,7 @@ def bake(**overrides):
 
 
 def is_furnace(values):
-    # Exact but for the solver's tolerance and single precision.
+    # The tolerance is that of the solver and of single precision.
     return np.abs(values / FURNACE_LIGHT - 1.0).max() < 1e-3
 
 
@@ -56,7 +56,7 @@ def test_lights_beyond_the_range_of_numbers_are_refused(closed_box, kind, proper
 
 @pytest.mark.parametrize("name", ["exposure", "target_error", "patch_size"])
 def test_a_setting_that_is_no_number_is_refused(closed_box, name):
-    # The limits of a property let it pass.
+    # The limits of a property do not exclude NaN.
     setattr(bpy.context.scene.raybundle, name, float("nan"))
     if not np.isfinite(getattr(bpy.context.scene.raybundle, name)):
         with pytest.raises(raybundle.BakeError, match=name):
@@ -139,7 +139,7 @@ def test_an_object_without_volume_spoils_nothing(closed_box, new_object, scale):
 
 
 def test_instances_of_instances_of_instances(closed_box, new_object):
-    """A collection of a cube, instanced three times in a collection, and so on: 27 cubes."""
+    """Three levels of collections, each with three instances of the collection below: 27 cubes."""
     inner = bpy.data.collections.new("Level 0")
     cube = new_object("Cube", 0.02 * np.array(CUBE_VERTICES), CUBE_FACES,
                       closed_box.data.materials[0])
@@ -172,7 +172,7 @@ def test_memory_stays_the_same(closed_box):
     before = resident_bytes()
     for seed in range(32):
         bake(seed=seed)
-    # A leak of one bake's lines alone, about 1 MB, would show.
+    # A leak of the lines of each bake alone, about 1 MB, would exceed this.
     assert resident_bytes() < before + 8e6
 
 
@@ -239,7 +239,7 @@ def clear_bake(item):
 @pytest.mark.parametrize("change", [open_another_file, undo, remove_object, remove_mesh, add_faces,
                                     enter_edit_mode, clear_bake])
 def test_a_change_of_the_file_during_a_bake(closed_box, new_object, stage, change):
-    # The other one would be written first.
+    # This object, which is not changed, would be written first.
     other = new_object("A", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES],
                        closed_box.data.materials[0])
     other.location.x = 5.0
@@ -298,7 +298,10 @@ def saved_box(closed_box, tmp_path):
 
 
 def limit_files(size):
-    """As a full disk does, writing fails; instead of the signal, an error."""
+    """Returns a function that limits the size of files that its process can write. size: bytes.
+
+    SIGXFSZ is ignored, so that writing more fails with an error, as on a full disk.
+    """
     def limit():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))

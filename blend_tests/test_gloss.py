@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The albedo of gloss: closed forms, then Cycles of the running Blender."""
+"""The albedo of gloss, compared with closed forms and with Cycles of the running Blender."""
 
 import math
 
@@ -14,7 +14,10 @@ from raybundle.materials.principled import PrincipledSockets, principled_albedo
 
 
 def fresnel_mean(n):
-    """Of a dielectric, over all directions: Fresnel's formulas at 20000 midpoints."""
+    """Returns the mean reflectance of a dielectric over all directions, weighted by the cosine.
+
+    Evaluates Fresnel's formulas at 20000 midpoints. n: index of refraction.
+    """
     cosine = np.sqrt((np.arange(20000) + 0.5) / 20000)
     g = np.sqrt(n**2 - 1.0 + cosine**2)
     a, b = (cosine - g) / (cosine + g), (n**2 * cosine - g) / (n**2 * cosine + g)
@@ -25,15 +28,19 @@ def fresnel_mean(n):
 def test_smooth(ior):
     f0 = ((ior - 1.0) / (ior + 1.0))**2
     assert ior_of(f0) == pytest.approx(ior)
-    # Midpoints in 96 directions miss some of the steep rise at grazing ones.
+    # The albedo is a sum over 96 directions, whose midpoints miss a part of the steep rise at
+    # grazing angles.
     assert gloss_albedo(0.0, ior).of(f0) == pytest.approx(fresnel_mean(ior), abs=1e-3)
     assert gloss_albedo(0.0, ior, from_above=True).of(f0) == pytest.approx(f0, rel=1e-3)
     assert gloss_albedo(0.0, ior).white == pytest.approx(1.0, abs=1e-4)
 
 
 def test_rough_from_above():
-    """Of GGX with alpha = 1 all slopes up to 1 mirror upwards, with u the squared cosine of the
-    facet and G = 2 c / (1 + c), c = 2 u - 1: the integral of G over u from 1/2 to 1 is 1 - ln 2."""
+    """The albedo of GGX with alpha = 1, for a view from straight above, has a closed form.
+
+    All slopes up to 1 reflect light upwards. With u the squared cosine of the facet, c = 2 u - 1
+    and G = 2 c / (1 + c), the integral of G over u from 1/2 to 1 is 1 - ln 2.
+    """
     assert gloss_albedo(1.0, 1.5, from_above=True).white == pytest.approx(1.0 - math.log(2.0),
                                                                            abs=2e-3)
 
@@ -46,7 +53,7 @@ def test_white_loses_nothing_where_light_meets_several_facets(roughness):
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
 def test_cycles_from_above(new_object, new_world, roughness, metallic):
-    """What a sheet under an even sky sends straight up, by Cycles' Glossy bake."""
+    """The light that a sheet under a uniform sky reflects straight up, as Cycles bakes it."""
     base, f0 = 0.6, 0.08 * 0.5
     material = bpy.data.materials.new("Sheet")
     if bpy.app.version < (5, 0, 0):
@@ -63,7 +70,7 @@ def test_cycles_from_above(new_object, new_world, roughness, metallic):
     new = bpy.app.version >= (4, 0, 0)
     albedo = gloss_albedo(roughness, 1.5, from_above=True, correlated=new)
     expected = albedo.of(base if metallic else f0, node.distribution == 'MULTI_GGX')
-    # Cycles' noise here, and its fit of the light of several facets.
+    # The tolerance covers the noise of Cycles and its fit of multiple reflections.
     assert found == pytest.approx(expected, rel=0.02, abs=0.001)
     if not metallic:
         diffuse = bake_objects([sheet], 512, 0, "DIFFUSE", passes)["Sheet"].mean()

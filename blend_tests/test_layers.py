@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The albedo of sheen, velvet and clearcoat: integrals, then Cycles of the running Blender."""
+"""The albedo of sheen, velvet and clearcoat, compared with integrals and with Cycles."""
 
 import bpy
 import numpy as np
@@ -14,14 +14,17 @@ NEW = bpy.app.version >= (4, 0, 0)
 
 @pytest.mark.parametrize("view", [0.9, 0.5, 0.2])
 def test_burley_sheen(view):
-    """The integral of (1 - cos d)^5 cos i over the directions of the light, by midpoints in 200 x
-    200 equal shares of the projected solid angle; d from the light to the half vector."""
+    """The albedo of Burley's sheen is the integral of (1 - cos d)^5 cos i over directions of light.
+
+    d is the angle between the light and the half vector. The integral is a sum over midpoints of
+    200 x 200 equal shares of the projected solid angle.
+    """
     steps = (np.arange(200) + 0.5) / 200
     light, angle = np.sqrt(steps)[:, None], 2 * np.pi * steps
     between = view * light + np.sqrt((1 - view**2) * (1 - light**2)) * np.cos(angle)
     expected = np.pi * ((1 - np.sqrt((1 + between) / 2))**5).mean()
     terms = np.append(1.0, angle_terms(np.array([view]))[0])
-    # The table is fitted to a ten thousandth.
+    # The table is a fit with errors of up to 1e-4.
     assert terms @ burley_sheen().angles == pytest.approx(expected, abs=2e-4)
 
 
@@ -60,7 +63,7 @@ def cloth(kind, roughness):
 @pytest.mark.parametrize("roughness", [0.35, 0.5, 1.0])
 @pytest.mark.parametrize("kind", ['MICROFIBERS', 'VELVET'])
 def test_cycles_from_above(new_object, new_world, kind, roughness):
-    """What a sheet under an even sky sends straight up."""
+    """The light that a sheet under a uniform sky reflects straight up."""
     if not NEW and kind == 'MICROFIBERS':
         pytest.skip("not in this Blender")
     new_world((1.0, 1.0, 1.0))
@@ -69,7 +72,7 @@ def test_cycles_from_above(new_object, new_world, kind, roughness):
     found = bake_objects([sheet], 1024, 0, pass_type,
                          frozenset({"DIRECT", "INDIRECT", "COLOR"}))["Sheet"].mean()
     layer = {'MICROFIBERS': microfibers, 'VELVET': velvet}[kind](roughness)
-    # Interpolated between roughnesses 0.1 apart; 0.003 is the worst fit.
+    # Values are interpolated between roughnesses 0.1 apart. The largest error of the fit is 0.003.
     assert layer.angles[0] == pytest.approx(found, rel=0.03, abs=0.003)
     if kind == 'MICROFIBERS':
         assert layer.above == pytest.approx(found, rel=0.03, abs=0.001)
@@ -78,7 +81,7 @@ def test_cycles_from_above(new_object, new_world, kind, roughness):
 @pytest.mark.skipif(NEW, reason="not in this Blender")
 @pytest.mark.parametrize("roughness", [0.5, 1.0])
 def test_clearcoat_from_above(new_object, new_light, roughness):
-    """Suns at 24 angles of equal shares stand for light from everywhere."""
+    """Suns at 24 angles with equal shares of the projected solid angle replace a uniform sky."""
     sheet = new_object("Sheet", *square(1.0, 2), cloth('CLEARCOAT', roughness))
     sun = new_light("Sun", 'SUN', np.pi, angle=0.0)
     bpy.context.scene.cycles.light_sampling_threshold = 0.0
@@ -88,5 +91,5 @@ def test_clearcoat_from_above(new_object, new_light, roughness):
         sun.rotation_euler.x = np.arccos(cosine)
         light = bake_objects([sheet], 4, 0, "GLOSSY", frozenset({"DIRECT", "COLOR"}))
         found.append(light["Sheet"].mean() / cosine)
-    # Of lobes that are not narrow the mean of 24 is good to 1 %, and the fit to 0.0002.
+    # For lobes that are not narrow, the mean of 24 suns is accurate to 1 %, and the fit to 2e-4.
     assert clearcoat(roughness).angles[0] == pytest.approx(np.mean(found), rel=0.01, abs=2e-4)

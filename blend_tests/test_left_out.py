@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles draws and the bake does not is named in a line, with what to do; lamps and worlds
-that the viewport, or a view layer, hides are as in Cycles."""
+"""Differences between the bake and Cycles are named in a warning, with what to do.
+
+Lamps and worlds that the viewport or a view layer hides are treated as in Cycles.
+"""
 
 import bpy
 import numpy as np
@@ -37,7 +39,7 @@ def test_bumps_are_not_in_cycles_bake_either(floor):
 
 
 # --------------------------------------------------------------------------------------------------
-# Named
+# Differences that a warning names
 # --------------------------------------------------------------------------------------------------
 
 
@@ -161,7 +163,7 @@ def offset_terminator(item):
     (override, ('"Grey"', "material override")),
     (hide_copy, ('"Hidden"', "hidden in the viewport")),
     (offset_terminator, ('"Floor"', "terminator")),
-    # 1.41 is half a stop.
+    # Exposure is in stops: a factor of 1.41 is half a stop.
     (set_cycles(film_exposure=2.0 ** 0.5), ("Exposure of 1.41", "set exposure to 0.5")),
     (set_cycles(use_fast_gi=True), ("Fast GI",)),
     (set_cycles(diffuse_bounces=2), ("2 times",)),
@@ -206,7 +208,7 @@ def test_a_material_of_a_volume_alone_is_air(floor):
 
 
 # --------------------------------------------------------------------------------------------------
-# Followed
+# Settings that are followed as in Cycles
 # --------------------------------------------------------------------------------------------------
 
 
@@ -251,7 +253,7 @@ def collection_in_viewports(item):
 
 
 def as_an_instance_by_eye(item):
-    """The lamp in a collection that a hidden object instances."""
+    """Puts the lamp into a collection, of which a hidden object is an instance."""
     collection, layer_collection = collection_of(item)
     layer_collection.exclude = True
     empty = bpy.data.objects.new("Empty", None)
@@ -280,7 +282,7 @@ def test_a_lamp_that_only_the_viewport_hides_shines(floor, hide):
     assert result.scene.lights[0].position == pytest.approx(before[0].position)
     assert result.scene.lights[0].position == pytest.approx([0.5, 0.0, 2.0])
     assert result.scene.lights[0].intensity == pytest.approx(before[0].intensity)
-    # Nothing is left of how it was found out.
+    # The export leaves the file as it was.
     assert (lamp.hide_get(), lamp.hide_viewport) == hidden
     assert len(bpy.data.scenes) == scenes
     assert len(bpy.data.objects) <= objects + 1
@@ -310,7 +312,10 @@ def test_hidden_lamps_belong_to_their_light_sets(floor):
 
 @pytest.mark.needs_library
 def test_cycles_bakes_the_light_of_hidden_lamps(new_object, new_material, new_light):
-    """Both see the same lamp: directly above its centre the light is P / (4 pi^2 d^2)."""
+    """Raybundle and Cycles have the same light from a hidden lamp.
+
+    Directly below the lamp, the light is P / (4 pi^2 d^2).
+    """
     points = [(0.5 * x, 0.5 * y, 0) for y in range(-4, 5) for x in range(-4, 5)]
     faces = [(9 * y + x, 9 * y + x + 1, 9 * y + x + 10, 9 * y + x + 9)
              for y in range(8) for x in range(8)]
@@ -322,7 +327,7 @@ def test_cycles_bakes_the_light_of_hidden_lamps(new_object, new_material, new_li
     light = read_colors(floor)[40]
     assert light == pytest.approx(np.full(3, 100.0 / (4.0 * np.pi * 4.0) / np.pi), rel=1e-3)
     assert any('"Lamp"' in text and "shine" in text for text in report.warnings)
-    # A lamp without a size has no noise.
+    # The light of a lamp without size has no noise in Cycles.
     reference = bake_objects([floor], 4, 0)["Floor"]
     corner = np.array(faces).ravel().tolist().index(40)
     assert reference[corner] == pytest.approx(light, rel=2e-3)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light sets: several groups of lights baked into several attributes from one trace."""
+"""Light sets: a bake writes the light of several groups of lights to separate attributes.
+
+All light sets use the same traced lines.
+"""
 
 import json
 
@@ -13,25 +16,25 @@ from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
 
-# Both bakes solve the same system to a relative residual of at most 1e-5, perhaps from other first
-# guesses; reflectance 0.5 at most doubles it.
+# Both bakes solve the same system, to a relative residual of at most 1e-5, but may start from
+# different guesses. The reflectance of 0.5 increases the error by a factor of at most 2.
 SOLVER_TOLERANCE = 5e-5
-# Sums of floats.
+# Error of float sums.
 ROUNDING = 1e-6
 
 FLOOR = [(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0)]
-SKY = (0.05, 0.1, 0.2)  # radiance
+SKY = (0.05, 0.1, 0.2)  # radiance, W/(m^2 sr)
 PANEL = [(1, 3.5, 1), (2, 3.5, 1), (2, 3.5, 2), (1, 3.5, 2)]
 
 
 def bake(**overrides):
-    # Fixed bundles, so that all bakes have the same lines.
+    # The number of bundles is fixed, so that all bakes have the same lines.
     return raybundle.bake(bpy.context, **{"max_patches": 2000, "max_bundles": 64,
                                           "target_error": 0.001, **overrides})
 
 
 def difference(a, b):
-    """Largest difference over the largest value."""
+    """Returns the largest difference, divided by the largest value of b."""
     assert b.max() > 0.0
     return np.abs(a - b).max() / b.max()
 
@@ -54,7 +57,10 @@ def add_set(name, collection=None, **values):
 
 @pytest.fixture
 def court(new_object, new_light, new_material, new_world):
-    """Floor and box under a sky; a red lamp and an emissive panel, a blue lamp, and a sun."""
+    """Builds a floor and a box under a sky, a red lamp, an emissive panel, a blue lamp and a sun.
+
+    Returns the baked objects, the collections for two light sets, and the colour of the sky.
+    """
     sky = new_world(SKY)
     floor = new_object("Floor", FLOOR, [(0, 1, 2, 3)], new_material("Grey", (0.5, 0.5, 0.5)))
     box = new_object("Box", [(0.5 * x, 0.5 * y, 0.5 * z) for x, y, z in CUBE_VERTICES], CUBE_FACES,
@@ -64,7 +70,7 @@ def court(new_object, new_light, new_material, new_world):
     red = new_light("Red", 'POINT', 60.0, (1, 1, 2), color=(1.0, 0.2, 0.1))
     blue = new_light("Blue", 'AREA', 60.0, (3, 3, 2.5), color=(0.2, 0.4, 1.0), size=0.5)
     new_light("Sun", 'SUN', 0.5, angle=0.01)
-    # The lamp lies in a collection inside that of the set.
+    # The lamp is in a collection inside the collection of the light set.
     warm = collection_of("Warm", panel)
     collection_of("Lamps", red, parent=warm)
     return {"items": [floor, box], "warm": warm, "cold": collection_of("Cold", blue),
@@ -77,7 +83,7 @@ def add_both(court):
 
 
 def lit_by(court, warm=False, cold=False, sun=False):
-    """The other lights are off."""
+    """Switches the given groups of lights on and all others off."""
     bpy.data.objects["Red"].hide_render = not warm
     strength = bpy.data.materials["Glow"].node_tree.nodes["Emission"].inputs["Strength"]
     strength.default_value = float(warm)
@@ -121,9 +127,13 @@ def test_the_main_attribute_is_the_sum_and_stays_active(court):
 
 @pytest.mark.parametrize("reconstruction", ['AREA_AVERAGE', 'POINT'])
 def test_all_lights_are_those_of_a_bake_without_sets(court, reconstruction):
-    """Up to the noise of the shadow rays, which are not the same: the panel is bright enough for
-    them in both. Least squares is not linear where it would be negative: on this floor of one face,
-    in the light of single sets."""
+    """The light of all light sets together equals that of a bake without light sets.
+
+    The tolerance is the noise of the shadow rays. They differ between the two bakes, because the
+    panel is bright enough for shadow rays in both. LEAST_SQUARES is not tested. It is not linear
+    where its solution would be negative, which happens in the light of single sets on this floor of
+    one face.
+    """
     bake(attribute="Plain", target_error=0.02, reconstruction=reconstruction)
     add_both(court)
     bake(target_error=0.02, reconstruction=reconstruction)
@@ -154,7 +164,7 @@ def test_relight_updates_all_sets_on_the_same_lines(court):
 def test_clear_removes_the_attributes_of_all_sets(court):
     add_both(court)
     bake()
-    # One has another name by now, one is switched off.
+    # Clear must find the attributes although one set has been renamed and the other disabled.
     sets = bpy.context.scene.raybundle.light_sets
     sets[0].name, sets[1].enabled = "hot", False
     other = court["items"][0].data.color_attributes.new("Mine", 'FLOAT_COLOR', 'CORNER')
@@ -213,12 +223,12 @@ def emit_attribute(material):
 
 @pytest.mark.parametrize("emit", (emit_image, emit_attribute))
 def test_objects_that_emit_an_image_or_an_attribute_belong_to_sets(court, emit):
-    """An even image gives the light of its colour."""
+    """An image or attribute of uniform colour gives the same light as the colour."""
     add_set("warm", court["warm"])
     bpy.data.objects["Red"].hide_render = True
     glow = bpy.data.materials["Glow"].node_tree.nodes["Emission"].inputs['Color']
     glow.default_value = (40.0, 20.0, 10.0, 1.0)
-    # No point has more or less noise than another: the same lines and shadow rays.
+    # Both bakes have the same lines and shadow rays, so that their noise is equal at each corner.
     bake()
     expected = [read_colors(item, "Radiosity warm") for item in court["items"]]
     emit(bpy.data.materials["Glow"])
@@ -265,7 +275,7 @@ def test_copies_and_means_have_the_sets_too(court):
 
 
 # --------------------------------------------------------------------------------------------------
-# What is wrong
+# Errors of the user
 # --------------------------------------------------------------------------------------------------
 
 
@@ -302,7 +312,7 @@ def test_a_light_in_two_sets(court):
     court["cold"].objects.link(bpy.data.objects["Panel"])
     expect_error('"Panel"', '"warm"', '"cold"')
     court["cold"].objects.unlink(bpy.data.objects["Panel"])
-    # What does not shine may be in both.
+    # An object that does not emit may be in two sets.
     for name in ("warm", "cold"):
         court[name].objects.link(court["items"][0])
     bake()

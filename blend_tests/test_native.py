@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Structs that cross to the native library: each member arrives where it belongs."""
+"""Structs are passed to the native library with each member in its place."""
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
@@ -10,15 +10,17 @@ from raybundle import native
 from raybundle.surface_data import ColorData, SurfaceData
 
 TERMS = [name for name, _ in native._AngleFactors._fields_]
-# What the library says of these, instead of the name of the member.
+# Texts in the messages of the library about members whose name the message does not contain.
 REASONS = {'reflectance.constant': "reflectance and emission must be finite",
            'emission.constant': "reflectance and emission must be finite",
            'gloss.masking': "unknown masking 99", 'diffuse.model': "unknown diffuse model 99"}
 
 
 def spoiled(data: object) -> Iterator[tuple[str, object]]:
-    """For each member of a dataclass and of those in it: its name, and a copy where it alone is
-    wrong."""
+    """Yields, for each member of a dataclass and of dataclasses in it, a copy with a wrong value.
+
+    Each pair is the name of the member, with dots, and a copy in which only this member is invalid.
+    """
     for item in fields(data):
         value = getattr(data, item.name)
         if is_dataclass(value):

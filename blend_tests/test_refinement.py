@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adaptive patches against Cycles: a box on a plane in the sun alone, whose shadow's edge crosses
-patches of the ground.
+"""Adaptive patches, compared with Cycles: the edge of a shadow crosses patches of the ground.
 
-The walls that look away from the sun get only what the ground reflects. Few lines bring it: their
-own noise is 2 % at this target, with patches of any size, so that 6 % are asserted there and 1 %
-elsewhere.
+A box stands on the ground, and the sun is the only light. Walls that face away from the sun only
+get light that the ground reflects. Few lines transport this light, with 2 % noise at this target
+for any size of patches. The tolerance is therefore 6 % on these walls, and 1 % elsewhere.
 """
 
 import json

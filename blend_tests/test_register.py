@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registration, and settings that agree with the native library."""
+"""Registration of the add-on, and agreement of its properties with the native library."""
 
 import inspect
 import re
@@ -15,19 +15,19 @@ from raybundle import native, panels, properties
 
 GROUPS = (properties.RaybundleSceneSettings, properties.RaybundleObjectSettings)
 
-# Names that scripts use; see the interfaces in docs.
+# Names that scripts use, as documented in docs/.
 SCENE_PROPERTIES = """scope target_error output attribute domain data_type topology shared_meshes
     patch_size max_patches refine contacts solver first_shot directions projector small_patches
     reconstruction final_gather plane_count plane_placement local_rays estimator max_bundles
     lines_per_bundle memory_limit seed threads report""".split()
 OPERATORS = ("bake", "relight", "clear", "preview")
 
-# Settings of the library that Blender does not show: they are for studies from C.
+# Settings of the library that Blender does not show. They are for studies with the C interface.
 NOT_IN_BLENDER = ["min_bundles", "thesis_literal", "plane_coherence", "regularization"]
-# Properties with a narrower range than the library's, which serves studies too.
+# Properties with a narrower range than in the library, where studies use the full range.
 NARROWER = {'target_error': (0.0005, 1.0)}
 RNA_TYPES = {int: 'INT', float: 'FLOAT', str: 'ENUM'}
-RNA_UNITS = {"": 'NONE', "m": 'LENGTH'}  # Blender has none for megabytes
+RNA_UNITS = {"": 'NONE', "m": 'LENGTH'}  # Blender has no unit for megabytes
 
 
 def test_register_unregister_register():
@@ -68,7 +68,7 @@ def rna_properties() -> bpy.types.bpy_prop_collection:
 
 
 def library_settings(kind: type) -> list[native.Setting]:
-    """Those of a type that are properties of the scene too."""
+    """Returns the settings of a type that are also properties of the scene."""
     return [setting for setting in native.settings().values()
             if setting.type is kind and setting.name in rna_properties()]
 
@@ -98,7 +98,7 @@ def test_types_descriptions_and_units_are_those_of_the_library():
 def test_numbers_have_the_default_and_the_range_of_the_library(kind):
     for setting in library_settings(kind):
         definition = rna_properties()[setting.name]
-        # Floats cross the interface in single precision, hence 1e-6.
+        # Floats are passed in single precision, hence 1e-6.
         assert definition.default == pytest.approx(setting.default, rel=1e-6), setting.name
         if definition.type == 'BOOLEAN':
             continue
@@ -115,7 +115,7 @@ def test_choices_are_those_of_the_library_in_its_order():
         assert definition.default == setting.default
         assert {item.identifier: item.description for item in definition.enum_items} == \
             setting.choices
-        # Files store the place of a choice.
+        # A .blend file stores the index of a choice, so that the order must not change.
         assert definition.enum_items.keys() == list(setting.choices), setting.name
 
 
@@ -149,7 +149,7 @@ def test_skips_are_those_of_the_library_in_its_order():
              if name.startswith("skip.")]
     assert [(item[0], item[2]) for item in properties.enum_skip] == \
         [(name, setting.help) for name, setting in skips]
-    # The add-on has a set of those that are off, which is empty at first.
+    # The property of the add-on is the set of skips that are off. By default it is empty.
     assert all((setting.type, setting.least, setting.most, setting.default) == (int, 0, 1, 1)
                for _, setting in skips)
     assert rna_properties()['skips_off'].default_flag == set()

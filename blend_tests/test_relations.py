@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A short run of relations.py, which states what must hold: the Cornell box and some coarse rooms.
+"""A short run of relations.py, which defines what is checked: the Cornell box and coarse rooms.
 
-Seeds are fixed: a relation holds or fails the same each time.
+Seeds are fixed, so that the result of each relation is reproducible.
 """
 
 import lamp_noise
@@ -12,10 +12,11 @@ import relations
 pytestmark = pytest.mark.needs_library
 
 QUICK = [relation for relation in relations.RELATIONS if relation.is_quick]
-# What each scene is tested for, beside a turn about all axes: what it is most likely to break.
+# Relations for each scene, in addition to a turn about all axes: those most likely to fail there.
 CHOSEN = {
+    # The only lamp is a mesh, so that the two excluded relations do not apply.
     "cornell_box": [relation.name for relation in QUICK if relation.name not in
-                    ("each lamp two of half", "the sum of light sets")],  # it has one, a mesh
+                    ("each lamp two of half", "the sum of light sets")],
     "room:area_flush": ["each lamp two of half", "mirrored"],
     "room:panel": ["vertices moved by 1e-6", "quads triangulated"],
     "room:panel_on_wall": ["joined"],
@@ -31,7 +32,7 @@ CASES = [(scene, relation) for scene, names in CHOSEN.items()
 
 @pytest.fixture(scope="module")
 def scenes():
-    """Each keeps the bakes before any change."""
+    """Returns the scenes by name. Each keeps its bakes before any change."""
     return {name: relations.Scene(name, lamp_rooms.COARSE) for name in CHOSEN}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table of road_test.py: what it says of files that are baked, refused, or are no files."""
+"""The table of road_test.py: rows of files that are baked, are refused, or are no .blend files."""
 
 import shutil
 from pathlib import Path

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps made of mesh, and lamps that lie in the plane of a wall: the same light in every pose.
+"""Lamps made of meshes, and lamps in the plane of a wall, give the same light in every orientation.
 
-Turned and unturned scenes must have the same light, and one of each kind that of Cycles. All that
-is compared are means over an object's corners, whose noise at the target of 1 % is below half a per
-cent; 2 % is four times that. The energy balance is that of closed rooms, 5e-3 at most.
+Scenes are compared before and after a rotation, and one of each kind with Cycles. The compared
+values are means over the corners of an object. At the target of 1 %, their noise is below half a
+per cent. The tolerance of 2 % is four times this noise. The error of the energy balance is at most
+5e-3, as in other closed rooms.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ SAME, BALANCE = 0.02, 5e-3
 
 
 def _room(size: float = 4.0, cells: int = 8, reflectance: float = 0.6) -> bpy.types.Object:
-    """A cube with its fronts to the inside, on z = 0."""
+    """Returns a cube on the plane z = 0 with its fronts inwards. size: length of an edge, m."""
     grid = bmesh.new()
     bmesh.ops.create_cube(grid, size=size)
     bmesh.ops.subdivide_edges(grid, edges=grid.edges[:], cuts=cells - 1, use_grid_fill=True)
@@ -73,7 +74,8 @@ def test_a_turned_scene_has_the_same_light(name):
         report = _bake()
         assert report.energy['balance_error'] < BALANCE
         means.append(_means(report))
-    # Objects darker than a twentieth of the brightest are as exact as that.
+    # For objects with less than a twentieth of the brightest light, the tolerance is relative to
+    # this twentieth.
     floor = 0.05 * max(means[0].values())
     for item, light in means[0].items():
         assert means[1][item] == pytest.approx(light, rel=SAME, abs=SAME * floor), item
@@ -92,8 +94,8 @@ def test_a_tilted_emitter_lights_the_ground_as_in_cycles_and_not_itself(shape, o
     lamp = create_object("lamp", *shape, _lamp_material(10.0, 0.8), (0.3, -0.2, 2.5))
     lamp.rotation_euler = (0.4, 0.2, 0.3)
     report = _bake()
-    # The sides of the cube get what the ground sends back; what looks up alone gets nothing, to the
-    # rounding of the reconstruction.
+    # The sides of the cube get light that the ground reflects. The other lamps face up and get no
+    # light, except for rounding errors of the reconstruction.
     assert read_colors(lamp).max() <= max(own, 5e-4)
     assert report.energy['balance_error'] < BALANCE
     light = read_colors(ground).mean()
@@ -162,7 +164,11 @@ def _block() -> None:
 
 
 def test_lamps_of_mesh_need_no_more_bundles_than_others():
-    """Noisy is their light on their own faces and on what is close, which bundles do not help."""
+    """The light of a mesh lamp has noise on the lamp itself and on surfaces near it.
+
+    More bundles do not reduce this noise. A mesh lamp may therefore need at most twice as many
+    bundles as an area light.
+    """
     def bundles(lamp) -> int:
         bpy.ops.wm.read_homefile(use_empty=True)
         _room(cells=16)

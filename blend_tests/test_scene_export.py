@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the native library is given: counts, areas, orientation, materials, lights, world.
+"""The data that the add-on exports to the native library.
 
-Coordinates are single precision: 1e-6 relative where nothing else is said.
+Counts, areas, orientation, materials, lights and world are checked. Coordinates are in single
+precision, so that tolerances are 1e-6, relative, unless a comment gives another reason.
 """
 
 import math
@@ -18,7 +19,7 @@ from raybundle.materials import cycles_bake
 from raybundle.materials.principled import PrincipledSockets, principled_albedo
 from raybundle.scene_export import export_scene
 
-# Diffuse part of a Principled shader of roughness 0.5, without specular reflection.
+# Albedo of the diffuse part of a Principled shader with roughness 0.5, without specular reflection.
 ALBEDO = principled_albedo(PrincipledSockets(0.5, 0.0, 1.5, 0.0, False, 0.5), 1.0).diffuse[0]
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
@@ -33,7 +34,7 @@ def world_vertices(scene, instance):
 
 
 def face_area_vectors(scene, instance):
-    """(f, 3): area times normal of each face in the world, by its fan."""
+    """Returns (faces, 3): area times normal of each face in the world, m^2, by its triangle fan."""
     mesh, points = scene.meshes[instance.mesh], world_vertices(scene, instance)
     vectors = []
     for first, last in zip(mesh.face_offsets[:-1], mesh.face_offsets[1:]):
@@ -62,7 +63,7 @@ def test_box_counts_areas_and_winding(new_object):
     vectors = face_area_vectors(scene, scene.instances[0])
     centres = np.array([world_vertices(scene, scene.instances[0])[list(face)].mean(axis=0)
                         for face in CUBE_FACES])
-    # Each face looks away from the centre of the box.
+    # Each face points away from the centre of the box.
     assert ((centres - [3, 4, 5]) * vectors).sum(axis=1).min() > 0.0
 
 
@@ -75,7 +76,7 @@ def test_negative_scale_keeps_front_sides_outside(new_object):
     points = world_vertices(scene, scene.instances[0])
     centres = np.array([points[list(face)].mean(axis=0) for face in CUBE_FACES])
     assert (centres * vectors).sum(axis=1).min() > 0.0
-    # 2 x 4 x 2: two faces of 4, four of 8.
+    # The box is 2 x 4 x 2 m: two faces have 4 m^2 and four have 8 m^2.
     assert area(scene) == pytest.approx(40.0)
 
 
@@ -97,7 +98,7 @@ def test_modifiers_are_applied_and_leave_no_trace(new_object):
     assert area(result.scene) == pytest.approx(3.0)
     assert [attribute.name for attribute in item.data.attributes
             if attribute.name in (VERTEX_CODE, CORNER_CODE)] == []
-    # Each of the four corners has the value of the copy in its place.
+    # Each of the four original corners has the value of the copy in its place.
     corner_map = result.targets[0].corner_map
     assert (corner_map.copied, corner_map.untraced) == (4, 0)
     values = np.repeat([[1.0], [2.0], [6.0]], 4, axis=0) * np.ones(3)
@@ -129,7 +130,7 @@ def test_subdivision_surface_maps_back_to_the_corners(new_object):
     mesh, corner_map = result.scene.meshes[0], result.targets[0].corner_map
     assert mesh.face_count == 6 * 16
     assert (corner_map.original_count, corner_map.untraced) == (24, 0)
-    # Exactly one evaluated corner belongs to each original one: positions go the same way.
+    # Each original corner has exactly one evaluated corner, in the same octant.
     assert sorted(corner_map.original) == list(range(24)) and corner_map.copied == 0
     positions = corner_map.to_original(mesh.vertices[mesh.corner_vertices])
     original = np.array(CUBE_VERTICES, float)[[index for face in CUBE_FACES for index in face]]
@@ -152,10 +153,10 @@ def test_every_corner_gets_the_light_of_its_place(new_object, modifier, settings
     if modifier == 'MIRROR':
         assert positions == pytest.approx(original, abs=1e-6)
     elif modifier == 'DECIMATE':
-        # Vertices are gone; what remains is somewhere on the box.
+        # DECIMATE removes vertices. All corners get positions on the box.
         assert np.abs(positions).max() <= 1.0 + 1e-6
     else:
-        # The bevel's width is the largest shift; a voxel is not larger.
+        # Positions move by at most the width of the bevel, or by the size of a voxel.
         assert np.linalg.norm(positions - original, axis=1).max() < 0.3
     for count, text in ((corner_map.untraced, "no trace"), (corner_map.copied, "several faces")):
         lines = [line for line in result.warnings if text in line and '"Box"' in line]
@@ -163,7 +164,8 @@ def test_every_corner_gets_the_light_of_its_place(new_object, modifier, settings
     assert bool(corner_map.untraced) == (modifier in ('BEVEL', 'REMESH', 'DECIMATE'))
     assert bool(corner_map.copied) == (modifier in ('SOLIDIFY', 'MIRROR'))
     if modifier not in ('DECIMATE', 'REMESH'):
-        # On the face that the corner is of, or what is left of it.
+        # The evaluated corner belongs to the same face as the original corner, or to what remains
+        # of this face.
         faces = np.searchsorted(mesh.face_offsets, corner_map.evaluated, side='right') - 1
         for corner, face in zip(corner_map.original, faces):
             ring = mesh.vertices[mesh.corner_vertices[mesh.face_offsets[face]:][:3]]
@@ -175,7 +177,7 @@ def test_every_corner_gets_the_light_of_its_place(new_object, modifier, settings
 
 
 def test_interpolated_codes_are_not_mistaken_for_corners(new_object):
-    # A grid of 50 x 50 squares, once subdivided: only the old corners have exact codes.
+    # A grid of 50 x 50 squares is subdivided once. Only the original corners have exact codes.
     size = 50
     vertices = [(x, y, 0) for y in range(size + 1) for x in range(size + 1)]
     faces = [(i, i + 1, i + size + 2, i + size + 1)
@@ -204,7 +206,7 @@ def test_objects_with_one_mesh_export_it_once(new_object):
     second = bpy.data.objects.new("Second", first.data)
     second.location.z = 2.0
     bpy.context.scene.collection.objects.link(second)
-    # A copy with the same content counts as the same mesh.
+    # A mesh with equal content counts as the same mesh.
     third = bpy.data.objects.new("Third", first.data.copy())
     bpy.context.scene.collection.objects.link(third)
     bpy.context.view_layer.update()
@@ -296,16 +298,18 @@ def test_selected_objects_bake_and_the_others_occlude(new_object):
 def test_smooth_and_flat_normals(new_object):
     item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
     flat = export().scene.meshes[0].corner_normals
-    # A flat face has its own normal at all corners: exactly one component of 1.
+    # In a flat face all corners have the normal of the face, with exactly one component of 1 or -1.
     assert np.abs(flat).max(axis=1) == pytest.approx(np.ones(24))
     item.data.polygons.foreach_set('use_smooth', [True] * 6)
     item.data.update()
     bpy.context.view_layer.update()
     smooth = export().scene.meshes[0]
     positions = smooth.vertices[smooth.corner_vertices]
-    # The mean of three faces points along the diagonal; normals may be stored in 16 bits.
+    # The mean of the normals of three faces points along the diagonal. Blender may store normals in
+    # 16 bits.
     assert smooth.corner_normals == pytest.approx(positions / math.sqrt(3.0), abs=1e-4)
-    # Some faces smooth: these have the normals of their vertices, the others their own.
+    # Corners of smooth faces have the normals of their vertices, those of flat faces the normal of
+    # the face.
     flags = [True, False] * 3
     item.data.polygons.foreach_set('use_smooth', flags)
     item.data.update()
@@ -315,7 +319,7 @@ def test_smooth_and_flat_normals(new_object):
     is_smooth = np.repeat(flags, 4)[:, None]
     at_vertices = smooth.corner_normals
     if bpy.app.version >= (4, 1, 0):
-        # The edges of flat faces are sharp: the mean of the smooth faces alone.
+        # The edges of flat faces are sharp. Vertex normals are the mean over smooth faces only.
         sums = np.zeros((8, 3))
         np.add.at(sums, mixed.corner_vertices, np.where(is_smooth, flat, 0.0))
         at_vertices = sums[mixed.corner_vertices]
@@ -389,7 +393,7 @@ def exported_material(material):
 
 @pytest.fixture
 def principled():
-    """Without specular reflection."""
+    """Returns a material of a Principled shader without specular reflection."""
     material = bpy.data.materials.new("Principled")
     material.use_nodes = True
     set_specular(material, 0.0)
@@ -414,7 +418,7 @@ def shader_of(material):
 
 
 def sockets_of(shader, specular, base):
-    """Of a Principled shader of the default roughness."""
+    """Returns the sockets of a Principled shader with the default roughness, 0.5."""
     return PrincipledSockets(0.5, specular, shader.inputs['IOR'].default_value, 0.0,
                              shader.distribution == 'MULTI_GGX', base)
 
@@ -484,7 +488,7 @@ def test_backfacing_separates_the_sides(new_material):
 
 
 def test_mixed_shaders_and_colours_through_a_group(new_material):
-    # A group mixes two colours by 0.25 and passes the result through a reroute.
+    # A group mixes two colours with the factor 0.25, and a reroute passes the result on.
     group = bpy.data.node_groups.new("Tint", 'ShaderNodeTree')
     if bpy.app.version < (4, 0, 0):
         group.inputs.new('NodeSocketColor', "First")
@@ -552,7 +556,7 @@ def test_image_as_base_colour(principled, is_float):
         assert side.reflectance.constant == pytest.approx(np.zeros(3))
     data = result.scene.images[0]
     assert data.extension == 'EXTEND'
-    # 8 bits of 0.5 are 128/255 (127.5 is rounded up), in sRGB; floats are linear already.
+    # A texel of 0.5 in 8 bits is 128/255 (127.5 is rounded up), in sRGB. Floats are linear.
     expected = 0.5 if is_float else ((128 / 255 + 0.055) / 1.055) ** 2.4
     assert data.pixels[0, 1] == pytest.approx(np.full(3, expected), rel=1e-3)
     assert data.pixels[1, 0] == pytest.approx(np.zeros(3))
@@ -592,7 +596,7 @@ def test_what_cannot_be_read_is_baked_and_named(principled):
     add_noise(principled)
     material, result = exported_material(principled)
     pixels = result.scene.images[material.front.reflectance.image].pixels
-    # Noise lies about 0.5; the image has room beside the face.
+    # The mean of the noise is near 0.5. Texels of 0 are outside the face.
     assert 0.3 < pixels[pixels > 0].mean() < 0.7
     assert len(result.warnings) == 1
     assert '"Principled"' in result.warnings[0] and '"Noise Texture"' in result.warnings[0]
@@ -618,7 +622,7 @@ def test_a_bake_leaves_no_trace(principled, monkeypatch, fails):
     if fails:
         monkeypatch.setattr(cycles_bake._Stage, '_run', fail_to_bake)
     add_noise(principled)
-    # The noise is in a group too, which the bake copies.
+    # A group contains noise too. The bake copies the group.
     group = bpy.data.node_groups.new("Group", 'ShaderNodeTree')
     group.nodes.new('ShaderNodeTexNoise')
     principled.node_tree.nodes.new('ShaderNodeGroup').node_tree = group
@@ -689,7 +693,7 @@ def test_gloss_is_reflected_and_not_diffuse(principled):
                      for filter_glossy in (1.0, None))
     material, result = exported_material(principled)
     assert result.warnings == []
-    # Of F0 = 0.04 or a little less.
+    # F0 is 0.04 or slightly less.
     assert 0.04 < albedo.specular[0] < 0.07
     assert material.front.reflectance.constant == pytest.approx(
         albedo.diffuse * base + albedo.specular)
@@ -719,7 +723,7 @@ def test_all_of_a_matt_material_is_diffuse(principled):
     tree = principled.node_tree
     texture = tree.nodes.new('ShaderNodeTexImage')
     texture.image = new_image(np.full((2, 2, 3), 0.25, np.float32), True)
-    # White less the image: a negative weight.
+    # White minus the image gives the image a negative weight.
     mix = tree.nodes.new('ShaderNodeMixRGB')
     mix.blend_type = 'SUBTRACT'
     mix.inputs['Fac'].default_value = 1.0
@@ -748,7 +752,7 @@ def test_gloss_of_what_cycles_bakes(principled):
     pixels = result.scene.images[material.front.reflectance.image].pixels
     whole = pixels[pixels > 0.02].mean()
     diffuse = part_of(material.front.shown.color, whole).mean()
-    # Noise lies about 0.5; of the base colour 80 % are diffuse.
+    # The mean of the noise is near 0.5, and 80 % of the base colour is diffuse.
     assert 0.3 < diffuse / 0.8 < 0.7 and diffuse < 0.85 * whole
 
 
@@ -759,7 +763,7 @@ def test_gloss_alone(principled):
     node.inputs['Roughness'].default_value = 0.0
     output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
     tree.links.new(node.outputs[0], output.inputs['Surface'])
-    # By default diffuse light sees it rougher than it is.
+    # By default, Filter Glossy makes gloss rougher for diffuse light.
     material, _ = exported_material(principled)
     assert 0.6 < material.front.gloss.roughness < 0.7
     assert (material.front.reflectance.constant < [0.7, 0.35, 0.18]).all()
@@ -777,7 +781,7 @@ def test_alpha_is_opacity(principled):
     shader_of(principled).inputs['Base Color'].default_value = (0.8, 0.4, 0.0, 1.0)
     material, result = exported_material(principled)
     assert material.opacity == pytest.approx(0.25)
-    # Of the whole: what passes through is not reflected.
+    # Reflectance includes the opacity: light that passes through is not reflected.
     assert material.front.reflectance.constant == pytest.approx(ALBEDO * np.array([0.2, 0.1, 0.0]))
     assert result.warnings == []
 
@@ -840,7 +844,7 @@ def test_two_materials_by_face(new_object, new_material):
     item = new_object("Box", CUBE_VERTICES, CUBE_FACES, new_material("Red", (1, 0, 0)))
     item.data.materials.append(new_material("Blue", (0, 0, 1)))
     item.data.polygons[3].material_index = 1
-    # Past the end: Blender shows the last one.
+    # An index past the last material: Blender uses the last one that exists.
     item.data.polygons[4].material_index = 7
     item.data.update()
     bpy.context.view_layer.update()
@@ -850,7 +854,7 @@ def test_two_materials_by_face(new_object, new_material):
 
 
 # --------------------------------------------------------------------------------------------------
-# Lights and world: Cycles' formulas, docs/method.md
+# Lights and world, by the formulas of Cycles (docs/method.md)
 # --------------------------------------------------------------------------------------------------
 
 
@@ -886,11 +890,12 @@ def test_spot_light(new_light):
     bpy.context.view_layer.update()
     light = only_light()
     assert (light.cone_angle, light.cone_blend) == pytest.approx((1.0, 0.3))
-    # Not renormalised for the cone; up to 3.4 the cosine to the axis dims it.
+    # Cycles does not normalise the intensity for the cone. Up to Blender 3.4, the cosine to the
+    # axis dims the light.
     assert light.intensity == pytest.approx(np.full(3, 40 / (4 * math.pi)))
     assert light.cone_dims == (bpy.app.version < (3, 5, 0))
-    # It looks along -Z, which the rotation has turned to -X; across, the cone is twice as wide, if
-    # the version looks at the scale.
+    # The axis of a spot is -Z, which the rotation turns to -X. The scale makes the cone twice as
+    # wide in Y, in versions that take the scale into account.
     across = 1.0 if bpy.app.version < (3, 5, 0) else 0.5
     assert light.world_to_light @ [-1, 0, 0] == pytest.approx([0, 0, -1], abs=1e-6)
     assert light.world_to_light @ [0, 1, 0] == pytest.approx([0, across, 0], abs=1e-6)
@@ -921,7 +926,7 @@ def test_area_light(new_light, shape, area_share, mirrored):
     factor = 4.0 if bpy.app.version < (4, 0, 0) else math.pi
     assert light.radiance == pytest.approx(np.full(3, 10.0 / (factor * area)))
     assert light.shape == ('ELLIPSE' if shape in ('DISK', 'ELLIPSE') else 'RECTANGLE')
-    # Down, also when it is mirrored.
+    # The light faces down, even if it is mirrored.
     assert np.cross(light.axis_u, light.axis_v) == pytest.approx([0, 0, -6.0 * height / 4])
 
 
@@ -937,7 +942,7 @@ def test_area_light_of_each_version():
 def test_sun_of_each_version():
     assert sun_irradiance_factor(1.0, (4, 0, 0)) == 1.0
     assert sun_irradiance_factor(0.0, (3, 6, 0)) == 1.0
-    # The mean of cos over a disk of radius r at distance 1, by rings of equal area.
+    # Mean of the cosine over a disk of radius r at distance 1, from rings of equal area.
     radius = math.tan(0.5)
     rings = radius ** 2 * (np.arange(10_000) + 0.5) / 10_000
     assert sun_irradiance_factor(1.0, (3, 6, 0)) == pytest.approx(
@@ -961,7 +966,7 @@ def test_spread(new_light):
 def test_light_without_shadows(new_light, kind):
     light = new_light("Fill", kind, 10.0)
     assert only_light().casts_shadows
-    # As long as Cycles has its own property, the other one is Eevee's.
+    # In versions where Cycles has a property of its own, use_shadow is that of Eevee.
     cycles = light.data.cycles
     if hasattr(cycles, 'cast_shadow'):
         light.data.use_shadow = False

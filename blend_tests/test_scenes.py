@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every scene of the tree, baked with the default settings: the report, and the exact answers.
+"""All scenes in scenes/ at the default settings: their reports, and exact solutions.
 
-The exact answers and how they are known: scenes/README.md. Tolerances are those of the default
-target_error of 2 % noise, divided by what a mean over many corners averages out.
+scenes/README.md states the exact solutions and how they are derived. Tolerances follow from the
+default target_error, 2 % noise, and from the number of corners over which a mean averages it.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ ENERGY_KEYS = {"emitted", "absorbed", "escaped", "balance_error"}
 
 @dataclass(frozen=True)
 class BakedObject:
-    light: np.ndarray  # (corners, 3)
-    positions: np.ndarray  # (corners, 3) in the world
-    areas: np.ndarray  # (corners,)
-    faces: np.ndarray  # (faces, 3) mean light of each face's corners
-    face_areas: np.ndarray
+    light: np.ndarray  # (corners, 3) LIGHTING, W/(m^2 sr)
+    positions: np.ndarray  # (corners, 3) in the world, m
+    areas: np.ndarray  # (corners,) m^2
+    faces: np.ndarray  # (faces, 3) mean light of the corners of each face
+    face_areas: np.ndarray  # (faces,) mean area of the corners of each face, m^2
 
     def mean(self) -> np.ndarray:
-        """(3,) over the area."""
+        """Returns (3,) the mean light over the area."""
         return self.areas @ self.light / self.areas.sum()
 
 
@@ -94,7 +94,7 @@ def test_report(name):
     assert all(value >= 0.0 for value in report["seconds"].values())
     stages = sum(value for key, value in report["seconds"].items() if key != "total")
     assert stages <= 1.01 * report["seconds"]["total"] + 1e-3
-    # A face is a patch or more, and the default limit holds.
+    # Each face has at least one patch, and the default limit of patches is kept.
     assert scene.face_count <= report["patches"] <= 100_000
     assert 2 <= report["bundles"] <= 4096
     assert report["lines"] >= report["bundles"]
@@ -136,7 +136,7 @@ def test_light_is_finite_and_not_negative(name):
 def test_energy(name):
     energy = baked(name).report["energy"]
     assert energy["emitted"] > 0.0 and energy["absorbed"] > 0.0 and energy["escaped"] >= 0.0
-    # In open scenes what escapes is sampled too, with the noise of the lines.
+    # In open scenes, the light that escapes is determined by lines too, and has their noise.
     assert energy["balance_error"] < (1e-3 if name in CLOSED else 2e-3)
     arrived = energy["absorbed"] + energy["escaped"]
     assert abs(arrived / energy["emitted"] - 1.0) == pytest.approx(energy["balance_error"],
@@ -146,7 +146,7 @@ def test_energy(name):
 @pytest.mark.parametrize("name", ["big_room", "office", "two_rooms", "thin_wall", "laid_table"])
 def test_nothing_escapes_from_closed_rooms(name):
     energy = baked(name).report["energy"]
-    # Emission on both sides of the furnace and the sphere goes to the outside: not they.
+    # The furnace and the sphere are not tested, because the outer sides of their faces emit too.
     assert energy["escaped"] < 1e-4 * energy["emitted"]
 
 
@@ -158,7 +158,8 @@ def test_nothing_escapes_from_closed_rooms(name):
 def test_furnace():
     scene = baked("furnace")
     light = scene.objects["walls"].light
-    # Rows of counted form factors sum to 1: only the solver's tolerance and floats remain.
+    # Rows of form factors that are counted from lines sum to 1. The remaining errors are the
+    # tolerance of the solver and single precision.
     assert np.abs(light / scene.properties["exact_lighting"] - 1.0).max() < 1e-4
 
 
@@ -166,10 +167,11 @@ def test_facing_squares():
     scene = baked("facing_squares")
     receiver = scene.objects["receiver"]
     exact = scene.properties["exact_mean_lighting"][0]
-    # Least squares keep the integral; 0.5 %, a quarter of the noise, for the mean of 1600 patches.
+    # Least squares preserve the integral. The mean over 1600 patches has a tolerance of 0.5 %, a
+    # quarter of the noise of a patch.
     assert receiver.mean() == pytest.approx(np.full(3, exact), rel=5e-3)
-    # Single vertices have the noise of the patches around them, the corner that of one patch, and
-    # the fit's error: 3 %, three times the noise of about 1 % there.
+    # A single vertex has the noise of the patches around it (at a corner that of one patch) and the
+    # error of the fit. The tolerance of 3 % is three times the noise, which is about 1 %.
     on_corner = (np.abs(receiver.positions[:, :2]) > 0.499).all(axis=1)
     in_centre = (np.abs(receiver.positions[:, :2]) < 1e-3).all(axis=1)
     assert on_corner.sum() == 4 and in_centre.sum() == 4
@@ -181,11 +183,11 @@ def test_sphere_interior():
     scene = baked("sphere_interior")
     sphere = scene.objects["sphere"]
     exact = np.array(scene.properties["exact_lighting"])
-    # Values at single corners differ with the tilt of the flat faces; the mean over the area has
-    # the tessellation's 0.03 % and what is left of 2 % noise over 5120 faces.
+    # Values at single corners vary with the tilt of the flat faces. The mean over the area has the
+    # error of the tessellation, 0.03 %, and what remains of 2 % noise over 5120 faces.
     assert sphere.mean() == pytest.approx(exact, rel=3e-3)
-    # Over the faces and RGB the error is the noise, which target_error bounds; the worst of 15360
-    # values is 4 to 5 standard deviations off.
+    # The RMSE over faces and RGB is the noise, which target_error bounds. The largest of 15360
+    # errors is 4 to 5 standard deviations.
     error = surface_error(sphere.faces, np.tile(exact, (len(sphere.faces), 1)), sphere.face_areas)
     assert error.rmse < 0.02, str(error)
     assert np.abs(sphere.faces / exact - 1.0).max() < 0.1
@@ -213,7 +215,8 @@ def test_open_court_far_ground():
     expected = (0.5 * np.array((0.55, 0.75, 1.0))
                 + 3.5 / np.pi * np.array((1.0, 0.93, 0.82)) * 0.749838)
     mean = ground.areas[far] @ ground.light[far] / ground.areas[far].sum()
-    # The walls, 7 to 10 m off, hide under 1 % of the sky, weighted by the cosine, and reflect.
+    # The walls, at a distance of 7 to 10 m, hide less than 1 % of the sky, weighted by the cosine,
+    # and reflect light themselves.
     assert mean == pytest.approx(expected, rel=0.01)
     assert np.abs(ground.light[far] / expected - 1.0).max() < 0.05
 
@@ -221,7 +224,7 @@ def test_open_court_far_ground():
 def test_two_rooms():
     scene = baked("two_rooms")
     west, east = scene.objects["wall_west"].mean(), scene.objects["wall_east"].mean()
-    # Lit through the door only, but lit.
+    # The east room gets light only through the door.
     assert (0.0 < east).all() and (east < 0.2 * west).all()
 
 

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A screen that shines by an image, on a floor or above it: as clean as one of an even colour, and
-the light of its texels.
+"""A screen that emits an image, on a floor or above it.
 
-Nothing stands in between, so that a sum over many points of the screen is what the floor gets. The
-patches of the screen have the mean of their texels, which close to it is some per cent off; and on
-faces of 0.25 m the values whose interpolation is nearest to the light are not the light at the
-corners.
+Its noise is as low as that of a screen of uniform colour, and the floor gets the light of the
+single texels. Nothing occludes the screen, so that a sum over many of its points gives the exact
+light of the floor. The patches of the screen have the mean of their texels, which would be wrong by
+some per cent near the screen. On faces of 0.25 m, the values whose interpolation is nearest to the
+light (LEAST_SQUARES) differ from the light at the corners.
 """
 
 from __future__ import annotations
 
 import bpy
-import lamp_rooms  # by which the construction of scenes is found too
+import lamp_rooms  # also makes `build` importable
 import numpy as np
 import pytest
 import raybundle
@@ -26,15 +26,16 @@ TEXELS = 64
 STRENGTH = 10.0
 STRIPES = {"red, black, blue": ((1, 0, 0), (0, 0, 0), (0, 0, 1)),
            "red, green, blue": ((1, 0, 0), (0, 1, 0), (0, 0, 1))}
-# What corners further than CLOSE from the plane of the screen may be off, root mean square over the
-# mean of all channels: measured are 0.5 to 1.7 % and 1.5 to 5.7 %.
+# Largest error at corners that are more than CLOSE away from the plane of the screen: root mean
+# square, relative to the mean of all channels. Measured are 0.5 to 1.7 % and 1.5 to 5.7 %.
 TOLERANCE = {'POINT': 0.03, 'LEAST_SQUARES': 0.08}
-NOISE = 0.005  # target 0.02; measured are 0.0015 to 0.003, and 0.002 before an even screen
-CLOSE = 0.3  # metres
+# Largest noise at a target of 0.02. Measured are 0.0015 to 0.003, and 0.002 for a uniform screen.
+NOISE = 0.005
+CLOSE = 0.3  # m
 
 
 def _image(name: str) -> np.ndarray:
-    """Texels by row from below, linear colours."""
+    """Returns (TEXELS, TEXELS, 3) linear colours, rows from the bottom."""
     if name == "coloured dots":
         return lamp_rooms.coloured_dots(TEXELS)
     bounds = (0, TEXELS * 20 // 64, TEXELS * 44 // 64, TEXELS)
@@ -45,7 +46,10 @@ def _image(name: str) -> np.ndarray:
 
 
 def _screen(pixels: np.ndarray, height: float) -> bpy.types.Object:
-    """2 x 2 m in the plane y = 1.5, which shines both ways; on a floor of 6 x 6 m."""
+    """Builds a screen of 2 x 2 m in the plane y = 1.5, and a floor of 6 x 6 m, which is returned.
+
+    Both sides of the screen emit. height: that of its centre, m.
+    """
     floor = create_object("floor", *square(6.0, 24), create_material("floor", (0.8,) * 3))
     screen = create_object("screen", *square(2.0, 4),
                            material("screen", Emission((1, 1, 1), STRENGTH)))
@@ -56,17 +60,18 @@ def _screen(pixels: np.ndarray, height: float) -> bpy.types.Object:
 
 
 def _exact(pixels: np.ndarray, height: float, points: np.ndarray) -> np.ndarray:
-    """Irradiance over pi at points of the floor; the screen reflects nothing."""
+    """Returns the exact irradiance / pi at points of the floor. The screen reflects nothing."""
     fine = 4 * TEXELS
     at = (np.arange(fine) + 0.5) / fine
 
-    def blend(values: np.ndarray) -> np.ndarray:  # linear between texels along the first axis
+    # Interpolates linearly between texels along the first axis.
+    def blend(values: np.ndarray) -> np.ndarray:
         place = at * TEXELS - 0.5
         low = np.floor(place).astype(int)
         share = (place - low)[:, None, None]
         return values[low % TEXELS] * (1 - share) + values[(low + 1) % TEXELS] * share
 
-    radiance = STRENGTH * blend(blend(pixels).transpose(1, 0, 2))  # by column, row
+    radiance = STRENGTH * blend(blend(pixels).transpose(1, 0, 2))  # indices: column, row
     x, z = (2 * at - 1)[:, None], (height + 2 * at - 1)[None, :]
     light = np.empty((len(points), 3))
     for k, point in enumerate(points):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials that show the result of a bake: to look at it in them and to bake again gives the same
-light, whatever reads the attribute and however."""
+"""Materials that show the result of a bake do not change the light of the next bake.
+
+This holds whichever attribute of a bake a material reads, and for every way to read it.
+"""
 
 import json
 
@@ -15,22 +17,22 @@ from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
 
-# The second bake is given the same numbers as the first: the same lines, and a solution to start
-# from that is one already. What is left are sums of floats.
+# The second bake gets exactly the numbers of the first. It has the same lines, and starts from a
+# solution that already fulfils the tolerance. The remaining differences are those of float sums.
 SAME = 1e-6
 GREY = (0.5, 0.4, 0.3)
-LAMP = (20.0, 10.0, 5.0)  # radiance
+LAMP = (20.0, 10.0, 5.0)  # radiance, W/(m^2 sr)
 
 
 def bake(**overrides):
-    # Fixed bundles, so that all bakes have the same lines.
+    # The number of bundles is fixed, so that all bakes have the same lines.
     return raybundle.bake(bpy.context, **{"output": 'LIGHTING', "max_patches": 500,
                                           "target_error": 0.001, "max_bundles": 64, **overrides})
 
 
 @pytest.fixture
 def corner(new_object, new_material, new_light):
-    """A floor and a wall under a lamp, and a panel that shines; a material each."""
+    """Returns a floor, a wall and a panel that emits, each with its own material, under a lamp."""
     points = [(x, y, 0) for y in (-2, 0, 2) for x in (-2, 0, 2)]
     faces = [(i, i + 1, i + 4, i + 3) for i in (0, 1, 3, 4)]
     floor = new_object("Floor", points, faces, new_material("Grey", GREY))
@@ -47,7 +49,7 @@ def node_of(tree, kind):
 
 
 def reader(tree, name, kind='VERTEX_COLOR'):
-    """A socket that is the attribute."""
+    """Returns a socket with the colour of the attribute."""
     if kind == 'VERTEX_COLOR':
         node = tree.nodes.new('ShaderNodeVertexColor')
         node.layer_name = name
@@ -58,7 +60,10 @@ def reader(tree, name, kind='VERTEX_COLOR'):
 
 
 def new_mix(tree, first, second, blend='MULTIPLY', factor=1.0, is_old=False):
-    """Mixed of two sockets or colours, by the node of 3.4 and newer or the one before."""
+    """Returns the mix of two sockets or colours.
+
+    is_old: uses the node that Blender 3.4 replaced.
+    """
     if is_old:
         node = tree.nodes.new('ShaderNodeMixRGB')
         sockets, output = node.inputs, node.outputs[0]
@@ -79,7 +84,7 @@ def new_mix(tree, first, second, blend='MULTIPLY', factor=1.0, is_old=False):
 
 
 # --------------------------------------------------------------------------------------------------
-# Ways to show a result: each changes a material of which the last bake took the colour
+# Ways to show a result: each changes a material, whose colour the last bake used
 # --------------------------------------------------------------------------------------------------
 
 
@@ -89,7 +94,10 @@ def as_emission(material, name, kind):
 
 
 def as_emission_beside(material, name, kind):
-    """What the material was stays; its own emission gives way."""
+    """Adds the result as emission to the shader of the material, which stays.
+
+    The bake then no longer reads the material's own emission from its nodes.
+    """
     tree = material.node_tree
     emission = tree.nodes.new('ShaderNodeEmission')
     tree.links.new(reader(tree, name, kind), emission.inputs['Color'])
@@ -109,7 +117,7 @@ def as_strength(material, name, kind):
 
 
 def as_base_color(material, name, kind):
-    """Linked in place; the socket has the colour of before."""
+    """Links the result in place of the colour. The socket still contains the old colour."""
     tree = material.node_tree
     tree.links.new(reader(tree, name, kind), node_of(tree, 'BSDF_DIFFUSE').inputs['Color'])
 
@@ -163,7 +171,7 @@ def as_half_factor(material, name, kind):
 
 
 def as_vector_factor(material, name, kind):
-    """By a node that only Cycles can evaluate, of a colour that varies."""
+    """Multiplies a varying colour by the result, in a node that only Cycles can evaluate."""
     shader = new_shader(material, 'ShaderNodeBsdfDiffuse')
     tree = material.node_tree
     noise = tree.nodes.new('ShaderNodeTexNoise')
@@ -175,7 +183,7 @@ def as_vector_factor(material, name, kind):
 
 
 def group_of(show):
-    """The same, from within a group."""
+    """Returns a variant of `show` that reads the attribute in a node group."""
     def show_in_group(material, name, kind):
         show(material, name, kind)
         tree = material.node_tree
@@ -219,7 +227,8 @@ def test_to_show_the_result_and_bake_again_gives_the_same_light(corner, show, do
     first = bake(domain=domain)
     assert naming(first) == ""
     before = [read_colors(item) for item in corner]
-    # Two of them: only what changes nothing may be shown by the lamp in place of its own emission.
+    # Shows the result only on the first two objects. On the lamp, some of the ways would replace
+    # its own emission.
     for item in corner[:2]:
         show(item.data.materials[0], "Radiosity", kind)
     for _ in range(2):
@@ -241,7 +250,7 @@ def test_a_lamp_that_shows_nothing_but_the_result_still_shines(corner, show):
 
 
 def test_other_materials_in_the_slots_and_a_saved_file(corner, tmp_path):
-    """As a look at the result is made: a new material for all, which is saved with the file."""
+    """A new material shows the result on all objects, and is saved with the file."""
     bake()
     before = [read_colors(item) for item in corner]
     shown = bpy.data.materials.new("Shown")
@@ -258,7 +267,7 @@ def test_other_materials_in_the_slots_and_a_saved_file(corner, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shown.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shown.blend"))
     report = bake()
-    # Traced anew; the same numbers give the same lines.
+    # The lines are traced anew. Equal numbers give equal lines.
     assert difference([bpy.data.objects[name] for name in names], before) < SAME
     assert '"Shown"' in naming(report)
 
@@ -274,13 +283,13 @@ def test_subdivided_copies_that_show_the_result(corner, topology):
     assert not any("no earlier bake" in text for text in report.warnings)
     copies = [bpy.data.objects[f"{item.name} (Radiosity)"] for item in corner]
     for item, mean in zip(copies, before):
-        # Of the copies themselves the lines are others: noise of 64 bundles.
+        # KEEP bakes the copies themselves, with other lines: noise of 64 bundles.
         assert read_colors(item).mean(axis=0) == pytest.approx(
             mean, rel=SAME if topology == 'SUBDIVIDE' else 0.02)
 
 
 def test_what_an_image_was_stays_one(corner):
-    """A colour that was read from an image, and then only from the result."""
+    """A colour comes from an image in the first bake, and in later ones the result replaces it."""
     image = bpy.data.images.new("Stripes", 4, 4, float_buffer=True)
     image.pixels = np.tile([0.8, 0.1, 0.1, 1.0, 0.1, 0.1, 0.8, 1.0], 8).tolist()
     floor = corner[0]
@@ -295,14 +304,17 @@ def test_what_an_image_was_stays_one(corner):
     tree.links.new(reader(tree, "Radiosity"), color)
     bake()
     assert difference(corner, before) < SAME
-    # Where it is gone, its mean is known.
+    # If the image no longer exists, its mean is used.
     bpy.data.images.remove(image)
     bake()
     assert 0.0 < difference(corner, before) < 0.1
 
 
 def test_materials_that_cycles_bakes_do_not_see_the_result(corner):
-    """A pattern times the result is the pattern, and is not asked for again."""
+    """Cycles bakes a pattern multiplied by the result as the pattern alone.
+
+    A later bake therefore gives the same light.
+    """
     for item in corner[:2]:
         as_vector_factor(item.data.materials[0], "Light", 'VERTEX_COLOR')
     first = bake(attribute="Light")
@@ -328,7 +340,8 @@ def test_the_results_of_light_sets_errors_and_earlier_bakes(corner):
     for name in names:
         assert difference(corner, before[name], name) < SAME
     assert all(f'"{name}"' in naming(report) for name in ("Grey", "Dark", "Lamp"))
-    # Another name for the next bake: what the ones before wrote is still no light.
+    # The next bake writes to another attribute. Results of earlier bakes still do not count as
+    # light.
     options["attribute"] = "Other"
     as_emission(corner[0].data.materials[0], "Light", 'ATTRIBUTE')
     bake(**options)
@@ -336,7 +349,10 @@ def test_the_results_of_light_sets_errors_and_earlier_bakes(corner):
 
 
 def test_the_render_attribute_without_a_name(corner):
-    """What nodes read without a name is the result after the first bake."""
+    """Nodes without an attribute name read the active render attribute.
+
+    After the first bake this is the result.
+    """
     floor, wall, panel = corner
     painted = floor.data.color_attributes.new("Painted", 'FLOAT_COLOR', 'POINT')
     painted.data.foreach_set('color', np.tile([0.2, 0.7, 0.4, 1.0], len(painted.data)))
@@ -345,7 +361,7 @@ def test_the_render_attribute_without_a_name(corner):
         tree = item.data.materials[0].node_tree
         tree.links.new(reader(tree, ""), node_of(tree, 'BSDF_DIFFUSE').inputs['Color'])
     first = bake()
-    # The floor's is its paint; the wall has no other than the result to come.
+    # The floor has a painted attribute. The wall has no attribute other than the future result.
     assert '"Dark"' in naming(first) and '"Grey"' not in naming(first)
     before = [read_colors(item) for item in corner]
     report = bake()
@@ -373,7 +389,7 @@ def test_a_result_alone_before_the_first_bake_is_a_guess_that_is_said(corner):
 
 
 def test_the_light_of_a_material_that_shows_the_result_in_its_colour_follows(corner):
-    """Only what the result hides is that of the last bake."""
+    """Only the part of a material that the result hides is taken from the last bake."""
     bake()
     before = [read_colors(item, "Radiosity") for item in corner]
     tree = corner[2].data.materials[0].node_tree

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The quick cases of stress.py, which states what is expected of each."""
+"""The quick cases of stress.py, which defines what is checked in each case."""
 
 import pytest
 import stress

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines of the report that say the same of several owners are one."""
+"""Warnings in the report with equal text about several owners are merged into one line."""
 
 import bpy
 import pytest
@@ -22,7 +22,7 @@ COPY_MIRRORS = MIRRORS.replace('"Glossy BSDF"', '"Glossy BSDF.001"')
      ['object "A", "B": 7 faces lie on others']),
     (['"A" is left out: it has no faces', '"B" is left out: it has no faces'],
      ['"A", "B" is left out: it has no faces']),
-    # Where a name ends is not known if it has quotes.
+    # If a name contains quotes, its end in the line is not known. Such lines are not merged.
     (['material "a "quoted" name" is black', 'material "B" is black'],
      ['material "a "quoted" name" is black', 'material "B" is black']),
 ])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes with the mouse in a Blender with a window; started by run_ui_test.py.
+"""Bakes with the mouse in a Blender with a window. run_ui_test.py starts this script.
 
     blender --factory-startup FILE.blend -P blend_tests/ui_test.py -- --out DIR
 
@@ -127,8 +127,8 @@ def click(x: int, y: int) -> Iterator[float]:
     if len(identifiers) != 1:
         raise UiError(f"there are {len(identifiers)} windows of Blender")
     place = ["mousemove", "--window", identifiers[0], x]
-    # Enters the button from outside, so that the button notices the mouse, with time for Blender to
-    # react.
+    # Enters the button from outside, so that the button becomes the active one, with time for
+    # Blender to react.
     for offset in (40, 2, 0):
         xdotool(*place, window().height - 1 - y - offset)
         yield PAUSE
@@ -189,7 +189,7 @@ def check_result() -> None:
 def leave(code: int, message: str) -> None:
     print(f"ui_test: {message}", flush=True)
     sys.stdout.flush()
-    # A normal exit would ask whether to save the file.
+    # A normal exit would open a dialog that asks whether to save the file.
     os._exit(code)
 
 
