@@ -55,7 +55,7 @@ def discard_all() -> None:
 
 @persistent
 def _on_load(*_arguments: object) -> None:
-    # In the next file, the same names belong to other scenes.
+    # In the next file, these names may belong to other scenes.
     discard_all()
 
 

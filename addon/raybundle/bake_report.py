@@ -19,7 +19,7 @@ class ObjectReport:
     name: str
     corners: int  # number, of the mesh that was written to; 0: not baked
     status: str  # 'baked', optionally with a remark, or the reason why the object was not baked
-    # keys as in BakeReport.error; {}: not baked
+    # Keys as in BakeReport.error. {}: not baked.
     error: dict[str, float] = field(default_factory=dict)
 
 
@@ -38,7 +38,7 @@ class BakeReport:
     estimated_error: float = 0.0  # relative noise of the light on patches
     # The stated error, relative to the light; keys: noise, discretisation, mesh, total.
     error: dict[str, float] = field(default_factory=dict)
-    # W, except balance_error, which is relative
+    # In W, except balance_error, which is relative.
     energy: dict[str, float] = field(default_factory=dict)
     peak_memory_bytes: int = 0
     light_sets: list[dict] = field(default_factory=list)  # keys: name, attribute, estimated_error

@@ -92,7 +92,7 @@ def oren_nayar(roughness: float, color: np.ndarray) -> DiffuseAngles:
         return lambert()
     color = np.clip(color, 0.0, 1.0)
     above = _from_above(roughness)
-    # weights by angle, in addition to `above`
+    # The part of the albedo that depends on the angle. The constant part is `above`.
     facets = roughness * above / math.pi * _FACETS[:, None]
     once, several = facet_shares(roughness)
     again = several * color**2 / (1.0 - color * (1.0 - once))

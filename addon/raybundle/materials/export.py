@@ -256,8 +256,8 @@ class MaterialExporter:
         return replace(self._add(material.name, list(last.sides)), surface=last)
 
     def _guess(self, name: str, sides: list[Surface], shown: _Shown) -> MaterialExport:
-        """Adds a material that shows only a result and whose surface the last bake has not kept.
-        Its colours are those of its sockets, or grey if these are black."""
+        """Adds a material that shows only a result and whose surface the last bake has not stored.
+        Its colours are those of its sockets, or grey if these are black. Adds a warning."""
         if any(np.any(side.reflectance.mean() + side.translucence.mean() > 0.0) for side in sides):
             self.warnings.add(
                 f'material "{name}" shows the result of a bake alone, and no earlier bake tells '

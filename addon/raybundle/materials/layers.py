@@ -92,7 +92,7 @@ _VELVET = _MICROFIBERS[0], np.array([
 # vector.
 _BURLEY_SHEEN = np.array([0.0004, 0.0037, 0.0452, 0.0375, 0.0550])
 
-# order of the lobes in rb_surface
+# Order of the lobes in rb_surface.
 MICROFIBERS, VELVET, BURLEY_SHEEN, SEVERAL_FACETS = LOBES = range(4)
 
 
@@ -161,7 +161,7 @@ def clearcoat(roughness: float) -> Layer:
     light (gloss.seen_roughness). The integral is a sum over midpoints of the facets' directions."""
     alpha2 = min(max(roughness, 0.01)**4, 0.9999)
     steps = (np.arange(_FACETS) + 0.5) / _FACETS
-    # cosines of the facets
+    # Cosines of the facets' angles.
     facet = np.sqrt((1.0 - alpha2**(1.0 - steps)) / (1.0 - alpha2))[:, None]
     views = np.sqrt(steps)[:, None, None]
     between = (views * facet + np.sqrt((1.0 - views**2) * (1.0 - facet**2))
