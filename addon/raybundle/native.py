@@ -735,13 +735,15 @@ class Bake(_Handle):
 
 
 class Subdivision(_Handle):
-    """A conforming triangle mesh, made of another mesh, with edges not longer than max_edge, m.
+    """A conforming triangle mesh, built from another mesh, with edges of at most max_edge, m.
+
+    Each corner of a triangle lies between three corners of one face of the source mesh.
 
     vertices        (n, 3) float32, m
     triangles       (t, 3) int32, vertex indices
-    source_faces    (t,) int32, the face of the source mesh that a triangle lies in
-    source_corners  (t, 3, 3) int32, per new corner the three source corners it lies between
-    source_weights  (t, 3, 3) float32, their weights, which sum to 1
+    source_faces    (t,) int32, the face of the source mesh that contains the triangle
+    source_corners  (t, 3, 3) int32, three source corners for each corner of a triangle
+    source_weights  (t, 3, 3) float32, the weights of the source corners, which sum to 1
     """
 
     _release = 'rb_release_subdivision'
