@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Raybundle: global illumination in vertex colours, by bundles of parallel global lines.
+"""Raybundle: global illumination in vertex colours, computed by bundles of parallel global lines.
 
 Scripts call raybundle.bake(bpy.context, ...), which returns a BakeReport and raises BakeError or
 RaybundleError.
@@ -26,7 +26,7 @@ bl_info = {
     "category": "Render",
 }
 
-# In the order in which they are registered: panels show operators and properties.
+# In the order of registration: panels refer to operators and properties.
 _MODULES = (properties, bake_cache, operators, panels)
 
 
@@ -34,7 +34,7 @@ def register() -> None:
     for module in _MODULES:
         module.register()
     # Blender as a Python module (4.2) frees the classes of panels after Python has ended, which
-    # crashes: they are unregistered while Python still runs.
+    # crashes. Therefore unregister the classes while Python is still running.
     if not bpy.app.binary_path:
         atexit.register(unregister)
 

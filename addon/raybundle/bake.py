@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bake, stage by stage: check, export, native scene, execute, read results, write, report.
+"""A bake in stages: check, export, native scene, execution, results, writing, report.
 
 The user's data is changed only after the native library has computed all of the light.
 """
@@ -31,13 +31,15 @@ from .warning_lines import grouped
 
 @dataclass(frozen=True)
 class TargetLight:
-    """The light that is to be written to an object."""
+    """The light that will be written to an object."""
 
     target: BakeTarget
-    light: np.ndarray  # (n, 3), of n corners or vertices by settings.domain
-    error: np.ndarray | None  # (n,), the stated error; None: not to be written
-    subdivided: SubdividedMesh | None  # the finer mesh that gets the light; None: the object's own
-    # (n, 3) by name of the attribute, the light of each light set.
+    # (n, 3), for n corners or vertices (settings.domain), in the unit of settings.output
+    light: np.ndarray
+    error: np.ndarray | None  # (n,), the stated error; None: not written
+    # the finer mesh that receives the light; None: the object's own mesh
+    subdivided: SubdividedMesh | None
+    # The light of each light set, (n, 3), by name of the attribute.
     set_lights: dict[str, np.ndarray] = field(default_factory=dict)
 
 
@@ -45,15 +47,15 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
          **overrides: object) -> BakeReport:
     """Bakes the context's scene into colour attributes of its meshes, and returns the report.
 
-    progress(stage, fraction), fraction from 0 to 1, may return False to cancel. overrides: values
-    of settings of scene.raybundle that hold for this bake (seed=1, ...). Raises BakeError, with a
-    message for the user, for settings or scenes that cannot be baked, and RaybundleError if the
-    native library is missing or fails; its code is CANCELLED after a cancel.
+    progress(stage, fraction), with a fraction from 0 to 1, may return False to cancel. overrides:
+    values of settings of scene.raybundle that apply only to this bake (seed=1, ...). Raises
+    BakeError, with a message for the user, for settings or scenes that cannot be baked. Raises
+    RaybundleError if the native library is missing or fails; its code is CANCELLED after a cancel.
     """
     started = time.perf_counter()
     report_progress = _checked_progress(progress)
     native.load()
-    # Call before anything is read: the function may change the file.
+    # Call the function before anything is read, because it may change the file.
     report_progress('export', 0.0)
     scene = context.scene
     try:
@@ -104,7 +106,8 @@ def _checked_progress(progress: Progress | None) -> Progress:
 
 @contextmanager
 def _object_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Object Mode in the with block: in Edit Mode meshes can be neither evaluated nor written."""
+    """Switches to Object Mode in the with block, because meshes in Edit Mode can be neither
+    evaluated nor written."""
     was_editing = context.mode.startswith('EDIT')
     if was_editing and bpy.ops.object.mode_set.poll():
         bpy.ops.object.mode_set(mode='OBJECT')
@@ -116,7 +119,8 @@ def _object_mode(context: bpy.types.Context) -> Iterator[None]:
 
 
 def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[LightSet]) -> None:
-    """Raises BakeError if the attributes of settings and light sets cannot be written."""
+    """Raises BakeError if the attributes of the settings and of the light sets cannot be
+    written."""
     if not settings.attribute:
         raise BakeError("The attribute needs a name")
     longest = settings.attribute
@@ -143,14 +147,14 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[Ligh
 
 def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list[LightSet]
             ) -> tuple[SceneExport, dict[int, SubdividedMesh]]:
-    """The exported scene and, for topology 'SUBDIVIDE', the finer mesh of each target, by the
-    target's position in SceneData.instances. Raises BakeError if there is nothing to bake."""
+    """Exports the scene. For topology 'SUBDIVIDE' also returns the finer mesh of each target, by
+    the target's position in SceneData.instances. Raises BakeError if there is nothing to bake."""
     refine = settings.topology == 'SUBDIVIDE'
     selected = None
     if settings.scope == 'SELECTED':
         selected = {item for item in context.scene.objects if item.select_get()}
         if refine:
-            # A selected copy stands for its original.
+            # A selected copy counts as a selection of its original.
             selected |= {original for original, copy in find_copies(context.scene).items()
                          if copy in selected}
     with originals_shown(context.scene) if refine else nullcontext():
@@ -169,11 +173,12 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
 
 
 def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
-    """Removes targets that cannot be written, since their data belongs to another file. They still
-    reflect and block light."""
+    """Removes targets that cannot be written because their data belongs to another file. These
+    objects still reflect and block light."""
     writable = []
     for target in export.targets:
-        # A subdivided copy has a mesh of its own, but is put beside its original object.
+        # A subdivided copy has its own mesh, but is placed in the collections of its original
+        # object.
         owner = target.object if settings.topology == 'SUBDIVIDE' else target.object.data
         if owner.library is None and owner.override_library is None:
             writable.append(target)
@@ -188,7 +193,8 @@ def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
 
 
 def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, SubdividedMesh]:
-    """Puts a finer mesh in the place of each target's; returns them by position of the instance."""
+    """Replaces the mesh of each target by a finer mesh. Returns the finer meshes by position of the
+    instance in SceneData.instances."""
     scene = export.scene
     patch_size = settings.patch_size or scene.diagonal() / 64.0
     result = {}
@@ -202,7 +208,8 @@ def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, Subdivided
 
 
 def _want_written_corners(export: SceneExport) -> None:
-    """Where modifiers have changed a mesh, limits the results to the corners that are written."""
+    """Limits the results of meshes that modifiers have changed to the corners whose light is
+    written."""
     instances = export.scene.instances
     for target in export.targets:
         if not target.corner_map.is_identity:
@@ -220,8 +227,8 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
 
 
 def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: native.Bake) -> None:
-    """Raises BakeError if a target or the bake is no longer as it was exported: the progress
-    function may have undone a step, opened a file or edited a mesh."""
+    """Raises BakeError if a target or the bake has changed since the export. The progress function
+    may have undone a step, opened a file or edited a mesh."""
     for target in export.targets:
         try:
             mesh = target.object.data
@@ -245,7 +252,7 @@ def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: n
 def _read_results(native_bake: native.Bake, export: SceneExport,
                   subdivided: dict[int, SubdividedMesh], settings: BakeSettings,
                   light_sets: list[LightSet]) -> list[TargetLight]:
-    """The light of each target, at the corners or vertices of the mesh that gets it."""
+    """Returns the light of each target, at the corners or vertices of the mesh that receives it."""
     results = []
     for target in export.targets:
         mesh = export.scene.meshes[export.scene.instances[target.instance].mesh]
@@ -273,8 +280,8 @@ def _read_results(native_bake: native.Bake, export: SceneExport,
 
 def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
                 corner_map: CornerMap, domain: str) -> np.ndarray:
-    """(n,): the stated error of n corners or vertices, by domain ('CORNER' or 'POINT'); the root
-    mean square where several evaluated corners stand for one element."""
+    """Returns the stated error at corners or vertices, (n,). domain: 'CORNER' or 'POINT'. If
+    several evaluated corners belong to one element, the result is their root mean square."""
     error = native_bake.corner_error(target.instance, mesh.corner_count)
     squares = corner_map.to_original(np.repeat(error[:, None] ** 2, 3, axis=1))
     if domain == 'POINT' and corner_map.is_identity:
@@ -292,7 +299,8 @@ def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
 
 def _write(context: bpy.types.Context, lights: list[TargetLight], settings: BakeSettings,
            export: SceneExport, native_report: dict) -> list[ObjectReport]:
-    """Writes the light to the targets, or to their subdivided copies."""
+    """Writes the light to the targets, or to their subdivided copies. Returns a report for each
+    target."""
     copies: dict[bpy.types.Object, bpy.types.Object] = {}
     if settings.topology == 'SUBDIVIDE':
         copies = create_copies(context, {item.target.object: item.subdivided for item in lights})
@@ -302,7 +310,7 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
     reports = []
     for item in lights:
         receiver = copies.get(item.target.object, item.target.object)
-        # Each attribute becomes the active one: write the light of all lights last.
+        # Each written attribute becomes the active one: write the light of all lights last.
         for name, light in {**item.set_lights, settings.attribute: item.light}.items():
             color_attribute.write_light(receiver.data, name, settings.data_type, settings.domain,
                                         light)
@@ -324,14 +332,15 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
 
 
 def _exposed(light: np.ndarray, settings: BakeSettings) -> np.ndarray:
-    """Light as it is written, with the settings' exposure and clamping."""
+    """Returns light with the settings' exposure and clamping applied."""
     light = light * np.float32(2.0 ** settings.exposure)
     return np.clip(light, 0.0, 1.0) if settings.clamp else light
 
 
 def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
                            export: SceneExport) -> list[TargetLight]:
-    """Where targets share a mesh, which has one light, copies the mesh or takes the mean light."""
+    """Resolves meshes that several targets share. A mesh can only show one light, so either each
+    target gets a copy of the mesh, or the mesh gets the mean light of its targets."""
     groups: dict[bpy.types.Mesh, list[TargetLight]] = {}
     for item in lights:
         groups.setdefault(item.target.object.data, []).append(item)
@@ -341,7 +350,8 @@ def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
             mean = np.mean([item.light for item in group], axis=0)
             set_means = {name: np.mean([item.set_lights[name] for item in group], axis=0)
                          for name in group[0].set_lights}
-            # The largest error: errors of different signs would make that of the mean smaller.
+            # Use the largest error. The actual error of the mean may be smaller if errors have
+            # different signs.
             error = None if group[0].error is None else np.max([item.error for item in group], 0)
             group = [replace(item, light=mean, error=error, set_lights=set_means)
                      for item in group]

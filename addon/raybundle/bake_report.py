@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report of a bake. Scripts read it as JSON: its keys must not change."""
+"""The report of a bake. Scripts read it as JSON, so its keys must not change."""
 
 from __future__ import annotations
 
@@ -8,47 +8,50 @@ from dataclasses import asdict, dataclass, field
 
 
 class BakeError(RuntimeError):
-    """A bake that cannot be made; the message is for the user and names the object concerned."""
+    """Raised if a bake is impossible. The message is for the user and names the object
+    concerned."""
 
 
 @dataclass(frozen=True)
 class ObjectReport:
-    """What became of one object."""
+    """The result of one object."""
 
     name: str
-    corners: int  # of the mesh that was written to; 0: the object was not baked
-    status: str  # 'baked', perhaps followed by a remark, or the reason why it was not
-    error: dict[str, float] = field(default_factory=dict)  # as BakeReport.error; {}: not baked
+    corners: int  # number, of the mesh that was written to; 0: not baked
+    status: str  # 'baked', optionally with a remark, or the reason why the object was not baked
+    # Keys as in BakeReport.error. {}: not baked.
+    error: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
 class BakeReport:
-    """What a bake did, how long it took and how exact its result is."""
+    """The statistics of a bake: its work, its times, and the accuracy of its result."""
 
     seconds: dict[str, float] = field(default_factory=dict)  # per stage, and 'total'
     patches: int = 0
-    # Tiles of patches that were cut into smaller ones; keys: why, tiles (their number).
+    # Tiles that were cut into smaller patches; keys: why, tiles (number of tiles).
     refined: list[dict] = field(default_factory=list)
     bundles: int = 0
     lines: int = 0
     exchanges: int = 0
     shadow_rays: int = 0
-    estimated_error: float = 0.0  # relative noise of the light on the patches
+    estimated_error: float = 0.0  # relative noise of the light on patches
     # The stated error, relative to the light; keys: noise, discretisation, mesh, total.
     error: dict[str, float] = field(default_factory=dict)
-    energy: dict[str, float] = field(default_factory=dict)  # W; balance_error is relative
+    # In W, except balance_error, which is relative.
+    energy: dict[str, float] = field(default_factory=dict)
     peak_memory_bytes: int = 0
     light_sets: list[dict] = field(default_factory=list)  # keys: name, attribute, estimated_error
     objects: list[ObjectReport] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    # What the library's warnings are of, for programs: "MAX_BUNDLES" and so on, each once.
+    # Identifiers of the library's warnings for programs, such as "MAX_BUNDLES", without duplicates.
     warning_ids: list[str] = field(default_factory=list)
-    # Work that was not needed; keys: id, what, why, count.
+    # Work that was skipped because the scene did not need it; keys: id, what, why, count.
     skipped: list[dict] = field(default_factory=list)
 
     @classmethod
     def from_native(cls, values: dict) -> BakeReport:
-        """The report with what the native library reports, without objects."""
+        """Returns a report with the values of the native library's report, without objects."""
         report = cls()
         for name in ('seconds', 'patches', 'refined', 'bundles', 'lines', 'exchanges',
                      'shadow_rays', 'estimated_error', 'error', 'energy', 'peak_memory_bytes',
@@ -59,11 +62,11 @@ class BakeReport:
         return report
 
     def to_json(self, indent: int | None = None) -> str:
-        """The JSON form; indent: as in json.dumps."""
+        """Returns the report as JSON. indent: as in json.dumps."""
         return json.dumps(asdict(self), indent=indent)
 
     def summary(self) -> str:
-        """One line for the status bar."""
+        """Returns one line for the status bar."""
         baked = sum(item.status.startswith('baked') for item in self.objects)
         warnings = f", {len(self.warnings)} warnings" if self.warnings else ""
         return (f"{baked} objects baked in {self.seconds['total']:.2f} s: {self.patches} patches, "

@@ -6,17 +6,20 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-# The longest name of an attribute: Blender cuts off or refuses longer ones, by version.
+# Length limit of attribute names in bytes. Blender truncates or rejects longer names, depending on
+# its version.
 MOST_BYTES = 63
 
 
 def write_light(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, light: np.ndarray
                 ) -> None:
-    """Writes light to a colour attribute, and makes that the active and the rendered one.
+    """Writes light to a colour attribute, and makes this attribute the active one and the render
+    one.
 
-    domain: 'CORNER' or 'POINT'; data_type: 'FLOAT_COLOR' or 'BYTE_COLOR'; light: (n, 3),
-    scene-linear, of n corners or vertices. An attribute of this name with another domain or type is
-    replaced; the alpha of one that fits is kept. Raises ValueError if n is not the mesh's.
+    domain: 'CORNER' or 'POINT'. data_type: 'FLOAT_COLOR' or 'BYTE_COLOR'. light: (n, 3),
+    scene-linear, for n corners or vertices. An attribute of this name with another domain or type
+    is replaced. The alpha of a matching attribute is kept. Raises ValueError if n differs from the
+    mesh's number of elements.
     """
     attribute = mesh.color_attributes.get(name)
     if attribute is not None and (attribute.domain, attribute.data_type) != (domain, data_type):
@@ -33,21 +36,21 @@ def write_light(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, li
     if not created:
         attribute.data.foreach_get('color', colors)
     colors.reshape(-1, 4)[:, :3] = light
-    # `color` is scene-linear for both types: Blender itself converts to the bytes' sRGB.
+    # `color` is scene-linear for both types. Blender itself converts it to the bytes' sRGB.
     attribute.data.foreach_set('color', colors)
     activate(mesh, name)
     mesh.update()
 
 
 def error_name(name: str) -> str:
-    """The name of the attribute with the stated error of the light of this name."""
+    """Returns the name of the attribute for the stated error of the light in attribute `name`."""
     return f"{name} Error"
 
 
 def write_error(mesh: bpy.types.Mesh, name: str, domain: str, error: np.ndarray) -> None:
-    """Writes the stated error of light to a float attribute of its own, which is replaced.
+    """Writes the stated error of light to a float attribute. An earlier attribute is replaced.
 
-    name: of the light's attribute; domain: 'CORNER' or 'POINT'; error: (n,), of n corners or
+    name: of the light's attribute. domain: 'CORNER' or 'POINT'. error: (n,), for n corners or
     vertices.
     """
     clear_error(mesh, name)
@@ -57,23 +60,24 @@ def write_error(mesh: bpy.types.Mesh, name: str, domain: str, error: np.ndarray)
 
 
 def clear_error(mesh: bpy.types.Mesh, name: str) -> None:
-    """Removes the stated error of the light of this name, if the mesh has it."""
+    """Removes the stated error of the light in attribute `name`, if the mesh has it."""
     attribute = mesh.attributes.get(error_name(name))
     if attribute is not None and attribute.data_type == 'FLOAT':
         mesh.attributes.remove(attribute)
 
 
 def name_is_free(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Whether a colour attribute of this name can be written without losing something else."""
+    """Returns whether a colour attribute of this name can be written without replacing other
+    data."""
     if name in mesh.color_attributes:
         return True
-    # UV maps share the names of attributes, but only Blender 3.5 and later list them there.
+    # UV maps share the names of attributes, but only Blender 3.5 and later list them as attributes.
     return name not in mesh.attributes and name not in mesh.uv_layers
 
 
 def activate(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Makes a colour attribute the active one (of the viewport) and the rendered one; returns
-    whether the mesh has it."""
+    """Makes a colour attribute the active one (of the viewport) and the render one. Returns whether
+    the mesh has the attribute."""
     for index, attribute in enumerate(mesh.color_attributes):
         if attribute.name == name:
             mesh.color_attributes.active_color_index = index
@@ -83,15 +87,16 @@ def activate(mesh: bpy.types.Mesh, name: str) -> bool:
 
 
 def rendered_attribute(mesh: bpy.types.Mesh) -> bpy.types.Attribute | None:
-    """The render colour attribute, which materials read without naming it; None if the mesh has
-    none."""
+    """Returns the render colour attribute, which materials read without naming it. Returns None if
+    the mesh has none."""
     index = mesh.color_attributes.render_color_index
     # The index is -1 or past the end if there is none.
     return mesh.color_attributes[index] if 0 <= index < len(mesh.color_attributes) else None
 
 
 def clear(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Removes the light of this name and its stated error; returns whether there was light."""
+    """Removes the light in attribute `name` and its stated error. Returns whether the mesh had the
+    light."""
     clear_error(mesh, name)
     attribute = mesh.color_attributes.get(name)
     if attribute is None:

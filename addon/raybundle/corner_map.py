@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which corners of an evaluated mesh stand for which corners of the mesh that the user edits.
+"""Maps corners of an evaluated mesh to corners of the mesh that the user edits.
 
-Modifiers may change the topology, and Python has no access to Blender's own index of the original
-element. During the export the original mesh therefore carries two integer attributes, with a code
-for each vertex and each corner. Modifiers copy the codes of elements that they keep, and
-interpolate codes for elements that they create. Codes are sparse numbers in no order, so that an
-interpolated one is nearly never the code of an element; a plain index often would be.
+Modifiers may change the topology, and Python cannot access Blender's own index of the original
+element. During the export, the original mesh therefore has two integer attributes with a code for
+each vertex and each corner. Modifiers copy the codes of elements that they keep, and interpolate
+codes for elements that they create. Codes are sparse numbers in no order, so that an interpolated
+code is almost never the code of an element. An interpolated index often would be.
 """
 
 from __future__ import annotations
@@ -22,44 +22,46 @@ from .mesh_arrays import corner_vertices, read, topology, vertex_positions
 VERTEX_CODE = ".raybundle_vertex"
 CORNER_CODE = ".raybundle_corner"
 
-# Blender interpolates integers in single precision, which keeps so many bits if the weight is 1.
+# Blender interpolates integers in single precision, which keeps this number of bits if the weight
+# is 1.
 _CODE_BITS = 24
 
-# One in so many integers is a code: an interpolated one is taken for a code as rarely. On meshes of
-# more than 4096 elements the limit of bits makes codes denser.
+# One in this number of integers is a code, so an interpolated value is mistaken for a code with
+# this probability. On meshes of more than 4096 elements, the limit of bits makes codes denser.
 _CODES_PER_ELEMENT = 4096
 
-# Faces count as facing the same way if the cosine between their normals is larger.
+# Faces count as facing the same way if the cosine between their normals is larger than this.
 _SAME_WAY = 0.7
 
 
 @dataclass(frozen=True)
 class CornerMap:
-    """Pairs of corners of an evaluated mesh and of the original one.
+    """Pairs of corners of an evaluated mesh and of its original mesh.
 
     An original corner gets the mean of the evaluated corners that it is paired with.
     """
 
-    original_count: int  # corners of the original mesh
-    # (k,): evaluated corner of each pair; None: both meshes have the same corners.
+    original_count: int  # number of corners of the original mesh
+    # (k,): evaluated corner of each pair. None: both meshes have the same corners.
     evaluated: np.ndarray | None = None
     original: np.ndarray | None = None  # (k,): original corner of each pair
-    copied: int = 0  # original corners that modifiers have copied to other places as well
-    untraced: int = 0  # original corners that the modifiers kept no code of
+    copied: int = 0  # number of original corners that modifiers have also copied to other places
+    untraced: int = 0  # number of original corners whose code the modifiers have not kept
 
     @property
     def is_identity(self) -> bool:
         return self.evaluated is None
 
     def to_original(self, values: np.ndarray) -> np.ndarray:
-        """Values (evaluated corners, 3) -> (original corners, 3); 0 for a corner without a pair."""
+        """Converts values of evaluated corners, (evaluated corners, 3), to values of original
+        corners, (original corners, 3). The value of a corner without a pair is 0."""
         if self.is_identity:
             return values
         return grouped_mean(values[self.evaluated], self.original, self.original_count)
 
 
 class ElementCodes:
-    """A context manager: original meshes have their codes in the with block."""
+    """A context manager that gives original meshes their codes in the with block."""
 
     def __init__(self, meshes: Iterable[bpy.types.Mesh]) -> None:
         self._meshes = list(dict.fromkeys(meshes))
@@ -83,17 +85,18 @@ class ElementCodes:
 
 
 def same_topology(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> bool:
-    """Whether the corners of the two meshes correspond one to one."""
+    """Returns whether the corners of the two meshes correspond one to one."""
     return topology(original).matches(topology(evaluated))
 
 
 def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> CornerMap:
-    """Pairs the corners of two meshes, both in object space.
+    """Returns pairs of corners of two meshes, which are both in object space.
 
     If the topology differs, the original mesh must have had its codes (ElementCodes) when it was
-    evaluated. Where modifiers have made several corners of one, the corner is taken whose face
-    faces the same way, then the one nearest to the original, then the first: for Solidify that is
-    the shell with the original's normals, for Mirror and Array the copy in the original's place.
+    evaluated. If modifiers have created several corners from one, the best of them is chosen: first
+    by whether its face faces the same way as the original, then by its distance to the original
+    corner, then by its index. For Solidify this is the shell with the original's normals, for
+    Mirror and Array the copy in the original's place.
     """
     count = len(original.loops)
     if same_topology(original, evaluated):
@@ -131,21 +134,21 @@ def build_corner_map(original: bpy.types.Mesh, evaluated: bpy.types.Mesh) -> Cor
 
 
 def grouped_mean(values: np.ndarray, groups: np.ndarray, group_count: int) -> np.ndarray:
-    """(group_count, 3) float32: the mean of each group's values, 0 for a group without values.
-    values: (k, 3); groups: (k,), the group of each value."""
+    """Returns the mean of each group's values, (group_count, 3) float32. It is 0 for a group
+    without values. values: (k, 3). groups: (k,), the group of each value."""
     counts = np.bincount(groups, minlength=group_count)
     sums = [np.bincount(groups, values[:, channel], group_count) for channel in range(3)]
     return (np.stack(sums, axis=1) / np.maximum(counts, 1)[:, None]).astype(np.float32)
 
 
 def _codes(count: int) -> np.ndarray:
-    """(count,) int32: a code for each element, distinct and positive; always the same for the same
-    count."""
+    """Returns a code for each element, (count,) int32. Codes are distinct, positive, and only
+    depend on the count."""
     numbers = np.arange(1, count + 1, dtype=np.uint64)
     bits = min((_CODES_PER_ELEMENT * count).bit_length(), _CODE_BITS)
     if count >= 2 ** bits:
         return numbers.astype(np.int32)
-    # Each step is a permutation of the numbers of so many bits, in which 0 stays 0.
+    # Each step is a permutation of the numbers of this many bits, which maps 0 to 0.
     for factor in (0x9E3779B1, 0x85EBCA77):
         numbers = (numbers * np.uint64(factor)) & np.uint64(2 ** bits - 1)
         numbers ^= numbers >> np.uint64(bits // 2)
@@ -153,8 +156,8 @@ def _codes(count: int) -> np.ndarray:
 
 
 def _decoded(evaluated: bpy.types.Mesh, name: str, count: int, original_count: int) -> np.ndarray:
-    """(count,): the original element of each of the count evaluated ones, by the attribute `name`;
-    -1 where its value is no code."""
+    """Returns the original element of each evaluated element, (count,), from the attribute `name`.
+    The result is -1 where the value of the attribute is not a code."""
     attribute = evaluated.attributes.get(name)
     # Modifiers that build a new mesh, such as Remesh, drop attributes; others change their domain.
     if attribute is None or len(attribute.data) != count or attribute.data_type != 'INT' \
@@ -170,9 +173,9 @@ def _decoded(evaluated: bpy.types.Mesh, name: str, count: int, original_count: i
 
 def _pairs_with_equal_keys(source_keys: np.ndarray, target_keys: np.ndarray, targets: np.ndarray
                            ) -> tuple[np.ndarray, np.ndarray]:
-    """All pairs (source, target) with the same key, as two arrays. targets: positions in
-    target_keys that are looked for; their keys are at least 0, so that negative source keys, which
-    mean none, match nothing."""
+    """Returns all pairs (source, target) with equal keys, as two arrays. targets: positions in
+    target_keys for which pairs are searched. Their keys are at least 0, so negative source keys,
+    which stand for no element, match nothing."""
     order = np.argsort(source_keys, kind='stable')
     ordered = source_keys[order]
     first = np.searchsorted(ordered, target_keys[targets], side='left')
@@ -183,14 +186,15 @@ def _pairs_with_equal_keys(source_keys: np.ndarray, target_keys: np.ndarray, tar
 
 
 class _Corners:
-    """The corners of a mesh: places, in object space, and normals of their faces, (c, 3) each."""
+    """The corners of a mesh: positions, in object space, and normals of their faces, (c, 3)
+    each."""
 
     def __init__(self, mesh: bpy.types.Mesh) -> None:
         self.places = vertex_positions(mesh)[corner_vertices(mesh)]
         sizes = read(mesh.polygons, 'loop_total', np.int32)
         faces = np.repeat(np.arange(len(sizes)), sizes)
         self.normals = read(mesh.polygons, 'normal', np.float32, 3)[faces]
-        # Move each corner a little into its face, so that those of one vertex differ.
+        # Move each corner slightly into its face, so that the corners of one vertex differ.
         centres = grouped_mean(self.places, faces, len(sizes))[faces]
         self.inner_places = self.places + 0.1 * (centres - self.places)
         areas = read(mesh.polygons, 'area', np.float32)
@@ -199,13 +203,13 @@ class _Corners:
 
 def _are_best(candidates: np.ndarray, targets: np.ndarray, before: _Corners, after: _Corners
               ) -> np.ndarray:
-    """(k,) bool: whether each pair of a candidate (evaluated corner) and a target (original corner)
-    is the best one of its target, or its candidate lies where that of the best one does, as for the
-    corners of the two triangles of a quad."""
+    """Returns for each pair of a candidate (evaluated corner) and a target (original corner)
+    whether the pair is the best one of its target, (k,) bool. The result is also True if the
+    candidate lies in the place of the best one, like the corners of the two triangles of a quad."""
     cosines = np.einsum('ij,ij->i', after.normals[candidates], before.normals[targets])
     turn = np.searchsorted((-_SAME_WAY, 0.0), -cosines)  # 0: the same way, 1: sideways, 2: away
     distances = np.linalg.norm(after.places[candidates] - before.places[targets], axis=1)
-    # Distances that differ by rounding alone count as equal.
+    # Distances that only differ by rounding count as equal.
     rounding = 1e-4 * before.face_width or 1.0
     order = np.lexsort((candidates, np.round(distances / rounding), turn, targets))
     groups, first = np.unique(targets[order], return_index=True)
@@ -215,8 +219,9 @@ def _are_best(candidates: np.ndarray, targets: np.ndarray, before: _Corners, aft
 
 
 def _nearest_corners(before: _Corners, after: _Corners, corners: np.ndarray) -> np.ndarray:
-    """(k,): for each of the given original corners, the evaluated one nearest in place and normal.
-    A distance of a mean face's width weighs as much as normals that differ by 60 degrees."""
+    """Returns for each of the given original corners the evaluated corner with the nearest position
+    and normal, (k,). A distance equal to the mean width of a face has the same weight as normals
+    that differ by 60 degrees."""
     width = before.face_width
     tree = KDTree(len(after.places))
     for index, point in enumerate((after.inner_places + width * after.normals).tolist()):

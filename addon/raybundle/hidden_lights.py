@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps that are hidden in the viewport but not in renders, whose light Cycles bakes.
+"""Lamps that are hidden in the viewport but not in renders. Cycles bakes their light.
 
-Python can only evaluate a scene as the viewport does, without these lamps. They are therefore
-evaluated in a scene of their own, which is removed afterwards.
+Python can only evaluate a scene as the viewport does, without these lamps. The lamps are therefore
+evaluated in a temporary scene.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ _SCENE = "Raybundle Hidden Lights"
 
 def hidden_light_instances(context: bpy.types.Context, hidden: Iterable[bpy.types.Object]
                            ) -> Iterator[bpy.types.DepsgraphObjectInstance]:
-    """Evaluated instances of hidden lamps: of those among the given original objects, and of those
-    in collections that the objects instance."""
+    """Yields evaluated instances of hidden lamps: of the lamps among the given original objects,
+    and of the lamps in collections that these objects instance."""
     bearers = [item for item in hidden if _bears_light(item)]
     if not bearers:
         return
     scene = bpy.data.scenes.new(_SCENE)
     switched = [item for item in bearers if item.hide_viewport]
     try:
-        # Not by frame_set, which calls the user's handlers.
+        # frame_set is not used because it calls the user's handlers.
         scene.frame_current = context.scene.frame_current
         for item in switched:
             item.hide_viewport = False
@@ -43,7 +43,7 @@ def hidden_light_instances(context: bpy.types.Context, hidden: Iterable[bpy.type
 
 
 def _bears_light(item: bpy.types.Object) -> bool:
-    """Whether an object is a lamp, or instances a collection with lamps."""
+    """Returns whether an object is a lamp, or instances a collection with lamps."""
     if item.type == 'LIGHT':
         return True
     return (item.instance_type == 'COLLECTION' and item.instance_collection is not None

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names what changes Cycles' diffuse light but not that of a bake, with what the user can do.
+"""Warns of features that change Cycles' diffuse light but not that of a bake, and names remedies.
 
-Each function yields lines for the report. docs/limits.md lists all such features, and those that
-the bake follows.
+Each function yields lines for the report. docs/limits.md lists all of these features, and those
+that the bake supports.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import bpy
 from .materials.node_links import output_node
 from .warning_lines import listed
 
-# Types of objects that take no part in a bake, and what is said of each.
+# Types of objects that a bake leaves out, and the warning for each.
 UNREAD_TYPES = {
     'CURVES': "hair curves neither block nor reflect light here: convert them to a mesh with "
               "thickness",
@@ -24,7 +24,7 @@ UNREAD_TYPES = {
     'VOLUME': "a volume neither dims nor scatters light here: convert it to a mesh, or hide it in "
               "renders to compare with Cycles",
 }
-# Blender's defaults: lower values were chosen by the user.
+# Blender's defaults. Lower values were chosen by the user.
 _BOUNCES, _DIFFUSE_BOUNCES, _CLAMP_INDIRECT = 12, 4, 10.0
 # Names of properties that set the detail of geometry in the viewport and in renders: of modifiers,
 # and of the data of objects by type.
@@ -38,7 +38,8 @@ NO_CAUSTICS = "its Shadow Caustics are not read: light goes straight on through 
 
 
 def of_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
-    """Settings of the scene, of its view layer and of Cycles that a bake does not follow."""
+    """Yields warnings of settings of the scene, of its view layer and of Cycles that a bake
+    ignores."""
     if scene.background_set is not None:
         yield (f'the background set "{scene.background_set.name}" is left out: link its objects to '
                f'the scene')
@@ -68,9 +69,9 @@ def of_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) 
 
 
 def of_world(world: bpy.types.World | None) -> Iterator[str]:
-    """Features of the world that a bake does not follow."""
+    """Yields warnings of features of the world that a bake ignores."""
     tree = world.node_tree if world is not None else None
-    # From 5.0 on every world has nodes and use_nodes only warns.
+    # From 5.0 on, every world has nodes, and use_nodes only warns.
     if tree is None or bpy.app.version < (5, 0, 0) and not world.use_nodes:
         return
     output = output_node(tree)
@@ -83,8 +84,8 @@ def of_world(world: bpy.types.World | None) -> Iterator[str]:
 
 def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Material, bool]]
                  ) -> Iterator[str]:
-    """Features of materials that a bake does not follow. materials: original, each with whether
-    light passes straight through it."""
+    """Yields warnings of features of materials that a bake ignores. materials: original materials,
+    each with whether light passes straight through it."""
     turned, glassy = [], []
     for material, is_transparent in materials:
         output = output_node(material.node_tree) if material.node_tree is not None else None
@@ -110,7 +111,7 @@ def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Mat
 
 
 def _line_about(owners: Iterable[str], what: str, remedy: str) -> Iterator[str]:
-    """One line that names the owners (quoted names), or none where there are no owners."""
+    """Yields one line that names the owners (quoted names), or no line if there are no owners."""
     owners = list(owners)
     if owners:
         yield f"{what}: {listed(owners)}: {remedy}"
@@ -122,7 +123,8 @@ def _quoted(names: Iterable[str]) -> list[str]:
 
 def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
            ) -> Iterator[bpy.types.Node]:
-    """The nodes of a tree and of its groups. seen: full names of the groups around the tree."""
+    """Yields the nodes of a tree and of its groups. seen: full names of the groups that enclose the
+    tree."""
     for node in tree.nodes:
         yield node
         group = getattr(node, 'node_tree', None)
@@ -131,8 +133,8 @@ def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
 
 
 def _turns_normals(node: bpy.types.Node) -> bool:
-    """Whether a node changes shading normals in a way that Cycles' vertex bake shows; bumps are not
-    in it."""
+    """Returns whether a node changes shading normals in a way that Cycles' vertex bake shows. That
+    bake does not show bumps."""
     if node.type == 'NORMAL_MAP':
         return not node.mute and any(output.is_linked for output in node.outputs)
     socket = node.inputs.get('Normal') if any(item.type == 'SHADER' for item in node.outputs) \
@@ -142,7 +144,7 @@ def _turns_normals(node: bpy.types.Node) -> bool:
 
 
 def _is_glass(node: bpy.types.Node) -> bool:
-    """Whether a shader refracts light."""
+    """Returns whether a shader refracts light."""
     if node.type != 'BSDF_PRINCIPLED':
         return node.type in ('BSDF_GLASS', 'BSDF_REFRACTION')
     # The socket was renamed in 4.0.
@@ -151,9 +153,10 @@ def _is_glass(node: bpy.types.Node) -> bool:
 
 
 def _setting(owner: bpy.types.ID, name: str, usual: object) -> object:
-    """A setting that was Cycles' and is Blender's own in later versions; `usual` if neither has
-    it."""
-    # Read the original: changes of Cycles' settings by scripts do not reach the evaluated owner.
+    """Returns a setting that belongs to Cycles or, in later versions, to Blender itself. Returns
+    `usual` if neither has it."""
+    # Read the original, because changes of Cycles' settings by scripts do not reach the evaluated
+    # owner.
     cycles = getattr(owner.original, 'cycles', None)
     return getattr(cycles, name, getattr(owner, name, usual))
 
@@ -163,7 +166,8 @@ def _displacement(material: bpy.types.Material) -> str:
 
 
 def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
-    """Features of objects that a bake does not follow. items: original, those that take part."""
+    """Yields warnings of features of objects that a bake ignores. items: original objects that are
+    part of the bake."""
     differing = []
     for item in items:
         yield from _of_hair(item)
@@ -177,7 +181,7 @@ def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
 
 
 def _of_hair(item: bpy.types.Object) -> Iterator[str]:
-    """Hair of particle systems that renders show."""
+    """Yields warnings of hair of particle systems that renders show."""
     for modifier in item.modifiers:
         if modifier.type != 'PARTICLE_SYSTEM' or not modifier.show_render:
             continue
@@ -190,7 +194,8 @@ def _of_hair(item: bpy.types.Object) -> Iterator[str]:
 
 
 def _differences(item: bpy.types.Object) -> Iterator[str]:
-    """Where the object's geometry differs between viewport and renders, each in a few words."""
+    """Yields the differences of the object's geometry between viewport and renders, each in a few
+    words."""
     for modifier in item.modifiers:
         if modifier.show_viewport != modifier.show_render:
             yield f'{modifier.name} is on in one of them'
@@ -215,15 +220,16 @@ def _differences(item: bpy.types.Object) -> Iterator[str]:
 
 
 def has_light_linking(item: bpy.types.Object) -> bool:
-    """Whether light linking limits what a lamp or an emissive object lights or is blocked by. It
-    exists from Blender 4.0 on."""
+    """Returns whether light linking limits the objects that a lamp or an emissive object lights, or
+    the objects that block its light. Light linking exists from Blender 4.0 on."""
     linking = getattr(item, 'light_linking', None)
     return bool(linking and (linking.receiver_collection or linking.blocker_collection))
 
 
 def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iterator[str]:
-    """What is hidden in the viewport but not in renders. hidden: original objects with surfaces,
-    which are left out; lights: names of lamps, which do take part."""
+    """Yields warnings of objects that are hidden in the viewport but not in renders. hidden:
+    original objects with surfaces, which are left out. lights: names of lamps, which are part of
+    the bake."""
     yield from _line_about(
         _quoted(dict.fromkeys(lights)),
         "lights that are hidden in the viewport shine, as in Cycles",
@@ -235,17 +241,18 @@ def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iter
 
 
 def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
-    """What is shown in the viewport but not in renders, and left out. unrendered: original objects.
-    Those that are drawn as wires or bounds, such as cutters of Boolean modifiers, are not named."""
+    """Yields warnings of objects that are shown in the viewport but not in renders. They are left
+    out. unrendered: original objects. Objects that are drawn as wires or bounds, such as cutters of
+    Boolean modifiers, are not named."""
     yield from _line_about(
         _quoted(item.name for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')),
         "what is hidden in renders is left out, as by Cycles", "enable it in renders to bake it")
 
 
 def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str]:
-    """Modifiers that hinder the way back to the original mesh (corner_map.py). copied: names of
-    objects whose modifiers make several corners of one; untraced: names of objects whose modifiers
-    do not tell what some corners were."""
+    """Yields warnings of modifiers that prevent an exact assignment of results to the original mesh
+    (corner_map.py). copied: names of objects whose modifiers create several corners from one.
+    untraced: names of objects whose modifiers do not keep the codes of some corners."""
     yield from _line_about(
         _quoted(copied),
         "modifiers make several faces of one, and all show the light of that in its place",
@@ -257,7 +264,8 @@ def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str
 
 
 def of_normals(turned: Iterable[str]) -> Iterator[str]:
-    """Custom normals. turned: names of objects whose custom normals turn their faces."""
+    """Yields warnings of custom normals. turned: names of objects whose custom normals differ from
+    the orientation of the faces."""
     yield from _line_about(
         _quoted(turned),
         "custom normals that turn faces are not followed, light falls on the faces as they lie",

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's lamps -> radiance, intensity or irradiance, as Cycles of the version computes them."""
+"""Converts Blender's lamps to radiance, intensity or irradiance, as Cycles of the same version
+does."""
 
 from __future__ import annotations
 
@@ -22,10 +23,10 @@ _ALL_BOUNCES = 1024
 
 def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: ImagePixels,
                  warnings: Warnings) -> LightData | None:
-    """A lamp in physical units, in the world; None if it emits nothing.
+    """Returns a lamp in world space and physical units. Returns None if the lamp emits nothing.
 
-    light_object: evaluated. matrix_world: of its instance. Strengths that are negative or not
-    finite count 0, and options that are not read are warned of.
+    light_object: evaluated. matrix_world: of the lamp's instance. Strengths that are negative or
+    not finite count as 0. Adds warnings of these strengths and of options that are ignored.
     """
     light = light_object.data
     name = light_object.name
@@ -42,7 +43,7 @@ def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: I
 
 def _shape(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray
            ) -> LightData | None:
-    """The lamp by its type. strength: (3,) W, or W/m^2 of a sun."""
+    """Returns the lamp by its type. strength: (3,) W, or W/m^2 for a sun."""
     if light.type in ('POINT', 'SPOT'):
         return _point_light(light, name, matrix_world, strength)
     if light.type == 'SUN':
@@ -54,10 +55,11 @@ def _shape(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np
 
 def area_light_radiance(power: np.ndarray, area: float, normalize: bool = True,
                         version: tuple[int, int, int] = bpy.app.version) -> np.ndarray:
-    """The radiance, (3,) W/(m^2 sr), of an area light.
+    """Returns the radiance of an area light, (3,) W/(m^2 sr).
 
-    power: (3,) W; area: m^2; normalize: whether the power is that of the whole area, which Blender
-    4.5 can switch off. The factor is 1/4 before Blender 4.0 and 1/pi, the right one, since.
+    power: (3,) W. area: m^2. normalize: whether the power is that of the whole area, which can be
+    switched off from Blender 4.5 on. The factor is 1/4 before Blender 4.0, and since then 1/pi,
+    which is correct.
     """
     radiance = power / (area * (4.0 if version < (4, 0, 0) else math.pi))
     return radiance if normalize else radiance * area
@@ -65,10 +67,11 @@ def area_light_radiance(power: np.ndarray, area: float, normalize: bool = True,
 
 def sun_irradiance_factor(angle: float, version: tuple[int, int, int] = bpy.app.version
                           ) -> float:
-    """Irradiance, at normal incidence, over the strength of a sun of an angular diameter, radians.
+    """Returns the ratio of irradiance, at normal incidence, to the strength of a sun. angle:
+    angular diameter, radians.
 
-    Before Blender 4.0 the strength belongs to a flat disk, so that the mean cosine over the disk
-    is left; from 4.0 on the factor is 1.
+    Before Blender 4.0 the strength is that of a flat disk, so that the factor is the mean cosine
+    over the disk. From 4.0 on the factor is 1.
     """
     if version >= (4, 0, 0) or angle <= 0.0:
         return 1.0
@@ -79,7 +82,8 @@ def sun_irradiance_factor(angle: float, version: tuple[int, int, int] = bpy.app.
 
 def _strength(light: bpy.types.Light, name: str, images: ImagePixels, warnings: Warnings
               ) -> np.ndarray:
-    """(3,) W, or W/m^2 of a sun: colour, power, exposure, temperature and nodes multiplied."""
+    """Returns the product of colour, power, exposure, temperature and nodes, (3,) W, or W/m^2 for a
+    sun."""
     strength = np.array(light.color) * light.energy
     # Lamps have an exposure from 4.5 on.
     strength = strength * 2.0 ** getattr(light, 'exposure', 0.0)
@@ -95,19 +99,20 @@ def _strength(light: bpy.types.Light, name: str, images: ImagePixels, warnings: 
 
 
 def is_portal(light: bpy.types.Light) -> bool:
-    """Whether an area lamp is a portal, which emits nothing and only tells Cycles where the light
-    of the world comes in."""
+    """Returns whether an area lamp is a portal. A portal emits nothing. It only helps Cycles to
+    sample the light of the world."""
     return getattr(_cycles_settings(light), 'is_portal', False)
 
 
 def _cycles_settings(light: bpy.types.Light) -> bpy.types.PropertyGroup | None:
-    # Read the original: changes of these settings by scripts do not reach the evaluated lamp.
+    # Read the original, because changes of these settings by scripts do not reach the evaluated
+    # lamp.
     return getattr(light.original, 'cycles', None)
 
 
 def _casts_shadows(light: bpy.types.Light) -> bool:
     cycles = _cycles_settings(light)
-    # While Cycles has a property of its own, use_shadow belongs to Eevee.
+    # As long as Cycles has its own property, use_shadow belongs to Eevee.
     if hasattr(cycles, 'cast_shadow'):
         return cycles.cast_shadow
     return getattr(light, 'use_shadow', True)
@@ -127,8 +132,8 @@ def _warn_of_unread_options(light_object: bpy.types.Object, warnings: Warnings) 
 
 def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray
                  ) -> PointLightData:
-    # Before 4.0 a lamp with a radius is a disk that faces the receiver, in 4.0 a sphere, and since
-    # 4.1 either.
+    # Before 4.0, a lamp with a radius is a disk that faces the receiver. In 4.0 it is a sphere, and
+    # since 4.1 an option selects the shape.
     if bpy.app.version < (4, 0, 0):
         soft = True
     elif bpy.app.version < (4, 1, 0):
@@ -141,14 +146,14 @@ def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, streng
     if light.type == 'POINT':
         return PointLightData(name, position, intensity, light.shadow_soft_size, shape)
     if bpy.app.version < (3, 5, 0):
-        # Only the direction of the object's -Z axis counts, also where the object is scaled or
-        # mirrored, and the light falls with the cosine to it.
+        # Only the direction of the object's -Z axis matters, even if the object is scaled or
+        # mirrored, and the light falls off with the cosine to this axis.
         axis = matrix_world.col[2].to_3d().normalized()
         across = matrix_world.col[0].to_3d()
         across = (across - across.dot(axis) * axis).normalized()
         world_to_light = np.array([across, axis.cross(across), axis])
     else:
-        # The object's scale deforms the cone and does not change the intensity within it.
+        # The object's scale deforms the cone and does not change the intensity in it.
         world_to_light = np.array(matrix_world.to_3x3().inverted_safe())
     return PointLightData(name, position, intensity, light.shadow_soft_size, shape,
                           world_to_light, light.spot_size, light.spot_blend,
@@ -161,7 +166,7 @@ def _area_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strengt
     size_v = light.size_y if light.shape in ('RECTANGLE', 'ELLIPSE') else light.size
     matrix = np.array(matrix_world)[:3, :3]
     axis_u, axis_v = matrix[:, 0] * size_u / 2.0, matrix[:, 1] * size_v / 2.0
-    # The lamp shines along the object's -Z axis, also where the object is mirrored.
+    # The lamp shines along the object's -Z axis, even if the object is mirrored.
     if np.cross(axis_u, axis_v) @ matrix[:, 2] > 0.0:
         axis_v = -axis_v
     area = 4.0 * np.linalg.norm(axis_u) * np.linalg.norm(axis_v)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light sets: named groups of lights, each baked into a colour attribute of its own.
+"""Light sets: named groups of lights, each baked into its own colour attribute.
 
 A set contains the lamps and the emissive objects of a Blender collection and of its children, and
-perhaps the world. Lights in no set are only part of the light of all, in the main attribute.
+optionally the world. Lights that are in no set are only part of the main attribute, which contains
+the light of all lights.
 """
 
 from __future__ import annotations
@@ -22,18 +23,19 @@ class LightSet:
     """An enabled light set of a scene."""
 
     name: str
-    attribute: str  # name of the colour attribute that it is written to
-    objects: frozenset[bpy.types.Object]  # original
-    world: bool  # whether it contains the light of the world
+    attribute: str  # name of the colour attribute for the set's light
+    objects: frozenset[bpy.types.Object]  # original objects
+    world: bool  # whether the set contains the light of the world
 
 
 def attribute_of(item: bpy.types.PropertyGroup, main_attribute: str) -> str:
-    """The name of the attribute that a set is written to. item: of scene.raybundle.light_sets."""
+    """Returns the name of the attribute for the light of a set. item: of
+    scene.raybundle.light_sets."""
     return item.attribute or f"{main_attribute} {item.name}"
 
 
 def read_light_sets(scene: bpy.types.Scene, main_attribute: str) -> list[LightSet]:
-    """The enabled sets of the scene. Raises BakeError if a set has no name, or if names or
+    """Returns the enabled sets of the scene. Raises BakeError if a set has no name, or if names or
     attributes are too long or occur twice."""
     sets: list[LightSet] = []
     owners = {main_attribute: "the light of all"}
@@ -58,7 +60,8 @@ def read_light_sets(scene: bpy.types.Scene, main_attribute: str) -> list[LightSe
 
 
 def written_attributes(scene: bpy.types.Scene) -> set[str]:
-    """Names of the attributes that the scene's sets are written to, or were in the last bake."""
+    """Returns the names of the attributes for the scene's current sets and for the sets of the last
+    bake."""
     settings = scene.raybundle
     names = {attribute_of(item, settings.attribute) for item in settings.light_sets}
     # Sets may have been renamed or removed since the last bake.
@@ -67,7 +70,7 @@ def written_attributes(scene: bpy.types.Scene) -> set[str]:
 
 
 class LightSetMembers:
-    """Records, while a scene is exported, which of its lights belong to which set.
+    """Records during the export of a scene which of its lights belong to which set.
 
     Raises BakeError if a light belongs to more than one set.
     """
@@ -79,20 +82,21 @@ class LightSetMembers:
         _check_single("The world", [light_set for light_set in sets if light_set.world])
 
     def add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        """Records the lamp that was exported last. instance: the evaluated instance of it."""
+        """Records the lamp that was exported last. instance: the lamp's evaluated instance."""
         for index in self._sets_of(instance):
             self._scene.light_sets[index].lights.append(len(self._scene.lights) - 1)
 
     def add_world_lights(self, count: int) -> None:
-        """Records the last `count` exported lights as parts of the world: the suns in its sky."""
+        """Records the last `count` exported lights, which are the suns in the world's sky, as parts
+        of the world."""
         lights = range(len(self._scene.lights) - count, len(self._scene.lights))
         for data in self._scene.light_sets:
             if data.world:
                 data.lights.extend(lights)
 
     def add_instance(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        """Records the mesh instance that was exported last, if it emits light. instance: the
-        evaluated instance of it."""
+        """Records the mesh instance that was exported last, if it emits light. instance: its
+        evaluated instance."""
         position = len(self._scene.instances) - 1
         if not self._scene.emits(position):
             return
@@ -100,8 +104,8 @@ class LightSetMembers:
             self._scene.light_sets[index].instances.append(position)
 
     def _sets_of(self, instance: bpy.types.DepsgraphObjectInstance) -> list[int]:
-        """Positions of the sets, one at most, that contain the object or the one that instances
-        it."""
+        """Returns the positions of the sets that contain the object or the object that instances
+        it. The result has at most one element. Raises BakeError if there are more."""
         items = {instance.object.original}
         if instance.is_instance and instance.parent is not None:
             items.add(instance.parent.original)
@@ -112,7 +116,8 @@ class LightSetMembers:
 
 
 def _check_single(what: str, sets: list[LightSet]) -> None:
-    """Raises BakeError if there is more than one set. what: what belongs to them."""
+    """Raises BakeError if there is more than one set. what: subject of the message, which is a
+    member of the sets."""
     if len(sets) > 1:
         names = " and ".join(f'"{light_set.name}"' for light_set in sets)
         raise BakeError(f"{what} belongs to the light sets {names}: light is in one set at most")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The elements of a Blender mesh as numpy arrays, read by foreach_get."""
+"""Reads the elements of a Blender mesh as numpy arrays with foreach_get."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-# Whether Blender keeps the vertices of corners, material slots and sharpness as attributes.
+# Whether Blender stores the vertices of corners, material slots and sharpness as attributes.
 HAS_ATTRIBUTES = bpy.app.version >= (4, 1, 0)
 
 
 @dataclass(frozen=True)
 class Topology:
-    """What must be equal in two meshes for their corners to correspond one to one."""
+    """The properties that two meshes must share for their corners to correspond one to one."""
 
     vertex_count: int
-    corner_vertices: np.ndarray  # (c,) int32
-    face_sizes: np.ndarray  # (f,) int32
+    corner_vertices: np.ndarray  # (c,) int32, vertex of each corner
+    face_sizes: np.ndarray  # (f,) int32, number of corners of each face
 
     def matches(self, other: Topology) -> bool:
         return (self.vertex_count == other.vertex_count
@@ -28,8 +28,8 @@ class Topology:
 
 def read(collection: bpy.types.bpy_prop_collection, name: str, dtype: type, width: int = 1
          ) -> np.ndarray:
-    """A property of all elements of a collection, as an array of dtype: (n,), or (n, width) for
-    vectors of width components."""
+    """Returns a property of all elements of a collection as an array of dtype. The shape is (n,),
+    or (n, width) for vectors of width components."""
     values = np.empty(len(collection) * width, dtype)
     collection.foreach_get(name, values)
     return values.reshape(-1, width) if width > 1 else values
@@ -37,8 +37,8 @@ def read(collection: bpy.types.bpy_prop_collection, name: str, dtype: type, widt
 
 def read_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str, dtype: type
                     ) -> np.ndarray | None:
-    """(n,): one of Blender's own attributes; None if the mesh does not have it in this domain and
-    type, which means that all elements have the default."""
+    """Returns one of Blender's built-in attributes, (n,). Returns None if the mesh does not have
+    the attribute in this domain and type, which means that all elements have the default value."""
     attribute = mesh.attributes.get(name)
     if attribute is None or (attribute.domain, attribute.data_type) != (domain, data_type):
         return None
@@ -46,7 +46,7 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, domain: str, data_type: str,
 
 
 def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(c,) int32: the vertex of each corner."""
+    """Returns the vertex of each corner, (c,) int32."""
     if HAS_ATTRIBUTES:
         vertices = read_attribute(mesh, '.corner_vert', 'CORNER', 'INT', np.int32)
         if vertices is not None:
@@ -55,11 +55,11 @@ def corner_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def topology(mesh: bpy.types.Mesh) -> Topology:
-    """The topology of a mesh, original or evaluated."""
+    """Returns the topology of an original or evaluated mesh."""
     return Topology(len(mesh.vertices), corner_vertices(mesh),
                     read(mesh.polygons, 'loop_total', np.int32))
 
 
 def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(n, 3) float32, in object space."""
+    """Returns the positions of the vertices in object space, (n, 3) float32."""
     return read(mesh.vertices, 'co', np.float32, 3)

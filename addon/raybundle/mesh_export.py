@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evaluated Blender meshes -> `MeshData`, by foreach_get only.
+"""Converts evaluated Blender meshes to `MeshData`, with foreach_get only.
 
 Blender copies an attribute as a whole, but reads other properties element by element, at some tens
-of nanoseconds each. Therefore what Blender 4 keeps as attributes is read as such, and what is the
-same for all elements is not read at all.
+of nanoseconds each. Therefore data that Blender 4 stores as attributes is read as attributes, and
+data that is equal for all elements is not read at all.
 """
 
 from __future__ import annotations
@@ -19,36 +19,39 @@ from .materials.export import MaterialExport
 from .mesh_arrays import HAS_ATTRIBUTES, corner_vertices, read, read_attribute, vertex_positions
 from .scene_data import MeshData
 
-# Squares of larger coordinates, m, lose all meaning or overflow in single precision.
+# Limit of coordinates, m. The squares of larger coordinates are meaningless or overflow in single
+# precision.
 COORDINATE_LIMIT = 1e15
 
-# A normal counts as turned if its cosine to the usual one is smaller (about 10 degrees), and a mesh
-# as one with turned normals if more than this share of its corners are turned.
+# A normal counts as turned if its cosine to the usual normal is smaller than _SAME_WAY (about 10
+# degrees). A mesh has turned normals if more than _TURNED_SHARE of its corners have turned normals.
 _SAME_WAY, _TURNED_SHARE = 0.985, 0.02
 
 
 class MeshError(ValueError):
-    """A mesh that cannot take part in a bake; the message says why, without naming the mesh."""
+    """Raised if a mesh cannot be part of a bake. The message gives the reason and does not name the
+    mesh."""
 
 
 def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExport],
                 default_material: MaterialExport, baked_uvs: np.ndarray | None = None) -> MeshData:
-    """The arrays of a mesh, in object space.
+    """Returns the arrays of a mesh in object space.
 
-    mesh: evaluated. name: for messages. materials: by slot; default_material: used if there are no
+    mesh: evaluated. name: for messages. materials: by slot. default_material: used if there are no
     slots. baked_uvs: (c, 2), for materials that Cycles has baked. Raises MeshError if the mesh has
-    no faces, coordinates that are not finite or too large, or an invalid order of faces.
+    no faces, has coordinates that are not finite or are too large, or has an invalid order of
+    faces.
     """
     if not len(mesh.polygons):
         raise MeshError("has no faces")
     vertices = vertex_positions(mesh)
-    # The comparison is False for NaN too.
+    # The comparison is also False for NaN.
     if not (np.abs(vertices) < COORDINATE_LIMIT).all():
         raise MeshError("has coordinates that are not finite numbers, or too large to compute with")
     starts = read(mesh.polygons, 'loop_start', np.int32)
     face_offsets = np.append(starts, np.int32(len(mesh.loops)))
     sizes = np.diff(face_offsets)
-    # Later versions of Blender have no sizes that could contradict the starts.
+    # Later versions of Blender store no sizes that could contradict the starts.
     if not HAS_ATTRIBUTES and not np.array_equal(sizes, read(mesh.polygons, 'loop_total',
                                                              np.int32)):
         raise MeshError("has faces out of order; a modifier or script left the mesh invalid")
@@ -65,8 +68,8 @@ def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExp
 
 
 def has_turned_normals(mesh: bpy.types.Mesh, data: MeshData) -> bool:
-    """Whether custom normals turn the shading of faces, away from both the faces' own normals and
-    those of their vertices. mesh: evaluated; data: exported from it."""
+    """Returns whether custom normals turn the shading of faces away from both the faces' own
+    normals and the normals of their vertices. mesh: evaluated. data: exported from the mesh."""
     if not mesh.has_custom_normals:
         return False
     usual = (np.repeat(read(mesh.polygon_normals, 'vector', np.float32, 3),
@@ -78,19 +81,19 @@ def has_turned_normals(mesh: bpy.types.Mesh, data: MeshData) -> bool:
 
 
 def _face_slots(mesh: bpy.types.Mesh, count: int) -> np.ndarray:
-    """(f,) int32: the material slot of each face, clamped to 0 to count - 1."""
+    """Returns the material slot of each face, clamped to 0 to count - 1, (f,) int32."""
     slots = None
     if count > 1:
         slots = (read_attribute(mesh, 'material_index', 'FACE', 'INT', np.int32)
                  if HAS_ATTRIBUTES else read(mesh.polygons, 'material_index', np.int32))
     if slots is None:
         return np.zeros(len(mesh.polygons), np.int32)
-    # Blender shows the last material where a face names one that does not exist.
+    # If the slot of a face does not exist, Blender shows the last material.
     return np.clip(slots, 0, count - 1)
 
 
 def _face_smooth(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(f,) bool: whether each face is shaded smooth."""
+    """Returns whether each face is shaded smooth, (f,) bool."""
     if not HAS_ATTRIBUTES:
         return read(mesh.polygons, 'use_smooth', bool)
     sharp = read_attribute(mesh, 'sharp_face', 'FACE', 'BOOLEAN', bool)
@@ -99,14 +102,14 @@ def _face_smooth(mesh: bpy.types.Mesh) -> np.ndarray:
 
 def _corner_normals(mesh: bpy.types.Mesh, vertices_of_corners: np.ndarray, sizes: np.ndarray,
                     smooth: np.ndarray) -> np.ndarray:
-    """(c, 3) float32, the unit shading normal of each corner, in object space.
+    """Returns the unit shading normal of each corner in object space, (c, 3) float32.
 
-    vertices_of_corners: (c,); sizes: (f,), corners of each face; smooth: (f,) bool.
+    vertices_of_corners: (c,). sizes: (f,), number of corners of each face. smooth: (f,) bool.
     """
     if bpy.app.version >= (4, 1, 0):
         return read(mesh.corner_normals, 'vector', np.float32, 3)
     if mesh.use_auto_smooth:
-        # Normals that are split at sharp edges, or set by the user.
+        # Normals that are split at sharp edges or set by the user.
         mesh.calc_normals_split()
         normals = read(mesh.loops, 'normal', np.float32, 3)
         mesh.free_normals_split()
@@ -122,7 +125,7 @@ def _corner_normals(mesh: bpy.types.Mesh, vertices_of_corners: np.ndarray, sizes
 
 
 def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(e, 2) int32: the two vertices of each edge that is marked sharp."""
+    """Returns the two vertices of each edge that is marked sharp, (e, 2) int32."""
     sharp = (read_attribute(mesh, 'sharp_edge', 'EDGE', 'BOOLEAN', bool)
              if HAS_ATTRIBUTES else read(mesh.edges, 'use_edge_sharp', bool))
     if sharp is None or not sharp.any():
@@ -132,8 +135,8 @@ def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray:
 
 def _uvs(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport], corner_slots: np.ndarray,
          baked_uvs: np.ndarray | None) -> np.ndarray | None:
-    """(c, 2) float32: the coordinates at which each corner's own material reads its images; None if
-    no material has an image. corner_slots: (c,), slot of each corner."""
+    """Returns the coordinates at which the material of each corner reads its images, (c, 2)
+    float32. Returns None if no material has an image. corner_slots: (c,), slot of each corner."""
     textures = [(slot, item.texture) for slot, item in enumerate(materials) if item.texture]
     baked = [slot for slot, item in enumerate(materials) if item.baked_uvs]
     if not textures and not baked:
@@ -145,7 +148,7 @@ def _uvs(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport], corner_slots
     layers: dict[str, np.ndarray] = {}
     for slot, texture in textures:
         layer = _uv_layer(mesh, texture)
-        # Without a UV map Cycles reads the image at (0, 0).
+        # Without a UV map, Cycles reads the image at (0, 0).
         if layer is None:
             continue
         if layer.name not in layers:
@@ -157,7 +160,7 @@ def _uvs(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport], corner_slots
 
 
 def _uv_layer(mesh: bpy.types.Mesh, texture: Texture) -> bpy.types.MeshUVLoopLayer | None:
-    """The UV map that a texture is read at; None if the mesh has no such map."""
+    """Returns the UV map at which a texture is read. Returns None if the mesh has no such map."""
     if texture.uv_layer:
         return mesh.uv_layers.get(texture.uv_layer)
     return next((layer for layer in mesh.uv_layers if layer.active_render), None)
@@ -165,8 +168,9 @@ def _uv_layer(mesh: bpy.types.Mesh, texture: Texture) -> bpy.types.MeshUVLoopLay
 
 def _corner_colors(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport],
                    corner_slots: np.ndarray) -> np.ndarray | None:
-    """(c, 3) float32, linear RGB: the attribute that each corner's own material reads; None if no
-    material reads one. corner_slots: (c,), slot of each corner."""
+    """Returns the values of the attribute that the material of each corner reads, (c, 3) float32,
+    linear RGB. Returns None if no material reads an attribute. corner_slots: (c,), slot of each
+    corner."""
     names = [(slot, item.attribute) for slot, item in enumerate(materials)
              if item.attribute is not None]
     if not names:
@@ -174,7 +178,7 @@ def _corner_colors(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport],
     colors = np.zeros((len(corner_slots), 3), np.float32)
     for slot, name in names:
         attribute = _color_attribute(mesh, name)
-        # Without the attribute Cycles reads black.
+        # Without the attribute, Cycles reads black.
         if attribute is None:
             continue
         values = read(attribute.data, 'color', np.float32, 4)[:, :3]
@@ -186,5 +190,6 @@ def _corner_colors(mesh: bpy.types.Mesh, materials: Sequence[MaterialExport],
 
 
 def _color_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    """The colour attribute of a name, "" for the rendered one; None if there is none."""
+    """Returns the colour attribute of a name, or the render colour attribute for "". Returns None
+    if there is none."""
     return mesh.color_attributes.get(name) if name else rendered_attribute(mesh)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calls the native library; the only module that uses ctypes.
+"""Calls the native library. This is the only module that uses ctypes.
 
 The library is loaded at its first use and not when the add-on is registered, so that enabling the
-add-on never fails, and a missing or incompatible library gives a readable message. Arrays are numpy
-arrays, whose shape and type are checked here: TypeError and ValueError name the one that does not
-fit. Handles are wrapped in classes with close(), which are context managers too. A call that fails
+add-on never fails and a missing or incompatible library causes a readable message. Arrays are numpy
+arrays. Their shape and type are checked here: TypeError and ValueError name the array that does not
+fit. Handles are wrapped in classes with close(), which are also context managers. A call that fails
 raises RaybundleError. native/include/raybundle/raybundle.h describes the interface.
 """
 
@@ -27,6 +27,8 @@ ABI_VERSION = 2
 
 
 class ErrorCode(enum.IntEnum):
+    """Error codes of the native library, as in rb_error."""
+
     NONE = 0
     UNKNOWN = 1
     INVALID_ARGUMENT = 2
@@ -37,16 +39,16 @@ class ErrorCode(enum.IntEnum):
 
 
 class RaybundleError(RuntimeError):
-    """A call of the native library failed, or the library cannot be used."""
+    """Raised if a call of the native library failed, or if the library cannot be used."""
 
     def __init__(self, code: int, message: str) -> None:
-        """code: an ErrorCode."""
+        """code: an ErrorCode. message: text for the user."""
         super().__init__(message)
         self.code = code
         self.message = message
 
 
-# Names of the stages in the order of rb_stage, which are keys of the report's seconds.
+# Names of the stages in the order of rb_stage. They are keys of the report's seconds.
 STAGES = ('patches', 'first_shot', 'bundles', 'solve', 'reconstruction')
 
 IMAGE_EXTENSIONS = {'REPEAT': 0, 'EXTEND': 1, 'CLIP': 2}
@@ -59,8 +61,8 @@ OUTPUTS = {'COMBINED': 0, 'LIGHTING': 1, 'DIRECT': 2, 'INDIRECT': 3}
 # Types of settings in the order of rb_setting_type.
 SETTING_TYPES = (int, float, str)
 
-# A function that is called with the name of the stage and the share of it that is done, 0 to 1;
-# it cancels the bake by returning False.
+# A function that is called with the name of the stage and the completed share of the stage, 0 to 1.
+# It cancels the bake by returning False.
 Progress = Callable[[str, float], object]
 
 _ProgressFunction = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_double)
@@ -111,7 +113,7 @@ class _Diffuse(ctypes.Structure):
 
 
 class _Surface(ctypes.Structure):
-    """rb_surface; its members but for the size are named as those of SurfaceData."""
+    """rb_surface. Its members, except for the size, have the names of those of SurfaceData."""
 
     _fields_ = [('size', _size), ('reflectance', _Color), ('emission', _Color),
                 ('translucence', _Color), ('reflectance_by_angle', _AngleFactors),
@@ -141,7 +143,7 @@ class _SettingInfo(ctypes.Structure):
     )
 
 
-# Argument types of every function that returns an rb_error.
+# Argument types of all functions that return an rb_error.
 _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_new_scene': (_out(_handle),),
     'rb_add_image': (_handle, _text, _int, _int, _floats, _enum, _out(_int)),
@@ -208,15 +210,16 @@ _library: ctypes.CDLL | None = None
 
 
 def library_path() -> Path:
-    """Where the build puts the shared library."""
+    """Returns the path at which the build creates the shared library."""
     name = {'win32': "raybundle.dll", 'darwin': "libraybundle.dylib"}.get(
         sys.platform, "libraybundle.so")
     return Path(__file__).parent / "lib" / name
 
 
 def load() -> ctypes.CDLL:
-    """The library, loaded at the first call. Raises RaybundleError, with code INVALID_OPERATION, if
-    it is missing, cannot be loaded or has another version of the interface."""
+    """Returns the library, which is loaded at the first call. Raises RaybundleError with code
+    INVALID_OPERATION if the library is missing, cannot be loaded or has another version of the
+    interface."""
     global _library
     if _library is not None:
         return _library
@@ -252,7 +255,7 @@ def load() -> ctypes.CDLL:
 
 
 def version() -> str:
-    """Release of the native library, "major.minor.patch"."""
+    """Returns the release of the native library as "major.minor.patch"."""
     return load().rb_get_version().decode()
 
 
@@ -281,10 +284,11 @@ def _declare(library: ctypes.CDLL) -> None:
 
 
 def _array(values: object, dtype: type, shape: tuple[int | None, ...], name: str) -> np.ndarray:
-    """The values as a C-contiguous array of a type and shape; None in shape stands for any length.
+    """Converts values to a C-contiguous array of the given type and shape. None in shape stands for
+    any length.
 
-    Floats may change precision and integers size, but floats do not become integers. Raises
-    TypeError or ValueError, which name the array, if type or shape do not fit.
+    Floats may change precision and integers size, but floats are not converted to integers. Raises
+    TypeError or ValueError, with the name of the array, if type or shape do not fit.
     """
     array = np.asarray(values)
     if array.size and not np.can_cast(array.dtype, dtype, casting='same_kind'):
@@ -313,8 +317,8 @@ def _as_ints(array: np.ndarray) -> object:
 
 
 def _fill(target: ctypes.Structure, data: object, name: str) -> None:
-    """Sets the members of a struct that data, a dataclass of surface_data.py, has by their names.
-    Factors by angle are rows of an array."""
+    """Sets the members of a struct from the members with equal names of data, a dataclass of
+    surface_data.py. Factors by angle are the rows of an array."""
     if isinstance(target, _AngleFactors):
         rows = _float_array(data, (len(target._fields_), 3), name)
         for (member, _), row in zip(target._fields_, rows):
@@ -341,6 +345,7 @@ class _Handle:
         self._pointer = _handle()
 
     def close(self) -> None:
+        """Releases the native object. Does nothing if it was released before."""
         if self._pointer:
             getattr(self._library, self._release)(self._pointer)
             self._pointer = _handle()
@@ -367,9 +372,10 @@ class _Handle:
 
 
 class Scene(_Handle):
-    """The native library's scene: images, materials, meshes, instances, lights, world.
+    """The native library's scene: images, materials, meshes, instances, lights and world.
 
-    Arrays are copied. Methods that add something return its id.
+    Arrays are copied. Methods whose name begins with "add" return the id of the added element. All
+    methods raise RaybundleError if the library rejects the arguments.
     """
 
     _release = 'rb_release_scene'
@@ -379,8 +385,8 @@ class Scene(_Handle):
         self._library.rb_new_scene(ctypes.byref(self._pointer))
 
     def add_image(self, name: str, pixels: np.ndarray, extension: str) -> int:
-        """pixels: (height, width, 3) float, linear RGB, bottom row first; extension: a key of
-        IMAGE_EXTENSIONS."""
+        """Adds an image. pixels: (height, width, 3) float, linear RGB, bottom row first. extension:
+        a key of IMAGE_EXTENSIONS."""
         pixels = _float_array(pixels, (None, None, 3), "pixels")
         identifier = _int()
         self._library.rb_add_image(
@@ -390,8 +396,9 @@ class Scene(_Handle):
 
     def add_material(self, name: str, front: SurfaceData, back: SurfaceData,
                      opacity: float = 1.0, opacity_image: int | None = None) -> int:
-        """opacity: 0 to 1, share of the light that does not pass straight through, which the mean
-        of the image's channels multiplies."""
+        """Adds a material. opacity: 0 to 1, share of the light that does not pass straight through.
+        The mean of the channels of opacity_image, the id of an image, multiplies it; None: no
+        image."""
         sides = [self._surface(data, side) for data, side in ((front, "front"), (back, "back"))]
         identifier = _int()
         self._library.rb_add_material(
@@ -407,8 +414,9 @@ class Scene(_Handle):
 
     def add_mesh(self, name: str, vertices: np.ndarray, corner_vertices: np.ndarray,
                  face_offsets: np.ndarray, face_materials: np.ndarray | None) -> int:
-        """vertices: (n, 3) m; corner_vertices: (c,), vertex of each corner; face_offsets: (f + 1,),
-        first corner of each face, and c; face_materials: (f,), ids, or None for a grey of 0.8."""
+        """Adds a mesh. vertices: (n, 3) m. corner_vertices: (c,), vertex of each corner.
+        face_offsets: (f + 1,), first corner of each face, and c. face_materials: (f,), ids, or None
+        for a grey of 0.8."""
         vertices = _float_array(vertices, (None, 3), "vertices")
         corner_vertices = _int_array(corner_vertices, (None,), "corner_vertices")
         face_offsets = _int_array(face_offsets, (None,), "face_offsets")
@@ -425,30 +433,32 @@ class Scene(_Handle):
         return identifier.value
 
     def set_mesh_corner_normals(self, mesh: int, normals: np.ndarray) -> None:
-        """normals: (c, 3), unit length, by corner."""
+        """Sets the shading normals of a mesh. normals: (c, 3), unit length, per corner."""
         normals = _float_array(normals, (None, 3), "normals")
         self._library.rb_set_mesh_corner_normals(
             self._pointer, mesh, _as_floats(normals), len(normals))
 
     def set_mesh_sharp_edges(self, mesh: int, edges: np.ndarray) -> None:
-        """edges: (e, 2), the two vertices of each edge."""
+        """Sets the sharp edges of a mesh. edges: (e, 2), the two vertices of each edge."""
         edges = _int_array(edges, (None, 2), "edges")
         self._library.rb_set_mesh_sharp_edges(self._pointer, mesh, _as_ints(edges), len(edges))
 
     def set_mesh_uvs(self, mesh: int, uvs: np.ndarray) -> None:
-        """uvs: (c, 2), by corner: where materials read images."""
+        """Sets the coordinates at which materials read images. uvs: (c, 2), per corner."""
         uvs = _float_array(uvs, (None, 2), "uvs")
         self._library.rb_set_mesh_uvs(self._pointer, mesh, _as_floats(uvs), len(uvs))
 
     def set_mesh_corner_colors(self, mesh: int, colors: np.ndarray) -> None:
-        """colors: (c, 3), linear RGB, by corner: what materials with corner colours read."""
+        """Sets the colours for materials with corner colours. colors: (c, 3), linear RGB, per
+        corner."""
         colors = _float_array(colors, (None, 3), "colors")
         self._library.rb_set_mesh_corner_colors(
             self._pointer, mesh, _as_floats(colors), len(colors))
 
     def add_instance(self, mesh: int, name: str, transform: np.ndarray, role: str,
                      side: str) -> int:
-        """transform: (3, 4), object to world; role: a key of ROLES; side: a key of SIDES."""
+        """Adds an instance of a mesh. transform: (3, 4), object to world. role: a key of ROLES.
+        side: a key of SIDES."""
         transform = _float_array(transform, (3, 4), "transform")
         identifier = _int()
         self._library.rb_add_instance(
@@ -458,7 +468,8 @@ class Scene(_Handle):
 
     def add_point_light(self, name: str, position: np.ndarray, intensity: np.ndarray,
                         radius: float, shape: str) -> int:
-        """position: (3,) m; intensity: (3,) W/sr; radius: m; shape: a key of POINT_SHAPES."""
+        """Adds a point light. position: (3,) m. intensity: (3,) W/sr. radius: m. shape: a key of
+        POINT_SHAPES."""
         position = _float_array(position, (3,), "position")
         intensity = _float_array(intensity, (3,), "intensity")
         identifier = _int()
@@ -469,16 +480,17 @@ class Scene(_Handle):
 
     def set_light_cone(self, light: int, world_to_light: np.ndarray, angle: float,
                        blend: float, dims_by_cosine: bool) -> None:
-        """Makes a point light a spot light, which shines along its -Z axis. world_to_light: (3, 3);
-        angle: full opening in radians; blend: 0 to 1, share of the cone in which the light fades;
-        dims_by_cosine: whether the intensity falls with the cosine to the axis."""
+        """Makes a point light a spot light, which shines along its -Z axis. world_to_light: (3, 3).
+        angle: full opening in radians. blend: 0 to 1, share of the cone in which the light fades.
+        dims_by_cosine: whether the intensity falls off with the cosine to the axis."""
         world_to_light = _float_array(world_to_light, (3, 3), "world_to_light")
         self._library.rb_set_light_cone(
             self._pointer, light, _as_floats(world_to_light), angle, blend, dims_by_cosine)
 
     def add_sun_light(self, name: str, direction: np.ndarray, irradiance: np.ndarray,
                       angle: float) -> int:
-        """direction: (3,) towards the sun; irradiance: (3,) W/m^2; angle: diameter in radians."""
+        """Adds a sun. direction: (3,), towards the sun. irradiance: (3,) W/m^2, at normal
+        incidence. angle: angular diameter in radians."""
         direction = _float_array(direction, (3,), "direction")
         irradiance = _float_array(irradiance, (3,), "irradiance")
         identifier = _int()
@@ -489,8 +501,8 @@ class Scene(_Handle):
 
     def add_area_light(self, name: str, centre: np.ndarray, axis_u: np.ndarray,
                        axis_v: np.ndarray, radiance: np.ndarray, shape: str) -> int:
-        """centre: (3,) m; axis_u, axis_v: (3,) m, half axes; radiance: (3,) W/(m^2 sr); shape: a
-        key of AREA_SHAPES."""
+        """Adds an area light. centre: (3,) m. axis_u, axis_v: (3,) m, half axes. radiance: (3,)
+        W/(m^2 sr). shape: a key of AREA_SHAPES."""
         centre = _float_array(centre, (3,), "centre")
         axis_u = _float_array(axis_u, (3,), "axis_u")
         axis_v = _float_array(axis_v, (3,), "axis_v")
@@ -503,41 +515,48 @@ class Scene(_Handle):
         return identifier.value
 
     def set_light_spread(self, light: int, spread: float) -> None:
-        """spread: full opening in radians, 0 to pi, of the light of an area light."""
+        """Limits the directions of the light of an area light. spread: full opening in radians, 0
+        to pi."""
         self._library.rb_set_light_spread(self._pointer, light, spread)
 
     def set_light_shadows(self, light: int, casts_shadows: bool) -> None:
+        """Sets whether surfaces block the light of a lamp. They do by default."""
         self._library.rb_set_light_shadows(self._pointer, light, casts_shadows)
 
     def set_instance_visibility(self, instance: int, stops_direct: bool, exchanges: bool) -> None:
-        """stops_direct: whether the instance blocks direct light; exchanges: whether it reflects
-        light to other surfaces and blocks theirs."""
+        """Sets which light an instance affects. stops_direct: whether the instance blocks direct
+        light. exchanges: whether the instance reflects light to other surfaces and blocks their
+        light."""
         self._library.rb_set_instance_visibility(self._pointer, instance, stops_direct, exchanges)
 
     def set_result_corners(self, instance: int, corners: np.ndarray) -> None:
-        """corners: (k,), the corners of the instance's mesh whose light will be read."""
+        """Limits the results of an instance to some corners. corners: (k,), the corners of the
+        instance's mesh whose light will be read."""
         corners = np.ascontiguousarray(corners, np.int32)
         self._library.rb_set_result_corners(self._pointer, instance, _as_ints(corners),
                                             len(corners))
 
     def set_world(self, radiance: np.ndarray) -> None:
-        """radiance: (3,) W/(m^2 sr), the same from all directions."""
+        """Sets the constant light of the world. radiance: (3,) W/(m^2 sr), equal in all
+        directions."""
         radiance = _float_array(radiance, (3,), "radiance")
         self._library.rb_set_world(self._pointer, _as_floats(radiance))
 
     def set_world_image(self, pixels: np.ndarray) -> None:
-        """pixels: (height, width, 3) W/(m^2 sr), equirectangular as in Cycles, bottom row first; is
-        added to the radiance of set_world."""
+        """Sets the image of the world, which is added to the radiance of set_world. pixels:
+        (height, width, 3) W/(m^2 sr), equirectangular as in Cycles, bottom row first."""
         pixels = _float_array(pixels, (None, None, 3), "pixels")
         self._library.rb_set_world_image(
             self._pointer, pixels.shape[1], pixels.shape[0], _as_floats(pixels))
 
     def add_light_set(self, name: str) -> int:
+        """Adds a light set, which contains no lights yet."""
         identifier = _int()
         self._library.rb_add_light_set(self._pointer, name.encode(), ctypes.byref(identifier))
         return identifier.value
 
     def set_light_set(self, light: int, light_set: int) -> None:
+        """Puts a light into a light set."""
         self._library.rb_set_light_set(self._pointer, light, light_set)
 
     def set_instance_light_set(self, instance: int, light_set: int) -> None:
@@ -545,6 +564,7 @@ class Scene(_Handle):
         self._library.rb_set_instance_light_set(self._pointer, instance, light_set)
 
     def set_world_light_set(self, light_set: int) -> None:
+        """Puts the light of the world into a light set."""
         self._library.rb_set_world_light_set(self._pointer, light_set)
 
 
@@ -555,25 +575,26 @@ class Scene(_Handle):
 
 @dataclasses.dataclass(frozen=True)
 class Setting:
-    """What the library says of a setting of a bake."""
+    """The library's description of a setting of a bake."""
 
     name: str
-    type: type  # int, float, or str: a choice
+    type: type  # int, float, or str for a choice
     help: str
-    unit: str  # "m", "MB", or "" for a number without one
-    least: float  # the range of a number, both ends allowed; 0 for a choice
-    most: float
+    unit: str  # "m", "MB", or "" if the setting has no unit
+    least: float  # smallest allowed value of a number; 0 for a choice
+    most: float  # largest allowed value of a number; 0 for a choice
     default: int | float | str
-    choices: dict[str, str]  # of a choice: help by name, in their lasting order; else empty
-    # The choice that decides whether the setting has an effect, and its values with which it has.
-    # An empty name: the setting always has an effect.
+    choices: dict[str, str]  # help of each choice by name, in a fixed order; empty for numbers
+    # Name of the choice that determines whether the setting has an effect, and its values for which
+    # the setting has one. If the name is empty, the setting always has an effect.
     used_with: str = ""
     used_with_choices: frozenset[str] = frozenset()
 
 
 @functools.cache
 def settings() -> dict[str, Setting]:
-    """All settings of a bake by name. Raises RaybundleError without a library."""
+    """Returns all settings of a bake by name. Raises RaybundleError if the library cannot be
+    loaded."""
     library = load()
     result, used_with = {}, {}
     for index in range(library.rb_get_setting_count()):
@@ -596,7 +617,8 @@ def settings() -> dict[str, Setting]:
 
 
 def _setting_type(name: str) -> type:
-    """float for an unknown name, which the library itself refuses."""
+    """Returns the type of a setting. Returns float for an unknown name, which the library itself
+    rejects."""
     return settings()[name].type if name in settings() else float
 
 
@@ -611,6 +633,8 @@ class Bake(_Handle):
         self._library.rb_new_bake(ctypes.byref(self._pointer))
 
     def set(self, name: str, value: int | float | str) -> None:
+        """Sets a setting. name: a key of settings(). Raises RaybundleError if the name is unknown
+        or the value is not allowed."""
         kind = _setting_type(name)
         if kind is str:
             self._library.rb_set_bake_string(self._pointer, name.encode(), str(value).encode())
@@ -620,6 +644,8 @@ class Bake(_Handle):
             self._library.rb_set_bake_float(self._pointer, name.encode(), float(value))
 
     def get(self, name: str) -> int | float | str:
+        """Returns the value of a setting. name: a key of settings(). Raises RaybundleError if the
+        name is unknown."""
         kind = _setting_type(name)
         if kind is str:
             text = _text()
@@ -635,19 +661,20 @@ class Bake(_Handle):
 
     def execute(self, scene: Scene, progress: Progress | None = None) -> None:
         """Bakes a scene. Raises RaybundleError, with code CANCELLED if progress returned False. An
-        exception in progress cancels too and is raised again here. If progress calls close(), there
-        are no results."""
+        exception in progress also cancels the bake and is raised again here. If progress calls
+        close(), there are no results."""
         raised: list[BaseException] = []
 
         def report(_user: object, stage: int, fraction: float) -> bool:
             try:
                 return progress(STAGES[stage], fraction) is not False
             except BaseException as exception:
-                # An exception must not cross the C frames between here and execute.
+                # An exception must not cross the C frames between this function and execute.
                 raised.append(exception)
                 return False
 
-        # Keep the function object in this frame: it must live as long as the library may call it.
+        # Keep the function object in this frame, because it must exist as long as the library may
+        # call it.
         function = _ProgressFunction(report) if progress else _ProgressFunction()
         self._library.rb_set_bake_progress(self._pointer, function, None)
         try:
@@ -657,26 +684,27 @@ class Bake(_Handle):
                 raise raised[0]
             raise
         finally:
-            if not self.is_closed:  # by progress
+            if not self.is_closed:  # progress may have closed the bake
                 self._library.rb_set_bake_progress(self._pointer, _ProgressFunction(), None)
         if raised:
             raise raised[0]
 
     def corner_light(self, instance: int, output: str, count: int, light_set: int | None = None
                      ) -> np.ndarray:
-        """(count, 3) float32: the light at the corners of an instance's mesh, of which there are
-        count. output: a key of OUTPUTS; light_set: id, or None for the light of all lights."""
+        """Returns the light at the corners of an instance's mesh, (count, 3) float32. output: a key
+        of OUTPUTS. count: number of corners. light_set: id, or None for the light of all lights."""
         return self._light('corner', instance, output, count, light_set)
 
     def vertex_light(self, instance: int, output: str, count: int, light_set: int | None = None
                      ) -> np.ndarray:
-        """(count, 3) float32: the light at the vertices of an instance's mesh, of which there are
-        count. output: a key of OUTPUTS; light_set: id, or None for the light of all lights."""
+        """Returns the light at the vertices of an instance's mesh, (count, 3) float32. output: a
+        key of OUTPUTS. count: number of vertices. light_set: id, or None for the light of all
+        lights."""
         return self._light('vertex', instance, output, count, light_set)
 
     def _light(self, element: str, instance: int, output: str, count: int,
                light_set: int | None) -> np.ndarray:
-        """corner_light or vertex_light. element: 'corner' or 'vertex'."""
+        """Returns corner_light or vertex_light. element: 'corner' or 'vertex'."""
         light = np.empty((count, 3), np.float32)
         arguments = (instance, OUTPUTS[output], _as_floats(light), count)
         if light_set is None:
@@ -687,14 +715,14 @@ class Bake(_Handle):
         return light
 
     def corner_error(self, instance: int, count: int) -> np.ndarray:
-        """(count,) float32: the stated error of LIGHTING, in its unit, at the corners of an
-        instance's mesh."""
+        """Returns the stated error of LIGHTING at the corners of an instance's mesh, (count,)
+        float32, W/(m^2 sr). count: number of corners."""
         error = np.empty(count, np.float32)
         self._library.rb_get_corner_error(self._pointer, instance, _as_floats(error), count)
         return error
 
     def report(self) -> dict:
-        """The native part of the report of the last execution that succeeded. Raises
+        """Returns the native part of the report of the last successful execution. Raises
         RaybundleError if there was none."""
         text = _text()
         self._library.rb_get_report(self._pointer, ctypes.byref(text))
@@ -707,13 +735,15 @@ class Bake(_Handle):
 
 
 class Subdivision(_Handle):
-    """A conforming triangle mesh, made of another mesh, with edges not longer than max_edge, m.
+    """A conforming triangle mesh, built from another mesh, with edges of at most max_edge, m.
+
+    Each corner of a triangle lies between three corners of one face of the source mesh.
 
     vertices        (n, 3) float32, m
     triangles       (t, 3) int32, vertex indices
-    source_faces    (t,) int32, the face of the source mesh that a triangle lies in
-    source_corners  (t, 3, 3) int32, per new corner the three source corners it lies between
-    source_weights  (t, 3, 3) float32, their weights, which sum to 1
+    source_faces    (t,) int32, the face of the source mesh that contains the triangle
+    source_corners  (t, 3, 3) int32, three source corners for each corner of a triangle
+    source_weights  (t, 3, 3) float32, the weights of the source corners, which sum to 1
     """
 
     _release = 'rb_release_subdivision'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the native library's scene of a `SceneData`."""
+"""Builds the native library's scene from a `SceneData`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from .scene_data import (AreaLightData, LightData, LightSetData, MeshData, Point
 
 
 def build_native_scene(data: SceneData) -> native.Scene:
-    """The native scene, which the caller closes. Its ids of instances and of lights are positions
-    in the lists of data. Raises RaybundleError if the native library refuses any of it."""
+    """Returns a native scene, which the caller closes. Its ids of instances and of lights are
+    positions in the lists of data. Raises RaybundleError if the native library rejects any of the
+    data."""
     scene = native.Scene()
     for image in data.images:
         scene.add_image(image.name, image.pixels, image.extension)

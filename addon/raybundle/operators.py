@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators of the add-on: each checks whether it may run, calls the bake, and reports."""
+"""The operators of the add-on. Each checks whether it may run, calls the bake, and reports the
+result."""
 
 import bpy
 
@@ -11,13 +12,14 @@ from .materials.last_surfaces import LastSurfaces
 from .native import ErrorCode, RaybundleError
 from .subdivided_copy import remove_copies
 
-# Where on the progress bar, from 0 to 1, each stage starts; bundles take most of the time.
+# Position on the progress bar, from 0 to 1, at which each stage starts. Bundles take most of the
+# time.
 _STAGE_STARTS = {'export': 0.0, 'patches': 0.05, 'first_shot': 0.1, 'bundles': 0.3, 'solve': 0.85,
                  'reconstruction': 0.9, 'write_back': 0.97, 'done': 1.0}
 
 
 def _overall_fraction(stage: str, fraction: float) -> float:
-    """The place on the progress bar, 0 to 1, of a fraction of a stage."""
+    """Returns the position on the progress bar, 0 to 1, for a fraction of a stage."""
     starts = list(_STAGE_STARTS.values())
     index = list(_STAGE_STARTS).index(stage)
     return starts[index] + fraction * (starts[index + 1] - starts[index])
@@ -46,7 +48,7 @@ def _run_bake(operator: bpy.types.Operator, context: bpy.types.Context) -> set[s
 
 
 class _NeedsScene:
-    """Mixin of operators that may run wherever there is a scene."""
+    """Mixin of operators that only require a scene."""
 
     @classmethod
     def poll(cls, context):

@@ -10,7 +10,8 @@ from .light_sets import attribute_of
 
 
 def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
-    """The panel's layout, with labels beside the values and without buttons for keyframes."""
+    """Returns the panel's layout, with labels beside the values and without buttons for
+    keyframes."""
     panel.layout.use_property_split = True
     panel.layout.use_property_decorate = False
     return panel.layout
@@ -18,8 +19,8 @@ def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
 
 def draw_used(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str,
               **options) -> None:
-    """Draws a setting if it has an effect with the other settings. Without the library, which knows
-    that, every setting is drawn."""
+    """Draws a setting if it has an effect with the current values of the other settings. If the
+    library, which provides this information, is missing, every setting is drawn."""
     try:
         setting = native.settings()[name]
     except native.RaybundleError:
@@ -30,8 +31,8 @@ def draw_used(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, nam
 
 
 class RaybundleRenderPanel:
-    """Mixin of panels in the Render properties, which show with any render engine: a bake does not
-    depend on it."""
+    """Mixin of panels in the Render properties. They are shown for all render engines, because a
+    bake does not depend on the engine."""
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     bl_context = "render"
@@ -66,7 +67,7 @@ class RAYBUNDLE_PT_last_bake(RaybundleRenderPanel, bpy.types.Panel):
         layout = self.layout
         report = json.loads(context.scene.raybundle.report)
         column = layout.column(align=True)
-        # Reports by earlier releases have no 'error'.
+        # Reports of earlier releases have no 'error'.
         if error := report.get('error'):
             column.label(text=f"Noise: {100.0 * error['noise']:.2g} %")
             column.label(text=f"Patch size: {100.0 * error['discretisation']:.2g} %")
@@ -98,7 +99,7 @@ class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        # Short labels, since the editor is narrow.
+        # Short labels, because the editor is narrow.
         layout.prop(settings, "max_patches", text="Patches")
         layout.prop(settings, "max_bundles", text="Bundles")
         layout.prop(settings, "lines_per_bundle", text="Lines")

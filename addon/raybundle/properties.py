@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The settings of a scene (scene.raybundle) and of an object (object.raybundle).
 
-Those that are settings of the native library too are defined here a second time, since properties
-must be registered where the library is missing. A test compares names, types, defaults, ranges,
-choices and descriptions with what the library says of them (native.settings()), so that both agree.
-Files store the place of a choice in its list: new ones go to the end.
+Settings of the native library are defined here a second time, because properties must be registered
+even if the library is missing. A test compares names, types, defaults, ranges, choices and
+descriptions with those of the library (native.settings()), so that both agree. Files store the
+position of a choice in its list, so new choices must be added at the end.
 """
 
 from __future__ import annotations
@@ -326,7 +326,7 @@ class RaybundleObjectSettings(bpy.types.PropertyGroup):
 
 @dataclass(frozen=True)
 class BakeSettings:
-    """The settings of one bake: those of the scene, of which some may be overridden."""
+    """The settings of one bake: those of the scene, some of which may be overridden."""
 
     scope: str
     target_error: float
@@ -363,9 +363,9 @@ class BakeSettings:
 
 
 def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
-    """The settings of a scene, with overrides by name. Raises ValueError for an override that is
-    unknown, and for a value, overridden or stored, that the property does not allow: Blender itself
-    stores NaN in spite of a property's limits."""
+    """Returns the settings of a scene, with overrides by name. Raises ValueError for an override
+    that is unknown, and for a value, overridden or stored, that the property does not allow. Stored
+    values are checked because Blender stores NaN in spite of a property's limits."""
     names = [item.name for item in fields(BakeSettings)]
     for name in overrides:
         if name not in names:
@@ -376,7 +376,8 @@ def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeS
 
 
 def assign(settings: RaybundleSceneSettings, name: str, value: object) -> None:
-    """Sets a setting of scene.raybundle to a value, which may be text; "skip.NAME" switches a skip.
+    """Sets a setting of scene.raybundle to a value, which may be text. The name "skip.NAME"
+    switches a skip on or off.
 
     Raises KeyError for an unknown name, and ValueError for a value that the setting does not allow.
     """
@@ -391,8 +392,8 @@ def assign(settings: RaybundleSceneSettings, name: str, value: object) -> None:
 
 
 def checked_value(name: str, value: object) -> object:
-    """The value, which may be text, in the type of the scene setting of this name. Raises KeyError
-    for an unknown name, and ValueError for a value that the setting does not allow."""
+    """Returns the value, which may be text, in the type of the scene setting of this name. Raises
+    KeyError for an unknown name, and ValueError for a value that the setting does not allow."""
     definition = RaybundleSceneSettings.bl_rna.properties[name]
     if definition.type == 'ENUM' and definition.is_enum_flag:
         unknown = set(value) - set(definition.enum_items.keys())
@@ -414,7 +415,7 @@ def checked_value(name: str, value: object) -> object:
     except (TypeError, ValueError) as error:
         raise ValueError(f'{name}: "{value}" is not a number') from error
     low, high = definition.hard_min, definition.hard_max
-    if definition.type == 'FLOAT':  # stored in single precision, where 0.0005 is a little more
+    if definition.type == 'FLOAT':  # stored in single precision, in which 0.0005 is slightly larger
         low, high = float(f"{low:g}"), float(f"{high:g}")
     if not low <= number <= high:
         raise ValueError(f"{name}: {number} is not between {low:g} and {high:g}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The exported scene as plain arrays, between Blender and the native library and without bpy.
+"""The exported scene as plain arrays, without bpy. It connects Blender and the native library.
 
 Indices of meshes, materials, images, instances and lights are positions in the lists of SceneData.
 """
@@ -30,7 +30,7 @@ class MaterialData:
     front: SurfaceData
     back: SurfaceData
     opacity: float = 1.0  # share of the light that does not pass straight through
-    opacity_image: int | None = None  # multiplies it, by the mean of its channels
+    opacity_image: int | None = None  # the mean of its channels multiplies `opacity`
 
     @property
     def sides(self) -> tuple[SurfaceData, SurfaceData]:
@@ -49,12 +49,13 @@ class MeshData:
     corner_normals: np.ndarray  # (c, 3) float32, unit length
     sharp_edges: np.ndarray  # (e, 2) int32, the two vertices of each edge
     face_smooth: np.ndarray  # (f,) bool, whether the face is shaded smooth
-    uvs: np.ndarray | None = None  # (c, 2) float32, where materials read images
-    corner_colors: np.ndarray | None = None  # (c, 3) float32, linear RGB, read by materials
+    uvs: np.ndarray | None = None  # (c, 2) float32, coordinates at which materials read images
+    # (c, 3) float32, linear RGB, for materials that read an attribute
+    corner_colors: np.ndarray | None = None
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Numbers of vertices, of corners and of faces."""
+        """Returns the numbers of vertices, of corners and of faces."""
         return len(self.vertices), self.corner_count, self.face_count
 
     @property
@@ -66,11 +67,11 @@ class MeshData:
         return len(self.face_offsets) - 1
 
     def digest(self) -> bytes:
-        """A digest of the content, without the name."""
+        """Returns a digest of the content, without the name."""
         content = hashlib.blake2b(digest_size=16)
         for array in (self.vertices, self.corner_vertices, self.face_offsets, self.face_materials,
                       self.corner_normals, self.sharp_edges, self.uvs, self.corner_colors):
-            # Add the shape, so that values cannot move from one array to the next.
+            # Add the shape, so that moving values from one array to the next changes the digest.
             content.update(str(None if array is None else array.shape).encode())
             if array is not None:
                 content.update(np.ascontiguousarray(array).data)
@@ -79,15 +80,16 @@ class MeshData:
 
 @dataclass(frozen=True)
 class InstanceData:
-    """A mesh at a place in the world."""
+    """A mesh that is placed in the world by a matrix."""
 
     mesh: int
     name: str
     transform: np.ndarray  # (3, 4) float64, object to world
     role: str  # 'BAKE' or 'OCCLUDE'
     side: str  # 'FRONT' or 'BACK'
-    stops_direct: bool = True  # whether it blocks the direct light of lamps
-    exchanges: bool = True  # whether it reflects light to other objects and blocks theirs
+    stops_direct: bool = True  # whether the instance blocks the direct light of lamps
+    # Whether the instance reflects light to other objects and blocks their light.
+    exchanges: bool = True
     result_corners: np.ndarray | None = None  # (k,), corners whose light is written; None: all
 
 
@@ -100,10 +102,11 @@ class PointLightData:
     intensity: np.ndarray  # (3,) W/sr
     radius: float  # m
     shape: str  # 'DISK' (facing the receiver) or 'SPHERE'
-    world_to_light: np.ndarray | None = None  # (3, 3), of a spot lamp, which shines along its -Z
+    # (3, 3), for a spot lamp, which shines along its -Z axis
+    world_to_light: np.ndarray | None = None
     cone_angle: float = 0.0  # radians, full opening of a spot lamp
     cone_blend: float = 0.0  # 0 to 1, share of the cone in which the light fades
-    cone_dims: bool = False  # whether the intensity falls with the cosine to the axis
+    cone_dims: bool = False  # whether the intensity falls off with the cosine to the axis
     casts_shadows: bool = True
 
 
@@ -128,7 +131,7 @@ class AreaLightData:
     axis_v: np.ndarray  # (3,) m, half axis
     radiance: np.ndarray  # (3,) W/(m^2 sr)
     shape: str  # 'RECTANGLE' or 'ELLIPSE'
-    spread: float = math.pi  # radians, full opening; the emitted power does not depend on it
+    spread: float = math.pi  # radians, full opening; does not change the emitted power
     casts_shadows: bool = True
 
 
@@ -139,14 +142,14 @@ LightData = PointLightData | SunLightData | AreaLightData
 class LightSetData:
     """A named group of lights."""
     name: str
-    world: bool = False  # whether the light of the world belongs to it
+    world: bool = False  # whether the light of the world is part of the set
     lights: list[int] = field(default_factory=list)  # indices
-    instances: list[int] = field(default_factory=list)  # indices, of those that emit light
+    instances: list[int] = field(default_factory=list)  # indices of emissive instances
 
 
 @dataclass
 class SceneData:
-    """All that the native library needs of a scene."""
+    """The whole scene as the native library receives it."""
 
     images: list[ImageData] = field(default_factory=list)
     materials: list[MaterialData] = field(default_factory=list)
@@ -154,20 +157,21 @@ class SceneData:
     instances: list[InstanceData] = field(default_factory=list)
     lights: list[LightData] = field(default_factory=list)
     world: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr)
-    # (height, width, 3) W/(m^2 sr), equirectangular as in Cycles, bottom row first: is added to
+    # (height, width, 3) W/(m^2 sr), equirectangular as in Cycles, bottom row first. It is added to
     # `world`.
     world_image: np.ndarray | None = None
     light_sets: list[LightSetData] = field(default_factory=list)
 
     def emits(self, instance: int) -> bool:
-        """Returns whether an instance has a material that may emit light. An image or corner colours
-        that emit may still be black."""
+        """Returns whether an instance has a material that may emit light. An image or corner
+        colours that may emit can still be black."""
         used = np.unique(self.meshes[self.instances[instance].mesh].face_materials)
         return any(side.emission.may_be_positive() for index in used
                    for side in self.materials[index].sides)
 
     def diagonal(self) -> float:
-        """The diagonal of the bounding box of all instances in the world, m; 0 without any."""
+        """Returns the diagonal of the bounding box of all instances in the world, m. Returns 0 if
+        there are no instances."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in self.instances:
             vertices = self.meshes[instance.mesh].vertices
@@ -178,13 +182,13 @@ class SceneData:
 
 
 def box_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(8, 3): the corners of the axis-aligned box from low, (3,), to high, (3,)."""
+    """Returns the corners of the axis-aligned box from low, (3,), to high, (3,), as (8, 3)."""
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
                      for z in (low[2], high[2])])
 
 
 class Warnings(list):
-    """Messages for the report, each kept once."""
+    """Messages for the report. add() keeps each message once."""
 
     def add(self, message: str) -> None:
         if message not in self:

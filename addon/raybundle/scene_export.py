@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The evaluated scene -> `SceneData`, and for each object that gets light how to write it back.
+"""Converts the evaluated scene to `SceneData`, and records how light is written back to each
+object.
 
-Python can only evaluate the scene as the viewport does; of that, what renders show is exported.
+Python can only evaluate the scene as the viewport does. Of this scene, the objects that renders
+show are exported.
 """
 
 from __future__ import annotations
@@ -34,24 +36,24 @@ GEOMETRY_TYPES = ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT')
 
 @dataclass(frozen=True)
 class BakeTarget:
-    """An object that light is written to."""
+    """An object that light will be written to."""
 
     object: bpy.types.Object  # original
     instance: int  # position in SceneData.instances
-    corner_map: CornerMap  # from the exported mesh to the object's own
-    name: str  # of the object when it was exported
-    vertex_count: int  # of the object's own mesh when it was exported
+    corner_map: CornerMap  # from the exported mesh to the object's own mesh
+    name: str  # of the object, at the time of the export
+    vertex_count: int  # of the object's own mesh, at the time of the export
 
 
 @dataclass
 class SceneExport:
-    """An exported scene, and what the report says of it."""
+    """An exported scene, and the messages about it for the report."""
 
     scene: SceneData = field(default_factory=SceneData)
     targets: list[BakeTarget] = field(default_factory=list)
-    statuses: dict[str, str] = field(default_factory=dict)  # by name: why an object gets no light
+    statuses: dict[str, str] = field(default_factory=dict)  # by object name: why it gets no light
     warnings: Warnings = field(default_factory=Warnings)
-    last: LastSurfaces | None = None  # holds the surfaces that are used, for the next bake
+    last: LastSurfaces | None = None  # the surfaces of this bake, for the next bake
 
 
 def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None,
@@ -59,10 +61,11 @@ def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Obje
                  attribute: str | None = None) -> SceneExport:
     """Exports the context's scene. The user's data is unchanged afterwards.
 
-    selected: original objects to bake, None for all; others still reflect and block light.
-    light_sets: of which the members are recorded. patch_size: m, 0 for the native library's choice;
-    images that Cycles bakes follow it. attribute: name of the attribute that light is written to,
-    None for that of the scene's settings. Raises BakeError if a light is in several light sets.
+    selected: original objects to bake, None for all. Other objects still reflect and block light.
+    light_sets: sets whose members are recorded. patch_size: m, 0 for the native library's choice;
+    it determines the size of the images that Cycles bakes. attribute: name of the attribute for the
+    light, None for that of the scene's settings. Raises BakeError if a light is in several light
+    sets.
     """
     if attribute is None:
         attribute = context.scene.raybundle.attribute
@@ -79,7 +82,7 @@ def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Obje
 
 
 def renderable_instances(context: bpy.types.Context) -> Iterator[bpy.types.DepsgraphObjectInstance]:
-    """Evaluated instances of objects that are both visible in the viewport and shown in renders."""
+    """Yields evaluated instances of objects that are visible in both the viewport and renders."""
     depsgraph = context.evaluated_depsgraph_get()
     renderable = _objects_in_rendered_collections(context.view_layer)
     for instance in depsgraph.object_instances:
@@ -97,7 +100,7 @@ def renderable_instances(context: bpy.types.Context) -> Iterator[bpy.types.Depsg
 
 
 def _objects_in_rendered_collections(view_layer: bpy.types.ViewLayer) -> set[bpy.types.Object]:
-    """Original objects in collections that the view layer has and renders show."""
+    """Returns the original objects in collections that the view layer contains and renders show."""
     objects: set[bpy.types.Object] = set()
     pending = [view_layer.layer_collection]
     while pending:
@@ -113,7 +116,7 @@ def _objects_in_rendered_collections(view_layer: bpy.types.ViewLayer) -> set[bpy
 
 
 def _role(item: bpy.types.Object, selected: Collection[bpy.types.Object] | None) -> str:
-    """'BAKE', 'OCCLUDE' or 'IGNORE': the role of an original object in this bake."""
+    """Returns the role of an original object in this bake: 'BAKE', 'OCCLUDE' or 'IGNORE'."""
     role = item.raybundle.role
     if role == 'BAKE' and selected is not None and item not in selected:
         return 'OCCLUDE'
@@ -123,7 +126,7 @@ def _role(item: bpy.types.Object, selected: Collection[bpy.types.Object] | None)
 def _meshes_with_changed_topology(context: bpy.types.Context,
                                   selected: Collection[bpy.types.Object] | None
                                   ) -> list[bpy.types.Mesh]:
-    """Original meshes of baked objects whose modifiers change the topology."""
+    """Returns the original meshes of baked objects whose modifiers change the topology."""
     meshes = []
     for instance in renderable_instances(context):
         item = instance.object.original
@@ -137,7 +140,7 @@ def _meshes_with_changed_topology(context: bpy.types.Context,
 
 
 class _Exporter:
-    """Exports the evaluated scene, for one bake."""
+    """Exports the evaluated scene for one bake."""
 
     def __init__(self, context: bpy.types.Context,
                  selected: Collection[bpy.types.Object] | None,
@@ -152,31 +155,34 @@ class _Exporter:
                                           filter_glossy_of(context.scene), self.results, self.last)
         self.members = LightSetMembers(list(light_sets), self.result.scene)
         self._baked: dict[bpy.types.Object, BakedSurface] = {}  # by original object
-        # By mesh and materials, see _mesh: index in SceneData.meshes, or why it is left out.
+        # By mesh and materials, see _mesh: index in SceneData.meshes, or the reason why the mesh is
+        # left out.
         self._meshes: dict[tuple, int | MeshError] = {}
-        # By the same keys, the digests (LastSurfaces) of the surfaces in the slots.
+        # By the keys of _meshes: the digests (LastSurfaces) of the surfaces in the slots.
         self._taken: dict[tuple, list[str]] = {}
-        # Exported meshes by counts and digest; None in place of the digest of a first one.
+        # Exported meshes by counts and digest. The digest of the first mesh with given counts is
+        # None until it is needed.
         self._alike: dict[tuple[int, int, int], dict[bytes | None, int]] = {}
-        # Instances that are no objects of their own, by names of the instancing object and theirs.
+        # Numbers of instances that are not objects themselves, by the names of the instancing
+        # object and of the instance's object.
         self._instance_counts: Counter[tuple[str, str]] = Counter()
         self._corner_maps: dict[bpy.types.Object, CornerMap] = {}  # by original object
-        self._copied: list[str] = []  # objects whose modifiers make several corners of one
-        self._untraced: list[str] = []  # objects whose modifiers keep no trace of some corners
+        self._copied: list[str] = []  # objects whose modifiers create several corners from one
+        self._untraced: list[str] = []  # objects whose modifiers lose the codes of some corners
         self._turned: dict[int, str] = {}  # by mesh: an object whose custom normals turn faces
-        # Name, mesh and transform of exported objects that are no meshes.
+        # Name, mesh and transform of exported objects that are not meshes.
         self._placed: set[tuple[str, int, bytes]] = set()
-        self._drawn: dict[bpy.types.Object, None] = {}  # originals that take part
+        self._drawn: dict[bpy.types.Object, None] = {}  # original objects that are exported
 
     def bake_surfaces(self, patch_size: float) -> None:
-        """Lets Cycles bake the materials that cannot be read. Must not be called while the
-        evaluated scene is in use, since Cycles evaluates another scene."""
+        """Bakes the materials that cannot be read with Cycles. Must not be called while the
+        evaluated scene is in use, because Cycles evaluates another scene."""
         wanted: dict[bpy.types.Object, Wanted] = {}
         seen: set[tuple] = set()
         for instance in renderable_instances(self.context):
             item = instance.object
-            # Only objects with a mesh of their own; of those that share one and its materials, the
-            # first.
+            # Only use objects with a mesh of their own. Of the objects that share a mesh and its
+            # materials, use the first.
             if (item.type != 'MESH' or item.original.type != 'MESH'
                     or _role(item.original, None) == 'IGNORE'):
                 continue
@@ -186,7 +192,7 @@ class _Exporter:
                 continue
             seen.add(group)
             reasons = {}
-            # Cycles bakes the original's materials, whose slots a script may have changed since the
+            # Cycles bakes the original's materials. A script may have changed their slots since the
             # evaluation.
             for index, (slot, original) in enumerate(zip(item.material_slots,
                                                          item.original.material_slots)):
@@ -207,21 +213,22 @@ class _Exporter:
             self.result.warnings.add(text)
 
     def _slots(self, item: bpy.types.Object) -> tuple[SlotMaterial, ...]:
-        """The material slots of an evaluated object."""
+        """Returns descriptions of the material slots of an evaluated object."""
         return tuple(
             self.materials.slot(slot.material, lambda: self._renders_result(item),
                                 lambda index=index: self.last.digest(item.original, index))
             for index, slot in enumerate(item.material_slots))
 
     def _renders_result(self, item: bpy.types.Object) -> bool:
-        """Whether the render colour attribute of an evaluated object is the result of a bake."""
+        """Returns whether the render colour attribute of an evaluated object is the result of a
+        bake."""
         if item.type != 'MESH' or item.original.type != 'MESH':
             return False
         return renders_result(item.data, self.results,
                               _role(item.original, self.selected) == 'BAKE')
 
     def _diagonal(self) -> float:
-        """The diagonal of the bounding box of what is exported, about, m."""
+        """Returns the approximate diagonal of the bounding box of the exported objects, m."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in renderable_instances(self.context):
             item = instance.object
@@ -231,7 +238,7 @@ class _Exporter:
         return float(np.linalg.norm(high - low))
 
     def export(self) -> SceneExport:
-        """Walks over the evaluated scene; after bake_surfaces."""
+        """Exports the evaluated scene. Must be called after bake_surfaces."""
         for instance in renderable_instances(self.context):
             item = instance.object
             if item.type == 'LIGHT':
@@ -260,22 +267,24 @@ class _Exporter:
         return self.result
 
     def _hidden(self) -> list[bpy.types.Object]:
-        """Original objects that are hidden in the viewport and not in renders, by name."""
+        """Returns the original objects that are hidden in the viewport and not in renders, sorted
+        by name."""
         shown = {item.original for item in self.context.evaluated_depsgraph_get().objects}
         return [item for item in sorted(_objects_in_rendered_collections(self.context.view_layer),
                                         key=lambda item: item.name_full)
                 if item not in shown and not item.hide_render]
 
     def _unrendered(self) -> list[bpy.types.Object]:
-        """Original objects that are shown in the viewport and not in renders, by name."""
+        """Returns the original objects that are shown in the viewport and not in renders, sorted by
+        name."""
         rendered = _objects_in_rendered_collections(self.context.view_layer)
         return [item for item in sorted(self.context.view_layer.objects,
                                         key=lambda item: item.name_full)
                 if (item.hide_render or item not in rendered) and item.visible_get()]
 
     def _name_what_is_left_out(self, hidden: list[bpy.types.Object], lights: list[str]) -> None:
-        """Warns of what the bake does not follow. hidden: see _hidden; lights: names of the lamps
-        among them, which are exported."""
+        """Adds warnings of features that the bake ignores. hidden: see _hidden. lights: names of
+        the hidden lamps, which are exported."""
         scene = self.context.scene
         hidden, unrendered = (
             [item for item in items
@@ -326,7 +335,8 @@ class _Exporter:
             return
         mesh = self._mesh(item, wants_map=role == 'BAKE' and not instance.is_instance)
         if isinstance(mesh, MeshError):
-            # Curves without a surface and empty texts are usual; only meshes are worth a warning.
+            # Curves without a surface and empty texts are common, so only meshes are worth a
+            # warning.
             if original.type == 'MESH':
                 self._refuse(item.name, str(mesh))
             return
@@ -351,7 +361,7 @@ class _Exporter:
             what = "holdout" if is_holdout else "shadow catcher"
             self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, here it '
                                      f'is an object like others')
-        # In Cycles the ray visibility of the instancing object counts too.
+        # In Cycles, the ray visibility of the instancing object also applies.
         shown = (item, instance.parent) if instance.is_instance and instance.parent else (item,)
         self.result.scene.instances.append(
             InstanceData(mesh, item.name, transform, role, original.raybundle.side,
@@ -374,8 +384,9 @@ class _Exporter:
         self.result.warnings.add(f'"{name}" is left out: {reason}')
 
     def _mesh(self, item: bpy.types.Object, wants_map: bool) -> int | MeshError:
-        """Index in SceneData.meshes of an evaluated object's mesh, which is exported once;
-        MeshError if it cannot take part. wants_map: the object's corner map is built too."""
+        """Returns the index in SceneData.meshes of an evaluated object's mesh, which is exported
+        once. Returns a MeshError if the mesh cannot be part of the bake. wants_map: whether the
+        object's corner map is also built."""
         # Materials may be linked to the object and then differ between objects with the same mesh.
         key = (item.data.as_pointer(), item.type, self._slots(item))
         original = item.original
@@ -398,7 +409,7 @@ class _Exporter:
     def _exported(self, item: bpy.types.Object, mesh: bpy.types.Mesh, key: tuple
                   ) -> int | MeshError:
         baked = self._baked.get(item.original)
-        # The mesh was evaluated again since and may have changed.
+        # The mesh has been evaluated again and may have changed.
         if baked is not None and len(baked.uvs) != len(mesh.loops):
             baked = None
         slots = self._slots(item)
@@ -420,12 +431,12 @@ class _Exporter:
         return index
 
     def _unique(self, data: MeshData) -> int:
-        """Index in SceneData.meshes, where a mesh with the same content, such as a copy that an
-        earlier bake made, is added once."""
+        """Returns the index in SceneData.meshes of a mesh. A mesh with equal content, such as a
+        copy that an earlier bake made, is added once."""
         meshes = self.result.scene.meshes
         alike = self._alike.setdefault(data.counts, {})
         if not alike:
-            # No mesh has the same counts: a digest is not needed yet.
+            # No mesh has the same counts, so a digest is not needed yet.
             digest = None
         else:
             if None in alike:

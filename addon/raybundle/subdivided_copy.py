@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finer copies of objects whose meshes are too coarse for their light (topology 'SUBDIVIDE').
 
-The copy "<name> (Radiosity)" is shown in place of the original, which is hidden. Its property
+The copy "<name> (Radiosity)" is shown instead of the original, which is hidden. The copy's property
 raybundle.source is the original, so that the next bake replaces the copy and Clear removes it.
 """
 
@@ -23,24 +23,24 @@ NAME_SUFFIX = " (Radiosity)"
 
 @dataclass(frozen=True)
 class SubdividedMesh:
-    """A finer mesh of t triangles, and where its corners lie on the mesh that it was made of."""
+    """A finer mesh of t triangles, and the positions of its corners on the source mesh."""
 
     data: MeshData  # of the finer mesh, in object space
-    source_faces: np.ndarray  # (t,) int32, the source face that each triangle lies in
-    # (3 t, 3): for each corner three corners of the source mesh, int32, and their weights, float32,
-    # which sum to 1.
+    source_faces: np.ndarray  # (t,) int32, the source face that contains each triangle
+    # (3 t, 3): for each corner, three corners of the source mesh, int32, and their weights,
+    # float32, which sum to 1.
     source_corners: np.ndarray
     source_weights: np.ndarray
 
     def interpolated(self, values: np.ndarray) -> np.ndarray:
-        """Values at the corners of the source, (source corners, n), interpolated at those of the
-        finer mesh, (3 t, n)."""
+        """Interpolates values at the corners of the source mesh, (source corners, n), at the
+        corners of the finer mesh, (3 t, n)."""
         return np.einsum('cj,cjn->cn', self.source_weights, values[self.source_corners])
 
 
 def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> SubdividedMesh:
-    """A triangle mesh whose edges are not longer than max_edge, m, in the world. transform: (3, 4),
-    object to world. Raises RaybundleError if the native library cannot make it."""
+    """Returns a triangle mesh whose edges in the world are not longer than max_edge, m. transform:
+    (3, 4), object to world. Raises RaybundleError if the native library cannot create the mesh."""
     world = mesh.vertices @ transform[:, :3].T + transform[:, 3]
     with Subdivision(world, mesh.corner_vertices, mesh.face_offsets, max_edge) as subdivision:
         vertices_of_corners = subdivision.triangles.reshape(-1)
@@ -48,7 +48,7 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
                                 subdivision.source_corners.reshape(-1, 3),
                                 subdivision.source_weights.reshape(-1, 3))
         vertex_count = len(subdivision.vertices)
-    # Interpolate in object space: the transform may be flat and have no inverse.
+    # Interpolate in object space, because the transform may be flat and have no inverse.
     vertices = np.zeros((vertex_count, 3), np.float32)
     vertices[vertices_of_corners] = result.interpolated(mesh.vertices[mesh.corner_vertices])
     normals = result.interpolated(mesh.corner_normals)
@@ -60,7 +60,8 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
         face_offsets=np.arange(0, len(vertices_of_corners) + 1, 3, dtype=np.int32),
         face_materials=mesh.face_materials[result.source_faces],
         corner_normals=normals.astype(np.float32),
-        # The source's edges do not exist here; its normals still differ across sharp ones.
+        # The source's edges do not exist in this mesh, but the normals still differ across sharp
+        # edges.
         sharp_edges=np.empty((0, 2), np.int32),
         face_smooth=mesh.face_smooth[result.source_faces],
         uvs=None if mesh.uvs is None else result.interpolated(mesh.uvs),
@@ -69,13 +70,13 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
 
 
 def find_copies(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.Object]:
-    """The subdivided copies in the scene, by original."""
+    """Returns the subdivided copies in the scene by original."""
     return {item.raybundle.source: item for item in scene.objects if item.raybundle.source}
 
 
 @contextmanager
 def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
-    """Shows the originals in place of their copies in the with block, in viewport and renders."""
+    """Shows the originals instead of their copies in the with block, in viewport and renders."""
     copies = find_copies(scene)
     states = [(item, item.hide_viewport, item.hide_render)
               for pair in copies.items() for item in pair]
@@ -92,11 +93,11 @@ def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
 def create_copies(context: bpy.types.Context,
                   meshes: dict[bpy.types.Object, SubdividedMesh]
                   ) -> dict[bpy.types.Object, bpy.types.Object]:
-    """Makes a finer copy of each object, hides the original and removes an earlier copy of it.
+    """Creates a finer copy of each object, hides the original and removes an earlier copy.
 
     meshes: by original object. Returns the copies by original.
     """
-    # Blender does not evaluate hidden objects: show all originals for one evaluation.
+    # Blender does not evaluate hidden objects, so show all originals for one evaluation.
     with originals_shown(context.scene):
         depsgraph = context.evaluated_depsgraph_get()
         built = {original: _evaluated_copy(original.evaluated_get(depsgraph), subdivided)
@@ -142,7 +143,7 @@ def _place_copy(context: bpy.types.Context, original: bpy.types.Object, mesh: bp
 
 
 def remove_copies(scene: bpy.types.Scene) -> int:
-    """Removes all copies and shows their originals again; returns the number of copies."""
+    """Removes all copies and shows their originals again. Returns the number of removed copies."""
     copies = find_copies(scene)
     for original, copy in copies.items():
         _set_hidden(original, False)
@@ -172,7 +173,7 @@ def _build_mesh(name: str, source: bpy.types.Mesh, subdivided: SubdividedMesh) -
     mesh.polygons.add(data.face_count)
     mesh.polygons.foreach_set('loop_start', data.face_offsets[:-1])
     if bpy.app.version < (4, 1, 0):
-        # Later versions derive the sizes from the starts and do not let them be set.
+        # Later versions derive the sizes from the starts and do not allow setting them.
         mesh.polygons.foreach_set('loop_total', np.diff(data.face_offsets))
     slots = read(source.polygons, 'material_index', np.int32)
     mesh.polygons.foreach_set('material_index', slots[subdivided.source_faces])
@@ -181,7 +182,7 @@ def _build_mesh(name: str, source: bpy.types.Mesh, subdivided: SubdividedMesh) -
     _carry_uv_layers(source, mesh, subdivided)
     _carry_color_attributes(source, mesh, subdivided)
     if data.face_smooth.any():
-        # Custom normals keep the shading of the source, sharp edges included.
+        # Custom normals preserve the shading of the source, including sharp edges.
         if bpy.app.version < (4, 1, 0):
             mesh.use_auto_smooth = True
             mesh.auto_smooth_angle = np.pi

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What one side of a material does with light, as the native library takes it, without bpy.
+"""The properties of one side of a material as the native library receives them, without bpy.
 
-The members, their units and ranges are those of rb_surface and its parts in
-native/include/raybundle/raybundle.h, by the same names: native.py copies them by name. Colours are
-(3,), linear RGB; factors by angle are (4, 3), of the terms of
-materials/diffuse_angles.py.
+The members have the names, units and ranges of those of rb_surface and its parts in
+native/include/raybundle/raybundle.h; native.py copies them by name. Colours are (3,), linear RGB.
+Factors by angle are (4, 3), weights of the terms of materials/diffuse_angles.py.
 """
 
 from __future__ import annotations
@@ -30,7 +29,8 @@ def _at_all_angles() -> np.ndarray:
 
 @dataclass(frozen=True)
 class ColorData:
-    """rb_color: constant + image_weight * image + corner_color_weight * corner colours."""
+    """rb_color: the colour constant + image_weight * image + corner_color_weight * corner
+    colours."""
 
     constant: np.ndarray = field(default_factory=_black)
     image: int | None = None  # position in SceneData.images
@@ -38,14 +38,14 @@ class ColorData:
     corner_color_weight: np.ndarray = field(default_factory=_black)
 
     def may_be_positive(self) -> bool:
-        """Returns whether some colour of the image and of the corners makes a channel positive."""
+        """Returns whether a channel is positive for some colour of the image and of the corners."""
         weights = (self.constant, self.image_weight, self.corner_color_weight)
         return any(np.any(weight > 0.0) for weight in weights)
 
 
 @dataclass(frozen=True)
 class PartData:
-    """rb_part: scale * reflectance + offset."""
+    """rb_part: the colour scale * reflectance + offset."""
 
     scale: np.ndarray = field(default_factory=_black)
     offset: np.ndarray = field(default_factory=_black)
@@ -53,7 +53,7 @@ class PartData:
 
 @dataclass(frozen=True)
 class ShownData:
-    """rb_shown: what outputs show."""
+    """rb_shown: the light that outputs show."""
 
     color: PartData = field(default_factory=lambda: PartData(_white()))
     from_above: np.ndarray = field(default_factory=_white)
@@ -72,7 +72,7 @@ class GlossData:
 
 @dataclass(frozen=True)
 class LobeData:
-    """rb_lobe: a part of the reflectance that has a lobe of its own."""
+    """rb_lobe: a part of the reflectance with its own lobe."""
 
     reflectance: np.ndarray = field(default_factory=_black)
     by_angle: np.ndarray = field(default_factory=_at_all_angles)
@@ -81,9 +81,9 @@ class LobeData:
 
 @dataclass(frozen=True)
 class DiffuseData:
-    """rb_diffuse: where the rest of the reflected light goes."""
+    """rb_diffuse: the directions of the diffuse part of the reflected light."""
 
-    model: int = 0  # of materials/scattering.py
+    model: int = 0  # one of the models of materials/scattering.py
     roughness: float = 0.0
     leaving: np.ndarray = field(default_factory=_at_all_angles)
 

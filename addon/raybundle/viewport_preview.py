@@ -19,13 +19,13 @@ class _Shading:
 _PREVIEW = _Shading('SOLID', 'VERTEX', 'FLAT')
 _DEFAULT = _Shading('SOLID', 'MATERIAL', 'STUDIO')
 
-# The shading before the preview, by the view's address: views have no names.
+# The shading before the preview by the view's address, because views have no names.
 _earlier: dict[int, _Shading] = {}
 
 
 def toggle(window_manager: bpy.types.WindowManager) -> bool:
-    """Switches the preview on in all 3D views; if it is on in all of them, switches it off. Returns
-    whether it is on now."""
+    """Switches the preview on in all 3D views, or off if it is on in all of them. Returns whether
+    it is on now."""
     views = list(_views(window_manager))
     show = any(_read(view) != _PREVIEW for view in views)
     for view in views:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Joins lines of the report that say the same of several owners, such as 45 materials, into one."""
+"""Joins lines of the report that contain the same message for several owners, such as 45
+materials."""
 
 from __future__ import annotations
 
@@ -7,16 +8,16 @@ import re
 from collections.abc import Iterable
 
 _MOST_NAMES = 12
-# A line: the kind of owner, its name, and what is said of it, which may begin with a count.
+# A line consists of the kind of the owner, its name, and the message, which may begin with a count.
 _LINE = re.compile(r'(?P<kind>(?:[a-z]+ )?)"(?P<name>.+?)"(?P<said>[: ].*)', re.DOTALL)
 _COUNT = re.compile(r': (?P<count>\d+) (?P<counted>.*)', re.DOTALL)
-# The suffix that Blender gives to names of copies, here of nodes.
+# The suffix that Blender adds to names of copies, here of nodes.
 _SUFFIX = re.compile(r'\.\d{3,}"')
 
 
 def grouped(lines: Iterable[str]) -> list[str]:
-    """Lines of which those that differ only by owner and count are joined: the owners are listed
-    and the counts added. The order is that of the first line of each group."""
+    """Joins lines that differ only by owner and count: the owners are listed and the counts are
+    added. The order is that of the first line of each group."""
     groups: dict[tuple[str, str], list[re.Match]] = {}
     for line in dict.fromkeys(lines):
         match = _LINE.fullmatch(line)
@@ -43,6 +44,6 @@ def grouped(lines: Iterable[str]) -> list[str]:
 
 
 def listed(items: list[str], most: int = 3) -> str:
-    """The first `most` items, separated by commas, and how many more there are."""
+    """Returns the first `most` items, separated by commas, and the number of further items."""
     text = ", ".join(items[:most])
     return text if len(items) <= most else f"{text} and {len(items) - most} more"

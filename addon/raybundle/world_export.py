@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The light of the world, as a constant radiance, an image of what varies, and suns."""
+"""Converts the light of the world to a constant radiance, an image of the varying part, and
+suns."""
 
 from __future__ import annotations
 
@@ -18,35 +19,36 @@ from .scene_data import SunLightData, Warnings
 
 # An image that varies by less than this share of its mean counts as constant.
 _LEAST_VARIATION = 1e-3
-# Number of evaluated worlds that are kept, so that a bake after a change of lamps is quick.
+# Number of evaluated worlds that are kept, so that a bake after a change of lamps is fast.
 _REMEMBERED = 4
 
 
 @dataclass(frozen=True)
 class WorldData:
-    """The light of a world on diffuse surfaces: the sum of its three parts."""
+    """The light of a world on diffuse surfaces, which is the sum of its three parts."""
 
     radiance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) W/(m^2 sr), constant
-    # (height, width, 3) W/(m^2 sr), equirectangular, bottom row first; None: none.
+    # (height, width, 3) W/(m^2 sr), equirectangular, bottom row first. None: no image.
     image: np.ndarray | None = None
     suns: tuple[SunLightData, ...] = ()
 
 
-# By _digest of the world, the last one last.
+# By _digest of the world, from the oldest to the newest.
 _evaluated: dict[bytes, WorldData] = {}
 
 
 def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warnings
                  ) -> WorldData:
-    """The light of the scene's world on diffuse surfaces. Node trees that cannot be read are
-    rendered by Cycles; where that fails too, the mean that was read is used, with a warning."""
+    """Returns the light of the scene's world on diffuse surfaces. Cycles renders node trees that
+    cannot be read. If this also fails, the mean is used as far as it could be read, with a
+    warning."""
     scene = context.scene
     world = scene.world
-    # The view layer may leave out the world, and diffuse surfaces may not see it.
+    # The view layer may exclude the world, and the world may be invisible to diffuse surfaces.
     if (world is None or not context.view_layer.use_sky
             or not getattr(world.cycles_visibility, 'diffuse', True)):
         return WorldData()
-    # From 5.0 on every world has nodes and use_nodes only warns.
+    # From 5.0 on, every world has nodes, and use_nodes only warns.
     if bpy.app.version < (5, 0, 0) and not world.use_nodes or world.node_tree is None:
         return WorldData(np.array(world.color))
     output = output_node(world.node_tree)
@@ -82,8 +84,8 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
 
 
 def _split(panorama: world_panorama.Panorama) -> WorldData:
-    """Takes the least radiance of all directions as constant, since bundles transport constant
-    light without shadow rays, and the rest as image."""
+    """Splits a panorama into a constant, which is the least radiance of all directions, and an
+    image of the rest, because bundles transport constant light without shadow rays."""
     pixels = panorama.pixels
     angles = world_panorama.solid_angles(*pixels.shape[:2])
     mean = (pixels * angles[..., None]).sum(axis=(0, 1)) / (4.0 * np.pi)
@@ -97,7 +99,7 @@ def _split(panorama: world_panorama.Panorama) -> WorldData:
 # Digests of worlds
 # --------------------------------------------------------------------------------------------------
 
-# Properties that only matter in the node editor, or are not the node's own.
+# Properties that only affect the node editor, or do not belong to the node itself.
 _OF_THE_EDITOR = {'rna_type', 'location', 'width', 'width_hidden', 'height', 'dimensions', 'select',
                   'label', 'color', 'use_custom_color', 'show_options', 'show_preview',
                   'show_texture', 'show_expanded', 'hide', 'hide_value', 'parent', 'internal_links',
@@ -108,7 +110,8 @@ _OF_THE_EDITOR = {'rna_type', 'location', 'width', 'width_hidden', 'height', 'di
 
 
 def _digest(world: bpy.types.World, frame: int) -> bytes:
-    """The same for worlds with the same nodes, values, images and other data at a frame."""
+    """Returns a digest that is equal for worlds with equal nodes, values, images and other data at
+    a frame."""
     content = hashlib.blake2b(digest_size=16)
     content.update(repr(bpy.app.version).encode())
     _add(content, world.node_tree, frame, set())
@@ -116,7 +119,8 @@ def _digest(world: bpy.types.World, frame: int) -> bytes:
 
 
 def _add(content: hashlib.blake2b, item: bpy.types.bpy_struct, frame: int, seen: set[int]) -> None:
-    """Adds a struct and all it refers to. seen: addresses of those that were added before."""
+    """Adds a struct and all data that it refers to. seen: addresses of structs that were added
+    before."""
     if item.as_pointer() in seen:
         return
     seen.add(item.as_pointer())
@@ -124,7 +128,7 @@ def _add(content: hashlib.blake2b, item: bpy.types.bpy_struct, frame: int, seen:
         _add_image(content, item, frame)
         return
     if isinstance(item, bpy.types.ID) and not isinstance(item, bpy.types.NodeTree):
-        # Of an object nodes read the coordinates, of a text the code.
+        # Nodes read the coordinates of an object, and the code of a text.
         content.update(repr((item.name_full, getattr(item, 'matrix_world', None))).encode())
         if isinstance(item, bpy.types.Text):
             content.update(item.as_string().encode())

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lets Cycles evaluate the node tree of a world, as radiance by direction and suns.
+"""Evaluates the node tree of a world with Cycles, as radiance by direction and suns.
 
-A copy of the world is rendered, as diffuse surfaces see it, in a scene of its own with nothing but
-a camera: as a panorama, once more with finer pixels where it is very bright, and the sun discs of
-Sky Textures apart, each in a small picture. Everything that is made for it is removed afterwards.
+A copy of the world is rendered, as diffuse surfaces see it, in a temporary scene that contains only
+a camera: as a panorama, again with finer pixels where it is very bright, and the sun discs of Sky
+Textures separately, each in a small picture. All temporary data is removed afterwards.
 """
 
 from __future__ import annotations
@@ -22,21 +22,23 @@ from mathutils import Vector
 from .materials.node_links import LIGHT_PATH
 from .scene_data import SunLightData
 
-# Pixels around the horizon, 0.7 degrees each. Suns are smaller and are rendered apart.
+# Number of pixels around the horizon, 0.7 degrees each. Suns are smaller and are rendered
+# separately.
 _WIDTH = 512
 _SAMPLES = 16
-# Pixels with more than this share of all light, and a margin around each, are rendered again with
-# pixels _FINER times as fine. The resulting image has pixels _KEPT times as fine as the first.
+# Pixels with more than the share _BRIGHT of all light, and a margin around each, are rendered again
+# with pixels _FINER times as fine. The resulting image has pixels _KEPT times as fine as the first
+# one.
 _BRIGHT = 1e-4
 _MARGIN = 2
 _FINER = 16
 _KEPT = 2
 _MAX_TILES = 24
-# To find a sun it is rendered with at least this diameter; then it is measured in a picture of
+# A sun is found by rendering it with at least this diameter. It is then measured in a picture of
 # _DISC_WIDTH pixels in width.
 _LARGE_DISC = 0.06  # radians
 _DISC_WIDTH = 128
-# Suns of a larger diameter stay in the panorama, which has enough pixels for them.
+# Suns of a larger diameter remain in the panorama, which has enough pixels for them.
 _LARGEST_DISC = 0.5  # radians
 _SKIES_WITHOUT_DISC = ('PREETHAM', 'HOSEK_WILKIE')
 # A rectangle of an image: begin and end of its rows, and of its columns.
@@ -55,7 +57,7 @@ class Panorama:
 
 
 def is_available() -> bool:
-    """Whether this Blender has Cycles."""
+    """Returns whether this Blender contains Cycles."""
     return hasattr(bpy.types.Scene, 'cycles') and hasattr(bpy.types.World, 'cycles')
 
 
@@ -72,8 +74,8 @@ def evaluate(world: bpy.types.World, frame: int) -> Panorama:
 
 
 def directions(height: int, width: int) -> np.ndarray:
-    """(height, width, 3): unit vectors to the middles of the pixels of an equirectangular image, as
-    Cycles maps them."""
+    """Returns unit vectors to the centres of the pixels of an equirectangular image, as Cycles maps
+    them, (height, width, 3)."""
     elevation = ((np.arange(height) + 0.5) / height - 0.5)[:, None] * np.pi
     azimuth = (1.0 - 2.0 * (np.arange(width) + 0.5) / width)[None, :] * np.pi
     return np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth),
@@ -81,7 +83,8 @@ def directions(height: int, width: int) -> np.ndarray:
 
 
 def solid_angles(height: int, width: int) -> np.ndarray:
-    """(height, 1): solid angle, sr, of a pixel in each row of an equirectangular image."""
+    """Returns the solid angle of a pixel in each row of an equirectangular image, (height, 1),
+    sr."""
     edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
     return (np.diff(edges) * 2.0 * np.pi / width)[:, None]
 
@@ -92,13 +95,13 @@ def solid_angles(height: int, width: int) -> np.ndarray:
 
 
 def _refined(renderer: _Renderer, base: np.ndarray) -> np.ndarray:
-    """The panorama with pixels _KEPT times as fine, in which bright spots are rendered anew and all
-    others repeated. base: (height, width, 3)."""
+    """Returns the panorama with pixels _KEPT times as fine. Bright spots are rendered again, and
+    all other pixels are repeated. base: (height, width, 3)."""
     height, width = base.shape[:2]
     pixels = base.repeat(_KEPT, axis=0).repeat(_KEPT, axis=1)
     power = base.sum(axis=2) * solid_angles(height, width)
     mean = power.sum() / power.size
-    # Only pixels well above the mean: in a sky that is bright all over none stands out.
+    # Only use pixels well above the mean. In a sky that is bright everywhere, no pixel stands out.
     left = np.where(power > max(_BRIGHT * power.sum(), 4.0 * mean), power, 0.0)
     tiles: list[_Part] = []
     while len(tiles) < _MAX_TILES and left.max() > 0.0:
@@ -118,11 +121,11 @@ def _refined(renderer: _Renderer, base: np.ndarray) -> np.ndarray:
 
 
 def _joined(parts: list[_Part]) -> list[_Part]:
-    """Joins rectangles as long as the rectangle around two is not larger than both together, since
-    each is rendered by itself."""
+    """Joins two rectangles as long as their bounding rectangle is not larger than both together,
+    because each rectangle is rendered separately."""
     joined: list[_Part] = []
     for part in parts:
-        # The joined rectangle may reach further ones.
+        # The joined rectangle may reach further rectangles.
         while other := next((other for other in joined
                              if _area(_around(part, other)) <= _area(part) + _area(other)), None):
             joined.remove(other)
@@ -132,7 +135,7 @@ def _joined(parts: list[_Part]) -> list[_Part]:
 
 
 def _around(first: _Part, second: _Part) -> _Part:
-    """The smallest rectangle around two."""
+    """Returns the bounding rectangle of two rectangles."""
     rows, columns = ((min(a[0], b[0]), max(a[1], b[1])) for a, b in zip(first, second))
     return rows, columns
 
@@ -143,12 +146,12 @@ def _area(part: _Part) -> int:
 
 
 def _sun(renderer: _Renderer, node: bpy.types.Node, base: np.ndarray) -> SunLightData | None:
-    """The light that the sun disc of a Sky Texture adds to the world; None if it adds none, as
-    below the horizon. base: the panorama without sun discs."""
+    """Returns the light that the sun disc of a Sky Texture adds to the world. Returns None if the
+    disc adds none, for example below the horizon. base: the panorama without sun discs."""
     size = node.sun_size
     node.sun_disc = True
     try:
-        # Find the direction, which other nodes may change; samples do not miss a large disc.
+        # Find the direction, which other nodes may change. The samples do not miss a large disc.
         node.sun_size = max(size, _LARGE_DISC)
         added = (renderer.panorama(_WIDTH) - base).sum(axis=2)
         added = np.where(added > 0.1 * max(added.max(), 0.0), added, 0.0)
@@ -181,7 +184,8 @@ def _sun(renderer: _Renderer, node: bpy.types.Node, base: np.ndarray) -> SunLigh
 
 
 class _Renderer:
-    """A context manager: a scene with a copy of the world and a camera, which renders the world."""
+    """A context manager that creates a scene with a copy of the world and a camera, and renders the
+    world."""
 
     def __init__(self, world: bpy.types.World, frame: int) -> None:
         self._original, self._frame = world, frame
@@ -201,15 +205,16 @@ class _Renderer:
         self._remove()
 
     def sun_discs(self) -> list[bpy.types.Node]:
-        """The Sky Textures of the copied world whose sun discs are too small for the panorama."""
+        """Returns the Sky Textures of the copied world whose sun discs are too small for the
+        panorama."""
         return [node for tree in self._trees for node in tree.nodes
                 if node.type == 'TEX_SKY' and getattr(node, 'sun_disc', False)
                 and node.sky_type not in _SKIES_WITHOUT_DISC and not node.mute
                 and node.sun_size <= _LARGEST_DISC and node.outputs[0].is_linked]
 
     def panorama(self, width: int, part: _Part | None = None) -> np.ndarray:
-        """(height, width, 3) W/(m^2 sr): all directions, or a part of the image. width: of the
-        whole image, twice its height."""
+        """Renders all directions, or a part of the image, and returns (height, width, 3) W/(m^2
+        sr). width: of the whole image, twice its height."""
         camera = self._camera.data
         camera.type = 'PANO'
         # Blender 5.0 moved the property from Cycles to the camera.
@@ -221,8 +226,9 @@ class _Renderer:
 
     def view(self, towards: Vector, field_of_view: float, width: int
              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A square perspective view of width pixels: radiance (width, width, 3) W/(m^2 sr), unit
-        directions (width, width, 3) and solid angles (width, width), sr. field_of_view: radians."""
+        """Renders a square perspective view. Returns radiance (width, width, 3) W/(m^2 sr), unit
+        directions (width, width, 3) and solid angles (width, width), sr. field_of_view: radians.
+        width: in pixels."""
         camera = self._camera.data
         camera.type = 'PERSP'
         camera.lens_unit, camera.angle = 'FOV', field_of_view
@@ -241,7 +247,7 @@ class _Renderer:
     def _build(self) -> None:
         world = self._keep(self._original.copy())
         world.cycles_visibility.camera = True
-        # Cycles need not build a map for sampling the world: nothing is lit by it here.
+        # Cycles need not build a map for sampling the world, because the world lights nothing here.
         world.cycles.sampling_method = 'NONE'
         self._trees = [world.node_tree]
         for tree in self._trees:
@@ -259,7 +265,7 @@ class _Renderer:
         cycles.device, cycles.samples = 'CPU', _SAMPLES
         cycles.use_adaptive_sampling = cycles.use_denoising = False
         cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
-        # Each pixel is to be the mean over its own area.
+        # Each pixel shall be the mean over its own area.
         cycles.pixel_filter_type = 'BOX'
         cycles.film_exposure = 1.0
         render.film_transparent = False
@@ -278,7 +284,7 @@ class _Renderer:
                 self._trees.append(node.node_tree)
 
     def _keep(self, made: bpy.types.ID) -> bpy.types.ID:
-        """Notes data that was created, to be removed."""
+        """Registers data that was created, so that _remove removes it. Returns the data."""
         self._made.append(made)
         return made
 
@@ -297,7 +303,7 @@ class _Renderer:
         render.resolution_x, render.resolution_y = width, height
         rows, columns = part or ((0, height), (0, width))
         render.use_border = render.use_crop_to_border = part is not None
-        # Put the border a quarter into a pixel, so that rounding cannot move it to another one.
+        # Put the border a quarter into a pixel, so that rounding cannot move it to another pixel.
         render.border_min_x, render.border_max_x = ((x + 0.25) / width for x in columns)
         render.border_min_y, render.border_max_y = ((y + 0.25) / height for y in rows)
         shape = (rows[1] - rows[0], columns[1] - columns[0])
@@ -309,8 +315,8 @@ class _Renderer:
 
 
 def _read(path: Path, shape: tuple[int, int]) -> np.ndarray:
-    """(height, width, 3) float64 of an image file, without negative values or ones that are not
-    finite. Raises RuntimeError if its (height, width) is not `shape`."""
+    """Returns the pixels of an image file, (height, width, 3) float64. Values that are negative or
+    not finite are replaced by 0. Raises RuntimeError if the size (height, width) is not `shape`."""
     image = bpy.data.images.load(str(path))
     try:
         if tuple(image.size) != shape[::-1]:
@@ -324,8 +330,8 @@ def _read(path: Path, shape: tuple[int, int]) -> np.ndarray:
 
 
 def _replace_light_paths(tree: bpy.types.NodeTree) -> None:
-    """Gives Light Path nodes the outputs of a ray from a diffuse surface, in place of the
-    camera's."""
+    """Replaces the outputs of Light Path nodes by their values for a ray from a diffuse surface,
+    because a camera renders the world."""
     for node in [node for node in tree.nodes if node.type == 'LIGHT_PATH']:
         for output in node.outputs:
             for socket in [link.to_socket for link in output.links]:
@@ -336,8 +342,8 @@ def _replace_light_paths(tree: bpy.types.NodeTree) -> None:
 
 @contextmanager
 def _silent_handlers() -> Iterator[None]:
-    """Removes render handlers in the with block: these renders are not the user's, and other
-    add-ons must not be told of them."""
+    """Removes render handlers in the with block. These renders are not the user's, so the handlers
+    of other add-ons must not run."""
     lists = [getattr(bpy.app.handlers, name) for name in _HANDLERS]
     kept = [list(handlers) for handlers in lists]
     for handlers in lists:
@@ -350,7 +356,7 @@ def _silent_handlers() -> Iterator[None]:
 
 
 def _collection_of(item: bpy.types.ID) -> bpy.types.bpy_prop_collection:
-    """The collection of bpy.data that an item, created here, is in."""
+    """Returns the collection of bpy.data that contains an item created in this module."""
     for kind, collection in ((bpy.types.Scene, bpy.data.scenes), (bpy.types.World, bpy.data.worlds),
                              (bpy.types.Object, bpy.data.objects),
                              (bpy.types.Camera, bpy.data.cameras)):

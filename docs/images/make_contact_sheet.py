@@ -39,7 +39,8 @@ def open_scene(path: Path, width: int) -> bpy.types.Scene:
 
 
 def bake_picture(path: Path, width: int, out: Path) -> float:
-    """Returns the exposure that the picture has, in stops."""
+    """Bakes a scene and renders a picture of the result to `out`. Returns the exposure of the
+    picture in stops."""
     scene = open_scene(path, width)
     report = raybundle.bake(bpy.context, output='COMBINED', attribute=ATTRIBUTE)
     baked = [item.name for item in report.objects if item.status.startswith('baked')]
@@ -66,7 +67,8 @@ def cycles_picture(path: Path, width: int, samples: int, exposure: float, out: P
 
 
 def pixels(path: Path) -> np.ndarray:
-    """Rows from below, RGBA as they are in the file."""
+    """Returns the pixels of an image file, (height, width, 4) float32 RGBA as stored, bottom row
+    first."""
     image = bpy.data.images.load(str(path))
     values = np.empty(4 * image.size[0] * image.size[1], np.float32)
     image.pixels.foreach_get(values)

@@ -26,7 +26,7 @@ ATTRIBUTE = "Radiosity"
 
 
 def show_own_colors(objects: list[bpy.types.Object]) -> None:
-    """Replaces the baked light by the front's reflectance, constant per object."""
+    """Replaces the baked light by the front's reflectance, which is constant per object."""
     exporter = MaterialExporter(SceneData(), Warnings())
     for item in objects:
         index = exporter.export(SlotMaterial(item.material_slots[0].material)).index
@@ -37,7 +37,7 @@ def show_own_colors(objects: list[bpy.types.Object]) -> None:
 
 def main(out: Path) -> None:
     raybundle.register()
-    # The pictures replace materials: each is made from the file as it was.
+    # Rendering a picture replaces materials, so open the original file again for each picture.
     for name in ("after", "before"):
         bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
         report = raybundle.bake(bpy.context, output='COMBINED', attribute=ATTRIBUTE)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The figures that compare methods: which bakes each one needs, and what it draws of them.
+"""The figures that compare methods: the bakes that each figure needs, and the diagrams that it
+shows.
 
 A run is a line of settings for `compare`. Runs with the same label form one curve. To add a figure,
 add a row to FIGURES.
@@ -11,7 +12,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-# About as many patches as the office of the thesis (3818), equal for all methods: without
+# About the number of patches of the office in the thesis (3818), equal for all methods. Without
 # contacts=0 only LINE_REUSE would cut patches beside narrow gaps.
 PATCHES = "max_patches=4000 contacts=0"
 # Lines per bundle in the thesis.
@@ -40,7 +41,7 @@ ALL, UNLIT, INDIRECT = 'error', 'error_unlit', 'error_indirect'
 
 @dataclass(frozen=True)
 class Panel:
-    """A diagram for each scene: y over x, both keys of AXES in plot.py."""
+    """A diagram for each scene: y as a function of x. Both are keys of AXES in plot.py."""
 
     x: str
     y: str
@@ -56,7 +57,7 @@ class Figure:
     panels: tuple[Panel, ...]
     seeds: int = 3
     error: str = ALL  # key of the error that is drawn
-    draws_table: bool = False  # a table of speed-ups instead of diagrams
+    draws_table: bool = False  # whether a table of speed-ups replaces the diagrams
 
 
 def run(label: str, settings: str, **values: object) -> str:
@@ -82,15 +83,15 @@ REUSE = "solver=LINE_REUSE"
 # --------------------------------------------------------------------------------------------------
 
 TOTAL_LINES = (50_000, 100_000, 200_000, 400_000, 800_000)
-# Mean reflectance of the thesis' scene. The scenes here have about the same.
+# Mean reflectance of the thesis' scene. The scenes here have a similar mean.
 MEAN_REFLECTANCE = 0.577
 
 
 def first_shots(ratio: float, share_of_lamps: float) -> list[str]:
-    """Runs in which the sum of local and global lines is equal for all methods.
+    """Returns runs in which the sum of local and global lines is equal for all methods.
 
-    ratio: local lines over global lines by eq. 3.1, for the plain first shot.
-    share_of_lamps: measured share of the local lines of EXTENDED that start at the lamps.
+    ratio: ratio of local to global lines by eq. 3.1, for the plain first shot. share_of_lamps:
+    measured share of the local lines of EXTENDED that start at the lamps.
     """
     runs = []
     for total in TOTAL_LINES:
@@ -103,8 +104,8 @@ def first_shots(ratio: float, share_of_lamps: float) -> list[str]:
             runs.append(run(label, f"{PATCHES} {MULTIPATH}", first_shot=kind, lines_per_bundle=1,
                             local_rays=round(share * local), min_bundles=lines, max_bundles=lines,
                             x=total))
-        # Paths from the lamps: SHOOT makes the first line, the walk the others. A path has 1 / (1 -
-        # R) lines, and the share R of the first lines continues.
+        # Paths from the lamps: SHOOT creates the first line of each path, the walk the others. A
+        # path has 1 / (1 - R) lines on average, and the share R of the first lines continues.
         first = total * (1.0 - MEAN_REFLECTANCE)
         walks = even(first * MEAN_REFLECTANCE / 1000)
         runs.append(run("local_walk", f"{PATCHES} {WALK}", first_shot='SHOOT',

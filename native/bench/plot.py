@@ -130,7 +130,7 @@ def draw(results: Path, images: Path, names: Sequence[str]) -> None:
 
 def draw_figure(figure: Figure, scenes: dict[str, Curves], path: Path) -> None:
     places = [(scene, panel) for scene in scenes for panel in figure.panels]
-    # One row per scene, unless there is only one diagram per scene. The legend has its own place.
+    # One row per scene, unless there is only one diagram per scene. The legend has its own cell.
     columns = len(figure.panels) if len(figure.panels) > 1 else min(3, len(places))
     rows = -(-len(places) // columns)
     beside = len(places) == rows * columns

@@ -28,14 +28,16 @@ from plot import COLORS, MARKERS, STYLE, plain_ticks  # noqa: E402
 from run_figures import ROOT, export  # noqa: E402
 
 CALIBRATE = ROOT / "build/release/native/bench/calibrate"
-# Rooms of blend_tests/lamp_rooms.py: objects under a luminous box, a sky in the window, a screen.
+# Rooms of blend_tests/lamp_rooms.py: objects under a luminous box, a sky in the window, and a
+# screen.
 ROOMS = ("room_box", "room_sky", "room_screen")
 # A bake is covered if its true error is at most this many times the stated error.
 COVERING = 1.25
-# Smaller errors count as none, as in a furnace: they are not drawn and count as covered.
+# Smaller errors count as zero, as in a furnace. They are not drawn and count as covered.
 NOTHING = 1e-5
-# Bundles of each half of the reference, for scenes where the noise of the default number is not
-# small compared with the measured error: few lines pass between the two squares.
+# Number of bundles of each half of the reference, for scenes in which the noise of the default
+# number is not small compared with the measured error, because few lines pass between the two
+# squares.
 REFERENCE_BUNDLES = {'facing_squares': 20000}
 # Title of each diagram -> keys of the stated and the true error that it compares.
 KINDS = {
@@ -59,7 +61,8 @@ def calibrate(names: list[str], seeds: int, folder: Path) -> None:
 
 
 def errors(rows: list[dict], kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Returns (n,) stated and (n,) true relative errors of the bakes whose true error is known."""
+    """Returns the stated and the true relative errors, (n,) each, of the bakes whose true error is
+    known."""
     stated, true = KINDS[kind]
     rows = [row for row in rows if true in row['true']]
     return (np.array([row['stated'][stated] for row in rows]),
@@ -110,7 +113,8 @@ def draw(rows: list[dict], path: Path) -> None:
 
 
 def print_table(rows: list[dict]) -> None:
-    """Prints a Markdown table: means over the seeds in per cent, and how many bakes are covered."""
+    """Prints a Markdown table of means over the seeds, in per cent, and of the number of covered
+    bakes."""
     print("| scene | target | noise: stated, true | covered | discretisation | mesh "
           "| surface: stated, true | covered | noise of objects: covered |")
     print("|---|---|---|---|---|---|---|---|---|")

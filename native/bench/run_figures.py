@@ -18,7 +18,7 @@ from plot import draw  # noqa: E402
 ROOT = Path(__file__).parent.parent.parent
 COMPARE = ROOT / "build/release/native/bench/compare"
 EXPORT = ROOT / "blend_tests/export_scene.py"
-# At least 10 times the bundles of any run whose error is close to that of the reference.
+# At least 10 times the number of bundles of any run whose error is close to that of the reference.
 REFERENCE_BUNDLES = 8192
 SMOKE_REFERENCE_BUNDLES = 64
 SECONDS_PER_BAKE = 60
@@ -52,7 +52,8 @@ def first_of_each_curve(runs: list[str]) -> list[str]:
 
 
 def compare(figure: Figure, folder: Path, is_smoke: bool) -> bool:
-    """Writes FOLDER/NAME.jsonl. Returns whether every run succeeded."""
+    """Writes FOLDER/NAME.jsonl, where NAME is that of the figure. Returns whether every run
+    succeeded."""
     runs, results = folder / f"{figure.name}.runs", folder / f"{figure.name}.jsonl"
     lines = first_of_each_curve(figure.runs) if is_smoke else figure.runs
     runs.write_text("\n".join(lines) + "\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the colours and values of node trees, as far as a ColorExpression can express them."""
+"""Reads colours and values of node trees, as far as a ColorExpression can represent them."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Textu
 from .node_links import LIGHT_PATH, Source, default_color, default_value, follow, input_of
 from .shown_results import reads_result
 
-# Nodes that change a colour by a formula that is not linear. ColorRamp and RGB to BW are evaluated
-# for constant colours; of all others the colour that goes in is used.
+# Nodes that change a colour by a non-linear formula. ColorRamp and RGB to BW are evaluated for
+# constant colours. For all others, the input colour is used unchanged.
 _COLOR_FILTERS = ('GAMMA', 'HUE_SAT', 'BRIGHTCONTRAST', 'INVERT', 'CURVE_RGB', 'VALTORGB',
                   'RGBTOBW', 'CLAMP')
 # Nodes whose output is a number.
@@ -42,33 +42,36 @@ _MATH: dict[str, Callable[[float, float], float]] = {
 
 @dataclass(frozen=True)
 class Reading:
-    """For which side of a surface a node tree is read, and with what known beforehand."""
+    """The side of a surface for which a node tree is read, and settings that apply to the
+    reading."""
 
-    backfacing: bool = False  # the back side: what the Backfacing output of Geometry is
-    varying_emission: bool = False  # emission may have images and attributes; else its mean counts
+    backfacing: bool = False  # True: back side; value of the Backfacing output of Geometry
+    varying_emission: bool = False  # False: emission is replaced by its mean
     filter_glossy: float | None = 1.0  # see gloss.filter_glossy_of
-    # (3,) linear RGB, used in place of colours that cannot be read; None: the socket's own colour.
+    # (3,) linear RGB, used in place of colours that cannot be read. None: the socket's own colour
+    # is used.
     unread_color: np.ndarray | None = None
-    # Names of the attributes that hold results of earlier bakes. A result counts 0 as emission and
-    # 1 as a factor; where it alone is the colour of a surface, the socket's own colour is used.
+    # Names of the attributes that hold results of earlier bakes. A result counts as 0 if it is
+    # emitted and as 1 if it is a factor. If a result alone is the colour of a surface, the socket's
+    # own colour is used.
     results: frozenset[str] = frozenset()
 
 
 class ColorReader:
     """Reads the colours and values of one node tree, for one side of a surface.
 
-    What the bake approximates in any case is added to `warnings`. What a ColorExpression cannot
-    express is added to `inexact`, since Cycles can bake such colours into images (cycles_bake.py);
-    `inexact` is the same list as `warnings` if it is not given.
+    Approximations that every bake makes are added to `warnings`. Colours that a ColorExpression
+    cannot represent are added to `inexact`, because Cycles can bake them into images
+    (cycles_bake.py). `inexact` is the same list as `warnings` if it is not given.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
                  reading: Reading = Reading(), inexact: Warnings | None = None) -> None:
-        self.owner = owner  # what warnings name, such as 'material "Wall"'
+        self.owner = owner  # the subject of warnings, such as 'material "Wall"'
         self.images = images
         self.warnings = warnings
         self.reading = reading
-        self.has_backfacing = False  # whether anything that was read depends on the side
+        self.has_backfacing = False  # whether any value that was read depends on the side
         self.inexact = warnings if inexact is None else inexact
         self.unread: list[str] = []  # the nodes that `inexact` names
         self._result_values = 0  # how often the result of a bake was read as a number
@@ -79,12 +82,12 @@ class ColorReader:
 
     def color(self, socket: bpy.types.NodeSocket,
               path: tuple[bpy.types.Node, ...] = ()) -> ColorExpression:
-        """The colour of an input: that of the node it is linked to, or its own. path: see
-        node_links.follow."""
+        """Returns the colour of an input: the colour of the node that is linked to the input, or
+        the input's own colour. path: see node_links.follow."""
         values = self._result_values
         color = self._read_color(follow(socket, path))
         if self._result_values > values and not color.result:
-            # A result that is read as a number, such as the factor of a mix, is a factor.
+            # A result that is read as a number, such as the factor of a mix, counts as a factor.
             color = replace(color, result=Result.FACTOR)
         return color
 
@@ -119,8 +122,9 @@ class ColorReader:
                                else self.reading.unread_color, result=behind)
 
     def _result_behind(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Result:
-        """How a node that cannot be read depends on the result of a bake: ALONE if results are all
-        that is linked to it, FACTOR if other nodes are linked too, NONE if no result is."""
+        """Returns how a node that cannot be read depends on the result of a bake: ALONE if only
+        results are linked to it, FACTOR if other nodes are also linked, NONE if no result is
+        linked."""
         has_result = has_others = False
         pending, seen = [(node, path)], set()
         while pending and self.reading.results:
@@ -168,9 +172,9 @@ class ColorReader:
 
     def _coordinates(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
                      ) -> tuple[str, np.ndarray] | None:
-        """Where an image is read: the name of a UV map ("" for the active render UV map), and a
-        (2, 3) affine map of its coordinates. None if the coordinates are no UV map, or are mapped
-        by more than constants."""
+        """Returns the coordinates at which an image is read: the name of a UV map ("" for the
+        active render UV map), and a (2, 3) affine map of its coordinates. Returns None if the
+        coordinates are not a UV map, or if inputs of the Mapping node are linked."""
         source = follow(socket, path)
         node, path = source.node, source.path
         if node is None:
@@ -217,7 +221,8 @@ class ColorReader:
         if node.type == 'MIX_RGB':
             factor, first, second = node.inputs[:3]
         elif node.data_type == 'RGBA':
-            # The node has sockets of the same names for each data type, told apart by identifier.
+            # The node has sockets of the same names for each data type, which only the identifier
+            # distinguishes.
             sockets = {socket.identifier: socket for socket in node.inputs}
             factor, first, second = (
                 sockets[name] for name in ('Factor_Float', 'A_Color', 'B_Color'))
@@ -233,7 +238,7 @@ class ColorReader:
         a, b = self.color(first, path), self.color(second, path)
         if (Result.ALONE in (a.result, b.result)
                 and node.blend_type not in ('MIX', 'ADD', 'SUBTRACT', 'MULTIPLY')):
-            # The result of a bake is no colour of the surface: the other colour is used.
+            # The result of a bake is not a colour of the surface, so the other colour is used.
             return a if a.result == b.result else replace(
                 b if a.result == Result.ALONE else a, result=Result.FACTOR)
         if node.blend_type == 'MIX':
@@ -287,8 +292,8 @@ class ColorReader:
     # ----------------------------------------------------------------------------------------------
 
     def value(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...] = ()) -> float:
-        """The number that an input has; its own value where what is linked varies over the surface.
-        path: see node_links.follow."""
+        """Returns the value of an input as a number. If the linked value varies over the surface,
+        the input's own value is returned. path: see node_links.follow."""
         source = follow(socket, path)
         if source.node is None:
             return default_value(source.socket)
@@ -343,9 +348,10 @@ def _only_result(source: Source) -> ColorExpression:
 
 
 def _times_result(a: ColorExpression, b: ColorExpression) -> ColorExpression:
-    """The product of two colours, at least one of which is the result of a bake."""
+    """Returns the product of two colours, at least one of which is the result of a bake."""
     result, other = (a, b) if a.result == Result.ALONE else (b, a)
-    # A factor of 1 or more is no reflectance: it only sets how bright the result is shown.
+    # A factor of 1 or more is not a reflectance. It only sets the brightness at which the result is
+    # shown.
     if other.result == Result.ALONE or other.is_constant and other.constant.max() >= 1.0:
         return result
     return replace(other, result=Result.FACTOR)

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lets Cycles bake into images what materials reflect, emit and let through.
+"""Bakes the reflectance, emission and transmission of materials into images with Cycles.
 
-This is for materials that node_reader.py cannot read. A copy of the object, in a scene of its own,
-gets copies of its materials that emit the property in question (shader_colors.py), and Cycles bakes
-the emission into one image (face_atlas.py). The images are kept until the object's mesh, place or
-materials change. The user's data does not change, and everything that is made for it is removed.
+This is used for materials that node_reader.py cannot read. An object is copied into a temporary
+scene, and its materials are replaced by copies that emit the property in question
+(shader_colors.py). Cycles bakes the emission into one image (face_atlas.py). The images are kept
+until the object's mesh, transform or materials change. The user's data does not change, and all
+temporary data is removed.
 
-Approximations: what depends on the direction of view is as seen from straight above; a material
-that uses the Backfacing output gets the mean of both sides; a random value per object is that of
-the copy.
+Approximations: values that depend on the direction of view are evaluated for a view from straight
+above. A material that uses the Backfacing output gets the mean of both sides. A random value per
+object is that of the copy.
 """
 
 from __future__ import annotations
@@ -31,21 +32,25 @@ from .shader_colors import (DIFFUSE, PROPERTIES, RADIANCE, REFLECTANCE, TRANSLUC
 
 _SAMPLES = 4  # per pixel
 _UV_MAP = "Raybundle Bake"
-# Where pixels are sampled, as a share of the way from the middle of a face to each corner.
+# Positions at which pixels are sampled, as a share of the way from the middle of a face to each
+# corner.
 _PLACES = (0.2, 0.5, 0.8)
 
 
 @dataclass(frozen=True)
 class BakedMaterial:
-    """One material of an object, baked. Images are (height, width, 3) float32, linear RGB, bottom
-    row first, and shared by all materials of the object."""
+    """One material of an object, baked into images.
 
-    message: str  # for the report: what was done and why
+    Images are (height, width, 3) float32, linear RGB, bottom row first. All materials of the object
+    share the same images.
+    """
+
+    message: str  # for the report: what was baked and why
     reflectance: np.ndarray
-    radiance: np.ndarray | None  # None: emits nothing
-    opacity: np.ndarray | None  # None: lets nothing straight through
-    translucence: np.ndarray | None  # None: lets nothing through diffusely
-    # (3,) each: scale * reflectance + offset is the diffuse part, fitted to the material's pixels.
+    radiance: np.ndarray | None  # W/(m^2 sr); None: no emission
+    opacity: np.ndarray | None  # share that does not pass; None: fully opaque
+    translucence: np.ndarray | None  # None: no diffuse transmission
+    # (3,) each: the diffuse part is scale * reflectance + offset, fitted to the material's pixels.
     diffuse_scale: np.ndarray
     diffuse_offset: np.ndarray
     # (3,) each: means over the material's faces.
@@ -59,33 +64,34 @@ class BakedMaterial:
 class BakedSurface:
     """The baked materials of an object."""
 
-    uvs: np.ndarray  # (c, 2) float32, where corners of the evaluated mesh read the images
+    uvs: np.ndarray  # (c, 2) float32, image coordinates per corner of the evaluated mesh
     materials: dict[int, BakedMaterial]  # by slot
 
 
-# The baked surfaces of the last export, by name of the scene and digest of what they depend on.
+# The baked surfaces of the last export, by name of the scene and by digest of the data that they
+# depend on.
 _cache: dict[str, dict[bytes, BakedSurface]] = {}
 
 
 def discard_all() -> None:
-    """Forgets the images of all scenes."""
+    """Discards the images of all scenes."""
     _cache.clear()
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be baked of an object."""
+    """The materials of an object that must be baked."""
 
-    reasons: dict[int, str]  # by slot to bake: why, see MaterialExporter.unread
+    reasons: dict[int, str]  # by slot to bake: the reason, see MaterialExporter.unread
     results: frozenset[str]  # attributes that hold results of bakes (shown_results.py)
 
 
 def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, Wanted], pixel: float
                   ) -> tuple[dict[bpy.types.Object, BakedSurface], list[str]]:
-    """Bakes materials of objects, or takes the images of the last export if nothing has changed.
+    """Bakes materials of objects, or reuses the images of the last export if nothing has changed.
 
-    wanted: by original object; pixel: about the size of a pixel on the surface, m. Returns the
-    baked surfaces by object, and for each object that Cycles could not bake a line that says why.
+    wanted: by original object. pixel: approximate size of a pixel on the surface, m. Returns the
+    baked surfaces by object, and one message for each object that Cycles could not bake.
     """
     name = context.scene.name_full
     before = _cache.get(name, {})
@@ -110,7 +116,8 @@ def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, Wan
 @contextmanager
 def _evaluated_mesh(context: bpy.types.Context, item: bpy.types.Object
                     ) -> Iterator[bpy.types.Mesh]:
-    """A copy of the object's evaluated mesh, which is removed at the end of the with block."""
+    """Yields a copy of the object's evaluated mesh. The copy is removed at the end of the with
+    block."""
     depsgraph = context.evaluated_depsgraph_get()
     mesh = bpy.data.meshes.new_from_object(item.evaluated_get(depsgraph),
                                            preserve_all_data_layers=True, depsgraph=depsgraph)
@@ -127,7 +134,7 @@ def _evaluated_mesh(context: bpy.types.Context, item: bpy.types.Object
 
 def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Mesh,
             asked: Wanted, pixel: float) -> bytes:
-    """Digest of all that the images depend on."""
+    """Returns a digest of all data that the images depend on."""
     content = hashlib.blake2b(digest_size=16)
     depsgraph = context.evaluated_depsgraph_get()
     content.update(repr((sorted(asked.reasons), sorted(asked.results), round(pixel, 9),
@@ -146,7 +153,7 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
         content.update(layer.name.encode() + bytes([layer.active_render])
                        + read(layer.data, 'uv', np.float32, 2).tobytes())
     for attribute in mesh.attributes:
-        # The bake changes the results in the attributes, and materials are read without them.
+        # A bake changes the results in the attributes, but materials are read without the results.
         if attribute.name in asked.results:
             continue
         content.update(attribute.name.encode() + _attribute_bytes(attribute))
@@ -156,7 +163,7 @@ def _digest(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.
 
 
 def _attribute_bytes(attribute: bpy.types.Attribute) -> bytes:
-    """The values of an attribute, none for types that nodes cannot read."""
+    """Returns the values of an attribute as bytes. Empty for types that nodes cannot read."""
     name, width = {'FLOAT': ('value', 1), 'INT': ('value', 1), 'BOOLEAN': ('value', 1),
                    'FLOAT_VECTOR': ('vector', 3), 'FLOAT_COLOR': ('color', 4),
                    'BYTE_COLOR': ('color', 4), 'FLOAT2': ('vector', 2)}.get(
@@ -225,8 +232,8 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
 
 def _pixels(atlas: FaceAtlas, sizes: np.ndarray, faces: np.ndarray, *images: np.ndarray
             ) -> list[np.ndarray]:
-    """(n, 3) float64 of each image: its pixels at some places in each chosen face. sizes: (f,),
-    corners of each face; faces: (f,) bool."""
+    """Returns the pixels of each image at some positions in each chosen face, (n, 3) float64 per
+    image. sizes: (f,), number of corners of each face. faces: (f,) bool."""
     firsts = np.cumsum(sizes) - sizes
     centres = np.repeat(np.add.reduceat(atlas.uvs, firsts) / sizes[:, None], sizes, axis=0)
     inside = np.repeat(faces, sizes)
@@ -238,8 +245,8 @@ def _pixels(atlas: FaceAtlas, sizes: np.ndarray, faces: np.ndarray, *images: np.
 
 
 def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """scale and offset, (3,) each, with which y is nearest to scale * x + offset by least squares;
-    x, y: (n, 3). The offset is 0 where x hardly varies."""
+    """Returns scale and offset, (3,) each, for which scale * x + offset is nearest to y by least
+    squares. x, y: (n, 3). The offset is 0 in channels in which x hardly varies."""
     means = x.mean(axis=0), y.mean(axis=0)
     spread = ((x - means[0])**2).sum(axis=0)
     varies = spread > 1e-6 * (x**2).sum(axis=0)
@@ -251,8 +258,8 @@ def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def _atlas(mesh: bpy.types.Mesh, matrix: np.ndarray, wanted: np.ndarray, pixel: float
            ) -> FaceAtlas:
-    """The layout of the mesh's faces at their size in the world. matrix: (4, 4), object to world;
-    wanted: (f,) bool."""
+    """Returns the layout of the mesh's faces at their size in the world. matrix: (4, 4), object to
+    world. wanted: (f,) bool."""
     placed = vertex_positions(mesh).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     sizes = read(mesh.polygons, 'loop_total', np.int32)
     return face_atlas(placed[read(mesh.loops, 'vertex_index', np.int32)],
@@ -266,14 +273,14 @@ class _Stage:
                  scene: bpy.types.Scene, item: bpy.types.Object, results: frozenset[str]) -> None:
         self.context, self.source, self.scene, self.item = context, source, scene, item
         self.results = results
-        # Known after the first bake, of REFLECTANCE; see ShaderColors.
+        # Set by the first bake, that of REFLECTANCE; see ShaderColors.
         self.has_backfacing = False
         self.has_gloss = False
 
     def bake(self, wanted: str, slots: set[int], atlas: FaceAtlas, backfacing: bool
              ) -> np.ndarray | None:
-        """Bakes a property. wanted: one of PROPERTIES; slots: those whose materials are baked.
-        Returns (height, width, 3) float32; None if no shader of the materials has the property.
+        """Bakes a property. wanted: one of PROPERTIES. slots: the slots whose materials are baked.
+        Returns (height, width, 3) float32, or None if no shader of the materials has the property.
         Raises RuntimeError if Cycles cannot bake."""
         image = bpy.data.images.new(_UV_MAP, atlas.width, atlas.height, alpha=False,
                                     float_buffer=True, is_data=True)
@@ -293,8 +300,8 @@ class _Stage:
 
     def _set_materials(self, wanted: str, slots: set[int], backfacing: bool,
                        image: bpy.types.Image, made: list[bpy.types.ID]) -> bool:
-        """Gives the object materials that emit the property; returns whether any shader has it.
-        made: gets all that is created, to be removed."""
+        """Assigns materials to the object that emit the property. Returns whether any shader has
+        the property. Adds all created data to `made`, which the caller removes."""
         found = False
         mesh = self.item.data
         faces = read(mesh.polygons, 'material_index', np.int32)
@@ -340,7 +347,7 @@ class _Stage:
 @contextmanager
 def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types.Mesh,
            results: frozenset[str]) -> Iterator[_Stage]:
-    """A scene with a copy of the object, both of which are removed at the end."""
+    """Yields a scene with a copy of the object. Both are removed at the end of the with block."""
     scene = bpy.data.scenes.new(_UV_MAP)
     item = bpy.data.objects.new(_UV_MAP, mesh)
     try:
@@ -348,7 +355,7 @@ def _stage(context: bpy.types.Context, source: bpy.types.Object, mesh: bpy.types
         scene.cycles.samples = _SAMPLES
         scene.cycles.use_adaptive_sampling = False
         scene.cycles.use_denoising = False
-        # Not by frame_set, which calls the user's handlers.
+        # frame_set is not used because it calls the user's handlers.
         scene.frame_current = context.scene.frame_current
         scene.collection.objects.link(item)
         depsgraph = context.evaluated_depsgraph_get()

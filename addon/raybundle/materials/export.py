@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Material slots -> `MaterialData`: reflectance and emission of both sides, images, attributes."""
+"""Converts material slots to `MaterialData`: reflectance and emission of both sides, images,
+attributes."""
 
 from __future__ import annotations
 
@@ -24,32 +25,33 @@ from .node_reader import NodeReader
 from .shown_results import RENDERED, attributes_read
 from .surface import Surface
 
-# Linear grey of faces without a material, as Blender shows them.
+# Linear grey of faces without a material, equal to Blender's default.
 DEFAULT_REFLECTANCE = 0.8
 
 
 @dataclass(frozen=True)
 class SlotMaterial:
-    """A material in the slot of an object, with what of the object matters for its light."""
+    """A material in the slot of an object, with the properties of the object that influence how the
+    material is read."""
 
-    material: bpy.types.Material | None  # original; None: the default grey
-    # Whether the material reads the mesh's render colour attribute, and that holds the result of
-    # an earlier bake.
+    material: bpy.types.Material | None  # original data-block; None: the default grey
+    # Whether the material reads the mesh's render colour attribute and this attribute contains the
+    # result of an earlier bake.
     renders_result: bool = False
-    # For a material that shows nothing but a result: digest of the surface that the last bake used
-    # for the slot (last_surfaces.py).
+    # For a material that shows only a result: digest of the surface that the last bake used for the
+    # slot (last_surfaces.py).
     last: str | None = None
 
 
 @dataclass(frozen=True)
 class MaterialExport:
-    """An exported material, and what a mesh must export for it."""
+    """An exported material, and the mesh data that must be exported for it."""
 
-    index: int  # in SceneData.materials
-    texture: Texture | None = None  # at whose coordinates the images are read
-    attribute: str | None = None  # that the corner colours are read from; "": the rendered one
-    baked_uvs: bool = False  # the images are read at the coordinates of cycles_bake.py
-    surface: LastSurface | None = None  # to be kept for the next bake; None: it was guessed
+    index: int  # position in SceneData.materials
+    texture: Texture | None = None  # the images are read at its coordinates
+    attribute: str | None = None  # source of the corner colours; "": the render colour attribute
+    baked_uvs: bool = False  # True: the images are read at the UVs of cycles_bake.py
+    surface: LastSurface | None = None  # kept for the next bake; None: the surface was guessed
 
 
 @dataclass(frozen=True)
@@ -57,12 +59,12 @@ class _Shown:
     """How far a material shows the result of an earlier bake."""
 
     any: bool = False
-    only: bool = False  # the material tells nothing of the surface's own colour
-    tells_emission: bool = False  # the material has an emission that is no result
+    only: bool = False  # the surface's own colour does not follow from the material
+    tells_emission: bool = False  # the material has an emission that is not a result
 
 
 def _share_coordinates(*colors: ColorExpression) -> bool:
-    """Whether the images and attributes of the colours can be read together: at the same UV
+    """Returns whether the images and attributes of the colours can be read together: at the same UV
     coordinates, and from one attribute."""
     if len({color.attribute for color in colors if color.attribute is not None}) > 1:
         return False
@@ -72,13 +74,15 @@ def _share_coordinates(*colors: ColorExpression) -> bool:
 
 
 def _is_laid_out(translucence: ColorExpression, *others: ColorExpression) -> bool:
-    """Whether a translucence varies by an image alone, at the same UV coordinates as the others."""
+    """Returns whether a translucence varies only by an image that is read at the same UV
+    coordinates as the other colours. True also for a constant translucence."""
     return translucence.attribute is None and _share_coordinates(translucence, *others)
 
 
 def _part_of(part: ColorExpression, whole: ColorExpression) -> PartData:
-    """scale and offset, (3,) each, with which part = scale * whole + offset: exactly if the part
-    varies by the same image or attribute as the whole, else for their means."""
+    """Returns scale and offset, (3,) each, for which part = scale * whole + offset. The result is
+    exact if the part varies by the same image or attribute as the whole, or is constant; otherwise
+    it holds for the means."""
     if part.texture and whole.texture and part.texture.same_as(whole.texture):
         scale = _ratio(part.texture_weight, whole.texture_weight)
     elif part.attribute is not None and part.attribute == whole.attribute:
@@ -96,8 +100,8 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
 
 def _surface_data(surface: Surface, model: int, diffuse: PartData, reflectance: ColorData,
                   emission: ColorData, translucence: ColorData) -> SurfaceData:
-    """One side of a material. model: of diffuse reflection, as in scattering.py; diffuse: what of
-    the reflectance is a diffuse colour."""
+    """Returns the data of one side of a material. model: of diffuse reflection, one of those in
+    scattering.py. diffuse: the diffuse colour as a function of the reflectance."""
     color = np.maximum(surface.diffuse.mean(), 0.0)
     shown = np.where(color > 1e-6, surface.shown_by_angle / np.maximum(color, 1e-6),
                      lambert().shown)
@@ -116,10 +120,10 @@ def _surface_data(surface: Surface, model: int, diffuse: PartData, reflectance: 
 
 
 class MaterialExporter:
-    """Adds each material, and each image that it uses, once to the exported scene.
+    """Adds each material, and each image that a material uses, once to the exported scene.
 
     filter_glossy: see gloss.filter_glossy_of. results: names of the attributes that bakes write to.
-    last: the surfaces that the last bake used; None: there was no bake.
+    last: the surfaces that the last bake used; None if there was no bake.
     """
 
     def __init__(self, scene: SceneData, warnings: Warnings, filter_glossy: float | None = 1.0,
@@ -130,20 +134,23 @@ class MaterialExporter:
         self.results = results
         self.last = last
         self.images = ImagePixels()
-        self.showing: dict[str, None] = {}  # names of exported materials that show results
-        self._attributes: dict[bpy.types.Material | None, set[str]] = {}  # that the nodes read
-        self._plain: dict[bpy.types.Material | None, SlotMaterial] = {}  # that show no result
+        # names of exported materials that show results, in order
+        self.showing: dict[str, None] = {}
+        self._attributes: dict[bpy.types.Material | None, set[str]] = {}  # names that nodes read
+        self._plain: dict[bpy.types.Material | None, SlotMaterial] = {}  # slots that show no result
         self._shown: dict[tuple[bpy.types.Material, bool], _Shown] = {}
         self._materials: dict[SlotMaterial, MaterialExport] = {}
-        # Of materials that Cycles has baked, the index of the last one: there is one per object.
+        # Position in SceneData.materials of the last entry for each material that Cycles has baked.
+        # There is one entry per object.
         self._baked: dict[bpy.types.Material, int] = {}
-        self._unread: dict[SlotMaterial, str | None] = {}  # results of unread()
+        self._unread: dict[SlotMaterial, str | None] = {}  # return values of unread()
         self._image_indices: dict[tuple[str, str], int] = {}
 
     def slot(self, material: bpy.types.Material | None, renders_result: Callable[[], bool],
              last: Callable[[], str | None]) -> SlotMaterial:
-        """Describes a slot. material: evaluated. renders_result, last: give the values of the
-        fields of SlotMaterial; called only where these matter."""
+        """Returns a description of a slot. material: evaluated. renders_result, last: return the
+        values of the fields of SlotMaterial; they are only called if the material depends on these
+        fields."""
         key = material.original if material is not None else None
         if key in self._plain:
             return self._plain[key]
@@ -159,14 +166,15 @@ class MaterialExporter:
 
     def export(self, slot: SlotMaterial, material: bpy.types.Material | None = None
                ) -> MaterialExport:
-        """Adds the slot's material to the scene, if it is not there yet. material: the evaluated
-        one, which is read; None: the original is read."""
+        """Adds the slot's material to the scene unless it was added before, and returns the export.
+        material: the evaluated material, which is read. None: the original material is read."""
         if slot not in self._materials:
             self._materials[slot] = self._export(slot, material or slot.material)
         return self._materials[slot]
 
     def exported(self) -> Iterator[tuple[bpy.types.Material, bool]]:
-        """The exported materials (original), each with whether light passes straight through."""
+        """Yields the exported materials (original data-blocks), each with whether light passes
+        straight through."""
         for slot, export in self._materials.items():
             if slot.material is not None:
                 yield slot.material, self.scene.materials[export.index].opacity < 1.0
@@ -174,8 +182,9 @@ class MaterialExporter:
             yield material, self.scene.materials[index].opacity_image is not None
 
     def unread(self, slot: SlotMaterial, material: bpy.types.Material) -> str | None:
-        """What of the evaluated material only Cycles can evaluate, as the end of the sentence
-        "because of ..."; None if the export can read all of it."""
+        """Returns the property of the evaluated material that only Cycles can evaluate, worded as
+        the end of the sentence "because of ...". Returns None if the export can read the whole
+        material."""
         key = replace(slot, last=None)
         if key not in self._unread:
             surface = self._surface(material, self._reading(slot), Warnings(), unread := [])
@@ -191,11 +200,11 @@ class MaterialExporter:
 
     def add_baked(self, slot: SlotMaterial, material: bpy.types.Material, baked: BakedMaterial
                   ) -> MaterialExport:
-        """Adds a material that Cycles has baked into images for one object (cycles_bake.py).
-        material: evaluated."""
+        """Adds a material that Cycles has baked into images for one object (cycles_bake.py), and
+        returns the export. material: evaluated."""
         if self._shows(material, slot).any:
             self.showing[material.name] = None
-        # What neither the nodes nor Cycles' bake give exactly is warned of.
+        # Warn of properties that neither the nodes nor Cycles' bake give exactly.
         approximated = Warnings()
         reading = replace(self._reading(slot), unread_color=baked.diffuse_color)
         surface = self._surface(material, reading, approximated, []).limited()
@@ -216,7 +225,7 @@ class MaterialExporter:
         self.scene.materials.append(MaterialData(material.name, side, side,
                                                  opacity_image=index.get('opacity')))
         self._baked[material.original] = len(self.scene.materials) - 1
-        # For the next bake only the means of the images are kept.
+        # Only the means of the images are kept for the next bake.
         mean = replace(surface, radiance=ColorExpression(baked.radiance_color),
                        transmittance=baked.transmittance,
                        translucence=ColorExpression(baked.translucence_color))
@@ -225,7 +234,7 @@ class MaterialExporter:
 
     def _export(self, slot: SlotMaterial, material: bpy.types.Material | None) -> MaterialExport:
         shown = self._shows(material, slot)
-        # What is wrong with a material that is not used is not worth a warning.
+        # Faults of a material whose colours are not used are not worth a warning.
         warnings = Warnings() if shown.only else self.warnings
         reader, front = self._read(material, self._reading(slot), warnings)
         sides = [front.limited()] * 2
@@ -241,14 +250,14 @@ class MaterialExporter:
         if last is None:
             return self._guess(material.name, sides, shown)
         if last.material == material.name and shown.tells_emission:
-            # The material's emission is no result: take it as it is now.
+            # The material's emission is not a result: use its current value.
             last = replace(last, sides=tuple(replace(kept, radiance=side.radiance)
                                              for kept, side in zip(last.sides, sides)))
         return replace(self._add(material.name, list(last.sides)), surface=last)
 
     def _guess(self, name: str, sides: list[Surface], shown: _Shown) -> MaterialExport:
-        """A surface for a material that shows nothing but a result, if the last bake has kept none:
-        with the colours of its sockets, or grey."""
+        """Adds a material that shows only a result and whose surface the last bake has not stored.
+        Its colours are those of its sockets, or grey if these are black. Adds a warning."""
         if any(np.any(side.reflectance.mean() + side.translucence.mean() > 0.0) for side in sides):
             self.warnings.add(
                 f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
@@ -264,7 +273,8 @@ class MaterialExporter:
         return self._add(name, sides)
 
     def _results(self, slot: SlotMaterial) -> frozenset[str]:
-        """Attributes, by the names that nodes use, that hold results on the slot's object."""
+        """Returns the names of the attributes that contain results on the slot's object, as nodes
+        name them."""
         return self.results | {RENDERED} if slot.renders_result else self.results
 
     def _reading(self, slot: SlotMaterial, backfacing: bool = False) -> Reading:
@@ -272,7 +282,7 @@ class MaterialExporter:
                        results=self._results(slot))
 
     def _shows(self, material: bpy.types.Material | None, slot: SlotMaterial) -> _Shown:
-        """How far the slot's material (evaluated) shows results, on either side."""
+        """Returns how far the slot's material (evaluated) shows results on either side."""
         if material is None or self._results(slot).isdisjoint(
                 self._attributes.get(material.original, ())):
             return _Shown()
@@ -290,8 +300,9 @@ class MaterialExporter:
         return self._shown[key]
 
     def _add(self, name: str, sides: list[Surface]) -> MaterialExport:
-        """Adds a material of these sides, front and back; what the native library cannot vary over
-        the surface gets its mean, with a warning."""
+        """Adds a material with the given sides, front and back, and returns the export. A colour
+        whose variation over the surface the native library cannot represent is replaced by its
+        mean, with a warning."""
         if not sides[0].reflectance.same_variation(sides[1].reflectance):
             # The native library has one image and one weight for the reflectance of both sides.
             self.warnings.add(f'material "{name}": an image or attribute differs between the '
@@ -332,7 +343,7 @@ class MaterialExporter:
                               f'or sides: its mean is used')
         images = [self._image_index(one) if one else None
                   for one in (texture, glow_texture, passed_texture)]
-        model = sides[0].scattering.diffuse_model()[0]  # of both sides
+        model = sides[0].scattering.diffuse_model()[0]  # used for both sides
         data = MaterialData(name, *(_surface_data(
             side, model, _part_of(side.diffuse, side.reflectance),
             ColorData(np.maximum(side.reflectance.constant, 0.0), images[0],
@@ -350,8 +361,8 @@ class MaterialExporter:
 
     def _surface(self, material: bpy.types.Material | None, reading: Reading, warnings: Warnings,
                  unread: list[str] | None = None) -> Surface:
-        """One side of a material. unread: gets the nodes that cannot be read, which otherwise are
-        warned of."""
+        """Returns one side of a material. Names of nodes that cannot be read are added to `unread`;
+        if it is None, warnings are added instead."""
         reader, surface = self._read(material, reading, warnings,
                                      None if unread is None else Warnings())
         if unread is not None and reader is not None:
@@ -360,8 +371,8 @@ class MaterialExporter:
 
     def _read(self, material: bpy.types.Material | None, reading: Reading, warnings: Warnings,
               inexact: Warnings | None = None) -> tuple[NodeReader | None, Surface]:
-        """One side of a material, and the reader that has read it: None where there are no nodes.
-        inexact: see ColorReader."""
+        """Returns one side of a material, and the reader that has read it. The reader is None if no
+        nodes were read. inexact: see ColorReader."""
         if material is None:
             return None, Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
         # From 5.0 on every material has nodes and use_nodes only warns.
@@ -378,7 +389,8 @@ class MaterialExporter:
         return reader, reader.surface(output.inputs['Surface'])
 
     def _image_index(self, texture: Texture) -> int:
-        """Index of the texture's image in SceneData.images, where it is added once."""
+        """Returns the position of the texture's image in SceneData.images. Each image is added
+        once."""
         key = (texture.image.name_full, texture.extension)
         if key not in self._image_indices:
             pixels = self.images.read(texture.image)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lays out the faces of a mesh in one image, each with a resolution that follows its size.
+"""Lays out the faces of a mesh in one image, each with a resolution that depends on its size.
 
-Each face is mapped by an affine map of its plane, so that all its triangulations interpolate the
-same coordinates. The cells of the faces have powers of two as sides and are packed in rows, the
-highest and then the widest first, so that no cell crosses the end of a row.
+Each face is mapped by an affine map of its plane, so that all triangulations of the face
+interpolate the same coordinates. The cells of the faces have powers of two as side lengths and are
+packed in rows, the highest and then the widest first, so that no cell crosses the end of a row.
 """
 
 from __future__ import annotations
@@ -12,28 +12,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Pixels between a face and the edge of its cell. The margin of the bake fills them, so that
-# interpolation at the edge of a face does not reach the pixels of another face.
+# Number of pixels between a face and the edge of its cell. The margin of the bake fills these
+# pixels, so that interpolation at the edge of a face does not reach the pixels of another face.
 BORDER = 2
-_LEAST_PIXELS = 4  # along either side of a face
-_MOST_PIXELS = 1024  # the same
+_LEAST_PIXELS = 4  # smallest number of pixels along either side of a face
+_MOST_PIXELS = 1024  # largest number of pixels along either side of a face
 _LARGEST_IMAGE = 4096
 
 
 @dataclass(frozen=True)
 class FaceAtlas:
-    """An image with a cell for each face, sizes in pixels."""
+    """An image with a cell for each face. Sizes are in pixels."""
 
     width: int
     height: int
-    uvs: np.ndarray  # (c, 2) float32, by corner; -1, outside the image, for faces without a cell
+    uvs: np.ndarray  # (c, 2) float32, per corner; -1 (outside the image) for faces without a cell
 
 
 def face_atlas(positions: np.ndarray, face_offsets: np.ndarray, wanted: np.ndarray,
                pixel: float) -> FaceAtlas:
-    """Lays out faces. positions: (c, 3) m, of the corners. face_offsets: (f + 1,), the first corner
-    of each face and their number. wanted: (f,) bool, the faces that get a cell. pixel: size of a
-    pixel on the surface, m; it is made larger if the image would be larger than 4096 pixels."""
+    """Returns a layout of faces.
+
+    positions: (c, 3) m, of the corners. face_offsets: (f + 1,), the first corner of each face, and
+    c. wanted: (f,) bool, the faces that get a cell. pixel: size of a pixel on the surface, m; it is
+    increased if the image would be larger than 4096 pixels.
+    """
     starts, sizes = face_offsets[:-1], np.diff(face_offsets)
     faces = np.flatnonzero(wanted)
     faces_of_corners = np.repeat(np.arange(len(starts)), sizes)
@@ -57,11 +60,11 @@ def face_atlas(positions: np.ndarray, face_offsets: np.ndarray, wanted: np.ndarr
 
 def _axes(positions: np.ndarray, starts: np.ndarray, sizes: np.ndarray
           ) -> tuple[np.ndarray, np.ndarray]:
-    """The two axes of each face's plane, (f, 3) each, m.
+    """Returns the two axes of each face's plane, (f, 3) each, m.
 
-    They are the two edges at the face's first corner, so that triangles and parallelograms fill
-    their cells; for n-gons, and where these edges are nearly parallel, the first edge and a vector
-    across it.
+    The axes are the two edges at the face's first corner, so that triangles and parallelograms fill
+    their cells. For n-gons, and if these edges are nearly parallel, the axes are the first edge and
+    a vector perpendicular to it.
     """
     first = positions[starts]
     a = positions[starts + 1] - first
@@ -86,7 +89,7 @@ def _axis_lengths(positions: np.ndarray, starts: np.ndarray, sizes: np.ndarray) 
 
 def _plane_coordinates(positions: np.ndarray, starts: np.ndarray, sizes: np.ndarray
                        ) -> np.ndarray:
-    """(c, 2): each corner in the affine coordinates of its face's two axes."""
+    """Returns the affine coordinates of each corner in the two axes of its face, (c, 2)."""
     a, b = (np.repeat(axis, sizes, axis=0) for axis in _axes(positions, starts, sizes))
     d = positions - np.repeat(positions[starts], sizes, axis=0)
     aa, ab, bb, da, db = (np.einsum('ij,ij->i', x, y)
@@ -97,8 +100,8 @@ def _plane_coordinates(positions: np.ndarray, starts: np.ndarray, sizes: np.ndar
 
 
 def _pack(cells: np.ndarray) -> tuple[np.ndarray, int, int]:
-    """Packs cells, (n, 2) sides in pixels that are powers of two. Returns their lower corners,
-    (n, 2), and width and height of the image."""
+    """Packs cells into an image. cells: (n, 2), sides in pixels, which are powers of two. Returns
+    the lower left corners of the cells, (n, 2), and the width and height of the image."""
     area = float(np.prod(cells, axis=1).sum())
     width = int(max(cells[:, 0].max(), 2 ** np.ceil(0.5 * np.log2(area))))
     order = np.lexsort((-cells[:, 0], -cells[:, 1]))

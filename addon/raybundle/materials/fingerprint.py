@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fingerprints of materials, which tell whether an earlier bake by Cycles is still valid."""
+"""Fingerprints of materials, which detect whether an earlier bake by Cycles is still valid."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import hashlib
 import bpy
 import numpy as np
 
-# Properties of nodes that only matter in the node editor.
+# Properties of nodes that only affect the node editor.
 _LOOKS = {'location', 'width', 'width_hidden', 'height', 'dimensions', 'select', 'hide',
           'color', 'use_custom_color', 'parent', 'internal_links', 'inputs', 'outputs', 'label',
           'bl_label', 'bl_description', 'bl_icon', 'location_absolute'}
 
 
 def material_fingerprint(material: bpy.types.Material | None) -> str:
-    """A text that differs if anything that may change the material's look differs: nodes, values,
-    links, groups, images with their pixels, objects that nodes refer to."""
+    """Returns a text that differs if any property differs that may change the material's
+    appearance: nodes, values, links, groups, images with their pixels, objects that nodes refer
+    to."""
     if material is None:
         return "none"
     if material.node_tree is None:
@@ -47,12 +48,12 @@ def _value(value: object) -> str:
 
 
 def _struct(struct: bpy.types.bpy_struct, seen: set[str], depth: int) -> str:
-    """The properties of a node, and of the structs in it: ramps, curves, images, groups. depth: 0
-    for the node itself."""
+    """Returns the properties of a node and of the structs in it (ramps, curves, images, groups) as
+    a text. depth: nesting depth, 0 for the node itself."""
     parts = []
     for prop in struct.bl_rna.properties:
         name = prop.identifier
-        # Below the node itself the same names matter, such as the colour of a ramp's element.
+        # Inside structs the same names are significant, such as the colour of a ramp's element.
         if (name == 'rna_type' or depth == 0 and name in _LOOKS or depth > 4
                 or name.startswith(('show_', 'bl_'))):
             continue

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surfaces that the last bake used for each object's material slots, kept in the .blend file.
+"""The surfaces that the last bake used for each object's material slots, stored in the .blend file.
 
-A material that shows nothing but the result of a bake (shown_results.py) tells neither the colour
-nor the emission of its surface: the next bake uses the same surface as the last one. The scene has
-a table of surfaces by digest, and each object the digests of its slots.
+A material that shows only the result of a bake (shown_results.py) contains neither the colour nor
+the emission of its surface. The next bake therefore uses the same surface as the last one. The
+scene stores a table of surfaces by digest, and each object the digests of its slots.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ _NONE = "-"
 
 @dataclass(frozen=True)
 class LastSurface:
-    """A material as a bake used it."""
+    """The surfaces of a material that a bake used."""
 
-    material: str  # name
+    material: str  # name of the material
     sides: tuple[Surface, Surface]  # front and back
 
 
 class LastSurfaces:
-    """The surfaces of a scene: those that the last bake has kept, and those of the current bake,
-    which write() puts in their place."""
+    """The stored surfaces of a scene: those of the last bake, and those of the current bake, by
+    which write() replaces them."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
-        """scene: original; what an earlier bake has stored in it is read."""
+        """Reads the surfaces that an earlier bake has stored in the scene. scene: original
+        data-block."""
         self._scene = scene
         self._table: dict[str, dict] = {}
         self._attributes: set[str] = set()
@@ -46,27 +47,29 @@ class LastSurfaces:
             self._table = dict(stored.get('surfaces', {}))
             self._attributes = set(stored.get('attributes', ()))
         except (ValueError, TypeError, AttributeError):
-            # Somebody else wrote the property: go on as if there had been no bake.
+            # The property has other content: continue as if there had been no bake.
             pass
         self._taken: dict[bpy.types.Object, str] = {}
         self._new: dict[str, dict] = {}
-        # By the surface's id(), and with the surface, so that the id stays its own.
+        # Digests by id() of the surface and name of the render colour attribute. The surface is
+        # stored too, so that its id() is not reused.
         self._digests: dict[tuple, tuple[LastSurface, str]] = {}
 
     @property
     def attributes(self) -> frozenset[str]:
-        """Names of the attributes that bakes have written to and Clear has not removed."""
+        """Returns the names of the attributes that bakes have written to and that Clear has not
+        removed."""
         return frozenset(self._attributes)
 
     def digest(self, item: bpy.types.Object, slot: int) -> str | None:
-        """Digest of the surface that the last bake used for a slot of an original object; None if
-        none is kept."""
+        """Returns the digest of the surface that the last bake used for a slot of an original
+        object. Returns None if no surface is stored."""
         digests = item.raybundle.last_surfaces.split()
         digest = digests[slot] if slot < len(digests) else _NONE
         return digest if digest in self._table else None
 
     def surface(self, digest: str | None) -> LastSurface | None:
-        """The kept surface of a digest; None if there is none that can be read."""
+        """Returns the stored surface of a digest. Returns None if no readable surface is stored."""
         if digest not in self._table:
             return None
         try:
@@ -74,11 +77,12 @@ class LastSurfaces:
             return LastSurface(stored['material'],
                                tuple(_decoded(side, Surface()) for side in stored['sides']))
         except (KeyError, ValueError, TypeError):
-            # Another version of the add-on has stored it.
+            # Another version of the add-on has stored the surface.
             return None
 
     def digest_of(self, surface: LastSurface | None, mesh: bpy.types.Mesh) -> str:
-        """Digest of a surface that the current bake uses on a mesh; the surface is kept for it."""
+        """Returns the digest of a surface that the current bake uses on a mesh, and keeps the
+        surface for write()."""
         if surface is None:
             return _NONE
         attribute = rendered_attribute(mesh)
@@ -97,25 +101,25 @@ class LastSurfaces:
         return self._digests[key][1]
 
     def take(self, item: bpy.types.Object, digests: Sequence[str]) -> None:
-        """Keeps the digests of all slots of an original object, for write()."""
+        """Keeps the digests of all slots of an original object for write()."""
         if item.library is None:
             self._taken[item] = " ".join(digests)
 
     def share(self, original: bpy.types.Object, copy: bpy.types.Object) -> None:
-        """Keeps for a copy (subdivided_copy.py) what is kept for its original, which has the same
+        """Keeps the digests of the original for a copy (subdivided_copy.py), which has the same
         slots."""
         if original in self._taken:
             self._taken[copy] = self._taken[original]
 
     def forget_attributes(self) -> None:
-        """After the baked attributes were removed. The surfaces are kept, since materials may still
-        read the attributes that are gone."""
+        """Removes the names of all baked attributes, after the attributes were removed. The
+        surfaces are kept, because materials may still read the removed attributes."""
         self._attributes.clear()
         self.write(())
 
     def write(self, attributes: Iterable[str]) -> None:
-        """Stores the surfaces of the current bake in the file. attributes: names of those that the
-        bake has written to."""
+        """Stores the surfaces of the current bake in the file. attributes: names of the attributes
+        that the bake has written to."""
         used: set[str] = set()
         for item, digests in self._taken.items():
             used.update(digests.split())
@@ -125,7 +129,7 @@ class LastSurfaces:
             except ReferenceError:
                 # The object was removed while the bake ran.
                 continue
-        # Objects that took no part in this bake keep their surfaces.
+        # Objects that were not part of this bake keep their surfaces.
         used.update(digest for item in self._scene.objects
                     for digest in item.raybundle.last_surfaces.split())
         table = {digest: stored for digest, stored in {**self._table, **self._new}.items()
@@ -137,17 +141,18 @@ class LastSurfaces:
 
 
 # --------------------------------------------------------------------------------------------------
-# JSON of surfaces: arrays of zeros are null, so that those of plain diffuse surfaces are short
+# JSON of surfaces. Arrays of zeros are stored as null, which keeps plain diffuse surfaces short.
 # --------------------------------------------------------------------------------------------------
 
 
 def _encoded(value: object, rendered: str | None) -> object:
-    """The JSON value of a surface or of a part of it. rendered: name of the mesh's render colour
-    attribute, which the surface is stored with since the bake makes its result that attribute."""
+    """Returns the JSON value of a surface or of a part of it. rendered: name of the mesh's render
+    colour attribute. The surface is stored with this name because the bake makes its result the
+    render colour attribute."""
     if isinstance(value, ColorExpression) and value.attribute == "":
         value = replace(value, attribute=rendered)
         if rendered is None:
-            # Without an attribute nodes read black.
+            # Without an attribute, nodes read black.
             value = replace(value, attribute_weight=np.zeros(3))
     if isinstance(value, Texture):
         return {'image': value.image.name_full, 'extension': value.extension,
@@ -162,7 +167,8 @@ def _encoded(value: object, rendered: str | None) -> object:
 
 
 def _decoded(stored: dict, default: object) -> object:
-    """The dataclass of a stored value; default: gives the type and the shapes of its arrays."""
+    """Returns the dataclass of a stored value. default: determines the type and the shapes of its
+    arrays."""
     values = {}
     for item in fields(default):
         if item.name not in stored:

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers on top of a surface, Cycles' sheen, velvet and clearcoat: what they reflect, by angle.
+"""Layers on top of a surface: the light that Cycles' sheen, velvet and clearcoat reflect, by angle.
 
 Sources: Zeltner, Burley and Chiang, "Practical Multiple-Scattering Sheen Using Linearly Transformed
 Cosines" (2022), sheen from Blender 4.0 on; Burley, "Physically-Based Shading at Disney" (2012),
-sheen and clearcoat before; Ashikhmin, Premoze and Shirley, "A Microfacet-Based BRDF Generator"
+sheen and clearcoat before 4.0; Ashikhmin, Premoze and Shirley, "A Microfacet-Based BRDF Generator"
 (2000), velvet.
 
-The tables were measured in Cycles: what it shows of a flat sheet of a layer of weight 1 under a sky
-that is the same in all directions, and from straight above under a sun, at 24 angles (equal shares
-of the projected solid angle), fitted by the terms of diffuse_angles.py. Microfibers were measured
-in Blender 4.5, the others in 3.4.
+The tables were measured in Cycles: the radiance of a flat sheet with a layer of weight 1 under a
+uniform sky, and as seen from straight above under a sun, at 24 angles (equal shares of the
+projected solid angle), fitted by the terms of diffuse_angles.py. Microfibers were measured in
+Blender 4.5, the others in 3.4.
 
 Clearcoat is computed from its formula. Cycles agrees for light of lamps. Its rays sample clearcoat
-by a density that is not quite proportional to it, so that other light depends on the colour
+with a density that is not quite proportional to it, so that other light depends on the colour
 beneath: over a red of 0.8 it is 3 % less.
 
-The directions in which cloth reflects light are formulas in native/src/surfaces/lobe.h. These are
-reciprocal: the share of light that is reflected depends on the angle of the light as what is seen
-depends on the angle of view. Only microfibers have another table for it, the integral of their
-formula.
+native/src/surfaces/lobe.h contains the formulas for the directions in which cloth reflects light.
+They are reciprocal: the reflected share depends on the angle of the light in the same way as the
+visible light depends on the angle of view. Only microfibers have a separate table for the reflected
+share, which is the integral of their formula.
 
 Differs from Cycles: values between the roughnesses of the tables are interpolated.
 """
@@ -33,10 +33,10 @@ import numpy as np
 from .diffuse_angles import MEANS, TERMS, angle_terms
 from .gloss import fresnel
 
-_FACETS = 48  # steps of the integral over facets in each of two dimensions, and number of views
+_FACETS = 48  # steps of the integral over facets in each of two dimensions; also number of views
 
-# Each table: the roughnesses of its rows, and rows of weights of the constant 1 and of the terms.
-# What is seen of microfibers, by the angle of view.
+# Each table consists of the roughnesses of its rows, and of rows of weights of the constant 1 and
+# of the terms. This table gives the visible light of microfibers, by the angle of view.
 _MICROFIBERS = np.linspace(0.0, 1.0, 11), np.array([
     [0.0, 0.0, 0.0, 0.0, 0.0],
     [0.0003, -0.0070, 0.0249, 0.0308, -0.2526],
@@ -49,7 +49,7 @@ _MICROFIBERS = np.linspace(0.0, 1.0, 11), np.array([
     [0.1762, 0.2741, 0.2520, -0.0095, 0.3164],
     [0.2581, 0.2638, 0.1947, -0.0073, 0.3183],
     [0.3421, 0.2172, 0.1753, 0.0026, 0.2641]])
-# What a view from straight above shows of microfibers, by the angle of the light.
+# The light of microfibers that a view from straight above shows, by the angle of the light.
 _MICROFIBERS_FROM_ABOVE = _MICROFIBERS[0], np.array([
     [0.0, 0.0, 0.0, 0.0, 0.0],
     [0.0, 0.0, 0.0, 0.0, 0.0],
@@ -62,7 +62,8 @@ _MICROFIBERS_FROM_ABOVE = _MICROFIBERS[0], np.array([
     [0.1087, 0.1666, 0.1040, -0.0948, -0.0999],
     [0.1807, 0.2202, 0.0576, -0.0882, -0.1527],
     [0.2643, 0.2456, 0.0046, -0.0683, -0.1481]])
-# What microfibers reflect, by the angle of the light, as weights of the terms alone.
+# The share of light that microfibers reflect, by the angle of the light, as weights of the terms
+# without a constant.
 _MICROFIBERS_ARRIVING = _MICROFIBERS[0], np.array([
     [0.0, 0.0, 0.0, 0.0],
     [-0.0025, 0.0092, 0.0142, -0.0983],
@@ -87,79 +88,84 @@ _VELVET = _MICROFIBERS[0], np.array([
     [0.0883, 0.5399, 0.7459, -0.3175, -1.3235],
     [0.1395, 0.5742, 0.7088, -0.3454, -1.6666],
     [0.1967, 0.5513, 0.7170, -0.3748, -1.9067]])
-# Burley's sheen has no roughness: Schlick's fifth power of the angle between light and half vector.
+# Burley's sheen has no roughness. It is Schlick's fifth power of the angle between light and half
+# vector.
 _BURLEY_SHEEN = np.array([0.0004, 0.0037, 0.0452, 0.0375, 0.0550])
 
-MICROFIBERS, VELVET, BURLEY_SHEEN, SEVERAL_FACETS = LOBES = range(4)  # the lobes of rb_surface
+# Order of the lobes in rb_surface.
+MICROFIBERS, VELVET, BURLEY_SHEEN, SEVERAL_FACETS = LOBES = range(4)
 
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer of weight 1 and white colour, as shares of light (0 to 1) by its angle."""
+    """A layer of weight 1 and white colour, as shares of light (0 to 1) by angle."""
 
-    # (1 + TERMS,): constant and weights of the share that is seen, by the angle of view.
+    # (1 + TERMS,): constant and weights of the visible share under uniform light, by the angle of
+    # view.
     angles: np.ndarray
-    # (1 + TERMS,): the same of what a view from straight above shows in the Diffuse pass, by the
-    # angle of the light.
+    # (1 + TERMS,): constant and weights of the share that a view from straight above shows in the
+    # Diffuse pass, by the angle of the light.
     shown: np.ndarray = field(default_factory=lambda: np.zeros(1 + TERMS))
-    lobe: int | None = None  # of cloth: one of LOBES
+    lobe: int | None = None  # one of LOBES for cloth, else None
     roughness: float = 0.0  # 0 to 1
-    _arriving: np.ndarray | None = None  # (TERMS,), see arriving; None: as by_angle
+    _arriving: np.ndarray | None = None  # (TERMS,), see `arriving`; None: equal to by_angle
     covers: bool = False  # whether light that the layer reflects is missing beneath it
 
     @property
     def albedo(self) -> float:
-        """Share of light that is the same from all directions."""
+        """Returns the reflected share of uniform light from all directions."""
         return float(self.angles[0] + MEANS @ self.angles[1:])
 
     @property
     def by_angle(self) -> np.ndarray:
-        """(TERMS,): weights of the share that is seen, by the angle of view."""
+        """Returns the weights of the visible share by the angle of view, (TERMS,)."""
         return self.angles[1:]
 
     @property
     def arriving(self) -> np.ndarray:
-        """(TERMS,): weights of the share that is reflected, by the angle of the light."""
+        """Returns the weights of the reflected share by the angle of the light, (TERMS,)."""
         return self.by_angle if self._arriving is None else self._arriving
 
     @property
     def above(self) -> float:
-        """Share of light from all directions that a view from straight above shows as diffuse."""
+        """Returns the share of uniform light that a view from straight above shows as diffuse."""
         return float(self.shown[0] + MEANS @ self.shown[1:])
 
     def taken(self, color: np.ndarray) -> float:
-        """How much light is missing beneath a layer of a colour, (3,), as a multiple of the layer's
-        albedo and alike in all channels."""
+        """Returns the share of light that is missing beneath the layer, as a multiple of the
+        layer's albedo. The share is the same in all channels. color: (3,), colour of the layer."""
         return float(color.max()) if self.covers else 0.0
 
 
 def microfibers(roughness: float) -> Layer:
-    """Sheen from Blender 4.0 on. roughness: 0 to 1."""
+    """Returns the sheen of Blender 4.0 and later. roughness: 0 to 1."""
     return Layer(_row(_MICROFIBERS, roughness), _row(_MICROFIBERS_FROM_ABOVE, roughness),
                  MICROFIBERS, roughness, _row(_MICROFIBERS_ARRIVING, roughness), covers=True)
 
 
 def burley_sheen() -> Layer:
-    """Sheen before Blender 4.0. The 0.03 % of light that a view from straight above shows of it are
-    left out."""
+    """Returns the sheen before Blender 4.0. Its 0.03 % of light that a view from straight above
+    shows is neglected."""
     return Layer(_BURLEY_SHEEN, lobe=BURLEY_SHEEN)
 
 
 def velvet(sigma: float) -> Layer:
-    """The Velvet shader. sigma: 0 to 1. It is not part of Cycles' Diffuse pass: `shown` is 0."""
+    """Returns the layer of the Velvet shader. sigma: 0 to 1. Cycles' Diffuse pass does not contain
+    it, so `shown` is 0."""
     return Layer(_row(_VELVET, sigma), lobe=VELVET, roughness=sigma)
 
 
 @lru_cache(maxsize=64)
 def clearcoat(roughness: float) -> Layer:
-    """Clearcoat before Blender 4.0. roughness: as diffuse light sees it (gloss.seen_roughness). The
-    integral is a sum over midpoints of the facets' directions."""
+    """Returns the clearcoat before Blender 4.0. roughness: the roughness that applies to diffuse
+    light (gloss.seen_roughness). The integral is a sum over midpoints of the facets' directions."""
     alpha2 = min(max(roughness, 0.01)**4, 0.9999)
     steps = (np.arange(_FACETS) + 0.5) / _FACETS
-    facet = np.sqrt((1.0 - alpha2**(1.0 - steps)) / (1.0 - alpha2))[:, None]  # cosines
+    # Cosines of the facets' angles.
+    facet = np.sqrt((1.0 - alpha2**(1.0 - steps)) / (1.0 - alpha2))[:, None]
     views = np.sqrt(steps)[:, None, None]
     between = (views * facet + np.sqrt((1.0 - views**2) * (1.0 - facet**2))
-               * np.cos(2.0 * np.pi * steps))  # of view and facet
+               * np.cos(2.0 * np.pi * steps))  # cosine between view and facet
     light = 2.0 * between * facet - views
     is_above = (light > 0.0) & (between > 0.0)
     masking = _smith(np.where(is_above, light, 1.0)) * _smith(views)
@@ -170,11 +176,12 @@ def clearcoat(roughness: float) -> Layer:
 
 
 def _smith(cosine: np.ndarray) -> np.ndarray:
-    """Smith's masking of clearcoat, whose alpha is always 0.25. cosine: of view or light."""
+    """Returns Smith's masking of clearcoat, whose alpha is always 0.25. cosine: of view or
+    light."""
     return 2.0 * cosine / (cosine + np.sqrt(0.0625 + 0.9375 * cosine**2))
 
 
 def _row(table: tuple[np.ndarray, np.ndarray], roughness: float) -> np.ndarray:
-    """The row of a table for a roughness, interpolated between those that the table has."""
+    """Returns the row of a table for a roughness, interpolated between the rows of the table."""
     steps, rows = table
     return np.array([np.interp(roughness, steps, column) for column in rows.T])

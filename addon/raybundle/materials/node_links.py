@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the value of a node's input comes from, and the values of inputs without a link."""
+"""Follows links between nodes to the source of an input's value, and returns values of unlinked
+inputs."""
 
 from __future__ import annotations
 
@@ -10,20 +11,20 @@ import numpy as np
 
 from .color_expression import WHITE
 
-# Outputs of the Light Path node for a ray that a diffuse surface sends out, which is how a bake
-# looks at surfaces; outputs that are not listed are 0.
+# Values of the outputs of the Light Path node for a ray that leaves a diffuse surface, because a
+# bake evaluates surfaces for these rays. Outputs that are not listed are 0.
 LIGHT_PATH = {'Is Diffuse Ray': 1.0, 'Is Reflection Ray': 1.0, 'Ray Depth': 1.0,
                'Diffuse Depth': 1.0}
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where the value of an input comes from: an output of a node, or the input itself."""
+    """The source of an input's value: an output of a node, or the input itself."""
 
-    socket: bpy.types.NodeSocket  # the last input on the way upstream, whose own value may count
-    path: tuple[bpy.types.Node, ...]  # the group nodes that enclose it, outermost first
-    node: bpy.types.Node | None = None  # None: nothing is linked, the value of `socket` counts
-    output: bpy.types.NodeSocket | None = None  # of the node
+    socket: bpy.types.NodeSocket  # the last input on the way upstream, which may provide the value
+    path: tuple[bpy.types.Node, ...]  # the group nodes that enclose `node`, outermost first
+    node: bpy.types.Node | None = None  # None: nothing is linked, `socket` provides the value
+    output: bpy.types.NodeSocket | None = None  # the output of `node`
 
 
 def follow(socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> Source:
@@ -66,19 +67,21 @@ def _group_output(tree: bpy.types.NodeTree, identifier: str) -> bpy.types.NodeSo
 
 
 def input_of(node: bpy.types.Node, *names: str) -> bpy.types.NodeSocket:
-    """The input with the first of the names that the node has; Blender renames sockets. Raises
-    StopIteration if there is none."""
+    """Returns the input with the first of the names that the node has. Several names are needed
+    because Blender renames sockets. Raises StopIteration if there is none."""
     return next(node.inputs[name] for name in names if name in node.inputs)
 
 
 def default_color(socket: bpy.types.NodeSocket) -> np.ndarray:
-    """(3,) linear RGB: the socket's own value; a number is grey, a socket without value black."""
+    """Returns the socket's own value as a colour, (3,) linear RGB. A number gives grey, a socket
+    without a value black."""
     value = getattr(socket, 'default_value', 0.0)
     return np.array(value[:3]) if hasattr(value, '__len__') else WHITE * float(value)
 
 
 def default_value(socket: bpy.types.NodeSocket) -> float:
-    """The socket's own value; of a colour the luminance, and 0 of a socket without value."""
+    """Returns the socket's own value as a number: the luminance of a colour, and 0 for a socket
+    without a value."""
     value = getattr(socket, 'default_value', 0.0)
     if hasattr(value, '__len__'):
         return float(np.array(value[:3]) @ [0.2126, 0.7152, 0.0722])
@@ -86,5 +89,5 @@ def default_value(socket: bpy.types.NodeSocket) -> float:
 
 
 def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
-    """The active output node that Cycles uses; None if the tree has none."""
+    """Returns the active output node that Cycles uses. Returns None if the tree has none."""
     return tree.get_output_node('CYCLES') or tree.get_output_node('ALL')

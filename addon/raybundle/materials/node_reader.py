@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the shaders of node trees, of materials, lamps and the world, as a Surface.
+"""Reads the shaders of node trees of materials, lamps and the world as a Surface.
 
-A Surface has what radiosity needs: the reflectance, which part of it is diffuse, in which
-directions the reflected light leaves, what passes through, and the emission. A tree is read from
-its output towards its inputs. Where something cannot be read, the value of the socket (or the mean
-of the image) is used and a warning names the node.
+A Surface contains the quantities that radiosity uses: the reflectance, its diffuse part, the
+directions in which the reflected light leaves, the transmitted light, and the emission. A tree is
+read from its output towards its inputs. If a value cannot be read, the value of the socket (or the
+mean of the image) is used and a warning names the node.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ from .surface import Surface
 
 # Types of shaders that mirror and have no diffuse part.
 GLOSSY = ('BSDF_GLOSSY', 'BSDF_ANISOTROPIC', 'BSDF_METALLIC')
-# Types of shaders that are one of the layers of layers.py.
+# Types of shaders that correspond to one of the layers of layers.py.
 CLOTH = ('BSDF_SHEEN', 'BSDF_VELVET')
-# Names of a socket, by Blender version, and the value assumed where it varies or is missing.
+# Names of a socket, by Blender version, and the value that is assumed if the input varies or is
+# missing.
 CLOTH_ROUGHNESS = ('Roughness', 'Sigma'), 0.5
 EDGE_TINT = ('Edge Tint',), 1.0  # of the Metallic shader
 MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughness of 0.45 or more"
@@ -39,7 +40,7 @@ MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughne
 class NodeReader(ColorReader):
     """Reads the shaders of one node tree, for one side of a surface.
 
-    ColorReader describes the parameters, and what becomes of nodes that cannot be read.
+    ColorReader describes the parameters, and how nodes that cannot be read are handled.
     """
 
     def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
@@ -52,12 +53,12 @@ class NodeReader(ColorReader):
 
     @property
     def shows_result(self) -> bool:
-        """Whether anything that was read depends on the result of a bake."""
+        """Returns whether any value that was read depends on the result of a bake."""
         return bool(self.color_result or self.emits_result or self._result_values)
 
     def shows_only_result(self, surface: Surface) -> bool:
-        """Whether the tree shows nothing but the result of a bake, so that the surface's own colour
-        is not known. surface: what surface() returned for the tree."""
+        """Returns whether the tree shows only the result of a bake, so that the surface's own
+        colour is unknown. surface: the return value of surface() for the tree."""
         if self.color_result == Result.ALONE:
             return True
         own = surface.diffuse, surface.translucence, surface.radiance
@@ -65,8 +66,8 @@ class NodeReader(ColorReader):
 
     def surface(self, socket: bpy.types.NodeSocket,
                 path: tuple[bpy.types.Node, ...] = ()) -> Surface:
-        """The surface that the shader linked to an input makes; black where nothing is linked, as
-        in Cycles. path: see node_links.follow."""
+        """Returns the surface of the shader that is linked to an input. If nothing is linked, the
+        surface is black, as in Cycles. path: see node_links.follow."""
         source = follow(socket, path)
         node, path = source.node, source.path
         if node is None:
@@ -92,7 +93,7 @@ class NodeReader(ColorReader):
             return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
         if node.type == 'MIX_SHADER':
             factor = float(np.clip(self.value(node.inputs[0], path), 0.0, 1.0))
-            # A branch of weight 0 is not read, so that nothing is warned of for its sake.
+            # A branch of weight 0 is not read, so that its nodes cause no warnings.
             parts = [self.surface(node.inputs[index], path).scaled(share)
                      for index, share in ((1, 1.0 - factor), (2, factor)) if share > 0.0]
             return self._sum(parts, node)
@@ -160,8 +161,8 @@ class NodeReader(ColorReader):
 
     def _base_color(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]
                     ) -> ColorExpression:
-        """The base colour. Before Blender 4.0 light that is scattered under the surface has a
-        colour of its own, which is mixed in by its weight."""
+        """Returns the base colour. Before Blender 4.0, subsurface scattering has a colour of its
+        own, which is mixed in by its weight."""
         base = self._own_color(node.inputs['Base Color'], path)
         if 'Subsurface Color' not in node.inputs:
             return base
@@ -189,9 +190,9 @@ class NodeReader(ColorReader):
 
     def _usual(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                path: tuple[bpy.types.Node, ...]) -> float:
-        """The value of the input with the first of the names that exists. Where it varies, or no
-        input has one of the names, `usual` is used: such values alone are not worth a bake by
-        Cycles."""
+        """Returns the value of the input with the first of the names that exists. If the value
+        varies, or if no input has one of the names, `usual` is returned, because these values alone
+        are not worth a bake by Cycles."""
         if not any(name in node.inputs for name in names):
             return usual
         source = follow(input_of(node, *names), path)
@@ -205,8 +206,9 @@ class NodeReader(ColorReader):
 
     def _usual_color(self, node: bpy.types.Node, names: tuple[str, ...], usual: float,
                      path: tuple[bpy.types.Node, ...]) -> np.ndarray:
-        """(3,) linear RGB: the colour of the input with the first of the names that exists, or grey
-        of the value `usual` where it varies or there is none."""
+        """Returns the colour of the input with the first of the names that exists, (3,) linear
+        RGB. If the colour varies, or if there is no such input, grey of the value `usual` is
+        returned."""
         if not any(name in node.inputs for name in names):
             return WHITE * usual
         source = follow(input_of(node, *names), path)
@@ -236,35 +238,37 @@ class NodeReader(ColorReader):
 
     def _own_color(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
                    ) -> ColorExpression:
-        """The colour of a reflecting or transmitting shader; keeps track of color_result."""
+        """Returns the colour of a reflecting or transmitting shader, and updates color_result."""
         color = self.color(socket, path)
         self.color_result = max(self.color_result, color.result)
         return color
 
     def _radiance(self, color: bpy.types.NodeSocket, strength: bpy.types.NodeSocket,
                   path: tuple[bpy.types.Node, ...]) -> ColorExpression:
-        """Colour times strength of an emission; 0 if either is the result of a bake."""
+        """Returns colour times strength of an emission, W/(m^2 sr). Returns 0 if either is the
+        result of a bake."""
         values, inexact, unread = self._result_values, len(self.inexact), len(self.unread)
         factor = self.value(strength, path)
         radiance = self._emission_color(color, path).scaled(factor) if factor else ColorExpression()
         if not radiance.result and self._result_values == values:
-            # From Blender 4.0 on a new Principled shader emits white with a strength of 0: nobody
-            # has chosen that colour.
+            # From Blender 4.0 on, a new Principled shader emits white with a strength of 0. This
+            # colour is a default, not a choice of the user.
             is_usual = (color.node.type == 'BSDF_PRINCIPLED' and bpy.app.version >= (4, 0, 0)
                         and factor == 0.0)
             self.tells_emission |= not is_usual and bool(
                 color.is_linked or np.any(default_color(color)))
             return radiance
-        # A result is not a light source of the scene, whatever it is multiplied by: what could not
-        # be read of it does not matter.
+        # A result is not a light source of the scene, whatever multiplies it. Nodes that could not
+        # be read have no effect here, so their entries are removed.
         del self.inexact[inexact:], self.unread[unread:]
         self.emits_result = True
         return ColorExpression()
 
     def _emission_color(self, socket: bpy.types.NodeSocket,
                         path: tuple[bpy.types.Node, ...]) -> ColorExpression:
-        """The colour of an emission; its mean, with a warning, unless reading.varying_emission is
-        set (lamps and the world have one radiance)."""
+        """Returns the colour of an emission. Unless reading.varying_emission is set, a varying
+        colour is replaced by its mean, with a warning, because lamps and the world have one
+        radiance."""
         color = self.color(socket, path)
         if color.is_constant or self.reading.varying_emission:
             return color
@@ -277,19 +281,20 @@ class Glossy:
     """Shares of diffuse light, linear RGB, that a shader of one of the types GLOSSY reflects."""
 
     once: np.ndarray  # (3,), light that is reflected by one facet
-    by_angle: np.ndarray  # (TERMS, 3), how `once` depends on the angle of the light
+    by_angle: np.ndarray  # (TERMS, 3), dependence of `once` on the angle of the light
     again: np.ndarray  # (3,), light that is reflected by several facets in turn
-    several: np.ndarray  # (TERMS,), how `again` depends on the angle; see GlossAlbedo
-    roughness: float  # 0 to 1, as diffuse light sees it
+    several: np.ndarray  # (TERMS,), dependence of `again` on the angle; see GlossAlbedo
+    roughness: float  # 0 to 1, applies to diffuse light
 
 
 def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray, filter_glossy: float,
                   tint: np.ndarray) -> Glossy:
-    """What a shader of one of the types GLOSSY reflects of diffuse light.
+    """Returns the shares of diffuse light that a shader of one of the types GLOSSY reflects.
 
     roughness: 0 to 1, of the socket. color: (3,) linear RGB, 0 to 1. filter_glossy: Cycles'
-    setting, which makes the roughness larger for light that one facet reflects; light of several
-    facets keeps that of the socket. tint: (3,), of the edge, which the Metallic shader alone has.
+    setting, which increases the roughness for light that one facet reflects. Light that several
+    facets reflect keeps the roughness of the socket. tint: (3,), of the edge, only used for the
+    Metallic shader.
     """
     if node.distribution == 'SHARP':
         roughness = 0.0
@@ -308,8 +313,8 @@ def glossy_albedo(node: bpy.types.Node, roughness: float, color: np.ndarray, fil
 
 
 def cloth_layer(node: bpy.types.Node, roughness: float) -> Layer:
-    """The layer that a Sheen shader is, or Velvet before Blender 4.0. roughness: 0 to 1, or
-    Velvet's Sigma."""
+    """Returns the layer of a Sheen shader, or of a Velvet shader before Blender 4.0. roughness: 0
+    to 1, or Velvet's Sigma."""
     if node.type == 'BSDF_VELVET' or node.distribution == 'ASHIKHMIN':
         return velvet(roughness)
     return microfibers(roughness)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender's Principled shader reflects of diffuse light, by version, for any base colour.
+"""The diffuse light that Blender's Principled shader reflects, by Blender version.
 
 Before Blender 4.0 the diffuse part is Burley's, and the specular layer, sheen and clearcoat are
-added to it. From 4.0 on the diffuse part is Lambert's, from 4.3 on Oren and Nayar's; sheen, coat
-and the specular layer lie on top, in this order from above, and light that a layer reflects is
-missing beneath it; the specular layer's reflectance follows from the index of refraction.
+added to it. From 4.0 on the diffuse part is Lambert's, and from 4.3 on Oren and Nayar's. From 4.0
+on, sheen, coat and the specular layer lie on top of it, in this order from above, and light that a
+layer reflects is missing beneath it. The reflectance of the specular layer then follows from the
+index of refraction.
 """
 
 from __future__ import annotations
@@ -18,57 +19,57 @@ from .diffuse_angles import MEANS, TERMS, DiffuseAngles, angle_terms, burley, or
 from .gloss import gloss_albedo, ior_of, seen_roughness
 from .layers import Layer, burley_sheen, clearcoat, microfibers
 
-# Groups of sockets: for each socket its names by Blender version, and the value that is assumed
-# where it varies or is missing. These are the first fields of PrincipledSockets, in its order.
+# Groups of sockets. Each socket has its names by Blender version, and the value that is assumed if
+# the input varies or is missing. GLOSS_SOCKETS are the first fields of PrincipledSockets, in order.
 GLOSS_SOCKETS = ((('Roughness',), 0.5), (('Specular IOR Level', 'Specular'), 0.5),
                  (('IOR',), 1.5), (('Diffuse Roughness',), 0.0))
-# Those of the coat, in the order of the arguments of PrincipledAlbedo.coated.
+# The sockets of the coat, in the order of the arguments of PrincipledAlbedo.coated.
 COAT_SOCKETS = ((('Coat Weight', 'Clearcoat'), 0.0),
                 (('Coat Roughness', 'Clearcoat Roughness'), 0.03), (('Coat IOR',), 1.5))
-# Those of sheen, in the order of the arguments of sheen_on.
+# The sockets of sheen, in the order of the arguments of sheen_on.
 SHEEN_SOCKETS = ((('Sheen Weight', 'Sheen'), 0.0), (('Sheen Roughness',), 0.5))
-# The colours of coat and sheen; that of sheen is a number before 4.0.
+# The colours of coat and sheen. Before 4.0 the tint of sheen is a number.
 COAT_TINT, SHEEN_TINT = (('Coat Tint',), 1.0), (('Sheen Tint',), 1.0)
-# The colour of the specular layer and of metals' edges; a number before 4.0.
+# The colour of the specular layer and of metals' edges. It is a number before 4.0.
 SPECULAR_TINT = ('Specular Tint',), 1.0 if bpy.app.version >= (4, 0, 0) else 0.0
-# Weights of the luminance by which, before 4.0, a tint takes the hue of the base colour: for sheen,
+# Weights of the luminance that defines the hue of the base colour for tints before 4.0: for sheen,
 # and for the specular layer.
 _LUMINANCE, _ROUGH_LUMINANCE = np.array([0.2126, 0.7152, 0.0722]), np.array([0.3, 0.6, 0.1])
-# Cosines of views that stand for equal shares of the projected solid angle.
+# Cosines of views that represent equal shares of the projected solid angle.
 _VIEWS = np.sqrt((np.arange(24) + 0.5) / 24)
 
 
 @dataclass(frozen=True)
 class PrincipledSockets:
-    """Values of a Principled shader's sockets and options that its gloss and angles depend on."""
+    """The values of a Principled shader's sockets and options that gloss and angles depend on."""
 
     roughness: float
     specular: float  # Specular IOR Level, or Specular before Blender 4.0
     ior: float
     diffuse_roughness: float
     is_multiscatter: bool  # whether the distribution is Multiscatter GGX
-    # (3,) linear RGB or one number for all channels: the base colour. It is the colour of metals,
-    # and of what light loses between several facets.
+    # (3,) linear RGB or one number for all channels: the base colour. It determines the colour of
+    # metals, and the light that is lost between several facets.
     base: np.ndarray | float
     tint: np.ndarray | float = SPECULAR_TINT[1]  # (3,) or one number: Specular Tint
 
 
 @dataclass(frozen=True)
 class PrincipledAlbedo:
-    """What a Principled shader reflects of diffuse light, as shares that the sockets Base Color,
-    Metallic and Transmission weigh.
+    """The shares of diffuse light that a Principled shader reflects. The sockets Base Color,
+    Metallic and Transmission weight these shares.
 
     With o = (1 - metallic) (1 - transmission) and m = metallic, each channel has
 
     reflectance = base (o diffuse + m metal) + o specular + m metal_edge.
 
-    A view from straight above shows the diffuse colour base o shown, which depends on the angle of
-    the light as `angles` says. What is mirrored depends on the angle of the light by
-    o specular_by_angle + m metal_by_angle.
+    A view from straight above shows the diffuse colour base * o * shown. `angles` describes how
+    this colour depends on the angle of the light. The dependence of the mirrored light on the angle
+    of the light is o specular_by_angle + m metal_by_angle.
     """
 
     angles: DiffuseAngles  # of the diffuse part without layers
-    roughness: float  # 0 to 1, of the gloss, as diffuse light sees it
+    roughness: float  # 0 to 1, of the gloss, applies to diffuse light
     diffuse_roughness: float  # 0 to 1
     shown: np.ndarray  # (3,)
     diffuse: np.ndarray  # (3,), under the layers
@@ -77,33 +78,35 @@ class PrincipledAlbedo:
     metal: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_edge: np.ndarray = field(default_factory=lambda: np.zeros(3))
     metal_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (2, 3): the part of metal and of metal_edge that several facets reflect in turn.
+    # (2, 3): the parts of `metal` and of `metal_edge` that several facets reflect in turn.
     several: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    # (TERMS, 3): how light that several facets reflect depends on its angle.
+    # (TERMS, 3): dependence of the light that several facets reflect on the angle.
     several_by_angle: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (TERMS, 3): how the layers let diffuse light out, by the angle at which it leaves.
+    # (TERMS, 3): dependence of the diffuse light that the layers transmit on the angle at which it
+    # leaves.
     leaving: np.ndarray = field(default_factory=lambda: np.zeros((TERMS, 3)))
-    # (3,): share of emission, and of light that passes through, that the coat lets out.
+    # (3,): share of the emission, and of the light that passes through the surface, that the coat
+    # transmits.
     uncoated: np.ndarray = field(default_factory=lambda: np.ones(3))
 
     def reflected_by_angle(self, base: np.ndarray, opaque: float, metallic: float) -> np.ndarray:
-        """(TERMS, 3): how the reflectance depends on the angle of the light. base: (3,) linear RGB;
-        opaque: o; metallic: m."""
-        under = self.diffuse / self.angles.albedo  # share of light that the layers let through
+        """Returns how the reflectance depends on the angle of the light, (TERMS, 3). base: (3,)
+        linear RGB. opaque: o. metallic: m."""
+        under = self.diffuse / self.angles.albedo  # share of light that the layers transmit
         return (opaque * base * under * self.angles.reflected
                 + metallic * self.several_by_angle + self.mirrored_by_angle(opaque, metallic))
 
     def mirrored_by_angle(self, opaque: float, metallic: float) -> np.ndarray:
-        """(TERMS, 3): how the part that one facet mirrors depends on the angle of the light.
-        opaque: o; metallic: m."""
+        """Returns how the part that one facet mirrors depends on the angle of the light, (TERMS,
+        3). opaque: o. metallic: m."""
         return opaque * self.specular_by_angle + metallic * self.metal_by_angle
 
     def coated(self, weight: float, roughness: float, ior: float, tint: np.ndarray,
                filter_glossy: float | None) -> PrincipledAlbedo:
-        """The same with a coat on top.
+        """Returns this albedo with a coat on top.
 
         weight: clamped to 0 to 1. roughness: 0 to 1. ior: the coat's index of refraction. tint:
-        (3,), by which light that passes through the coat is multiplied. filter_glossy: see
+        (3,), which multiplies the light that passes through the coat. filter_glossy: see
         gloss.filter_glossy_of.
         """
         weight = min(max(weight, 0.0), 1.0)
@@ -116,7 +119,8 @@ class PrincipledAlbedo:
             layer = gloss_albedo(roughness, ior)
             from_above = gloss_albedo(roughness, ior, from_above=True)
             terms = angle_terms(_VIEWS) - MEANS
-            # The length of the path through the coat to each view, relative to its thickness.
+            # The length of the path through the coat to each view, relative to the coat's
+            # thickness.
             depths = 1.0 / np.sqrt(1.0 - (1.0 - _VIEWS[:, None]**2) / max(ior, 1.0)**2)
             tint = np.clip(tint, 0.0, 1.0)
             let_out = 1.0 - weight + weight * tint**depths
@@ -147,10 +151,12 @@ class PrincipledAlbedo:
 
 def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray, opaque: float
              ) -> tuple[Layer, np.ndarray]:
-    """The sheen of a Principled shader: the layer, and the colour (3,) that multiplies its albedo.
+    """Returns the sheen of a Principled shader: the layer, and the colour (3,) that multiplies its
+    albedo.
 
     weight, roughness: of the sockets. tint, base: (3,) linear RGB. opaque: 0 to 1, the share of the
-    surface that is neither metal nor transmits light, which alone has sheen before Blender 4.0.
+    surface that is neither metal nor transmits light. Before Blender 4.0, only this share has
+    sheen.
     """
     if bpy.app.version >= (4, 0, 0):
         return microfibers(roughness), min(max(weight, 0.0), 1.0) * np.maximum(tint, 0.0)
@@ -158,8 +164,8 @@ def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray
 
 
 def _in_hue(base: np.ndarray, share: np.ndarray | float, weights: np.ndarray) -> np.ndarray:
-    """(3,): white, moved by `share` towards the hue of the base colour. weights: (3,), of the
-    luminance by which the base is divided to leave its hue."""
+    """Returns white, moved by `share` towards the hue of the base colour, (3,). weights: (3,), of
+    the luminance by which the base colour is divided to obtain its hue."""
     luminance = float(weights @ base)
     hue = base / luminance if luminance > 0.0 else np.zeros(3)
     return 1.0 + share * (hue - 1.0)
@@ -167,8 +173,8 @@ def _in_hue(base: np.ndarray, share: np.ndarray | float, weights: np.ndarray) ->
 
 def principled_albedo(sockets: PrincipledSockets, filter_glossy: float | None
                       ) -> PrincipledAlbedo:
-    """What the shader reflects of diffuse light, without coat and sheen. filter_glossy: see
-    gloss.filter_glossy_of."""
+    """Returns the diffuse light that the shader reflects, without coat and sheen. filter_glossy:
+    see gloss.filter_glossy_of."""
     is_layered = bpy.app.version >= (4, 0, 0)
     roughness, diffuse_roughness = sockets.roughness, sockets.diffuse_roughness
     multiple = sockets.is_multiscatter
@@ -184,8 +190,8 @@ def principled_albedo(sockets: PrincipledSockets, filter_glossy: float | None
                           for from_above in (False, True))
     under, shown, leaving = 1.0, np.ones(3), np.zeros((TERMS, 3))
     if is_layered:
-        # Light that the layer mirrors towards the eye is missing beneath, alike in all channels and
-        # whatever the direction of the light.
+        # Light that the layer mirrors towards the eye is missing beneath it, equally in all
+        # channels and regardless of the direction of the light.
         shown = shown - layer_above.covering(f0, multiple).max()
         angles = oren_nayar(diffuse_roughness, base)
     else:

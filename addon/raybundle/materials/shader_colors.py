@@ -2,11 +2,11 @@
 """Rewrites the node trees of materials so that they emit one of their own properties.
 
 Cycles then evaluates the property by baking the emission (cycles_bake.py). Each shader is replaced
-by an emission shader of its reflectance, of the diffuse part of that, of its radiance, its
-transmittance or its translucence. Mixes and sums of shaders stay, since all these properties are
-linear in them. The formulas are those of node_reader.py, as nodes: what is linked to a socket stays
-linked to the formula, except for the sockets that gloss depends on (principled.py), which count
-with a constant.
+by an emission shader of its reflectance, of the diffuse part of its reflectance, of its radiance,
+its transmittance or its translucence. Mixes and sums of shaders are kept, because all these
+properties are linear in them. The formulas are those of node_reader.py, built from nodes. Links to
+a socket become links to the formula, except for the sockets that gloss depends on (principled.py):
+constants replace their links.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from .shown_results import reads_result
 
 REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE = (
     'REFLECTANCE', 'DIFFUSE', 'RADIANCE', 'TRANSMITTANCE', 'TRANSLUCENCE')
-# In the order in which they are baked. DIFFUSE equals REFLECTANCE, and need not be baked, where no
+# In the order in which they are baked. DIFFUSE equals REFLECTANCE, and need not be baked, if no
 # shader has gloss, is cloth, or is diffuse with a roughness.
 PROPERTIES = (REFLECTANCE, DIFFUSE, RADIANCE, TRANSMITTANCE, TRANSLUCENCE)
-_USUAL_COLOR = 0.5  # grey that stands for a varying colour in what gloss depends on
+_USUAL_COLOR = 0.5  # grey that replaces a varying colour in the formulas of gloss
 
 # A value in a rewritten tree: an output of a node, or a constant number or colour (a tuple).
 _Value = object
 
 
 class ShaderColors:
-    """Rewrites node trees for one property, in place: the trees must be copies.
+    """Rewrites node trees for one property, in place. The trees must be copies.
 
-    Node groups are copied too; the caller removes the copies, which `groups` lists.
+    Node groups are copied too. `groups` lists the copies, and the caller removes them.
     """
 
     def __init__(self, wanted: str, light_path: dict[str, float], backfacing: bool = False,
                  filter_glossy: float | None = 1.0, results: frozenset[str] = frozenset()
                  ) -> None:
         self.wanted = wanted  # one of PROPERTIES
-        self.results = results  # attributes that hold results of bakes (shown_results.py)
+        self.results = results  # names of attributes that hold results of bakes (shown_results.py)
         self.filter_glossy = filter_glossy  # see gloss.filter_glossy_of
         self.light_path = light_path  # values of the Light Path node's outputs; others are 0
         self.backfacing = backfacing  # value of the Backfacing output
@@ -68,7 +68,7 @@ class ShaderColors:
                 self.has_backfacing = True
                 _replace(tree, node.outputs['Backfacing'], float(self.backfacing))
             elif node.type in ('ATTRIBUTE', 'VERTEX_COLOR'):
-                # The result of a bake emits no light, and as a factor changes nothing.
+                # The result of a bake emits no light, and as a factor it has no effect.
                 for output in node.outputs:
                     if reads_result(node, output, self.results):
                         _replace(tree, output, 0.0 if self.wanted == RADIANCE else 1.0)
@@ -96,14 +96,14 @@ class ShaderColors:
 
 
 def _is_shader(node: bpy.types.Node) -> bool:
-    """Whether the node is a shader, rather than a mix or sum of shaders or a group."""
+    """Returns whether the node is a shader and not a mix or sum of shaders or a group."""
     return (any(item.type == 'SHADER' for item in node.outputs)
             and not any(item.type == 'SHADER' for item in node.inputs)
             and node.type not in ('GROUP', 'GROUP_INPUT', 'REROUTE'))
 
 
 def _replace(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket, value: float) -> None:
-    """Puts a constant in the place of an output."""
+    """Replaces an output by a constant in all links."""
     targets = [link.to_socket for link in output.links]
     if not targets:
         return
@@ -114,7 +114,8 @@ def _replace(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket, value: floa
 
 
 def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: _Value) -> None:
-    """Gives an input a value: links it to an output, or sets its own value to a constant."""
+    """Sets the value of an input: links the input to an output, or sets the input's own value to a
+    constant."""
     if isinstance(value, bpy.types.NodeSocket):
         tree.links.new(value, socket)
     elif isinstance(value, tuple):
@@ -125,7 +126,7 @@ def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: _Value) 
 
 
 class _Formula:
-    """Adds the nodes of a formula to a tree. Operations on constants add no nodes and give
+    """Adds the nodes of a formula to a tree. Operations on constants add no nodes and return
     constants."""
 
     def __init__(self, tree: bpy.types.NodeTree, filter_glossy: float | None) -> None:
@@ -133,14 +134,16 @@ class _Formula:
         self.filter_glossy = filter_glossy
 
     def value(self, node: bpy.types.Node, *names: str) -> _Value:
-        """The number, clamped to 0 to 1, of the node's input with the first name that exists."""
+        """Returns the number, clamped to 0 to 1, of the node's input with the first name that
+        exists."""
         value = self.raw(node, *names)
         if not isinstance(value, bpy.types.NodeSocket):
             return min(max(value, 0.0), 1.0)
         return self._math('ADD', value, 0.0)
 
     def raw(self, node: bpy.types.Node, *names: str) -> _Value:
-        """The value of the node's input with the first name that exists, as it is."""
+        """Returns the value of the node's input with the first name that exists, without a
+        clamp."""
         socket = next(node.inputs[name] for name in names if name in node.inputs)
         if socket.is_linked and not socket.links[0].is_muted:
             return socket.links[0].from_socket
@@ -148,19 +151,19 @@ class _Formula:
         return tuple(value)[:3] if hasattr(value, '__len__') else float(value)
 
     def times(self, a: _Value, b: _Value) -> _Value:
-        """The product of two numbers."""
+        """Returns the product of two numbers."""
         if not isinstance(a, bpy.types.NodeSocket) and not isinstance(b, bpy.types.NodeSocket):
             return a * b
         return self._math('MULTIPLY', a, b, clamp=False)
 
     def rest(self, a: _Value) -> _Value:
-        """1 - a, of a number."""
+        """Returns 1 - a. a: a number."""
         if not isinstance(a, bpy.types.NodeSocket):
             return 1.0 - a
         return self._math('SUBTRACT', 1.0, a)
 
     def scaled(self, color: _Value, factor: _Value) -> _Value:
-        """A colour times a number."""
+        """Returns a colour times a number."""
         if isinstance(color, tuple) and not isinstance(factor, bpy.types.NodeSocket):
             return tuple(component * factor for component in color)
         if factor == 0.0 or color == (0.0, 0.0, 0.0):
@@ -172,13 +175,13 @@ class _Formula:
         return node.outputs[0]
 
     def plus(self, a: _Value, b: _Value) -> _Value:
-        """The sum of two colours."""
+        """Returns the sum of two colours."""
         if isinstance(a, tuple) and isinstance(b, tuple):
             return tuple(x + y for x, y in zip(a, b))
         return self.vector('ADD', a, b)
 
     def tinted(self, color: _Value, tint: np.ndarray) -> _Value:
-        """A colour times a constant colour, (3,), by channel."""
+        """Returns a colour times a constant colour, (3,), by channel."""
         if isinstance(color, tuple):
             return tuple(np.array(color) * tint)
         if np.ptp(tint) == 0.0:
@@ -186,7 +189,8 @@ class _Formula:
         return self.vector('MULTIPLY', color, tuple(tint))
 
     def vector(self, operation: str, a: _Value, b: _Value) -> _Value:
-        """A node of Vector Math on two colours, by channel. operation: as the node names it."""
+        """Adds a Vector Math node on two colours and returns its output. operation: its name in the
+        node."""
         node = self.tree.nodes.new('ShaderNodeVectorMath')
         node.operation = operation
         _set(self.tree, node.inputs[0], a)
@@ -253,7 +257,7 @@ def _rough_diffuse(formula: _Formula, node: bpy.types.Node) -> _Value:
 
 def _base_color(formula: _Formula, node: bpy.types.Node) -> _Value:
     base = formula.raw(node, 'Base Color')
-    # Before 4.0 light that is scattered under the surface has a colour of its own.
+    # Before 4.0, subsurface scattering has a colour of its own.
     if 'Subsurface Color' not in node.inputs:
         return base
     share = formula.value(node, 'Subsurface')
@@ -278,7 +282,8 @@ def _mean_base(formula: _Formula, node: bpy.types.Node) -> np.ndarray:
 
 
 def _principled_shares(formula: _Formula, node: bpy.types.Node) -> tuple[_Value, _Value]:
-    """The shares of the surface that are neither metal nor transmit light, and that are metal."""
+    """Returns two shares of the surface: the share that is neither metal nor transmits light, and
+    the share that is metal."""
     metallic = formula.value(node, 'Metallic')
     opaque = formula.times(formula.rest(metallic),
                            formula.rest(formula.value(node, *_TRANSMISSION)))
@@ -316,14 +321,14 @@ def _sheen(formula: _Formula, node: bpy.types.Node) -> tuple[Layer, np.ndarray]:
 
 def _covered(formula: _Formula, color: _Value, layer: Layer, sheen: np.ndarray, albedo: float
              ) -> _Value:
-    """A colour under sheen. sheen: (3,), the colour of the layer. albedo: of the layer, over all
-    directions or as seen from straight above."""
+    """Returns a colour under sheen. sheen: (3,), the colour of the layer. albedo: of the layer,
+    over all directions or as seen from straight above."""
     return formula.plus(formula.scaled(color, 1.0 - layer.taken(sheen) * albedo),
                         tuple(sheen * albedo))
 
 
 def _under_layers(formula: _Formula, node: bpy.types.Node) -> np.ndarray:
-    """(3,): share of emission and of transmitted light that coat and sheen let out."""
+    """Returns the share of emission and of transmitted light that coat and sheen transmit, (3,)."""
     layer, sheen = _sheen(formula, node)
     return (_principled_albedo(formula, node).uncoated
             * (1.0 - layer.taken(sheen) * layer.albedo))
@@ -369,7 +374,7 @@ def _principled_transmittance(formula: _Formula, node: bpy.types.Node) -> _Value
             formula.times(alpha, through)))
 
 
-# The formula of a property by type of shader. A shader that is not listed has 0 of the property.
+# The formula of a property by type of shader. A shader that is not listed has the value 0.
 _SHADERS: dict[tuple[str, str], Callable[[_Formula, bpy.types.Node], _Value]] = {
     ('BSDF_DIFFUSE', REFLECTANCE): _rough_diffuse,
     ('BSDF_DIFFUSE', DIFFUSE): _color,
