@@ -36,7 +36,7 @@
 namespace raybundle {
 namespace {
 
-constexpr uint32_t kBatch = 16;  // bundles of both halves traced at a time
+constexpr uint32_t kTracedAtOnce = 16;  // bundles of both halves traced at a time
 
 // What sides share in both halves.
 struct Sides {
@@ -132,7 +132,7 @@ class BundleIteration : public Transport {
     explicit BundleIteration(const TransportInput& input) : input(input), sides(makeSides(input)) {
         assert(input.exposed.size() == input.patches.sideCount());
         // Judge by the first bundles, and keep them.
-        std::vector<TracedBundle> traced = input.tracer.trace(kBatch);
+        std::vector<TracedBundle> traced = input.tracer.trace(kTracedAtOnce);
         refuseIfUnstable(traced);
         keep(std::move(traced));
     }
@@ -143,7 +143,7 @@ class BundleIteration : public Transport {
             warmUp = warmUpIterates(largestReflectance(input.patches), kMissing, count / 8);
         for (uint32_t left = count / 2; left > 0;) {
             progress.report(RB_STAGE_BUNDLES, 1 - 2.0 * left / count);
-            if (next == waiting[0].size()) keep(input.tracer.trace(std::min(kBatch, 2 * left)));
+            if (next == waiting[0].size()) keep(input.tracer.trace(std::min(kTracedAtOnce, 2 * left)));
             const uint32_t steps = uint32_t(std::min<size_t>(left, waiting[0].size() - next));
             auto go = [&](size_t half) {
                 for (uint32_t k = 0; k < steps; ++k)
