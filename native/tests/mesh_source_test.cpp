@@ -76,7 +76,7 @@ Mesh tyre(float radius, float width, int around, int across) {
 }
 
 // Returns the mesh with separate vertices for each corner.
-Mesh split(const Mesh& mesh) {
+Mesh withoutCommonVertices(const Mesh& mesh) {
     Mesh result = mesh;
     result.vertices.clear();
     for (size_t c = 0; c < mesh.cornerVertices.size(); ++c) {
@@ -96,7 +96,7 @@ std::vector<Lamp> lamps() {
             {"a plane with holes", turnedGrid(true)},
             {"a box", box("box", {-0.4f, -0.3f, 0.1f}, {0.5f, 0.2f, 0.6f}, false)},
             {"a bulb", icosphere("bulb", 0.5f, 2, false)},
-            {"a bulb of split faces", split(icosphere("bulb", 0.5f, 2, false))},
+            {"a bulb of split faces", withoutCommonVertices(icosphere("bulb", 0.5f, 2, false))},
             {"a ring", ring("ring", 0.6f, 0.1f, 24)},
             {"a tyre", tyre(0.4f, 0.03f, 48, 12)}};
 }

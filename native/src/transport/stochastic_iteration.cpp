@@ -39,7 +39,7 @@ namespace raybundle {
 namespace {
 
 // Number of bundles of both halves that are traced at a time.
-constexpr uint32_t kBatch = 16;
+constexpr uint32_t kTracedAtOnce = 16;
 
 // Properties of the sides and of the light, for both halves. Vectors are per side; `unshot` is in
 // W/m^2.
@@ -141,7 +141,7 @@ class BundleIteration : public Transport {
     explicit BundleIteration(const TransportInput& input) : input(input), sides(makeSides(input)) {
         assert(input.exposed.size() == input.patches.sideCount());
         // The first bundles serve to decide whether the iteration converges, and are then used.
-        std::vector<TracedBundle> traced = input.tracer.trace(kBatch);
+        std::vector<TracedBundle> traced = input.tracer.trace(kTracedAtOnce);
         refuseIfUnstable(traced);
         keep(std::move(traced));
     }
@@ -152,7 +152,8 @@ class BundleIteration : public Transport {
             warmUp = warmUpIterates(largestReflectance(input.patches), kMissing, count / 8);
         for (uint32_t left = count / 2; left > 0;) {
             progress.report(RB_STAGE_BUNDLES, 1 - 2.0 * left / count);
-            if (next == waiting[0].size()) keep(input.tracer.trace(std::min(kBatch, 2 * left)));
+            if (next == waiting[0].size())
+                keep(input.tracer.trace(std::min(kTracedAtOnce, 2 * left)));
             const uint32_t steps = uint32_t(std::min<size_t>(left, waiting[0].size() - next));
             auto go = [&](size_t half) {
                 for (uint32_t k = 0; k < steps; ++k)
