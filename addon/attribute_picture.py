@@ -27,12 +27,12 @@ GREY = (0.18, 0.18, 0.18)
 
 
 def render(context: bpy.types.Context, baked: Collection[str], attribute: str, path: Path) -> None:
-    """baked: names of the objects that have the attribute."""
+    """Renders the attribute of the baked objects, which are given by name."""
     scene = context.scene
     if context.mode != 'OBJECT':
-        # Of a mesh in Edit Mode attributes have no data.
+        # The attributes of a mesh in Edit Mode have no data.
         bpy.ops.object.mode_set(mode='OBJECT')
-    # A linked object may have the name of one of the file's own.
+    # A linked object may have the same name as an object of the file.
     objects = [item for item in scene.objects if item.name in baked and item.type == 'MESH'
                and attribute in item.data.color_attributes]
     if not objects:
@@ -41,7 +41,7 @@ def render(context: bpy.types.Context, baked: Collection[str], attribute: str, p
     own_camera = scene.camera is not None
     if not own_camera:
         scene.camera = _place_camera(scene, objects)
-    # From outside, the near walls of a room must not hide it.
+    # The near walls of a room must not hide its inside from a camera outside.
     _replace_materials(objects, emitters, attribute, hide_backs=not own_camera)
     for item in scene.objects:
         if item.type == 'LIGHT':
@@ -56,7 +56,7 @@ def render(context: bpy.types.Context, baked: Collection[str], attribute: str, p
 
 @contextmanager
 def _silent_stdout() -> Iterator[None]:
-    """Without Cycles' lines about each step, which come from C++ and go past sys.stdout."""
+    """Suppresses the lines that Cycles prints for each step from C++, not through sys.stdout."""
     sys.stdout.flush()
     kept = os.dup(1)
     try:
@@ -70,7 +70,8 @@ def _silent_stdout() -> Iterator[None]:
 
 def _emission_colors(objects: Collection[bpy.types.Object]
                      ) -> dict[bpy.types.Material, tuple[float, float, float]]:
-    """Colour, of full brightness, of materials that emit; none where all do, as in a furnace."""
+    """Returns the colour, scaled to full brightness, of each material that emits. Returns none if
+    all materials emit, as in a furnace."""
     exporter = MaterialExporter(SceneData(), Warnings())
     materials = {slot.material for item in objects for slot in item.material_slots}
     colors = {}
@@ -90,18 +91,18 @@ def _replace_materials(objects: Collection[bpy.types.Object],
     grey = _new_material("Unbaked", hide_backs, color=GREY)
     lamps = {material: _new_material(material.name, hide_backs, color=color)
              for material, color in emitters.items()}
-    # Also those that are not in the scene but in collections it has instances of.
+    # Objects of instanced collections count too, although they are not in the scene.
     for item in bpy.data.objects:
         if item.type not in ('MESH', 'CURVE', 'SURFACE', 'META', 'FONT'):
             continue
-        # What belongs to another file cannot be changed and stays as it is.
+        # Linked data cannot be changed and keeps its look.
         if item.library is not None or not item.material_slots and item.data.library is not None:
             continue
         is_baked = item in objects
         if not item.material_slots:
             item.data.materials.append(light if is_baked else grey)
         for slot in item.material_slots:
-            # On the object, since other objects may share the mesh.
+            # The object gets the material, because other objects may share the mesh.
             lamp = lamps.get(slot.material)
             slot.link = 'OBJECT'
             slot.material = lamp or (light if is_baked else grey)
@@ -135,7 +136,7 @@ def _new_material(name: str, hide_backs: bool, attribute: str = "",
 
 def _place_camera(scene: bpy.types.Scene, objects: Collection[bpy.types.Object]
                   ) -> bpy.types.Object:
-    """A camera that sees all baked objects from above, in front and the left."""
+    """Returns a camera that sees all baked objects from above, from the front and the left."""
     corners = np.array([item.matrix_world @ Vector(corner)
                         for item in objects for corner in item.bound_box])
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -144,7 +145,7 @@ def _place_camera(scene: bpy.types.Scene, objects: Collection[bpy.types.Object]
     item = bpy.data.objects.new("Camera", camera)
     scene.collection.objects.link(item)
     direction = Vector((-0.55, -1.0, 0.65)).normalized()
-    # The bounding sphere fills the narrower, vertical angle of the picture.
+    # The bounding sphere fills the vertical angle of the picture, which is the narrower one.
     camera.angle = math.radians(40.0)
     narrow = math.atan(math.tan(camera.angle / 2.0) * MAX_HEIGHT / MAX_WIDTH)
     distance = max(radius, 1e-3) / math.sin(narrow)
@@ -163,7 +164,7 @@ def _set_up_cycles(scene: bpy.types.Scene) -> None:
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
     cycles.max_bounces = 0
-    # Culled back sides may lie behind each other.
+    # A ray may meet several culled back sides in a row.
     cycles.transparent_max_bounces = 8
     cycles.film_exposure = 1.0
     render = scene.render
@@ -191,7 +192,7 @@ def _set_up_view_layer(view_layer: bpy.types.ViewLayer) -> None:
 
 def _set_exposure(scene: bpy.types.Scene, objects: Collection[bpy.types.Object], attribute: str
                   ) -> None:
-    """Keep the file's exposure where most of the light is shown by it, else fit it."""
+    """Keeps the exposure of the file if it shows most of the light, else fits the exposure."""
     values = []
     for item in objects:
         data = item.data.color_attributes[attribute].data

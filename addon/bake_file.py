@@ -26,7 +26,7 @@ import attribute_picture  # noqa: E402
 import raybundle  # noqa: E402
 from raybundle.properties import assign, enum_skip  # noqa: E402
 
-# Between two lines of progress within a stage.
+# Seconds between two lines of progress within a stage.
 PROGRESS_SECONDS = 1.0
 MOST_IMBALANCE = 0.01  # as in native/src/bake/bake.cpp
 
@@ -45,32 +45,32 @@ def main(arguments: list[str]) -> None:
 
     report = raybundle.bake(bpy.context, ProgressLines())
     _write_whole(out / f"{name}.json", report.to_json(indent=2) + "\n")
-    # Without a backup of the result of an earlier run beside it.
+    # No backup of the result of an earlier run is kept beside the file.
     bpy.context.preferences.filepaths.save_version = 0
-    # Textures and libraries beside the original must still be found from the new place.
+    # Paths of textures and libraries relative to the original must also work from the new place.
     bpy.ops.wm.save_as_mainfile(filepath=str(out / f"{name}.baked.blend"), relative_remap=True,
                                 compress=True, copy=True)
-    # From here on the open file is changed for the picture; it is not saved again.
+    # The picture changes the open file, which is therefore not saved after this.
     baked = {item.name for item in report.objects if item.status.startswith('baked')}
     no_picture = _draw_picture(baked, scene.raybundle.attribute, out / f"{name}.png")
     _print_summary(report, out, name, no_picture)
 
 
 def _check_writable(out: Path) -> None:
-    """Raises OSError: rather before the bake than after it."""
+    """Raises OSError if the folder cannot be written to, before time is spent on a bake."""
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=out):
         pass
 
 
 def _draw_picture(baked: set[str], attribute: str, path: Path) -> str:
-    """Returns why there is none, or nothing."""
+    """Writes the picture. Returns the reason if there is none, else an empty string."""
     try:
-        # Not that of an earlier bake.
+        # The picture of an earlier bake must not stay.
         path.unlink(missing_ok=True)
         attribute_picture.render(bpy.context, baked, attribute, path)
         return "" if path.is_file() else "Blender wrote none"
-    except Exception as error:  # Of whatever kind: the bake itself is done and saved.
+    except Exception as error:  # of any kind: the bake is saved already
         return (str(error).strip() or type(error).__name__).splitlines()[0]
 
 
@@ -97,7 +97,7 @@ def _apply(scene: bpy.types.Scene, assignment: str) -> None:
 
 
 class ProgressLines:
-    """A line when a stage begins, and after each second in it."""
+    """Prints a line when a stage begins and after each second of the stage."""
 
     def __init__(self) -> None:
         self._stage = ""
@@ -112,7 +112,7 @@ class ProgressLines:
 
 
 def _write_whole(path: Path, text: str) -> None:
-    """Writes a file, or on failure leaves the one that was there."""
+    """Writes a file. On failure an existing file stays as it was."""
     part = path.with_name(path.name + ".part")
     try:
         part.write_text(text)
@@ -123,7 +123,7 @@ def _write_whole(path: Path, text: str) -> None:
 
 def _print_summary(report: raybundle.BakeReport, out: Path, name: str, no_picture: str) -> None:
     if report.energy['balance_error'] > MOST_IMBALANCE:
-        # The bake's first warning: light that is lost or made is worse than noise.
+        # This warning comes first, because lost or created light is worse than noise.
         print(f"warning: {report.warnings[0]}")
     print(report.summary())
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
@@ -150,7 +150,7 @@ if __name__ == "__main__":
     try:
         main(given)
     except (raybundle.BakeError, raybundle.RaybundleError, ValueError, OSError,
-            RuntimeError) as error:  # the last: Blender's own, of operators such as saving
+            RuntimeError) as error:  # RuntimeError: of Blender's operators
         print(f"bake: {error}", file=sys.stderr, flush=True)
-        # Blender itself would print a traceback and go on.
+        # Otherwise Blender would print a traceback and continue.
         os._exit(1)

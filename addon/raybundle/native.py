@@ -121,7 +121,6 @@ class _Surface(ctypes.Structure):
                 ('burley_sheen', _Lobe), ('several_facets', _Lobe), ('diffuse', _Diffuse)]
 
 
-
 class _SettingInfo(ctypes.Structure):
     """rb_setting_info."""
 
@@ -532,7 +531,7 @@ class Scene(_Handle):
     def set_result_corners(self, instance: int, corners: np.ndarray) -> None:
         """Limits the results of an instance to some corners. corners: (k,), the corners of the
         instance's mesh whose light will be read."""
-        corners = np.ascontiguousarray(corners, np.int32)
+        corners = _int_array(corners, (None,), "corners")
         self._library.rb_set_result_corners(self._pointer, instance, _as_ints(corners),
                                             len(corners))
 

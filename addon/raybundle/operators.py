@@ -124,7 +124,7 @@ class RAYBUNDLE_OT_light_set_add(_NeedsScene, bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_light_set_remove(bpy.types.Operator):
-    """Remove the light set that is shown; what was baked of it stays until Clear"""
+    """Remove the selected light set; its baked attributes stay until Clear"""
     bl_idname = "raybundle.light_set_remove"
     bl_label = "Remove Light Set"
     bl_options = {'REGISTER', 'UNDO'}

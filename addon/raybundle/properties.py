@@ -168,7 +168,8 @@ class RaybundleLightSet(bpy.types.PropertyGroup):
         name="Enabled", description="Bake the set into an attribute of its own", default=True)
     collection: PointerProperty(
         name="Collection",
-        description="Its lights and emissive objects, those of its children included, are the set",
+        description="The lights and emissive objects of this collection and its children form "
+                    "the set",
         type=bpy.types.Collection)
     world: BoolProperty(
         name="World", description="The light of the world belongs to the set", default=False)
@@ -304,13 +305,13 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     report: StringProperty(
         name="Report", description="The report of the last bake, as JSON")
     last_surfaces: StringProperty(
-        name="Last Surfaces", description="What the last bake took the materials for, as JSON",
+        name="Last Surfaces", description="The surfaces of the materials in the last bake, as JSON",
         options={'HIDDEN'})
 
 
 class RaybundleObjectSettings(bpy.types.PropertyGroup):
     role: EnumProperty(
-        name="Role", description="What the object is to the bake", items=enum_role,
+        name="Role", description="What the object does in a bake", items=enum_role,
         default='BAKE')
     side: EnumProperty(
         name="Side", description="The side of the faces whose light is baked", items=enum_side,
@@ -319,8 +320,8 @@ class RaybundleObjectSettings(bpy.types.PropertyGroup):
         name="Source", description="The object that this one is the subdivided copy of",
         type=bpy.types.Object, poll=_is_mesh_object)
     last_surfaces: StringProperty(
-        name="Last Surfaces", description="Those of the scene's table that the last bake took the "
-                                          "material slots for",
+        name="Last Surfaces",
+        description="The surfaces of the material slots in the last bake, in the scene's table",
         options={'HIDDEN'})
 
 
