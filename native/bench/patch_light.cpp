@@ -151,7 +151,7 @@ PatchLight referenceLight(const Scene& scene, const Settings& like, int bundles)
         light.exposed[i] = exposedShare(patches, visibility, side);
         const double concentrated = light.exposed[i] > 0 ? 1 / double(light.exposed[i]) : 0;
         light.direct[i] +=
-            glm::vec3(concentrated * gathered) - bake.patchIrradiance().gathered[side];
+            glm::vec3(concentrated * gathered) - bake.patchIrradiance().ofSources[side];
     });
     return light;
 }

@@ -43,7 +43,7 @@ class LitMesh {
         for (uint32_t p = 0; p < patches.count(); ++p) {
             double mean = 0;
             forEachPoint(p, [&](glm::dvec2, double light) { mean += light; });
-            irradiance.direct[2 * p] = irradiance.gathered[2 * p] =
+            irradiance.direct[2 * p] = irradiance.ofSources[2 * p] =
                 glm::vec3(float(mean / (kSteps * kSteps)));
         }
     }

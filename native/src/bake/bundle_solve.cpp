@@ -229,8 +229,8 @@ SideNoise keepFirstShot(const SolveInput& in, SetLights& lights, std::vector<flo
     std::vector<std::array<Irradiance, 2>> halves;
     for (SetLight& light : lights) {
         HandOver first = handOver({patches, exposed}, light.shot);
-        light.irradiance.gathered = first.gathered;
-        light.irradiance.direct = std::move(first.gathered);
+        light.irradiance.ofSources = first.ofSources;
+        light.irradiance.direct = std::move(first.ofSources);
         light.irradiance.indirect = std::move(first.indirect);
         const Irradiance mean = meanOver(in.tiles, light.irradiance, weight);
         halves.push_back({mean, mean});

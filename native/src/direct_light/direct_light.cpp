@@ -48,14 +48,14 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
     : DirectLight(scene, patches, visibility, seed, skips,
                   std::make_unique<const EmissionSplit>(
                       splitEmission(scene, patches, visibility, lightSet, seed, skips))) {
-    sources = raybundle::lightSources(scene, patches, split->isSource, split->gathered, lightSet);
+    sources = raybundle::lightSources(scene, patches, split->isSource, split->ofSources, lightSet);
 }
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                          uint32_t seed, const Skips& skips, EmissionSplit reflected)
     : DirectLight(scene, patches, visibility, seed, skips,
                   std::make_unique<const EmissionSplit>(std::move(reflected))) {
-    sources = meshSources(scene, patches, split->isSource, split->gathered, split->directed.get());
+    sources = meshSources(scene, patches, split->isSource, split->ofSources, split->directed.get());
 }
 
 DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,

@@ -175,7 +175,7 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
         if (!patches.parentAt(side).exchanges) continue;
         if (brightest(split.emitted[side]) > limits[patches.parentAt(side).island]) {
             split.isSource[side] = true;
-            split.gathered[side] = patches.opacityOf(patchOf(side)) * split.emitted[side];
+            split.ofSources[side] = patches.opacityOf(patchOf(side)) * split.emitted[side];
         } else {
             split.bundled[side] = split.emitted[side];
         }

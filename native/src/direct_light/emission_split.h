@@ -21,11 +21,11 @@ namespace raybundle {
 
 // The emission of a light set, per side, W/m^2.
 struct EmissionSplit {
-    std::vector<glm::vec3> emitted;   // all emission of the light set
-    std::vector<glm::vec3> gathered;  // emission of the sources, for the whole patch area
-    std::vector<glm::vec3> bundled;   // emission that is left to the bundles
-    std::vector<bool> isSource;       // whether the side's emission is gathered
-    // The difference of what sides send towards a direction from `gathered`; null if there is none.
+    std::vector<glm::vec3> emitted;    // all emission of the light set
+    std::vector<glm::vec3> ofSources;  // emission of the sources, for the whole patch area
+    std::vector<glm::vec3> bundled;    // emission that is left to the bundles
+    std::vector<bool> isSource;        // whether the side is a light source
+    // The difference of what sides send towards a direction from `ofSources`; null if there is none.
     std::shared_ptr<const DirectedEmission> directed{};
     // Number of sides whose emission no surface can receive, and their power, W. The members above
     // leave this emission out.

@@ -120,12 +120,12 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
     };
     const double spared = bundlesFor(inSpots + inRest) - bundlesFor(inRest);
     if (!(spared > kWorthwhileBundles * double(objects.size()))) return spots;
-    spots.gathered.resize(n);
+    spots.ofSources.resize(n);
     spots.isSource.resize(n);
     for (size_t side = 0; side < n; ++side)
         if (exitance[side] > kBright * mean && isUncovered(input, exchange, uint32_t(side))) {
             spots.isSource[side] = true;
-            spots.gathered[side] = reflected(patches, shot, side);
+            spots.ofSources[side] = reflected(patches, shot, side);
         }
     return spots;
 }

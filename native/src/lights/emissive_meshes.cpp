@@ -56,7 +56,7 @@ void joinMany(Groups& groups) {
 }  // namespace
 
 std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
-                                                      const std::vector<bool>& gatheredSides,
+                                                      const std::vector<bool>& sourceSides,
                                                       const std::vector<glm::vec3>& emission,
                                                       const DirectedEmission* directed) {
     std::vector<std::unique_ptr<LightSource>> sources;
@@ -64,7 +64,7 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
     std::map<Group, std::vector<uint32_t>> groups;
     for (size_t p = 0; p < patches.parents.size(); ++p) {
         const Parent& parent = patches.parents[p];
-        const auto first = gatheredSides.begin() + 2 * int64_t(parent.firstPatch);
+        const auto first = sourceSides.begin() + 2 * int64_t(parent.firstPatch);
         if (std::none_of(first, first + 2 * int64_t(parent.patchCount()),
                          [](bool isGathered) { return isGathered; }))
             continue;

@@ -12,12 +12,12 @@
 
 namespace raybundle {
 
-// Returns the light sources of the sides that `gatheredSides` marks. `emission` is per side of all
+// Returns the light sources of the sides that `sourceSides` marks. `emission` is per side of all
 // patches, averaged over the whole patch, W/m^2, and 0 for sides that are not marked. `directed`
 // adds the dependence of the emission on the direction; null if there is none. All arguments must
-// outlive the sources, except `gatheredSides`.
+// outlive the sources, except `sourceSides`.
 std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
-                                                      const std::vector<bool>& gatheredSides,
+                                                      const std::vector<bool>& sourceSides,
                                                       const std::vector<glm::vec3>& emission,
                                                       const DirectedEmission* directed);
 

@@ -40,7 +40,7 @@ PatchPoint LightSource::placeOn(const ReceiverPlace& patch, glm::vec2 uv) const 
 }
 
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
-                                                       const std::vector<bool>& gatheredSides,
+                                                       const std::vector<bool>& sourceSides,
                                                        const std::vector<glm::vec3>& emission,
                                                        int32_t lightSet) {
     std::vector<std::unique_ptr<LightSource>> sources;
@@ -65,7 +65,7 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
         sources.back()->shape = hasher.value();
     }
 
-    for (auto& source : meshSources(scene, patches, gatheredSides, emission, nullptr))
+    for (auto& source : meshSources(scene, patches, sourceSides, emission, nullptr))
         sources.push_back(std::move(source));
     return sources;
 }

@@ -197,10 +197,10 @@ class LightSource {
 
 // Returns all sources of a light set whose light the first shot gathers: the lamps, the image of
 // the world if it is in the light set, and the emissive faces (lights/emissive_meshes.h).
-// `gatheredSides` marks the patch sides whose emission is gathered; `emission` is per patch side,
+// `sourceSides` marks the patch sides that are light sources; `emission` is per patch side,
 // W/m^2. `scene`, `patches` and `emission` must outlive the sources.
 std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
-                                                       const std::vector<bool>& gatheredSides,
+                                                       const std::vector<bool>& sourceSides,
                                                        const std::vector<glm::vec3>& emission,
                                                        int32_t lightSet = kNoLightSet);
 

@@ -33,7 +33,7 @@ struct Receiver {
     bool passingOnly = false;
     float errorFactor = 1;  // factor on the error that the receiver may have
     bool isShown = true;    // false: the result shows only light that this receiver reflects
-    // Irradiance that the receiver gets besides the gathered light, brightest channel, W/m^2.
+    // Irradiance that the receiver gets besides the light of the sources, brightest channel, W/m^2.
     float otherLight = 0;
 };
 

@@ -60,7 +60,7 @@ Group joined(Group a, Group b) {
 
 // Joins groups whose middles lie in one cell of a grid. The grid is coarsened until at most
 // kMostMembers groups are left.
-std::vector<Group> gathered(std::vector<Group> groups) {
+std::vector<Group> joinedByGrid(std::vector<Group> groups) {
     Extent all;
     for (const Group& group : groups) all.add(group.extent);
     for (double cells = 256; groups.size() > kMostMembers; cells /= 2) {
@@ -82,7 +82,7 @@ std::vector<Group> gathered(std::vector<Group> groups) {
 template <class Belong>
 std::vector<Group> groupsOf(std::vector<Group> open, const Belong& belong) {
     std::vector<Group> groups;
-    open = gathered(std::move(open));
+    open = joinedByGrid(std::move(open));
     std::sort(open.begin(), open.end(), [](const Group& a, const Group& b) {
         auto key = [](const Group& g) {
             return std::make_tuple(-g.extent.diagonal(), g.extent.low.x, g.extent.low.y,

@@ -45,9 +45,9 @@ void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const Sh
             own[count++] = node;
         });
         const uint32_t at = 2 * parent.firstPatch + uint32_t(surface.side);
-        const glm::vec3 gathered = light.irradiance.gathered[at];
+        const glm::vec3 ofSources = light.irradiance.ofSources[at];
         // On translucent patches the slopes of the light on both sides would be needed.
-        if (!isAlone || gathered == glm::vec3(0.0f) ||
+        if (!isAlone || ofSources == glm::vec3(0.0f) ||
             patches.translucenceOf(at) != glm::vec3(0.0f))
             continue;
         // Slopes that are small compared with the target error are left out.
@@ -58,7 +58,7 @@ void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const Sh
         for (size_t k = 0; k < count; ++k)
             values[k] = glm::max(mean + (values[k] - mean) / (1 - kOffCorner), 0.0f);
         for (int c = 0; c < 3; ++c)
-            if (mean[c] > 0) share[c] = std::min(1.0f, gathered[c] / mean[c]);
+            if (mean[c] > 0) share[c] = std::min(1.0f, ofSources[c] / mean[c]);
         for (size_t k = 0; k < count; ++k) {
             glm::vec3 &direct = nodes.direct[own[k]], &exitance = nodes.exitance[own[k]];
             const glm::vec3 flat = direct;

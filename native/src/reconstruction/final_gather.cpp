@@ -126,7 +126,7 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
         const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
                            hash(receiver.seed, kParts)};
         sum.reflected += shotReflectance(patches, light.shot, *hit) *
-                         (light.direct.sample(met, i) - light.irradiance.gathered[*hit]);
+                         (light.direct.sample(met, i) - light.irradiance.ofSources[*hit]);
     }
 }
 
@@ -164,7 +164,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
             const uint32_t at = 2 * (parent.firstPatch + k) + uint32_t(side);
             const std::array<float, 4> shares = cornerWeights.of(p, k).corner;
             const Irradiance& h = light.irradiance;
-            glm::vec3 difference = -(h.direct[at] - h.gathered[at] + h.indirect[at]);
+            glm::vec3 difference = -(h.direct[at] - h.ofSources[at] + h.indirect[at]);
             for (size_t a = 0; a < 4; ++a) {
                 if (cell.corner[a] < 0) continue;
                 const uint32_t node = regions.nodeOf[size_t(cell.corner[a])];

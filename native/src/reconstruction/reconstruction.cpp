@@ -77,7 +77,7 @@ std::vector<SideLight> sideLights(const ReconstructionInput& input, bool gathers
         if (gathersCorners) {
             Irradiance all = shown.of(light.irradiance, exposed);
             for (size_t side = 0; side < all.direct.size(); ++side)
-                all.direct[side] -= all.gathered[side];
+                all.direct[side] -= all.ofSources[side];
             out.carried = std::move(all.direct);
             out.indirect = std::move(all.indirect);
         }

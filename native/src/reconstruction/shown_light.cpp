@@ -91,8 +91,8 @@ Irradiance ShownLight::of(const SetLight& light, const std::vector<float>& expos
     for (size_t side = 0; side < fromEverywhere.size(); ++side) {
         const glm::vec3 factor = fromEverywhere[side], fromSources = ofSources(side, light.shot);
         own.direct[side] =
-            fromSources * own.gathered[side] + factor * (own.direct[side] - own.gathered[side]);
-        own.gathered[side] *= fromSources;
+            fromSources * own.ofSources[side] + factor * (own.direct[side] - own.ofSources[side]);
+        own.ofSources[side] *= fromSources;
         own.indirect[side] *= factor;
     }
     if (!isOwnAlone()) mixSides(own, light.irradiance, exposed);
@@ -112,7 +112,7 @@ void ShownLight::mixSides(Irradiance& own, const Irradiance& arriving,
             shownOf[side] = of(side, shownOf[side], others[opposite(side)], exposed);
     };
     mix(own.direct, arriving.direct);
-    mix(own.gathered, arriving.gathered);
+    mix(own.ofSources, arriving.ofSources);
     mix(own.indirect, arriving.indirect);
 }
 

@@ -79,7 +79,7 @@ void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, do
     Irradiance irradiance(patches.sideCount());
     std::vector<float> error(patches.sideCount());
     for (size_t side = 0; side < error.size(); ++side) {
-        irradiance.direct[side] = irradiance.gathered[side] = shot.gathered[side].irradiance;
+        irradiance.direct[side] = irradiance.ofSources[side] = shot.gathered[side].irradiance;
         error[side] = std::sqrt(shot.gathered[side].variance);
     }
     const std::vector<float> exposed(patches.sideCount(), 1.0f);

@@ -23,9 +23,9 @@ struct BroughtByLines {
     double open = 0;        // area times the share of lines that leave the scene, m^2
 };
 
-// Returns the irradiance that lines bring to a side: all but the gathered light, W/m^2.
+// Returns the irradiance that lines bring to a side: all but the light of the sources, W/m^2.
 glm::vec3 byLines(const Irradiance& irradiance, size_t side) {
-    return irradiance.all(side) - irradiance.gathered[side];
+    return irradiance.all(side) - irradiance.ofSources[side];
 }
 
 // Returns the index of a side's object and orientation: 2 * instance, + 1 for backs.
@@ -65,7 +65,7 @@ void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
     for (size_t side = 0; side < patches.sideCount(); ++side) {
         const double exposed = double(surfaces.exposed[side]);
         if (!patches.parentAt(uint32_t(side)).exchanges) {
-            absorbed += exposed * power(patches, side, irradiance.gathered[side]);
+            absorbed += exposed * power(patches, side, irradiance.ofSources[side]);
             continue;
         }
         const BroughtByLines& others = brought[objectSide(patches, side)];
@@ -79,11 +79,12 @@ void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
         }
         open = std::max(0.0f, open);
         glm::vec3 reflected = patches.reflectance[side] * ofLines +
-                              shotReflectance(patches, shot, side) * irradiance.gathered[side] +
+                              shotReflectance(patches, shot, side) * irradiance.ofSources[side] +
                               passedOn(surfaces, side, irradiance.all(opposite(side)));
         if (!irradiance.byAngle.empty()) reflected += irradiance.byAngle[side];
         emitted += exposed * power(patches, side, shot.emission[side] + open * worldExitance);
-        absorbed += exposed * power(patches, side, irradiance.gathered[side] + ofLines - reflected);
+        absorbed +=
+            exposed * power(patches, side, irradiance.ofSources[side] + ofLines - reflected);
         escaped += exposed * power(patches, side, open * (shot.emission[side] + reflected));
     }
     // In a closed scene the redirected power is noise and stays in the balance.

@@ -165,7 +165,7 @@ class Sites {
     uint32_t sideOf(uint32_t patch) const { return 2 * patch + uint32_t(side); }
     glm::vec3 allLight(uint32_t patch) const { return irradiance.all(sideOf(patch)); }
     const glm::vec3& lightOfSources(uint32_t patch) const {
-        return irradiance.gathered[sideOf(patch)];
+        return irradiance.ofSources[sideOf(patch)];
     }
 
     // Adds patch `b` to the normal equations of the gradients at patch `a`.

@@ -75,7 +75,7 @@ class ClusteredReuse : public Transport {
   private:
     Irradiance spread(Irradiance light) const {
         light.direct = clusters.spread(light.direct);
-        light.gathered = clusters.spread(light.gathered);
+        light.ofSources = clusters.spread(light.ofSources);
         light.indirect = clusters.spread(light.indirect);
         light.byAngle = clusters.spread(light.byAngle);
         if (light.scattered) {

@@ -60,7 +60,7 @@ constexpr double kMostMade = 1e-4;
 // Returns the irradiance that lines and rays bring to a side, W/m^2. `already` is the result of
 // alreadyIndirect().
 glm::vec3 broughtTo(uint32_t side, const Irradiance& light, const glm::vec3& already) {
-    return light.all(side) - light.gathered[side] - already;
+    return light.all(side) - light.ofSources[side] - already;
 }
 
 // Joins the estimate from `lines` lines with the sums that `rays` rays brought.
@@ -68,10 +68,10 @@ void blend(Irradiance& light, uint32_t side, float lines, const Brought& brought
            const glm::vec3& already) {
     if (!(rays > 0)) return;
     const float share = 1 / (lines + kLinesOfRay * rays);
-    const glm::vec3 carried = light.direct[side] - light.gathered[side];
+    const glm::vec3 carried = light.direct[side] - light.ofSources[side];
     const glm::vec3 reflected = light.indirect[side] - already;
     light.direct[side] =
-        light.gathered[side] + share * (lines * carried + kLinesOfRay * brought.carried);
+        light.ofSources[side] + share * (lines * carried + kLinesOfRay * brought.carried);
     light.indirect[side] = already + share * (lines * reflected + kLinesOfRay * brought.reflected);
 }
 
@@ -163,7 +163,7 @@ class ExtraGather {
             made += own * glm::dvec3(change[w]);
             changed += own * glm::abs(glm::dvec3(change[w]));
         }
-        for (uint32_t side = 0; side < light.gathered.size(); ++side)
+        for (uint32_t side = 0; side < light.ofSources.size(); ++side)
             all += absorbing(side) * glm::dvec3(light.all(side));
         glm::vec3 share(0.0f);
         for (int c = 0; c < 3; ++c)
@@ -181,7 +181,7 @@ class ExtraGather {
                 if (now[c] > 0)
                     factor[c] = std::max(0.0f, 1 - share[c] * std::abs(change[w][c]) / now[c]);
             glm::vec3 &direct = light.direct[side], &indirect = light.indirect[side];
-            direct = light.gathered[side] + factor * (direct - light.gathered[side]);
+            direct = light.ofSources[side] + factor * (direct - light.ofSources[side]);
             indirect = already + factor * (indirect - already);
         }
     }

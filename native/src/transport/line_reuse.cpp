@@ -168,7 +168,7 @@ Irradiance LineReuse::solvePassed(Half half, float tolerance, LineSolution& gues
     };
     if (passed.empty()) {
         const HandOver first = handOver({patches, exposed}, shot);
-        passOn(first.gathered, first.indirect);
+        passOn(first.ofSources, first.indirect);
         passed = next;
     }
     for (int pass = 1;; ++pass) {
@@ -201,7 +201,7 @@ Irradiance LineReuse::solveReflected(Half half, float tolerance, LineSolution& g
     // Exitance, W/m^2. scaledSystem() divides it by the scale.
     Field rightSide(n);
     forEachSide(n, [&](size_t i) {
-        glm::vec3 carried = result.direct[i] - first.gathered[i];
+        glm::vec3 carried = result.direct[i] - first.ofSources[i];
         if (!known.empty()) carried += known[i];
         glm::vec3 unshot = patches.reflectance[i] * carried;
         if (!byAngle.reflected.empty()) unshot += byAngle.reflected[i];
@@ -251,7 +251,7 @@ void LineReuse::addDirect(LineSystem& lines, const HandOver& first, Irradiance& 
     const glm::vec3 worldExitance = glm::pi<float>() * worldRadiance;
     if (hasEmission) lines.send([&](size_t i) { return lines.x(i) * shot.emission[i]; });
     forEachSide(lines.sideCount(), [&](size_t i) {
-        light.gathered[i] = light.direct[i] = first.gathered[i];
+        light.ofSources[i] = light.direct[i] = first.ofSources[i];
         if (lines.m(i) == 0) return;
         glm::vec3 sum = lines.skyLines(i) * worldExitance;
         if (hasEmission) sum += lines.brought(i);

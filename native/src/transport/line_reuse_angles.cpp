@@ -157,7 +157,7 @@ double LineReuse::findAngles(const LineWeights& weights, const std::vector<glm::
         const glm::vec3 more = sumOfTerms(patches.byAngle[i], terms / sum - kEverywhere);
         byAngle.reflected[i] =
             glm::clamp(more, -patches.reflectance[i], kMostReflectance - patches.reflectance[i]) *
-            (light.all(i) - light.gathered[i]);
+            (light.all(i) - light.ofSources[i]);
     });
     if (scattered.isNone()) return 0;
     double bent = 0, all = 0;

@@ -160,7 +160,7 @@ class LineReuseTransport : public Transport {
         }
         for (size_t i = 0; i < source.size(); ++i)
             source[i] +=
-                passedOn(surfaces, i, first.gathered[opposite(i)] + first.indirect[opposite(i)]);
+                passedOn(surfaces, i, first.ofSources[opposite(i)] + first.indirect[opposite(i)]);
         for (uint32_t half = 0; half < 2; ++half) {
             const Irradiance start =
                 solver.solve(Half(half), kStartTolerance, last.of[half].reflected);
@@ -169,7 +169,7 @@ class LineReuseTransport : public Transport {
                                    std::vector<glm::vec3>(n), std::vector<glm::vec3>(n)};
             for (size_t i = 0; i < n; ++i) {
                 byLines.lines[i] = float(input.counts.total[i][half]);
-                byLines.direct[i] = start.direct[i] - start.gathered[i];
+                byLines.direct[i] = start.direct[i] - start.ofSources[i];
                 byLines.indirect[i] = start.indirect[i] - first.indirect[i];
             }
             streaming[half].emplace(surfaces, byLines, source, input.shot.emission,
@@ -187,7 +187,7 @@ class LineReuseTransport : public Transport {
 
     Irradiance streamed(Half half) {
         Irradiance result(input.patches.sideCount());
-        result.gathered = result.direct = first.gathered;
+        result.ofSources = result.direct = first.ofSources;
         result.indirect = first.indirect;
         std::vector<glm::vec3>& exitance = last.of[size_t(half)].reflected;
         last.of[size_t(half)].brought.clear();

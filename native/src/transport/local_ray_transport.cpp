@@ -95,8 +95,8 @@ Irradiance LocalRayTransport::irradiance(Half half, float) {
         const double perPower = samples > 0 && rays.area(side) > 0
                                     ? 1 / (double(rays.area(side)) * double(samples))
                                     : 0;
-        result.gathered[side] = first.gathered[side];
-        result.direct[side] = first.gathered[side] + glm::vec3(perPower * direct);
+        result.ofSources[side] = first.ofSources[side];
+        result.direct[side] = first.ofSources[side] + glm::vec3(perPower * direct);
         result.indirect[side] = first.indirect[side] + glm::vec3(perPower * indirect);
     }
     return result;

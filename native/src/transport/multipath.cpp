@@ -136,7 +136,7 @@ class Multipath : public Transport {
     Irradiance irradiance(Half half, float) override {
         const size_t n = input.patches.sideCount();
         Irradiance result(n);
-        result.gathered = result.direct = first.gathered;
+        result.ofSources = result.direct = first.ofSources;
         result.indirect = first.indirect;
         for (int h = 0; h < 2; ++h) {
             if (half != Half::BOTH && h != int(half)) continue;
@@ -170,7 +170,7 @@ class Multipath : public Transport {
                 ambient += double(rest.area[i]) * sumOfChannels(rest.irradiance);
                 all += sumOfChannels(estimate.direct[i] + estimate.indirect[i]) +
                        estimate.bundles * input.exposedArea(i) *
-                           sumOfChannels(first.gathered[i] + first.indirect[i]);
+                           sumOfChannels(first.ofSources[i] + first.indirect[i]);
             }
             if (all > 0) worst = std::max(worst, 0.5 * ambient / all);
         }

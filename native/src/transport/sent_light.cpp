@@ -17,8 +17,8 @@ SentLight::SentLight(const LitSurfaces& surfaces, const FirstShot& shot,
     const bool isBeyond = of == Of::BEYOND_FIRST_SHOT && !shot.unshot.empty();
     for (size_t side = 0; side < mean.size(); ++side) {
         glm::vec3 arriving =
-            irradiance.direct[side] - irradiance.gathered[side] + irradiance.indirect[side];
-        glm::vec3 sent = shotReflectance(patches, shot, side) * irradiance.gathered[side];
+            irradiance.direct[side] - irradiance.ofSources[side] + irradiance.indirect[side];
+        glm::vec3 sent = shotReflectance(patches, shot, side) * irradiance.ofSources[side];
         if (isBeyond) {
             const float concentrated = exposed[side] > 0 ? 1 / exposed[side] : 0;
             arriving -= concentrated * shot.indirect[side];

@@ -15,7 +15,7 @@ bool SetLight::isDark() const {
 Irradiance meanOver(const Tiles& tiles, const Irradiance& light, const std::vector<float>& weight) {
     Irradiance result;
     result.direct = tiles.mean(light.direct, weight);
-    result.gathered = tiles.mean(light.gathered, weight);
+    result.ofSources = tiles.mean(light.ofSources, weight);
     result.indirect = tiles.mean(light.indirect, weight);
     return result;
 }

@@ -94,7 +94,7 @@ void StarvedSides::castRaysOf(size_t k) {
     }
     weights[k] = weight;
     if (weight == 0) return;
-    const glm::vec3 fromSources = shotLight.gathered[side];
+    const glm::vec3 fromSources = shotLight.ofSources[side];
     const glm::vec3 lineDirect = irradiance.direct[side] - fromSources;
     irradiance.direct[side] = fromSources + (lines * lineDirect + direct) / weight;
     known[k] = lines * (irradiance.indirect[side] - shotLight.indirect[side]) + byDirection;
@@ -124,7 +124,7 @@ bool StarvedSides::sweep(std::vector<glm::vec3>& sent, std::vector<glm::vec3>& n
         irradiance.indirect[side] = shotLight.indirect[side] + arriving;
         next[k] = shotLight.unshot[side] +
                   patches.reflectance[side] *
-                      (irradiance.direct[side] - shotLight.gathered[side] + arriving);
+                      (irradiance.direct[side] - shotLight.ofSources[side] + arriving);
     });
     glm::vec3 change(0.0f), most(0.0f);
     for (size_t k = 0; k < starved.size(); ++k) {

@@ -174,8 +174,8 @@ class BundleIteration : public Transport {
         Irradiance result(sides.unshot.size());
         for (size_t i = 0; i < sides.unshot.size(); ++i) {
             const auto [direct, indirect] = mean(half, i);
-            result.gathered[i] = first.gathered[i];
-            result.direct[i] = first.gathered[i] + glm::vec3(direct);
+            result.ofSources[i] = first.ofSources[i];
+            result.direct[i] = first.ofSources[i] + glm::vec3(direct);
             result.indirect[i] = first.indirect[i] + glm::vec3(indirect);
         }
         return result;

@@ -30,11 +30,11 @@ HandOver handOver(const LitSurfaces& surfaces, const FirstShot& shot) {
     for (size_t i = 0; i < n; ++i) {
         // The irradiance is a mean over the whole side, but only the exposed part receives light.
         const float concentrated = exposed[i] > 0 ? 1 / exposed[i] : 0;
-        light.gathered[i] = concentrated * shot.irradiance[i];
+        light.ofSources[i] = concentrated * shot.irradiance[i];
         if (!shot.indirect.empty()) light.indirect[i] = concentrated * shot.indirect[i];
         if (!patches.parentAt(uint32_t(i)).exchanges) continue;
         light.unshot[i] = shot.unshot.empty()
-                              ? shotReflectance(patches, shot, i) * light.gathered[i]
+                              ? shotReflectance(patches, shot, i) * light.ofSources[i]
                               : concentrated * shot.unshot[i];
     }
     return light;

@@ -29,11 +29,11 @@ class ScatteredLight;
 // Irradiance of patch sides, W/m^2, in a direct and an indirect part. The first three vectors have
 // one entry per side.
 struct Irradiance {
-    explicit Irradiance(size_t sides = 0) : direct(sides), gathered(sides), indirect(sides) {}
+    explicit Irradiance(size_t sides = 0) : direct(sides), ofSources(sides), indirect(sides) {}
 
-    std::vector<glm::vec3> direct;    // light straight from sources, emission and the world
-    std::vector<glm::vec3> gathered;  // the part of `direct` from the sources of the first shot
-    std::vector<glm::vec3> indirect;  // light that was reflected at least once
+    std::vector<glm::vec3> direct;     // light straight from sources, emission and the world
+    std::vector<glm::vec3> ofSources;  // the part of `direct` from the sources of the first shot
+    std::vector<glm::vec3> indirect;   // light that was reflected at least once
     // Per side, exitance in W/m^2 to add to reflectance times irradiance, because light along lines
     // arrives at angles at which the side reflects more (positive) or less (negative) than it
     // reflects of light from all directions. Empty if no side has this dependence.
@@ -54,7 +54,7 @@ struct Irradiance {
     void add(const Irradiance& other) {
         for (size_t side = 0; side < direct.size(); ++side) {
             direct[side] += other.direct[side];
-            gathered[side] += other.gathered[side];
+            ofSources[side] += other.ofSources[side];
             indirect[side] += other.indirect[side];
         }
         redirected += other.redirected;
@@ -168,9 +168,9 @@ std::vector<float> openShareOf(size_t sides, const Lines& lines, const SkyLines&
 // The light of a first shot that a transport starts with, per side and relative to the exposed part
 // of the side, W/m^2.
 struct HandOver {
-    std::vector<glm::vec3> gathered;  // direct irradiance
-    std::vector<glm::vec3> indirect;  // irradiance by reflected light, already distributed
-    std::vector<glm::vec3> unshot;    // reflected exitance that is still to be distributed
+    std::vector<glm::vec3> ofSources;  // direct irradiance
+    std::vector<glm::vec3> indirect;   // irradiance by reflected light, already distributed
+    std::vector<glm::vec3> unshot;     // reflected exitance that is still to be distributed
 };
 // Returns the light of a first shot, converted from whole sides to their exposed parts.
 HandOver handOver(const LitSurfaces& surfaces, const FirstShot& shot);
