@@ -89,7 +89,7 @@ TEST(Slivers, SubdividedMeshesHaveNone) {
                          glm::dmat4(1), false, seed);
     };
     // A single bake ends after one look at the noise or two, with half as many bundles or twice.
-    constexpr int kSeeds = 4;
+    constexpr int kSeeds = kFewBakes ? 1 : 4;
     std::array<Result, kSeeds> wanted;
     double bundlesWanted = 0;
     for (int seed = 0; seed < kSeeds; ++seed) {
@@ -105,6 +105,7 @@ TEST(Slivers, SubdividedMeshesHaveNone) {
             EXPECT_LT(found.balance, 5e-3) << height;
         }
         EXPECT_LE(bundles, 2 * bundlesWanted) << height;
+        if (kFewBakes) break;
     }
 }
 

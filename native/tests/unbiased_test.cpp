@@ -18,12 +18,8 @@ namespace {
 
 using namespace test;
 
-// Under sanitizers, which look for other faults, fewer: the tolerances are of the errors found.
-#ifdef RAYBUNDLE_FEW_BAKES
-constexpr int kBakes = 20;
-#else
-constexpr int kBakes = 200;
-#endif
+// The tolerances are of the errors found.
+constexpr int kBakes = kFewBakes ? 20 : 200;
 
 struct Method {
     std::string name;
