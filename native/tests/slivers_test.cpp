@@ -92,7 +92,7 @@ TEST(Slivers, SubdividedMeshesHaveNone) {
     };
     // A single bake may end after one look at the noise or after two, with half or twice as many
     // bundles.
-    constexpr int kSeeds = 4;
+    constexpr int kSeeds = kFewBakes ? 1 : 4;
     std::array<Result, kSeeds> wanted;
     double bundlesWanted = 0;
     for (int seed = 0; seed < kSeeds; ++seed) {
@@ -108,6 +108,7 @@ TEST(Slivers, SubdividedMeshesHaveNone) {
             EXPECT_LT(found.balance, 5e-3) << height;
         }
         EXPECT_LE(bundles, 2 * bundlesWanted) << height;
+        if (kFewBakes) break;
     }
 }
 

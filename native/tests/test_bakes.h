@@ -15,6 +15,13 @@ namespace raybundle::test {
 
 using Json = nlohmann::json;
 
+// Under sanitizers, which look for other faults than wrong light: no more of the same.
+#ifdef RAYBUNDLE_FEW_BAKES
+constexpr bool kFewBakes = true;
+#else
+constexpr bool kFewBakes = false;
+#endif
+
 Json reportOf(const Bake& bake);
 // Returns whether a part of a report contains a text.
 bool mentions(const Json& part, const std::string& text);

@@ -18,13 +18,8 @@ namespace {
 
 using namespace test;
 
-// Fewer bakes under sanitizers, which look for other faults. The tolerances follow from the
-// measured errors.
-#ifdef RAYBUNDLE_FEW_BAKES
-constexpr int kBakes = 20;
-#else
-constexpr int kBakes = 200;
-#endif
+// The tolerances follow from the measured errors.
+constexpr int kBakes = kFewBakes ? 20 : 200;
 
 struct Method {
     std::string name;
