@@ -23,7 +23,7 @@ namespace {
 using namespace test;
 
 // Of CI; RAYBUNDLE_DEGENERATE_MESHES asks for others.
-constexpr int kMeshes = kFewBakes ? 4 : 9;
+constexpr int kMeshes = 9;
 
 struct Polygons {
     std::vector<glm::vec3> vertices;
