@@ -105,7 +105,7 @@ TEST(Clusters, HaveTheMeansOfTheirPatches) {
 TEST(Clusters, AreAsManyHoweverManyFacesThereAre) {
     double patches[2], rays[2], bundles[2];
     for (int k : {0, 1}) {
-        Scene scene = roomWithBall(5 + k, 0.5f);
+        Scene scene = roomWithBall((kFewBakes ? 4 : 5) + k, 0.5f);
         scene.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
         Bake bake;
         bake.settings.patchSize = 0.3f;
