@@ -292,9 +292,9 @@ bool cancelAtCall(void* user, rb_stage, double) {
     return at.calls++ != at.call;
 }
 
-// Cancels at each call in turn, or at every step-th call. The results of the bake before remain, and the next bake, which
-// uses what is left, is right. Its solve starts from another solution, which allows a difference of
-// 1e-5 (kMostTolerance in bundle_solve.cpp).
+// Cancels at each call in turn, or at every step-th call. The results of the bake before remain, and
+// the next bake, which uses what is left, is right. Its solve starts from another solution, which
+// allows a difference of 1e-5 (kMostTolerance in bundle_solve.cpp).
 void cancelAtEachCall(const Scene& before, const Scene& scene, const Settings& settings,
                       int step = 1) {
     Bake fresh, bake;

@@ -23,7 +23,7 @@ namespace {
 using namespace test;
 
 // Number of meshes in the automatic tests. RAYBUNDLE_DEGENERATE_MESHES sets another number.
-constexpr int kMeshes = kFewBakes ? 4 : 9;
+constexpr int kMeshes = 9;
 
 struct Polygons {
     std::vector<glm::vec3> vertices;
