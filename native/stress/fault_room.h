@@ -46,7 +46,7 @@ inline std::vector<float> lightOf(rb_bake bake) {
 inline rb_bake newBake(const char* reconstruction) {
     rb_bake bake = nullptr;
     rb_new_bake(&bake);
-    rb_set_bake_float(bake, "patch_size", 1);
+    rb_set_bake_float(bake, "patch_size", 0.5f);
     rb_set_bake_int(bake, "min_bundles", 8);
     rb_set_bake_int(bake, "max_bundles", 8);
     rb_set_bake_int(bake, "threads", 2);
