@@ -10,12 +10,10 @@ from pathlib import Path
 import bpy
 import pytest
 
-REPOSITORY = Path(__file__).parent.parent
-sys.path[:0] = [str(REPOSITORY / "addon"), str(REPOSITORY / "scenes")]
+sys.path.insert(0, str(Path(__file__).parent.parent / "addon"))
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
-from build import construction, cornell_box  # noqa: E402
 
 # Closed box whose exact solution is known: radiance of its emission in W/(m^2 sr), reflectance.
 FURNACE_EMISSION_RADIANCE = 0.5
@@ -146,16 +144,3 @@ def closed_box(new_object, new_material):
     grey, radiance = FURNACE_REFLECTANCE, FURNACE_EMISSION_RADIANCE
     material = new_material("Furnace", (grey,) * 3, (radiance,) * 3)
     return new_object("Box", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES], material)
-
-
-def build_cornell_box(density: float) -> None:
-    """Replaces the open file by the Cornell box of scenes/.
-
-    density: factor of the number of cells along each edge of the walls.
-    """
-    bpy.ops.wm.read_homefile(use_empty=True)
-    construction.set_render_settings(bpy.context.scene)
-    construction.density, before = density, construction.density
-    cornell_box.build(bpy.context)
-    construction.density = before
-    bpy.context.view_layer.update()

@@ -11,7 +11,7 @@ import bpy
 import lamp_rooms
 import numpy as np
 import raybundle
-from conftest import build_cornell_box
+from build import construction, cornell_box
 from covered_faces import COVERED, covered_faces, mark_covered
 from scene_items import ORIGIN, ORIGINS, mesh_items
 from surface_error import corner_areas, face_sizes, read_colors
@@ -62,6 +62,19 @@ def open_file(name: str, cells: int) -> None:
         return
     path = SCENES / f"{name}.blend"
     bpy.ops.wm.open_mainfile(filepath=str(path if path.is_file() else Path(name).resolve()))
+
+
+def build_cornell_box(density: float) -> None:
+    """Replaces the open file by the Cornell box of scenes/.
+
+    density: factor of the number of cells along each edge of the walls.
+    """
+    bpy.ops.wm.read_homefile(use_empty=True)
+    construction.set_render_settings(bpy.context.scene)
+    construction.density, before = density, construction.density
+    cornell_box.build(bpy.context)
+    construction.density = before
+    bpy.context.view_layer.update()
 
 
 def bake(**settings: object) -> Bake:

@@ -23,7 +23,8 @@ import bpy
 import numpy as np
 import pytest
 import raybundle
-from conftest import FURNACE_LIGHT, build_cornell_box
+from conftest import FURNACE_LIGHT
+from object_light import build_cornell_box
 from raybundle.native import ErrorCode, RaybundleError
 from raybundle.properties import RaybundleSceneSettings
 from surface_error import corner_areas, off_contact_edges, read_colors

@@ -24,20 +24,19 @@ namespace raybundle {
 class DepthOrder {
   public:
     // `patches` must outlive the object.
-    explicit DepthOrder(const Patches& patches)
-        : patches(patches), touchDistance(double(patches.touchDistance)) {}
+    explicit DepthOrder(const Patches& patches) : patches(patches) {}
 
     // Sets the direction of the current bundle, a unit vector.
     void begin(const glm::dvec3& newDirection) { direction = newDirection; }
 
     // Returns the distance up to which two surfaces coincide, metres. The depth of coinciding
     // surfaces does not determine their order.
-    double coincidence() const { return kCoincidence * touchDistance; }
+    double coincidence() const { return kCoincidence * double(patches.touchDistance); }
 
     // Returns the distance along a line beyond which two surfaces neither touch nor coincide,
     // metres. A grazing line stretches the gap between them; gaps stretched beyond this distance
     // are not examined.
-    double zone() const { return kZone * touchDistance; }
+    double zone() const { return kZone * double(patches.touchDistance); }
     // Returns the largest such distance in the given islands, metres.
     double zone(const std::vector<uint32_t>& islands) const {
         double most = 0;
@@ -55,10 +54,7 @@ class DepthOrder {
 
     // Returns whether the two sides touch, so that they exchange nothing.
     bool touches(uint32_t a, uint32_t b, double along) const {
-        // Surfaces that meet at an angle are close only at their common edge, and see each other.
-        constexpr float kOpposite = -0.99f;  // cosine below which normals are opposite
-        return gapAcross(a, along) <= touchAt(a) &&
-               glm::dot(patches.normal(opposite(a)), patches.normal(b)) < kOpposite;
+        return gapAcross(a, along) <= touchAt(a) && pointAgainst(patches, opposite(a), b);
     }
 
     // Returns whether the two sides coincide and b belongs before a.
@@ -98,7 +94,6 @@ class DepthOrder {
     bool isInside(uint32_t side) const { return isBack(side) && patches.parentAt(side).isSolid; }
 
     const Patches& patches;
-    const double touchDistance;
     glm::dvec3 direction{0, 0, 1};
 };
 

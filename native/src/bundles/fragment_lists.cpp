@@ -169,7 +169,7 @@ void FragmentLists::pairLists(BundleLines& out) {
             if (!hasLeaks && !areNear(nearer, farther)) {
                 *nextSky++ = sideOf(nearer);
                 *nextSky++ = opposite(sideOf(farther));
-                runs.add(0, sideOf(nearer) ^ 1, sideOf(farther));
+                runs.add(0, opposite(sideOf(nearer)), sideOf(farther));
                 continue;
             }
         }

@@ -52,6 +52,13 @@ inline bool comesBefore(const Patches& patches, uint32_t a, bool aEnters, uint32
     return rank(a, aEnters) < rank(b, bEnters);
 }
 
+// Returns whether two sides point against each other, as sides that touch do. Surfaces that meet at
+// an angle are close only at their common edge, and see each other.
+inline bool pointAgainst(const Patches& patches, uint32_t side, uint32_t other) {
+    constexpr float kOpposite = -0.99f;  // cosine of the angle between the normals
+    return glm::dot(patches.normal(side), patches.normal(other)) < kOpposite;
+}
+
 // Returns whether two parents are parallel, within the rounding errors of coinciding faces.
 inline bool areParallel(const Parent& a, const Parent& b) {
     const glm::dvec3 n = glm::cross(glm::dvec3(a.a), glm::dvec3(a.b));

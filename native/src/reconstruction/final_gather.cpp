@@ -49,7 +49,6 @@ double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 FinalGather::FinalGather(const LitSurfaces& surfaces, const Visibility& visibility,
                          const SetLight& light, float meanLight, float targetError)
     : surfaces(surfaces),
-      patches(surfaces.patches),
       visibility(visibility),
       light(light),
       emission(light.direct.bundledEmission()),
@@ -106,7 +105,7 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
 // sequence, starting with the one at index `first`.
 void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
                           uint32_t count, Light& sum) const {
-    const glm::vec3 side = patches.normal(receiver.side);
+    const glm::vec3 side = surfaces.patches.normal(receiver.side);
     for (uint32_t i = first; i < first + count; ++i) {
         const glm::vec4 u = points[i];
         glm::vec3 direction = cosineDirection(receiver.normal, {u.x, u.y});
@@ -123,23 +122,24 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
         if (!hit) continue;
         sum.reflected += sent.towards(*hit, -direction);
         if (distance >= width(*hit)) continue;
-        const Receiver met{*hit, patches.normal(*hit), *receiver.point + distance * direction,
-                           hash(receiver.seed, kParts)};
-        sum.reflected += shotReflectance(patches, light.shot, *hit) *
+        const Receiver met{*hit, surfaces.patches.normal(*hit),
+                           *receiver.point + distance * direction, hash(receiver.seed, kParts)};
+        sum.reflected += shotReflectance(surfaces.patches, light.shot, *hit) *
                          (light.direct.sample(met, i) - light.irradiance.ofSources[*hit]);
     }
 }
 
 bool FinalGather::isNear(const Receiver& receiver) const {
-    const Parent& parent = patches.parentAt(receiver.side);
+    const Parent& parent = surfaces.patches.parentAt(receiver.side);
     if (parent.patchCount() >= kTellingPatches) return false;
     const float longest = std::ldexp(
         std::max(glm::length(parent.a) / parent.countA, glm::length(parent.b) / parent.countB),
-        -patches.level(patchOf(receiver.side)));
+        -surfaces.patches.level(patchOf(receiver.side)));
     const SobolPoints points(hash(receiver.seed, 0));
     for (uint32_t i = 0; i < kNearRays; ++i) {
         const glm::vec4 u = points[i];
-        const glm::vec3 direction = cosineDirection(patches.normal(receiver.side), {u.x, u.y});
+        const glm::vec3 direction =
+            cosineDirection(surfaces.patches.normal(receiver.side), {u.x, u.y});
         float distance = 0;
         const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
         if (hit && distance < std::max(width(*hit), kNearLengths * longest)) return true;
@@ -147,7 +147,9 @@ bool FinalGather::isNear(const Receiver& receiver) const {
     return false;
 }
 
-float FinalGather::width(uint32_t side) const { return std::sqrt(patches.area[patchOf(side)]); }
+float FinalGather::width(uint32_t side) const {
+    return std::sqrt(surfaces.patches.area[patchOf(side)]);
+}
 
 std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const SmoothRegions& regions,
                                         rb_side side, const std::vector<glm::vec3>& carriedAt,
@@ -155,10 +157,11 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
     std::vector<double> squares(regions.nodeCount, 0.0), weights(regions.nodeCount, 0.0);
     const CornerWeights cornerWeights(surfaces, range, side);
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
-        const Parent& parent = patches.parents[p];
-        const Cell& cell = patches.cells[parent.cell];
+        const Parent& parent = surfaces.patches.parents[p];
+        const Cell& cell = surfaces.patches.cells[parent.cell];
         // The final gather does not collect light from behind, which translucent patches show too.
-        if (patches.translucenceOf(2 * parent.firstPatch + uint32_t(side)) != glm::vec3(0.0f))
+        if (surfaces.patches.translucenceOf(2 * parent.firstPatch + uint32_t(side)) !=
+            glm::vec3(0.0f))
             continue;
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t at = 2 * (parent.firstPatch + k) + uint32_t(side);

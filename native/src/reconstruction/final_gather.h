@@ -82,7 +82,6 @@ class FinalGather {
     float width(uint32_t side) const;
 
     const LitSurfaces surfaces;
-    const Patches& patches;
     const Visibility& visibility;
     const SetLight& light;
     const std::vector<glm::vec3>& emission;  // per side, without sources, W/m^2

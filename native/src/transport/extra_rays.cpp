@@ -82,7 +82,6 @@ class ExtraGather {
   public:
     ExtraGather(const ExtraRaysInput& input, const Samples& samples, const SetLights& lights)
         : surfaces(input),
-          patches(input.patches),
           wanted(input.wanted),
           samples(samples),
           brought(wanted.size() * lights.size()),
@@ -128,11 +127,13 @@ class ExtraGather {
         for (uint32_t i = 0; i < own.rays; ++i) {
             throwIfCancelledAt(i);
             const glm::vec4 u = points[i];
-            const glm::vec3 direction = cosineDirection(patches.normal(own.side), {u.z, u.w});
+            const glm::vec3 direction =
+                cosineDirection(surfaces.patches.normal(own.side), {u.z, u.w});
             float distance = 0;
             const auto hit = input.visibility.firstHit(
-                own.side, patches.point(patchOf(own.side), {u.x, u.y}), direction, &distance);
-            if (hit && isCovered(patches, own.side, *hit, direction, distance)) continue;
+                own.side, surfaces.patches.point(patchOf(own.side), {u.x, u.y}), direction,
+                &distance);
+            if (hit && isCovered(surfaces.patches, own.side, *hit, direction, distance)) continue;
             if (hit && !(std::min(samples[*hit][0], samples[*hit][1]) > 0)) continue;
             // The first half of the Sobol points and the second half are each stratified.
             const size_t half = 2 * i < own.rays ? 0 : 1;
@@ -148,7 +149,7 @@ class ExtraGather {
 
     // Returns the area of a side times the share of light that it absorbs, by channel, m^2.
     glm::dvec3 absorbing(uint32_t side) const {
-        return surfaces.exposedArea(side) * glm::dvec3(1.0f - patches.reflectance[side]);
+        return surfaces.exposedArea(side) * glm::dvec3(1.0f - surfaces.patches.reflectance[side]);
     }
 
     // Removes the power that the rays added beyond kMostMade, from each side in proportion to the
@@ -187,7 +188,6 @@ class ExtraGather {
     }
 
     const LitSurfaces surfaces;
-    const Patches& patches;
     const std::vector<ExtraRays>& wanted;
     const Samples& samples;
     double linesMet = 0;  // number of lines that met the wanted sides

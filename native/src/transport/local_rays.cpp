@@ -25,17 +25,16 @@ glm::vec2 uniform2(std::mt19937_64& random) {
 
 }  // namespace
 
-LocalRays::LocalRays(const TransportInput& input)
-    : surfaces(input), patches(input.patches), visibility(input.visibility) {
-    assert(surfaces.exposed.size() == patches.sideCount() &&
+LocalRays::LocalRays(const TransportInput& input) : surfaces(input), visibility(input.visibility) {
+    assert(surfaces.exposed.size() == surfaces.patches.sideCount() &&
            "bake knows what is covered before it traces");
     const HandOver first = handOver(input, input.shot);
-    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+    for (uint32_t side = 0; side < surfaces.patches.sideCount(); ++side) {
         addSource(side, RayLight::EMITTED, area(side) * input.shot.emission[side]);
         addSource(side, RayLight::REFLECTED, area(side) * first.unshot[side]);
     }
     // The radiance L enters through the scene's sphere: exitance pi L over the area 4 pi R^2.
-    const float across = 2 * glm::pi<float>() * patches.radius;
+    const float across = 2 * glm::pi<float>() * surfaces.patches.radius;
     addSource(kNoSide, RayLight::WORLD, across * across * input.worldRadiance);
 }
 
@@ -60,23 +59,23 @@ std::optional<uint32_t> LocalRays::fromWorld(std::mt19937_64& random) const {
     const glm::vec3 direction = uniformDirection(uniform2(random));
     const auto [x, y] = frame(direction);
     const glm::vec2 across = onDisk(uniform2(random));
-    return visibility.firstHit(patches.radius * (across.x * x + across.y * y - 1.01f * direction),
-                               direction);
+    return visibility.firstHit(
+        surfaces.patches.radius * (across.x * x + across.y * y - 1.01f * direction), direction);
 }
 
 bool LocalRays::isCovered(uint32_t side, const glm::vec3& point) const {
-    return visibility.isBlocked(side, point, patches.normal(side),
-                                patches.islandAt(side).touchDistance);
+    return visibility.isBlocked(side, point, surfaces.patches.normal(side),
+                                surfaces.patches.islandAt(side).touchDistance);
 }
 
 std::optional<uint32_t> LocalRays::fromSide(uint32_t side, std::mt19937_64& random,
                                             RayLog& log) const {
-    glm::vec3 point = patches.point(patchOf(side), uniform2(random));
+    glm::vec3 point = surfaces.patches.point(patchOf(side), uniform2(random));
     if (surfaces.exposed[side] < 1)
         for (int k = 1; k < kMostPoints && isCovered(side, point); ++k)
-            point = patches.point(patchOf(side), uniform2(random));
-    const auto hit =
-        visibility.firstHit(side, point, cosineDirection(patches.normal(side), uniform2(random)));
+            point = surfaces.patches.point(patchOf(side), uniform2(random));
+    const auto hit = visibility.firstHit(
+        side, point, cosineDirection(surfaces.patches.normal(side), uniform2(random)));
     log.rays.push_back(side);
     if (!hit) log.escapes.push_back(side);
     return hit;

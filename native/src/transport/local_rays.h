@@ -91,7 +91,6 @@ class LocalRays {
     std::optional<uint32_t> fromWorld(std::mt19937_64& random) const;
 
     const LitSurfaces surfaces;
-    const Patches& patches;
     const Visibility& visibility;
     std::vector<Source> sources;
     // Per source: power of all sources up to and including it, W.

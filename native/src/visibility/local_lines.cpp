@@ -6,6 +6,7 @@
 
 #include "job/cancellation.h"
 #include "job/error.h"
+#include "patches/coincidence.h"
 
 namespace raybundle {
 namespace {
@@ -66,10 +67,9 @@ std::vector<uint64_t> allotLines(const std::vector<double>& expected, double xi)
 
 bool isCovered(const Patches& patches, uint32_t side, uint32_t met, const glm::vec3& direction,
                float distance) {
-    constexpr float kOpposite = -0.99f;  // cosine below which normals point against each other
-    const glm::vec3 normal = patches.normal(side);
-    return distance * glm::dot(direction, normal) <= patches.islandAt(side).touchDistance &&
-           glm::dot(normal, patches.normal(met)) < kOpposite;
+    return distance * glm::dot(direction, patches.normal(side)) <=
+               patches.islandAt(side).touchDistance &&
+           pointAgainst(patches, side, met);
 }
 
 glm::vec4 uniformPoint(std::mt19937_64& random) {
