@@ -272,6 +272,7 @@ TEST(Islands, ARoomHasItsLightWhateverIsFarAway) {
                             {"large", 200, 5000, 0},
                             {"lit", 1, 40, 5},
                             {"bright", 50, 2000, 100}}) {
+        if (kFewBakes && far.emission == 0) continue;
         Scene scene = litRoom();
         const glm::vec3 low(2, 2 - far.distance, 0);
         place(scene, box("far", low, low + far.size, false), grey("far", 0.5f, far.emission));

@@ -103,7 +103,7 @@ TEST(AreaLight, WithASpreadGivesItsIntegral) {
     for (rb_area_shape shape : {RB_AREA_RECTANGLE, RB_AREA_ELLIPSE})
         for (double spread : {0.2, 1.0, 2.5})
             for (const glm::dvec3 tilt : {glm::dvec3(0, 0, 0), glm::dvec3(0.1, 0, 0.15)}) {
-                if (kFewBakes && tilt.x > 0) continue;
+                if (kFewBakes && (tilt.x > 0 || spread == 1)) continue;
                 Scene scene;
                 place(scene, rectangle("ground", {-20, -20, -5}, {40, 0, 0}, {0, 40, 0}),
                       grey("", 0));

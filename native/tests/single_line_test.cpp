@@ -141,7 +141,8 @@ TEST(SingleLines, ExchangeAsInTheLists) {
         // Per group, relative to the area of a line or a pixel, in both directions.
         std::array<double, 4> lines{}, wanted{};
         double touching = 0, wantedTouching = 0;
-        constexpr uint32_t kLines = 40000, kBundles = 1000;
+        constexpr uint32_t kFewer = kFewBakes ? 5 : 1, kLines = 40000 / kFewer,
+                           kBundles = 1000 / kFewer;
         constexpr float kPixel = 0.08f;
         const auto single = scenery.singleLines();
         for (const Bundle& bundle : Directions(DirectionKind::RANDOM, 2).next(kLines)) {
