@@ -81,7 +81,7 @@ class Relation:
 
 RANDOM = {'directions': 'RANDOM'}
 # Warnings of methods that ignore the angle of light and do not cut patches in narrow gaps.
-LAMBERT = ("at which angles light arrives", "gaps much narrower than they are")
+LAMBERT = ("the angle at which light arrives", "gaps that are much narrower")
 
 
 def method(name: str, *says: str, costs_same: bool = False, **settings) -> Relation:

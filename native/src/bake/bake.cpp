@@ -58,15 +58,16 @@ bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
         if (light.set != kNoLightSet && light.isDark())
             report.warn(WarningId::DARK_LIGHT_SET,
                         "light set \"" + scene.lightSets[size_t(light.set)] +
-                            "\": no light of it reaches any surface; its result is "
-                            "black");
+                            "\": no light of the set reaches any surface, so that its result is "
+                            "black; check which lights belong to the set");
     if (isEmpty)
-        report.warn(WarningId::NO_FACES, "the scene has no faces");
+        report.warn(WarningId::NO_FACES,
+                    "the scene has no faces with an area, so that there is nothing to bake");
     else if (isDark)
         report.warn(
             WarningId::NO_LIGHT,
-            "no light reaches any surface: there is no lamp, no emission and no world that does; "
-            "the result is black");
+            "no light reaches any surface, so that the result is black; add a lamp, an emissive "
+            "material or a world that is not black");
     return isEmpty || isDark;
 }
 
@@ -77,8 +78,10 @@ void checkFinite(const std::vector<InstanceLight>& instances) {
         for (size_t c = 0; c < instance.direct.size(); ++c) {
             const glm::vec3 all = instance.direct[c] + instance.indirect[c] + instance.exitance[c];
             if (!std::isfinite(all.x + all.y + all.z))
-                throw invalidArgument("object \"" + instance.name +
-                                      "\": its light is too bright to compute with");
+                throw invalidArgument(
+                    "object \"" + instance.name +
+                    "\": its light is too bright to be stored; reduce the strength of the lights, "
+                    "or move them away from the object");
         }
 }
 
@@ -157,9 +160,11 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
 void Bake::noteWhatIsGiven(const Scene& scene, const Threads& threads, Report& report) const {
     report.warnings = scene.warnings;
     if (threads.count < threads.wanted)
-        report.warn(WarningId::FEWER_THREADS, "the system lets " + std::to_string(threads.count) +
-                                                  " of " + std::to_string(threads.wanted) +
-                                                  " threads run; the bake takes longer for it");
+        report.warn(WarningId::FEWER_THREADS,
+                    "the system allows only " + std::to_string(threads.count) + " of " +
+                        std::to_string(threads.wanted) +
+                        " threads, so that the bake takes longer; free memory, or raise the "
+                        "system's limit of threads");
     for (const std::string& name : scene.lightSets) report.lightSets.push_back({name, 0});
 }
 
@@ -238,7 +243,7 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     }
     trace->cuts = {{"narrow gap", cuts.contacts},
                    {"edge of a shadow", cuts.shadowEdges},
-                   {"light that bends within the patch", cuts.bentLight}};
+                   {"nonlinear light within the patch", cuts.bentLight}};
     return shots;
 }
 
@@ -316,12 +321,13 @@ const CornerLight& Bake::setLight(int32_t set, int32_t instance) const {
 }
 
 const InstanceLight& Bake::instanceLight(int32_t instance) const {
-    if (!ran) throw Error(RB_ERROR_INVALID_OPERATION, "there is no result before a bake");
+    if (!ran)
+        throw Error(RB_ERROR_INVALID_OPERATION, "there is no result before a successful bake");
     if (instance < 0 || size_t(instance) >= light.size())
         throw invalidArgument("there is no instance " + std::to_string(instance));
     if (!light[size_t(instance)].isBaked)
         throw invalidArgument("object \"" + light[size_t(instance)].name +
-                              "\" only occludes: it has no result");
+                              "\" has the role OCCLUDE, so that it has no result");
     return light[size_t(instance)];
 }
 

@@ -35,14 +35,17 @@ void warnOfVisibility(const Scene& scene, const SetLights& lights, const Setting
         if (hasDimEmission && instance.stopsDirect != instance.exchanges)
             report.warn(WarningId::BLOCKS_AS_THE_WORLD,
                         object +
-                            "it blocks the light of dim emission as it blocks that of "
-                            "the world and not as it blocks that of lights");
+                            "the Ray Visibility settings Shadow and Diffuse differ. The object "
+                            "blocks the light of dim emission as it blocks reflected light, not "
+                            "as it blocks the light of lamps; switch both settings on or both off "
+                            "to avoid this");
         if (!instance.exchanges && instance.role == RB_ROLE_BAKE &&
             !can(settings.solver, SolverCan::LIGHT_WITHOUT_EXCHANGE))
             report.warn(WarningId::NO_EXCHANGE,
-                        object + "it takes no part in the exchange of light, so that " +
-                            choiceName(settings.solver) + " finds no light of the world and of " +
-                            "other surfaces on it; LINE_REUSE does");
+                        object + "it does not exchange light with other surfaces. Solver " +
+                            choiceName(settings.solver) +
+                            " therefore leaves out the light that other surfaces and a constant "
+                            "world send to it; choose solver LINE_REUSE");
     }
 }
 
@@ -51,26 +54,27 @@ void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& re
     for (const Material& material : scene.materials)
         if (material.isTranslucent())
             report.warn(WarningId::NO_TRANSLUCENCE,
-                        "material \"" + material.name + "\": " + choiceName(settings.solver) +
-                            " does not carry on the light that passes through it; "
-                            "LINE_REUSE does");
+                        "material \"" + material.name + "\": solver " +
+                            choiceName(settings.solver) +
+                            " does not send the light that passes through this material on to "
+                            "other surfaces, which are too dark; choose solver LINE_REUSE");
 }
 
 void warnOfAngles(const Patches& patches, const Settings& settings, Report& report) {
     if (patches.byAngle.empty()) return;
     auto warn = [&](const std::string& what, const std::string& remedy) {
-        report.warn(WarningId::NO_ANGLES, what +
-                                              " does not know at which angles light arrives: what "
-                                              "reflects more at some angles, as "
-                                              "Principled and rough materials do, reflects it as "
-                                              "light from everywhere, which may be "
-                                              "some percent off; " +
-                                              remedy + " is right");
+        report.warn(WarningId::NO_ANGLES,
+                    what +
+                        " ignores the angle at which light arrives. Materials whose reflectance "
+                        "depends on this angle, such as Principled and rough materials, reflect as "
+                        "if light arrived equally from all directions, an error of up to some "
+                        "percent; choose " +
+                        remedy);
     };
     if (!settings.gathersFirstShot())
-        warn(std::string("first_shot ") + choiceName(settings.firstShot), "GATHER");
+        warn(std::string("first_shot ") + choiceName(settings.firstShot), "first_shot GATHER");
     if (!can(settings.solver, SolverCan::CARRY_ANGLES))
-        warn(std::string("solver ") + choiceName(settings.solver), "LINE_REUSE");
+        warn(std::string("solver ") + choiceName(settings.solver), "solver LINE_REUSE");
 }
 
 void warnOfGaps(size_t patches, Report& report) {
@@ -78,10 +82,9 @@ void warnOfGaps(size_t patches, Report& report) {
     report.warn(
         WarningId::UNCUT_GAPS,
         std::to_string(patches) +
-            " patches lie beside gaps much narrower than they are, as below cutlery on a table: "
-            "what "
-            "lies in such a gap gets too much light; solver LINE_REUSE with first_shot GATHER cuts "
-            "them smaller");
+            " patches lie beside gaps that are much narrower than a patch, such as below cutlery "
+            "on a table. The light in these gaps is too bright; choose solver LINE_REUSE and "
+            "first_shot GATHER, with which such patches are cut");
 }
 
 void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize, uint32_t bundles,
@@ -107,12 +110,10 @@ void warnOfFewLines(const Scene& scene, const Patches& patches, float pixelSize,
     if (few > kMostNamed) names += " and " + std::to_string(few - kMostNamed) + " more";
     report.warn(WarningId::FEW_LINES,
                 "fewer than " + std::to_string(int(kFewLines)) + " lines meet each patch of " +
-                    names +
-                    ", whose noise may be more "
-                    "than is stated: solver " +
+                    names + ", so that the noise there may be higher than stated. Solver " +
                     std::string(choiceName(settings.solver)) +
-                    " has the same lines everywhere; LINE_REUSE has more where patches "
-                    "are small");
+                    " has equally dense lines everywhere; choose solver LINE_REUSE, whose lines "
+                    "are denser where patches are small");
 }
 
 void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLights& lights,
@@ -133,46 +134,51 @@ void warnOfDirectNoise(const Scene& scene, const Patches& patches, const SetLigh
     const auto most =
         std::max_element(variances.begin(), variances.end(),
                          [](const auto& a, const auto& b) { return a.second < b.second; });
-    report.warn(
-        WarningId::DIRECT_NOISE,
-        "the noise is " + percent(noise) + " and not below " + percent(target) +
-            ": most of it is in the light of " + most->first.first + " on object \"" +
-            scene.instances[most->first.second].name +
-            "\", which more bundles do not help; smaller patches there or a larger distance do");
+    report.warn(WarningId::DIRECT_NOISE,
+                "the noise is " + percent(noise) + ", above the target of " + percent(target) +
+                    ". The largest part of the noise of direct light is in the light of " +
+                    most->first.first + " on object \"" + scene.instances[most->first.second].name +
+                    "\". More bundles do not reduce it; use smaller patches there (patch_size), or "
+                    "move nearby lamps away from the object");
 }
 
 void warnOfMissedTarget(const Scene& scene, const MissedTarget& missed, Report& report) {
     const std::string bundles = std::to_string(missed.bundles) + " bundles";
     const bool isCountable = missed.stop != Stop::UNCOUNTABLE_LINES;
-    report.warn(
-        isCountable ? WarningId::MAX_BUNDLES : WarningId::UNCOUNTABLE_LINES,
-        (isCountable ? "max_bundles was reached at " + bundles + ": "
-                     : "the lines of more than " + bundles +
-                           " cannot be counted, which fewer lines_per_bundle allow: ") +
-            "the noise " +
-            (missed.set == kNoLightSet
-                 ? ""
-                 : "of light set \"" + scene.lightSets[size_t(missed.set)] + "\" ") +
-            "is " + percent(missed.noise) +
-            (missed.ofNoisiest > 0 ? ", " + percent(missed.ofNoisiest) + " where it is most,"
-                                   : "") +
-            " and not below " + percent(missed.target));
+    report.warn(isCountable ? WarningId::MAX_BUNDLES : WarningId::UNCOUNTABLE_LINES,
+                (isCountable ? "max_bundles was reached at " + bundles + ": "
+                             : "the bake stopped at " + bundles +
+                                   " because it cannot count the lines of more bundles: ") +
+                    "the noise " +
+                    (missed.set == kNoLightSet
+                         ? ""
+                         : "of light set \"" + scene.lightSets[size_t(missed.set)] + "\" ") +
+                    "is " + percent(missed.noise) +
+                    (missed.ofNoisiest > 0
+                         ? ", and at least " + percent(missed.ofNoisiest) + " on the noisiest parts"
+                         : "") +
+                    "; the target is " + percent(missed.target) +
+                    (isCountable ? ". Increase max_bundles or target_error"
+                                 : ". Reduce lines_per_bundle or increase target_error"));
 }
 
 void warnOfBrokenCycles(uint64_t cycles, Report& report) {
     if (cycles == 0) return;
     report.warn(WarningId::BROKEN_CYCLES,
                 std::to_string(cycles) +
-                    " cycles of patches that cover each other were broken anywhere: the projector "
-                    "AUTO has none");
+                    " times, patches covered each other in a cycle, which no drawing order can "
+                    "solve. Some lines therefore meet surfaces in the wrong order; choose "
+                    "projector AUTO, which needs no drawing order");
 }
 
 void warnOfWrongExchanges(double share, double error, Report& report) {
     report.warn(WarningId::WRONG_EXCHANGES,
-                "the projector put " + std::to_string(100 * share) +
-                    " % of the lines in a wrong order or through surfaces, which more bundles do "
-                    "not mend: the error is about " +
-                    std::to_string(100 * error) + " %");
+                percent(share) +
+                    " of the lines met surfaces in a wrong order or passed through surfaces. The "
+                    "error of the light is about " +
+                    percent(error) +
+                    ", and more bundles do not reduce it; choose projector AUTO and small_patches "
+                    "CENTRE_SAMPLING");
 }
 
 void warnOfImbalance(Report& report) {
@@ -181,9 +187,9 @@ void warnOfImbalance(Report& report) {
         report.warnings.begin(),
         {WarningId::ENERGY_BALANCE,
          "the energy balance is off by " + percent(report.balanceError()) +
-             ": so much of the light that is emitted is neither absorbed nor leaves the scene, or "
-             "comes from nowhere; look for lamps inside of other surfaces, and compare with a bake "
-             "of smaller patches (patch_size)"});
+             ": this share of the emitted light is lost or added, and the result may be wrong by "
+             "as much. Look for lamps that are inside other surfaces or touch them, and compare "
+             "with a bake of smaller patches (patch_size)"});
 }
 
 }  // namespace raybundle

@@ -42,9 +42,10 @@ class FaceCutting {
         if (!crossings.isAll)
             patches.warnings.push_back(
                 {WarningId::UNCUT_CROSSINGS,
-                 "faces go through each other in so many places that the smaller ones are not cut "
-                 "there: they may let some light through walls; delete or hide what nobody sees of "
-                 "objects that go through each other"});
+                 "faces intersect in so many places that the smaller faces were not cut there. "
+                 "Some "
+                 "light may leak through walls; delete or hide the unseen parts of objects that "
+                 "intersect"});
         for (uint32_t c = 0; c < patches.cells.size(); ++c) {
             throwIfCancelledAt(c);
             if (patches.cells[c].hasPatches) addParents(c, crossings, shells);
@@ -89,13 +90,15 @@ class FaceCutting {
             patches.warnings.push_back(
                 {WarningId::DEGENERATE_FACES,
                  "object \"" + scene.instances[i].name + "\": " + std::to_string(degenerate) +
-                     " faces without area, or with none but by rounding, were left out"});
+                     " faces were left out, because their area is zero or no larger than rounding "
+                     "errors; remove them (Degenerate Dissolve)"});
         if (doubles)
             patches.warnings.push_back(
                 {WarningId::DOUBLED_FACES,
                  "object \"" + scene.instances[i].name + "\": " + std::to_string(doubles) +
-                     " faces lie on others that look the same way, whose light they get; merge "
-                     "such faces (Merge by Distance), or remove the object if it lies on another"});
+                     " faces lie on others that face the same way, and get the light of those "
+                     "faces; merge them (Merge by Distance), or delete the object if it lies on "
+                     "another object"});
     }
 
     // Returns the vertices of each cell's corners.

@@ -208,8 +208,8 @@ class InstanceReconstruction {
             said.status = "baked; no light on this side";
             warnings[i] = {WarningId::NO_LIGHT_ON_SIDE,
                            "object \"" + instance.name +
-                               "\": the baked sides of its faces get no light but the other sides "
-                               "do; flip its normals or choose the other side"};
+                               "\": almost no light reaches the baked sides of the faces, but the "
+                               "other sides are lit; flip the normals, or bake the other side"};
         }
     }
 
@@ -293,9 +293,9 @@ class InstanceReconstruction {
             warnings[i] = {
                 WarningId::UNSOLVED_FIT,
                 "object \"" + input.scene.instances[i].name +
-                    "\": the least squares came to no solution, and its vertices have the "
-                    "mean of the light around them; merge vertices by distance, or choose "
-                    "the reconstruction AREA_AVERAGE"};
+                    "\": the reconstruction LEAST_SQUARES did not converge, so that the vertices "
+                    "get the mean of the light around them; merge vertices (Merge by Distance), or "
+                    "choose the reconstruction AREA_AVERAGE"};
         return nodes;
     }
 

@@ -279,17 +279,19 @@ void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double targ
     std::stable_sort(noises.begin(), noises.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
     const size_t named = std::min(noises.size(), kMostNamed);
-    std::string text = "noisier than twice the target of " + inPercent(target) + ":";
+    std::string text =
+        "some objects are noisier than twice the target of " + inPercent(target) + ":";
     for (size_t k = 0; k < named; ++k)
         text += (k > 0 ? ", \"" : " object \"") + noises[k].second + "\" (" +
                 inPercent(noises[k].first) + ")";
     if (noises.size() > named)
         text += " and " + std::to_string(noises.size() - named) +
-                " more, of which the report has the noise of each";
+                " more (the report lists the noise of each object)";
     report.warn(
         WarningId::NOISY_OBJECTS,
-        text + (isOutOfReach ? "; few lines bring them light: a lower target_error takes long "
-                               "and gains little there"
+        text + (isOutOfReach ? ". Only few lines bring light to these objects, so that a lower "
+                               "target_error takes long and gains little; add lamps, or accept the "
+                               "noise"
                              : "; lower target_error"));
 }
 
@@ -308,10 +310,11 @@ std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, 
     return CoarseMesh{
         s.mesh(noiseScale),
         "object \"" + name + "\": its faces, " + inMetres(faceEdge) +
-            " wide in the mean, are too coarse for its light: interpolated over them it is " +
-            inPercent(mesh) + " off. Edges of about " + inMetres(edge) + " would bring that to " +
+            " wide on average, are too coarse for its light. Interpolation over the faces causes "
+            "an error of " +
+            inPercent(mesh) + ". Edges of about " + inMetres(edge) + " would reduce the error to " +
             inPercent(limit) +
-            ": subdivide the mesh, or choose the topology SUBDIVIDE with patch_size " +
+            "; subdivide the mesh, or choose the topology SUBDIVIDE with patch_size " +
             inMetres(0.5 * edge)};
 }
 
@@ -325,8 +328,8 @@ void warnOf(std::vector<CoarseMesh> meshes, Report& report) {
     if (meshes.size() > named)
         report.warn(WarningId::COARSE_MESH,
                     std::to_string(meshes.size() - named) +
-                        " more objects are too coarse for their light: the report has "
-                        "the error of each");
+                        " more objects are too coarse for their light; the report lists the error "
+                        "of each object");
 }
 
 }  // namespace

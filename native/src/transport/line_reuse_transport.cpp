@@ -122,16 +122,16 @@ class LineReuseTransport : public Transport {
         if (!result.isSettled)
             report.warn(
                 WarningId::UNSETTLED_EXCHANGE,
-                "the exchange of light did not come to rest: some surfaces reflect or let through "
-                "nearly all of it, over and over; give those that are closed around light a "
-                "reflectance or translucence of 0.9 at most");
+                "the exchange of light did not converge, because some surfaces reflect or transmit "
+                "nearly all light. The result may be wrong; reduce the reflectance and the "
+                "translucence of surfaces that enclose light to at most 0.9");
         if (streaming[0])
             report.warn(
                 WarningId::MEMORY_LIMIT,
                 "memory_limit was reached at " + std::to_string(input.counts.bundles) +
-                    " bundles: each of the other " +
-                    std::to_string(bundleCount() - input.counts.bundles) +
-                    " was used once and forgotten, so that relighting has to trace them again");
+                    " bundles. The other " + std::to_string(bundleCount() - input.counts.bundles) +
+                    " bundles were used once and discarded. The result is therefore less precise, "
+                    "and relighting has to trace these bundles again; increase memory_limit");
         return result;
     }
 

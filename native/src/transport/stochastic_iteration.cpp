@@ -236,12 +236,12 @@ class BundleIteration : public Transport {
         char number[32];
         std::snprintf(number, sizeof(number), "%.3g", growth);
         throw invalidArgument(
-            "solver STOCHASTIC_ITERATION does not converge on this scene: from bundle to bundle "
-            "the mean square of its noise would grow by a factor of " +
+            "solver STOCHASTIC_ITERATION does not converge on this scene: with each bundle, the "
+            "mean square of its noise would grow by a factor of " +
             std::string(number) +
-            ", which must be below 1. Lower the reflectances (large patches allow 0.86), raise "
-            "lines_per_bundle or patch_size until the patches are larger than the distance of "
-            "the lines, or choose solver LINE_REUSE, MULTIPATH or RANDOM_WALK");
+            ", and this factor must be below 1. Reduce the reflectances (large patches allow up to "
+            "0.86), increase lines_per_bundle or patch_size until the patches are larger than the "
+            "distance between lines, or choose solver LINE_REUSE, MULTIPATH or RANDOM_WALK");
     }
 
     // Replaces the waiting bundles, all of which must have been used.
