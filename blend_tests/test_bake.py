@@ -99,7 +99,7 @@ def test_faces_of_a_modifier_that_no_written_corner_touches_are_spared(floor_and
     assert spared.patches == whole.patches
     # The subdivided face has 256 faces with 4 corners each. Only 4 of these corners are written.
     assert {item['why']: item['count'] for item in spared.skipped}[
-        "their light is not asked for"] == 4 * 256 - 4
+        "no result is needed there"] == 4 * 256 - 4
     # With so few written corners, the light is gathered for each of them, at a point that lies
     # inside the face by a hundredth of the face's width. The tolerance covers this distance.
     exact = np.array([point_light_on_floor(x, y) for x, y, _ in SQUARE])
