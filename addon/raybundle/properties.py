@@ -57,88 +57,96 @@ enum_shared_meshes = (
 
 # The native library's settings "skip.NAME".
 enum_skip = (
-    ('darkness', "Darkness", "Leave out bundles and solve if no light reaches any surface"),
+    ('darkness', "Darkness", "Leave out the bundles and the solve if no light reaches any surface"),
     ('reflection', "Reflection",
-     "Leave out bundles and solve if no surface reflects light and lines carry no other light"),
-    ('geometry', "Geometry", "Keep patches and lines if the geometry is as in the last bake"),
-    ('lights', "Lights", "Keep the first shot if geometry and lights are as in the last bake"),
+     "Leave out the bundles and the solve if no surface reflects light and lines carry no other "
+     "light"),
+    ('geometry', "Geometry",
+     "Keep patches and lines if the geometry is unchanged since the last bake"),
+    ('lights', "Lights",
+     "Keep the first shot if geometry and lights are unchanged since the last bake"),
     ('facing', "Facing", "Leave out shadow rays to a light that the surface cannot face"),
     ('occluders', "Occluders", "Leave out the reconstruction of objects that are not baked"),
     ('lit', "Lit",
-     "Leave out the noise of a light that is wholly visible: its light is known exactly"),
-    ('weak', "Weak", "Leave out most shadow rays to a light that gives little of all"),
+     "Leave out the noise of a light that is fully visible, because its light is known exactly"),
+    ('weak', "Weak", "Leave out most shadow rays to a light that contributes little"),
     ('inside', "Inside", "Leave out most shadow rays from the inside of solids"),
-    ('gather', "Gather", "Leave out the final gather where interpolation follows the light"),
-    ('bundles', "Bundles", "Leave out further bundles once the noise is at its target"),
+    ('gather', "Gather", "Leave out the final gather where interpolation is accurate enough"),
+    ('bundles', "Bundles", "Leave out further bundles when the noise has reached its target"),
     ('warm_start', "Warm Start",
-     "Begin the solve with the solution of the last bake, which takes fewer iterations"),
-    ('sheets', "Sheets", "Project faces that lie in a plane with others of their kind as one"),
+     "Start the solve from the solution of the last bake, which takes fewer iterations"),
+    ('sheets', "Sheets", "Project neighbouring faces of equal shape in one plane together"),
     ('lamp_insides', "Lamp Insides",
-     "Leave out the emission inside of closed surfaces that hold nothing else"),
+     "Leave out the emission inside closed surfaces that contain nothing else"),
     ('clusters', "Clusters",
-     "Leave out the light of each patch where it is not shown and finer than needed"),
+     "Exchange light between clusters of patches where patches are not shown and finer than "
+     "needed"),
 )
 
 enum_solver = (
     ('LINE_REUSE', "Line Reuse",
-     "Keep all lines as a sparse matrix and solve on it to convergence"),
+     "Store all lines in a sparse matrix and solve the system of this matrix to convergence"),
     ('MULTIPATH', "Multipath",
-     "Each bundle passes on a part of the light that is still to be distributed. Two chains, each "
-     "of half of the bundles, tell the noise"),
+     "Each bundle passes on a part of the light that is not distributed yet. Two chains, each of "
+     "half of the bundles, measure the noise"),
     ('STOCHASTIC_ITERATION', "Stochastic Iteration",
-     "Each bundle reflects all the light that the one before brought; the result is the mean. Two "
-     "chains, each of half of the bundles, tell the noise"),
+     "Each bundle passes on all the light that the previous bundle brought; the result is the "
+     "mean. Two chains, each of half of the bundles, measure the noise"),
     ('RANDOM_WALK', "Random Walk",
-     "Light walks along local rays from surface to surface; there are no bundles"),
+     "Light follows random local rays from surface to surface; there are no bundles"),
 )
 
 enum_first_shot = (
-    ('GATHER', "Gather", "Shadow rays from the receivers to the lights"),
-    ('SHOOT', "Shoot", "Rays from the lights to the surfaces that they meet first"),
+    ('GATHER', "Gather", "Trace shadow rays from the receivers to the lights"),
+    ('SHOOT', "Shoot", "Trace rays from the lights to the first surfaces that they meet"),
     ('EXTENDED', "Extended",
-     "Shoot, and go on from the surfaces that became bright until light is everywhere"),
+     "Shoot, then continue from surfaces brighter than the mean until light is everywhere"),
 )
 
 enum_directions = (
-    ('LOW_DISCREPANCY', "Low Discrepancy", "Directions spread evenly: the least noise"),
+    ('LOW_DISCREPANCY', "Low Discrepancy", "Evenly spread directions, which give the least noise"),
     ('RANDOM', "Random", "Independent uniform directions"),
-    ('ADAPTIVE', "Adaptive", "Independent directions, more of them where more light passes"),
+    ('ADAPTIVE', "Adaptive", "Independent directions, denser where more light passes"),
 )
 
 enum_projector = (
     ('AUTO', "Automatic", "The fastest exact projector"),
-    ('FRAGMENT_LISTS', "Fragment Lists", "Exact lists of fragments per pixel, ordered by depth"),
+    ('FRAGMENT_LISTS', "Fragment Lists", "Exact lists of fragments per pixel, sorted by depth"),
     ('PAINTER', "Painter",
-     "Faces in the order of their centres: wrong where they overlap in depth"),
+     "Patches are drawn in the order of their centres, which is wrong where they overlap in depth"),
     ('PAINTER_NEWELL', "Painter, Newell",
-     "Faces in an order that Newell's tests have proved; cycles are broken and counted"),
-    ('PLANE', "Plane", "Two depth buffers, one on each side of a random plane per direction"),
-    ('PLANES', "Planes", "Two depth buffers on the sides of each of several planes per direction"),
+     "Patches are drawn in an order that Newell's tests have verified; cycles are broken and "
+     "counted"),
+    ('PLANE', "Plane", "Two depth buffers per direction, one on each side of a random plane"),
+    ('PLANES', "Planes", "Two depth buffers for each of several planes per direction"),
 )
 
 enum_plane_placement = (
-    ('SYSTEMATIC', "Systematic", "At equal distances, all moved by one random shift"),
-    ('STRATIFIED', "Stratified", "One at a random place of each of equal intervals"),
+    ('SYSTEMATIC', "Systematic", "At equal distances, with one common random shift"),
+    ('STRATIFIED', "Stratified", "At a random position in each of several equal intervals"),
     ('CLOSE_DISTANCE', "Close Distance",
-     "Some of the planes near surfaces, so that they part what lies close together"),
+     "Some planes near surfaces, to separate surfaces that lie close together"),
 )
 
 enum_estimator = (
-    ('COLLISION', "Collision", "A walk counts at every surface that it meets: the least noise"),
-    ('SURVIVAL', "Survival", "A walk counts where it goes on"),
-    ('ABSORPTION', "Absorption", "A walk counts where it ends"),
+    ('COLLISION', "Collision",
+     "A walk contributes light at every surface that it meets, which gives the least noise"),
+    ('SURVIVAL', "Survival", "A walk contributes light where it continues"),
+    ('ABSORPTION', "Absorption", "A walk contributes light where it ends"),
 )
 
 enum_small_patches = (
     ('CENTRE_SAMPLING', "Centre Sampling",
-     "A line meets what covers the pixel's centre: unbiased for patches of any size"),
+     "A line meets the patches that cover the centre of its pixel: unbiased for patches of any "
+     "size"),
     ('ROULETTE', "Roulette",
-     "A patch fills whole pixels; if it is smaller than a pixel, with a probability of its area"),
+     "A patch fills whole pixels; a patch smaller than a pixel is drawn with a probability "
+     "proportional to its area"),
 )
 
 enum_reconstruction = (
     ('LEAST_SQUARES', "Least Squares",
-     "Vertex values whose interpolation over the faces is nearest to the light on the surface"),
+     "Vertex values whose interpolation over the faces is closest to the light on the surface"),
     ('AREA_AVERAGE', "Area Average",
      "The mean of the light on the faces around each vertex: never too bright or too dark, but "
      "blurred"),
@@ -218,79 +226,83 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         items=enum_shared_meshes, default='SINGLE_USER')
     patch_size: FloatProperty(
         name="Patch Size",
-        description="Edge of the patches that the light is computed on; 0 is automatic",
+        description="Edge length of the patches on which the light is computed; 0 chooses it "
+                    "automatically",
         default=0.0, min=0.0, max=1e9, soft_max=10.0, precision=3, step=1, subtype='DISTANCE',
         unit='LENGTH')
     max_patches: IntProperty(
         name="Maximum Patches",
-        description="Most patches that subdivision may make; patches grow to stay below it, but a "
-                    "face is one at least",
+        description="Maximum number of patches; patches become larger to stay below it, but each "
+                    "face has at least one",
         default=100_000, min=1, max=2 ** 23, soft_min=1_000, soft_max=1_000_000)
     refine: BoolProperty(
         name="Refine",
-        description="Smaller patches at the edges of shadows, where what that gains is worth the "
-                    "time",
+        description="Use smaller patches at the edges of shadows and close to lamps, if the gain "
+                    "is worth the time",
         default=False)
     contacts: BoolProperty(
         name="Contacts",
-        description="Smaller patches beside gaps much narrower than a patch, as on a table below "
-                    "the rim of a plate",
+        description="Use smaller patches beside gaps much narrower than a patch, such as on a "
+                    "table below the rim of a plate",
         default=True)
     solver: EnumProperty(
-        name="Solver", description="How light is passed on between surfaces", items=enum_solver,
+        name="Solver", description="How surfaces exchange light", items=enum_solver,
         default='LINE_REUSE')
     estimator: EnumProperty(
-        name="Estimator", description="What a walk of the solver Random Walk counts as light",
+        name="Estimator",
+        description="Which events of a walk contribute light, for the solver Random Walk",
         items=enum_estimator, default='COLLISION')
     first_shot: EnumProperty(
-        name="First Shot", description="How the light of lamps and world is distributed",
+        name="First Shot",
+        description="How the light of lamps and the world is distributed before any bundle",
         items=enum_first_shot, default='GATHER')
     local_rays: IntProperty(
         name="Local Rays",
-        description="Rays from the lights, of a first shot that shoots; 0 is as many as the noise "
-                    "asks for",
+        description="Number of rays from the lights, for the first shots Shoot and Extended; 0 "
+                    "chooses it automatically",
         default=0, min=0, max=2 ** 31 - 1, soft_max=100_000_000)
     directions: EnumProperty(
         name="Directions", description="How the directions of the bundles are chosen",
         items=enum_directions, default='LOW_DISCREPANCY')
     projector: EnumProperty(
-        name="Projector", description="How a bundle's lines find the surfaces they meet",
+        name="Projector", description="How the lines of a bundle find the surfaces that they meet",
         items=enum_projector, default='AUTO')
     plane_count: IntProperty(
-        name="Planes", description="Planes per direction, of the projector Planes", default=4,
-        min=1, max=64)
+        name="Planes", description="Number of planes per direction, for the projector Planes",
+        default=4, min=1, max=64)
     plane_placement: EnumProperty(
-        name="Plane Placement", description="Where the projector Planes puts its planes",
+        name="Plane Placement", description="Where the projector Planes places its planes",
         items=enum_plane_placement, default='SYSTEMATIC')
     small_patches: EnumProperty(
-        name="Small Patches", description="How patches smaller than a pixel are met",
+        name="Small Patches", description="How lines meet patches that are smaller than a pixel",
         items=enum_small_patches, default='CENTRE_SAMPLING')
     reconstruction: EnumProperty(
-        name="Reconstruction", description="How patches become values at vertices",
+        name="Reconstruction", description="How the light on patches becomes values at vertices",
         items=enum_reconstruction, default='LEAST_SQUARES')
     final_gather: BoolProperty(
         name="Final Gather",
-        description="Of the reconstruction Point, and of meshes that modifiers subdivide: gather "
-                    "the light of other surfaces at the vertices too, where it changes between "
-                    "them",
+        description="Gather the light of other surfaces at the vertices too, where it varies "
+                    "between them; for the reconstruction Point and for meshes that modifiers "
+                    "subdivide",
         default=True)
     max_bundles: IntProperty(
         name="Maximum Bundles",
-        description="Most directions that are traced, even if there is still more noise than "
-                    "wanted",
+        description="Maximum number of bundles, even if the noise is still above the target",
         default=65_536, min=2, max=2 ** 24, soft_max=65_536)
     lines_per_bundle: IntProperty(
         name="Lines per Bundle",
-        description="Lines in each direction; 0 is automatic: two per patch",
+        description="Number of lines in each bundle; 0 chooses it automatically, at two lines per "
+                    "patch",
         default=0, min=0, max=2 ** 26, soft_max=10_000_000)
     memory_limit: FloatProperty(
-        name="Memory Limit", description="Most memory for the exchanges between patches, in MB",
+        name="Memory Limit", description="Maximum memory for the exchanges between patches, in MB",
         default=4096.0, min=1.0, max=1e9, soft_min=64.0, soft_max=262_144.0, precision=0,
         step=6400)
     seed: IntProperty(
-        name="Seed", description="The same seed gives the same noise", default=0, min=0)
+        name="Seed", description="Seed of the random numbers; the same seed gives the same noise",
+        default=0, min=0)
     threads: IntProperty(
-        name="Threads", description="Processor threads to use; 0 is all", default=0, min=0,
+        name="Threads", description="Number of processor threads; 0 uses all", default=0, min=0,
         soft_max=64, max=1024)
     skips_off: EnumProperty(
         name="Skips Off",

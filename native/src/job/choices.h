@@ -64,30 +64,30 @@ struct SolverRow {
 
 inline constexpr SolverRow kSolvers[] = {
     {Solver::LINE_REUSE, "LINE_REUSE",
-     "Keep all lines as a sparse matrix and solve on it to convergence",
-     "it moves no power while it traces, which directions could follow", "",
+     "Store all lines in a sparse matrix and solve the system of this matrix to convergence",
+     "it moves no light while it traces, so that directions cannot adapt to the light", "",
      SolverCan::TRACE_BUNDLES | SolverCan::USE_DEPENDENT_DIRECTIONS |
          SolverCan::USE_CHANCE_EXCHANGES | SolverCan::COUNT_LINES | SolverCan::CARRY_LIGHT_SETS |
          SolverCan::CARRY_ANGLES | SolverCan::CARRY_TRANSLUCENCE |
          SolverCan::LIGHT_WITHOUT_EXCHANGE},
     {Solver::MULTIPATH, "MULTIPATH",
-     "Each bundle passes on a part of the light that is still to be distributed. Two chains, each "
-     "of half of the bundles, tell the noise",
-     "light goes on from one bundle to the next, so that their directions must be independent", "",
+     "Each bundle passes on a part of the light that is not distributed yet. Two chains, each of "
+     "half of the bundles, measure the noise",
+     "it passes light from one bundle to the next, so that directions must be independent", "",
      SolverCan::TRACE_BUNDLES | SolverCan::USE_WEIGHTED_DIRECTIONS |
          SolverCan::USE_CHANCE_EXCHANGES | SolverCan::FOLLOW_THE_THESIS},
     {Solver::STOCHASTIC_ITERATION, "STOCHASTIC_ITERATION",
-     "Each bundle reflects all the light that the one before brought; the result is the mean. Two "
-     "chains, each of half of the bundles, tell the noise",
-     "light goes on from one bundle to the next whole, so that their directions must be "
-     "independent and of equal weight",
-     "exchanges found with a small probability have a weight without bound, with which the "
-     "iteration does not converge",
+     "Each bundle passes on all the light that the previous bundle brought; the result is the "
+     "mean. Two chains, each of half of the bundles, measure the noise",
+     "it passes all light from one bundle to the next, so that directions must be independent "
+     "and of equal weight",
+     "it does not converge with exchanges that are found with a small probability, because their "
+     "weights have no bound",
      SolverCan::TRACE_BUNDLES},
     {Solver::RANDOM_WALK, "RANDOM_WALK",
-     "Light walks along local rays from surface to surface; there are no bundles",
-     "it walks along random local rays and has no bundles",
-     "it walks along local rays and has no bundles to project", 0},
+     "Light follows random local rays from surface to surface; there are no bundles",
+     "it follows random local rays and has no bundles",
+     "it follows local rays and has no bundles to project", 0},
 };
 
 // --------------------------------------------------------------------------------------------
@@ -108,11 +108,11 @@ struct FirstShotRow {
 
 inline constexpr FirstShotRow kFirstShots[] = {
     // value, name, help, gathered
-    {FirstShotKind::GATHER, "GATHER", "Shadow rays from the receivers to the lights", true},
-    {FirstShotKind::SHOOT, "SHOOT", "Rays from the lights to the surfaces that they meet first",
-     false},
+    {FirstShotKind::GATHER, "GATHER", "Trace shadow rays from the receivers to the lights", true},
+    {FirstShotKind::SHOOT, "SHOOT",
+     "Trace rays from the lights to the first surfaces that they meet", false},
     {FirstShotKind::EXTENDED, "EXTENDED",
-     "Shoot, and go on from the surfaces that became bright until light is everywhere", false},
+     "Shoot, then continue from surfaces brighter than the mean until light is everywhere", false},
 };
 
 // --------------------------------------------------------------------------------------------
@@ -132,11 +132,11 @@ struct DirectionRow {
 
 inline constexpr DirectionRow kDirectionKinds[] = {
     // value, name, help, independent, weighted
-    {DirectionKind::LOW_DISCREPANCY, "LOW_DISCREPANCY", "Directions spread evenly: the least noise",
-     false, false},
+    {DirectionKind::LOW_DISCREPANCY, "LOW_DISCREPANCY",
+     "Evenly spread directions, which give the least noise", false, false},
     {DirectionKind::RANDOM, "RANDOM", "Independent uniform directions", true, false},
-    {DirectionKind::ADAPTIVE, "ADAPTIVE",
-     "Independent directions, more of them where more light passes", true, true},
+    {DirectionKind::ADAPTIVE, "ADAPTIVE", "Independent directions, denser where more light passes",
+     true, true},
 };
 
 // --------------------------------------------------------------------------------------------
@@ -159,16 +159,18 @@ inline constexpr ProjectorRow kProjectorKinds[] = {
     // value, name, help, automatic, exact, by chance
     {ProjectorKind::AUTO, "AUTO", "The fastest exact projector", true, true, false},
     {ProjectorKind::FRAGMENT_LISTS, "FRAGMENT_LISTS",
-     "Exact lists of fragments per pixel, ordered by depth", false, true, false},
+     "Exact lists of fragments per pixel, sorted by depth", false, true, false},
     {ProjectorKind::PAINTER, "PAINTER",
-     "Faces in the order of their centres: wrong where they overlap in depth", false, false, false},
+     "Patches are drawn in the order of their centres, which is wrong where they overlap in depth",
+     false, false, false},
     {ProjectorKind::PAINTER_NEWELL, "PAINTER_NEWELL",
-     "Faces in an order that Newell's tests have proved; cycles are broken and counted", false,
-     false, false},
+     "Patches are drawn in an order that Newell's tests have verified; cycles are broken and "
+     "counted",
+     false, false, false},
     {ProjectorKind::PLANE, "PLANE",
-     "Two depth buffers, one on each side of a random plane per direction", false, false, true},
-    {ProjectorKind::PLANES, "PLANES",
-     "Two depth buffers on the sides of each of several planes per direction", false, false, true},
+     "Two depth buffers per direction, one on each side of a random plane", false, false, true},
+    {ProjectorKind::PLANES, "PLANES", "Two depth buffers for each of several planes per direction",
+     false, false, true},
 };
 
 // --------------------------------------------------------------------------------------------
@@ -188,9 +190,12 @@ struct SmallPatchesRow {
 inline constexpr SmallPatchesRow kSmallPatches[] = {
     // value, name, help, needs pixels
     {SmallPatches::CENTRE_SAMPLING, "CENTRE_SAMPLING",
-     "A line meets what covers the pixel's centre: unbiased for patches of any size", false},
+     "A line meets the patches that cover the centre of its pixel: unbiased for patches of any "
+     "size",
+     false},
     {SmallPatches::ROULETTE, "ROULETTE",
-     "A patch fills whole pixels; if it is smaller than a pixel, with a probability of its area",
+     "A patch fills whole pixels; a patch smaller than a pixel is drawn with a probability "
+     "proportional to its area",
      true},
 };
 
@@ -211,7 +216,7 @@ enum class Reconstruction { LEAST_SQUARES, AREA_AVERAGE, POINT };
 
 inline constexpr NameRow<Reconstruction> kReconstructions[] = {
     {Reconstruction::LEAST_SQUARES, "LEAST_SQUARES",
-     "Vertex values whose interpolation over the faces is nearest to the light on the surface"},
+     "Vertex values whose interpolation over the faces is closest to the light on the surface"},
     {Reconstruction::AREA_AVERAGE, "AREA_AVERAGE",
      "The mean of the light on the faces around each vertex: never too bright or too dark, but "
      "blurred"},
@@ -222,10 +227,11 @@ inline constexpr NameRow<Reconstruction> kReconstructions[] = {
 enum class PlanePlacement { SYSTEMATIC, STRATIFIED, CLOSE_DISTANCE };
 
 inline constexpr NameRow<PlanePlacement> kPlanePlacements[] = {
-    {PlanePlacement::SYSTEMATIC, "SYSTEMATIC", "At equal distances, all moved by one random shift"},
-    {PlanePlacement::STRATIFIED, "STRATIFIED", "One at a random place of each of equal intervals"},
+    {PlanePlacement::SYSTEMATIC, "SYSTEMATIC", "At equal distances, with one common random shift"},
+    {PlanePlacement::STRATIFIED, "STRATIFIED",
+     "At a random position in each of several equal intervals"},
     {PlanePlacement::CLOSE_DISTANCE, "CLOSE_DISTANCE",
-     "Some of the planes near surfaces, so that they part what lies close together"},
+     "Some planes near surfaces, to separate surfaces that lie close together"},
 };
 
 // Which events of a walk of the solver RANDOM_WALK contribute light (transport/random_walk.cpp).
@@ -233,9 +239,9 @@ enum class Estimator { COLLISION, SURVIVAL, ABSORPTION };
 
 inline constexpr NameRow<Estimator> kEstimators[] = {
     {Estimator::COLLISION, "COLLISION",
-     "A walk counts at every surface that it meets: the least noise"},
-    {Estimator::SURVIVAL, "SURVIVAL", "A walk counts where it goes on"},
-    {Estimator::ABSORPTION, "ABSORPTION", "A walk counts where it ends"},
+     "A walk contributes light at every surface that it meets, which gives the least noise"},
+    {Estimator::SURVIVAL, "SURVIVAL", "A walk contributes light where it continues"},
+    {Estimator::ABSORPTION, "ABSORPTION", "A walk contributes light where it ends"},
 };
 
 // --------------------------------------------------------------------------------------------
