@@ -23,8 +23,8 @@
  *   kind.
  * - Names are UTF-8 and appear in messages and in the report. A NULL name is an empty name.
  * - Different handles may be used from different threads at the same time. A call fails with
- *   RB_ERROR_INVALID_OPERATION if another call on the same handle is still running, be it in
- *   another thread or around the progress function.
+ *   RB_ERROR_INVALID_OPERATION if another call on the same handle is still running, in another
+ *   thread or as the caller of the progress function.
  * - Handles are numbers, not addresses, and no number is used twice. A released handle, or a handle
  *   of another kind, fails with RB_ERROR_INVALID_ARGUMENT. Releasing it again does nothing. */
 #ifndef RAYBUNDLE_H
@@ -210,7 +210,7 @@ typedef struct rb_diffuse {
  *   size          size of this struct in the caller's header, in bytes. Later versions have more
  *                 members at the end. A library newer than the caller uses their defaults; a
  *                 library older than the caller rejects the surface.
- *   reflectance   albedo. Its constant must not be negative. A value of 1 or more is clamped to
+ *   reflectance   albedo. Its constant must not be negative. A value above 0.999 is clamped to
  *                 0.999, with a warning in the report. Default: 0.8.
  *   emission      exitance in W/m^2, which is pi times the radiance. Its constant is 0 to 1e15.
  *   translucence  the share of the light arriving at the other side that passes through diffusely
@@ -314,11 +314,11 @@ RB_API rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name,
                                 int32_t* instance);
 
 /* Sets how an instance takes part in the light. Both switches are true by default.
- *   stops_direct   the instance blocks the light that the first shot gathers: lamps and bright
- *                  emission
- *   exchanges      the instance emits and reflects light to other surfaces, and blocks the light of
- *                  the world and the light that other surfaces reflect. If false, the instance
- *                  still receives light and, with role RB_ROLE_BAKE, has a result.
+ *   stops_direct   the instance blocks the light that the first shot gathers: lamps, bright
+ *                  emission and the world image
+ *   exchanges      the instance emits and reflects light to other surfaces, and blocks the constant
+ *                  light of the world and the light that other surfaces reflect. If false, the
+ *                  instance still receives light and, with role RB_ROLE_BAKE, has a result.
  * Emission too dim for the first shot is distributed together with the reflected light, so
  * `exchanges` decides about it. A warning in the report names the instances for which that makes a
  * difference. */
