@@ -275,7 +275,7 @@ def test_a_bake_within_a_bake_is_refused(closed_box):
         if stage == 'bundles':
             bake()
 
-    with pytest.raises(raybundle.RaybundleError, match="not done"):
+    with pytest.raises(raybundle.RaybundleError, match="still using"):
         bake(progress=bake_again)
     assert len(closed_box.data.color_attributes) == 0
 

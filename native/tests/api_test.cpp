@@ -153,8 +153,10 @@ TEST_F(Api, PixelsThatAreNoColoursAreBlackAndCounted) {
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
     const nlohmann::json said = report();
     ASSERT_EQ(said["warnings"].size(), 1u);
-    EXPECT_EQ(said["warnings"][0],
-              "image \"paint\": 2 of its 3 pixels are negative or no number; they count as black");
+    EXPECT_EQ(
+        said["warnings"][0],
+        "image \"paint\": pixels that are negative or not finite count as black (2 of 3 pixels); "
+        "correct them in the image");
     EXPECT_EQ(said["warning_ids"][0], "BLACK_PIXELS");
 }
 

@@ -138,7 +138,7 @@ rb_error rb_get_report(rb_bake bake, const char** json) {
         const HeldBake held(bake, "bake");
         need(json, "json");
         if (!held->hasRun())
-            throw Error(RB_ERROR_INVALID_OPERATION, "there is no report before a bake");
+            throw Error(RB_ERROR_INVALID_OPERATION, "there is no report before a successful bake");
         *json = held->reportJson().c_str();
     });
 }

@@ -38,7 +38,7 @@ void needProcessor() {
         __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
     if (!isEnough)
         throw Error(RB_ERROR_UNSUPPORTED_HARDWARE,
-                    "this processor has no SSE 4.2 and POPCNT, which Raybundle needs");
+                    "this processor does not support SSE 4.2 and POPCNT, which Raybundle requires");
 #endif
 }
 

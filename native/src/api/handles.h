@@ -52,10 +52,11 @@ class Handles {
         const std::lock_guard lock(all.mutex);
         const auto slot = all.slots.find(handle);
         if (slot == all.slots.end() || slot->second.isReleased)
-            throw invalidArgument(std::string(name) + " was released, or is no " + name);
+            throw invalidArgument(std::string(name) + " was released, or is not a handle of a " +
+                                  name);
         if (slot->second.isInUse)
             throw Error(RB_ERROR_INVALID_OPERATION,
-                        std::string("another call that uses this ") + name + " is not done");
+                        std::string("another call is still using this ") + name);
         slot->second.isInUse = true;
         return *slot->second.value;
     }

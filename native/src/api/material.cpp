@@ -26,10 +26,12 @@ rb_surface defaultSurface() {
 // library's struct. `object` names the surface in the message.
 void needSurfaceSize(size_t size, const std::string& object) {
     const std::string given = object + " has a size of " + std::to_string(size) + " bytes";
-    if (size < kLeastSize) throw invalidArgument(given + ": rb_init_surface sets it");
+    if (size < kLeastSize)
+        throw invalidArgument(given + ", which is too small; call rb_init_surface first");
     if (size > sizeof(rb_surface))
-        throw invalidArgument(given + ", more than the " + std::to_string(sizeof(rb_surface)) +
-                              " that this library knows: the caller needs a newer one");
+        throw invalidArgument(given + ", but this library supports at most " +
+                              std::to_string(sizeof(rb_surface)) +
+                              " bytes; use a newer version of the library");
 }
 
 // Reads one side of a material from the caller's struct. Checks everything that Scene::addMaterial

@@ -92,7 +92,8 @@ rb_error rb_set_mesh_sharp_edges(rb_scene scene, int32_t mesh, const int32_t* ve
                 if (vertices[end] < 0 || size_t(vertices[end]) >= target.vertices.size())
                     throw invalidArgument("mesh \"" + target.name + "\": sharp edge " +
                                           std::to_string(e) + " uses vertex " +
-                                          std::to_string(vertices[end]));
+                                          std::to_string(vertices[end]) + ", but the mesh has " +
+                                          std::to_string(target.vertices.size()) + " vertices");
             edges.push_back(edgeKey(vertices[2 * e], vertices[2 * e + 1]));
         }
         std::sort(edges.begin(), edges.end());
@@ -167,7 +168,9 @@ rb_error rb_set_light_cone(rb_scene scene, int32_t light, const float world_to_l
         if (target.kind != Light::Kind::POINT)
             throw invalidArgument("light \"" + target.name + "\" is not a point light");
         if (!(angle >= 0 && std::isfinite(angle)) || !(blend >= 0 && blend <= 1))
-            throw invalidArgument("light \"" + target.name + "\": angle or blend out of range");
+            throw invalidArgument("light \"" + target.name +
+                                  "\": the angle must be finite and not negative, and the "
+                                  "blend must be 0 to 1");
         for (int row = 0; row < 3; ++row)
             for (int column = 0; column < 3; ++column)
                 target.worldToCone[column][row] = double(world_to_light[3 * row + column]);
@@ -227,7 +230,7 @@ rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread) {
             throw invalidArgument("light \"" + target.name + "\" is not an area light");
         // The caller's float value of pi may be rounded up.
         if (!(spread >= 0 && spread <= glm::pi<float>() * 1.000001f))
-            throw invalidArgument("light \"" + target.name + "\": spread out of range");
+            throw invalidArgument("light \"" + target.name + "\": the spread must be 0 to pi");
         target.spread = double(spread);
     });
 }
@@ -250,7 +253,7 @@ rb_error rb_set_world(rb_scene scene, const float radiance[3]) {
 rb_error rb_set_world_image(rb_scene scene, int32_t width, int32_t height, const float* rgb) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
-        if (width <= 0 || height <= 0) throw invalidArgument("world image has no pixels");
+        if (width <= 0 || height <= 0) throw invalidArgument("the world image has no pixels");
         const size_t pixels = size_t(width) * size_t(height);
         needArray(rgb, pixels, "rgb");
         held->setWorldImage({width, height, vectors<glm::vec3>(rgb, pixels)});

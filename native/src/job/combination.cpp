@@ -60,7 +60,7 @@ void checkDirections(const Settings& settings) {
                }));
     if (settings.thesisLiteral && directions.isWeighted)
         refuse(std::string("thesis_literal does not work with directions ") + directions.name,
-               "the pseudo-code of the thesis knows no weights",
+               "the pseudo-code of the thesis has no weights",
                remedy("directions", kDirectionKinds,
                       [&](const auto& row) { return accepts(solver, row) && !row.isWeighted; }));
 }
@@ -82,7 +82,7 @@ void checkProjector(const Settings& settings) {
     if (settings.linesPerBundle == 1 && (smallPatches.needsPixels || !projector.isAutomatic))
         refuse(std::string("lines_per_bundle 1 does not work with projector ") + projector.name +
                    " and small_patches " + smallPatches.name,
-               "single lines are traced and not projected",
+               "single lines are traced without a projector",
                remedy("projector", kProjectorKinds,
                       [](const ProjectorRow& row) { return row.isAutomatic; }) +
                    " and " + smallPatchesWithoutPixels());
@@ -96,10 +96,10 @@ void checkCombination(const Settings& settings, size_t lightSetCount) {
     checkProjector(settings);
     if (settings.thesisLiteral && !can(settings.solver, SolverCan::FOLLOW_THE_THESIS))
         refuse("thesis_literal does not work with solver " + solver,
-               "it is a variant of one method", solversThatCan(SolverCan::FOLLOW_THE_THESIS));
+               "it is a variant of another solver", solversThatCan(SolverCan::FOLLOW_THE_THESIS));
     if (lightSetCount > 0 && !can(settings.solver, SolverCan::CARRY_LIGHT_SETS))
         refuse("solver " + solver + " does not work with light sets",
-               "it moves the light of all sets while it traces and cannot tell them apart",
+               "it moves the light of all sets together and cannot separate them",
                solversThatCan(SolverCan::CARRY_LIGHT_SETS));
 }
 

@@ -13,7 +13,7 @@ template <class IsOfType>
 const Setting& find(const std::string& name, const IsOfType& isOfType) {
     for (const Setting& setting : kSettings)
         if (name == setting.name && std::visit(isOfType, setting.member)) return setting;
-    throw invalidArgument("there is no setting \"" + name + "\" of this type");
+    throw invalidArgument("setting \"" + name + "\" does not exist or has another type");
 }
 
 // Returns the setting `name` whose values are of the type Number (int or float). Throws
@@ -42,7 +42,7 @@ void setNumber(Settings& settings, const std::string& name, Number value) {
     const Setting& setting = findNumber<Number>(name);
     const Number least = Number(setting.least), most = Number(setting.most);
     if (!(value >= least && value <= most))
-        throw invalidArgument("setting \"" + name + "\" must lie between " + std::to_string(least) +
+        throw invalidArgument("setting \"" + name + "\" must be between " + std::to_string(least) +
                               " and " + std::to_string(most));
     settings.*memberOf<Number>(setting) = value;
 }

@@ -228,8 +228,9 @@ void bisectEdges(const Mesh& source, float maxEdge, TriMesh& mesh) {
         mesh.split_copy(edge, middle);
         for (auto spoke : mesh.voh_range(middle)) push(mesh.edge_handle(spoke));
         if (mesh.n_faces() > kMaxTriangles)
-            throw invalidArgument("mesh \"" + source.name + "\": an edge length of " +
-                                  std::to_string(maxEdge) + " would need too many triangles");
+            throw invalidArgument("mesh \"" + source.name + "\": edges of at most " +
+                                  std::to_string(maxEdge) + " need more than " +
+                                  std::to_string(kMaxTriangles) + " triangles; allow longer edges");
     }
 }
 

@@ -84,9 +84,10 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     }
     const size_t count = numberPatches(patches);
     if (count > kMostPatches)
-        throw invalidArgument("the scene has too many faces: they are " + std::to_string(count) +
-                              " patches at least, and " + std::to_string(kMostPatches) +
-                              " are possible");
+        throw invalidArgument("the scene has too many faces: it needs at least " +
+                              std::to_string(count) + " patches, and only " +
+                              std::to_string(kMostPatches) +
+                              " are possible; simplify meshes, or hide objects in renders");
     for (Island& island : patches.islands) {
         island.touchDistance =
             std::max(std::min(kTouchOfRadius * island.radius, kTouchOfPatch * island.finest),

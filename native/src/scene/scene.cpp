@@ -42,7 +42,8 @@ bool isFiniteAndPositive(const V& v) {
 // Largest strength of a light, in W/m^2, W/sr or W/(m^2 sr); sunlight is 1e3 W/m^2. Above it,
 // squares of the light times areas would exceed the range of float and the result would be NaN.
 constexpr float kMostLight = 1e15f;
-constexpr const char* kTooBright = " is too bright to compute with: more than 1e15";
+constexpr const char* kTooBright =
+    " is too bright; reduce it to at most 1e15 (W/m^2, W/sr or W/(m^2 sr))";
 
 std::string quoted(const char* kind, const std::string& name) {
     return std::string(kind) + " \"" + name + "\"";
@@ -86,9 +87,10 @@ int32_t Scene::addImage(Image image) {
     }
     if (black > 0)
         warnings.push_back({WarningId::BLACK_PIXELS,
-                            object + ": " + std::to_string(black) + " of its " +
+                            object + ": pixels that are negative or not finite count as black (" +
+                                std::to_string(black) + " of " +
                                 std::to_string(image.pixels.size()) +
-                                " pixels are negative or no number; they count as black"});
+                                " pixels); correct them in the image"});
     images.push_back(std::move(image));
     return int32_t(images.size()) - 1;
 }
@@ -118,7 +120,9 @@ int32_t Scene::addMaterial(Material material) {
     }
     if (clamped)
         warnings.push_back({WarningId::CLAMPED_REFLECTANCE,
-                            object + ": reflectance of 1 or more was clamped to 0.999"});
+                            object +
+                                ": its reflectance was clamped to 0.999, because every surface "
+                                "must absorb some light; choose a darker base colour"});
     materials.push_back(std::move(material));
     return int32_t(materials.size()) - 1;
 }
@@ -128,7 +132,8 @@ int32_t Scene::addMesh(Mesh mesh) {
     checkAllFinite(mesh.vertices, object, "vertex");
     if (mesh.faceOffsets.empty() || mesh.faceOffsets.front() != 0 ||
         size_t(mesh.faceOffsets.back()) != mesh.cornerVertices.size())
-        throw invalidArgument(object + ": face offsets must run from 0 to the number of corners");
+        throw invalidArgument(object +
+                              ": face offsets must start at 0 and end at the number of corners");
     for (size_t f = 0; f < mesh.faceCount(); ++f)
         if (mesh.faceOffsets[f + 1] - mesh.faceOffsets[f] < 3)
             throw invalidArgument(object + ": face " + std::to_string(f) +
@@ -136,8 +141,8 @@ int32_t Scene::addMesh(Mesh mesh) {
     for (size_t c = 0; c < mesh.cornerVertices.size(); ++c)
         if (mesh.cornerVertices[c] < 0 || size_t(mesh.cornerVertices[c]) >= mesh.vertices.size())
             throw invalidArgument(object + ": corner " + std::to_string(c) + " uses vertex " +
-                                  std::to_string(mesh.cornerVertices[c]) + " of " +
-                                  std::to_string(mesh.vertices.size()));
+                                  std::to_string(mesh.cornerVertices[c]) + ", but the mesh has " +
+                                  std::to_string(mesh.vertices.size()) + " vertices");
     for (int32_t id : mesh.faceMaterials)
         if (id != -1) checked(materials, id, "material");
     mesh.faceMaterials.resize(mesh.faceCount(), -1);
@@ -162,7 +167,9 @@ int32_t Scene::addLight(Light light) {
     if (!isFinite(light.position) || !isFinite(light.direction) || !isFinite(light.axisU) ||
         !isFinite(light.axisV) || !std::isfinite(light.radius) || light.radius < 0 ||
         !std::isfinite(light.angle) || light.angle < 0)
-        throw invalidArgument(object + ": its position and size must be finite");
+        throw invalidArgument(
+            object +
+            ": its position, direction and size must be finite, and its size not negative");
     const float reach = light.radius + glm::length(light.axisU) + glm::length(light.axisV);
     if (!(glm::length(light.position) + reach <= kFarthest))
         throw invalidArgument(object + " reaches further than 1e12 m from the origin");
@@ -193,26 +200,27 @@ glm::vec3 WorldImage::meanRadiance() const {
 }
 
 void Scene::setWorld(const glm::vec3& radiance) {
-    if (!isFinite(radiance)) throw invalidArgument("world radiance: it must be finite");
+    if (!isFinite(radiance)) throw invalidArgument("the world radiance must be finite");
     if (brightest(radiance) > kMostLight)
-        throw invalidArgument(std::string("world radiance") + kTooBright);
+        throw invalidArgument(std::string("the world radiance") + kTooBright);
     worldRadiance = glm::max(radiance, glm::vec3(0.0f));
 }
 
 void Scene::setWorldImage(WorldImage image) {
-    if (image.width <= 0 || image.height <= 0) throw invalidArgument("world image has no pixels");
+    if (image.width <= 0 || image.height <= 0)
+        throw invalidArgument("the world image has no pixels");
     for (const glm::vec3& pixel : image.pixels) {
         if (!isFiniteAndPositive(pixel))
-            throw invalidArgument("world image: its pixels must be finite and not negative");
+            throw invalidArgument("the pixels of the world image must be finite and not negative");
         if (brightest(pixel) > kMostLight)
-            throw invalidArgument(std::string("world image: a pixel") + kTooBright);
+            throw invalidArgument(std::string("a pixel of the world image") + kTooBright);
     }
     worldImage = std::move(image);
 }
 
 int32_t Scene::addLightSet(std::string name) {
     if (std::find(lightSets.begin(), lightSets.end(), name) != lightSets.end())
-        throw invalidArgument("there is a " + quoted("light set", name) + " already");
+        throw invalidArgument("there is already a " + quoted("light set", name));
     lightSets.push_back(std::move(name));
     return int32_t(lightSets.size()) - 1;
 }

@@ -57,7 +57,9 @@ std::vector<uint64_t> allotLines(const std::vector<double>& expected, double xi)
     for (size_t k = 0; k < expected.size(); ++k) {
         sum += expected[k];
         if (!std::isfinite(sum))
-            throw invalidArgument("the lights are too bright: their power is not a finite number");
+            throw invalidArgument(
+                "the lights are too bright: their power is not a finite number; reduce their "
+                "strength");
         const uint64_t upTo = uint64_t(std::floor(sum + xi));
         counts[k] = upTo - sent;
         sent = upTo;

@@ -21,11 +21,13 @@ namespace {
     // If an allocation fails in one of several threads that build a tree, Embree only reports that
     // the build was cancelled, as RTC_ERROR_UNKNOWN. Nothing else can fail in a build.
     const bool isMemory = code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_UNKNOWN;
-    throw Error(
-        isMemory                            ? RB_ERROR_OUT_OF_MEMORY
-        : code == RTC_ERROR_UNSUPPORTED_CPU ? RB_ERROR_UNSUPPORTED_HARDWARE
-                                            : RB_ERROR_UNKNOWN,
-        std::string("the ray tracer failed: ") + (isMemory ? "out of memory, " : "") + what);
+    throw Error(isMemory                            ? RB_ERROR_OUT_OF_MEMORY
+                : code == RTC_ERROR_UNSUPPORTED_CPU ? RB_ERROR_UNSUPPORTED_HARDWARE
+                                                    : RB_ERROR_UNKNOWN,
+                std::string("the ray tracer Embree could not ") + what +
+                    (isMemory                            ? ": out of memory"
+                     : code == RTC_ERROR_UNSUPPORTED_CPU ? ": it does not support this processor"
+                                                         : ""));
 }
 
 }  // namespace
@@ -35,9 +37,9 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
       surfaceOffset(kRelativeOffset * patches.radius),
       embree(std::make_unique<Embree>()) {
     embree->device = newEmbreeDevice();
-    if (!embree->device) fail(embree3.getDeviceError(nullptr), "no device");
+    if (!embree->device) fail(embree3.getDeviceError(nullptr), "create a device");
     embree->scene = embree3.newScene(embree->device);
-    if (!embree->scene) fail(embree3.getDeviceError(embree->device), "no scene");
+    if (!embree->scene) fail(embree3.getDeviceError(embree->device), "create a scene");
     // Robust, so that rays do not slip between neighbouring triangles.
     embree3.setSceneFlags(embree->scene,
                           RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
@@ -52,13 +54,14 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
         const std::unique_ptr<RTCGeometryTy, decltype(&rtcReleaseGeometry)> made(
             embree3.newGeometry(embree->device, RTC_GEOMETRY_TYPE_QUAD), embree3.releaseGeometry);
         const RTCGeometry geometry = made.get();
-        if (!geometry) fail(embree3.getDeviceError(embree->device), "no geometry");
+        if (!geometry) fail(embree3.getDeviceError(embree->device), "create a geometry");
         float* vertices = static_cast<float*>(
             embree3.setNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                          3 * sizeof(float), patches.vertices.size()));
         uint32_t* indices = static_cast<uint32_t*>(embree3.setNewGeometryBuffer(
             geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(uint32_t), quads));
-        if (!vertices || !indices) fail(embree3.getDeviceError(embree->device), "no buffers");
+        if (!vertices || !indices)
+            fail(embree3.getDeviceError(embree->device), "create its buffers");
         std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
         for (const Parent& parent : patches.parents) {
             if (!blocks(parent)) continue;
@@ -71,7 +74,7 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     }
     embree3.commitScene(embree->scene);
     const RTCError error = embree3.getDeviceError(embree->device);
-    if (error != RTC_ERROR_NONE) fail(error, "building its tree");
+    if (error != RTC_ERROR_NONE) fail(error, "build its tree");
 }
 
 Visibility::~Visibility() = default;
