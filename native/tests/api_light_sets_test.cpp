@@ -71,7 +71,7 @@ TEST_F(ApiLightSets, NameWhatIsWrong) {
     expectInvalid(rb_set_world_light_set(scene, -2), "light set -2");
     expectInvalid(rb_set_world_light_set(nullptr, set), "scene");
     expectFailure(rb_get_set_corner_light(bake, set, box, RB_OUTPUT_COMBINED, rgb, 24),
-                  RB_ERROR_INVALID_OPERATION, "before a bake");
+                  RB_ERROR_INVALID_OPERATION, "before a successful bake");
     ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE);
     expectInvalid(rb_get_set_corner_light(bake, 1, box, RB_OUTPUT_COMBINED, rgb, 24),
                   "light set 1");
