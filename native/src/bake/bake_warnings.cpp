@@ -158,8 +158,8 @@ void warnOfMissedTarget(const Scene& scene, const MissedTarget& missed, Report& 
                          ? ", and at least " + percent(missed.ofNoisiest) + " on the noisiest parts"
                          : "") +
                     "; the target is " + percent(missed.target) +
-                    (isCountable ? ". Increase max_bundles or target_error"
-                                 : ". Reduce lines_per_bundle or increase target_error"));
+                    (isCountable ? ". Increase max_bundles to reach the target"
+                                 : ". Reduce lines_per_bundle, or increase target_error"));
 }
 
 void warnOfBrokenCycles(uint64_t cycles, Report& report) {

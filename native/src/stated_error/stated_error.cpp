@@ -292,7 +292,8 @@ void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double targ
         text + (isOutOfReach ? ". Only few lines bring light to these objects, so that a lower "
                                "target_error takes long and gains little; add lamps, or accept the "
                                "noise"
-                             : "; lower target_error"));
+                             : "; lower target_error, or increase max_bundles if the bake reached "
+                               "it"));
 }
 
 // A mesh that is too coarse: its squared error, and the text of the warning.
