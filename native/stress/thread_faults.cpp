@@ -73,7 +73,7 @@ int bakeWith(int threads, float* light, bool isFirst) {
         if (!isLike(found, {light, light + found.size()})) return 2;
         const char* report = "";
         rb_get_report(bake, &report);
-        const bool isSaid = std::strstr(report, "threads run") != nullptr;
+        const bool isSaid = std::strstr(report, "FEWER_THREADS") != nullptr;
         if (isSaid != (!isFirst && threads < kAsked)) return 3;
         rb_set_bake_int(bake, "skip.geometry", 0);  // so that all stages run again
     }
