@@ -36,7 +36,7 @@ def render(context: bpy.types.Context, baked: Collection[str], attribute: str, p
     objects = [item for item in scene.objects if item.name in baked and item.type == 'MESH'
                and attribute in item.data.color_attributes]
     if not objects:
-        raise ValueError("no object in the scene shows the attribute")
+        raise ValueError(f'no baked object in the scene has the attribute "{attribute}"')
     emitters = _emission_colors(objects)
     own_camera = scene.camera is not None
     if not own_camera:
@@ -206,4 +206,4 @@ def _set_exposure(scene: bpy.types.Scene, objects: Collection[bpy.types.Object],
     if not 0.2 <= shown <= 1.0:
         exposure = math.log2(0.9 / bright)
         scene.view_settings.exposure = min(max(exposure, -10.0), 10.0)
-        print(f"picture: exposure {scene.view_settings.exposure:.1f} stops")
+        print(f"picture: exposure set to {scene.view_settings.exposure:.1f} stops")

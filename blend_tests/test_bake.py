@@ -447,7 +447,7 @@ def test_nothing_to_bake(new_object):
     with pytest.raises(raybundle.BakeError, match="Nothing to bake"):
         bake()
     new_object("Hollow", SQUARE, [])
-    with pytest.raises(raybundle.BakeError, match='"Hollow" has no faces'):
+    with pytest.raises(raybundle.BakeError, match='"Hollow": it has no faces'):
         bake()
     with pytest.raises(RuntimeError, match='"Hollow"'):
         bpy.ops.raybundle.bake()

@@ -258,7 +258,7 @@ def test_a_change_of_the_file_during_a_bake(closed_box, new_object, stage, chang
             done.append(change)
             change(bpy.data.objects["Box"])
 
-    with pytest.raises(raybundle.BakeError, match="nothing is written"):
+    with pytest.raises(raybundle.BakeError, match="nothing was written"):
         bake(seed=1, progress=change_once)
     assert done
     if bpy.context.mode != 'OBJECT':

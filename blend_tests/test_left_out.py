@@ -158,13 +158,13 @@ def offset_terminator(item):
     (fill, ('"Grey"', "volume")),
     (fill_world, ('"Fog"', "volume")),
     (hold_out, ('"Floor"', "holdout")),
-    (subdivide, ('"Floor" (Subdivision: 1 and 2 levels)', "make both alike")),
-    (mirror_in_renders, ('"Floor" (Mirror is on in one of them)', "make both alike")),
+    (subdivide, ('"Floor" (Subdivision: levels 1 in viewport, 2 in renders)', "same settings")),
+    (mirror_in_renders, ('"Floor" (Mirror: only in renders)', "same settings")),
     (override, ('"Grey"', "material override")),
     (hide_copy, ('"Hidden"', "hidden in the viewport")),
     (offset_terminator, ('"Floor"', "terminator")),
     # Exposure is in stops: a factor of 1.41 is half a stop.
-    (set_cycles(film_exposure=2.0 ** 0.5), ("Exposure of 1.41", "set exposure to 0.5")),
+    (set_cycles(film_exposure=2.0 ** 0.5), ("Exposure of 1.41", "set Raybundle's exposure to 0.5")),
     (set_cycles(use_fast_gi=True), ("Fast GI",)),
     (set_cycles(diffuse_bounces=2), ("2 times",)),
     (set_cycles(sample_clamp_direct=1.0), ("clamps",)),
@@ -222,7 +222,7 @@ def test_what_renders_hide_is_listed_and_named_where_nothing_is_left(new_object,
     assert export.statuses == {"Box": "hidden in renders", "Cutter": "hidden in renders"}
     assert [text for text in export.warnings if '"Box"' in text] == list(export.warnings)
     floor.hide_render = True
-    with pytest.raises(raybundle.BakeError, match='"Box" hidden in renders'):
+    with pytest.raises(raybundle.BakeError, match='"Box": hidden in renders'):
         raybundle.bake(bpy.context)
 
 
@@ -326,7 +326,7 @@ def test_cycles_bakes_the_light_of_hidden_lamps(new_object, new_material, new_li
     report = raybundle.bake(bpy.context, output='LIGHTING', domain='POINT', reconstruction='POINT')
     light = read_colors(floor)[40]
     assert light == pytest.approx(np.full(3, 100.0 / (4.0 * np.pi * 4.0) / np.pi), rel=1e-3)
-    assert any('"Lamp"' in text and "shine" in text for text in report.warnings)
+    assert any('"Lamp"' in text and "give light" in text for text in report.warnings)
     # The light of a lamp without size has no noise in Cycles.
     reference = bake_objects([floor], 4, 0)["Floor"]
     corner = np.array(faces).ravel().tolist().index(40)

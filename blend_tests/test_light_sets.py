@@ -289,7 +289,7 @@ def expect_error(*texts):
 def test_names_that_clash(court):
     add_set("a", court["warm"])
     second = add_set("a", court["cold"])
-    expect_error('two light sets of the name "a"')
+    expect_error('Two light sets have the name "a"')
     second.name, second.attribute = "b", "Radiosity a"
     expect_error('"b"', '"Radiosity a"', '"a"')
     second.attribute = "Radiosity"

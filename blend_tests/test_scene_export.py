@@ -103,7 +103,7 @@ def test_modifiers_are_applied_and_leave_no_trace(new_object):
     assert (corner_map.copied, corner_map.untraced) == (4, 0)
     values = np.repeat([[1.0], [2.0], [6.0]], 4, axis=0) * np.ones(3)
     assert corner_map.to_original(values) == pytest.approx(np.full((4, 3), 1.0))
-    assert any("several faces of one" in text and '"Square"' in text for text in result.warnings)
+    assert any("copy faces" in text and '"Square"' in text for text in result.warnings)
 
 
 @pytest.mark.parametrize("offset", [-1.0, 0.0, 1.0])
@@ -158,7 +158,7 @@ def test_every_corner_gets_the_light_of_its_place(new_object, modifier, settings
     else:
         # Positions move by at most the width of the bevel, or by the size of a voxel.
         assert np.linalg.norm(positions - original, axis=1).max() < 0.3
-    for count, text in ((corner_map.untraced, "no trace"), (corner_map.copied, "several faces")):
+    for count, text in ((corner_map.untraced, "no trace"), (corner_map.copied, "copy faces")):
         lines = [line for line in result.warnings if text in line and '"Box"' in line]
         assert len(lines) == (1 if count else 0)
     assert bool(corner_map.untraced) == (modifier in ('BEVEL', 'REMESH', 'DECIMATE'))
@@ -260,7 +260,7 @@ def test_whatever_evaluates_to_a_mesh_takes_part(add):
     result = export()
     assert [item.role for item in result.scene.instances] == ['OCCLUDE']
     assert result.scene.meshes[0].face_count > 0
-    assert "no attribute" in result.statuses[name]
+    assert "no colours" in result.statuses[name]
 
 
 def test_a_curve_without_surface_is_passed_over():
@@ -370,7 +370,7 @@ def test_not_finite_coordinates_leave_the_object_out(new_object, value):
 def test_meshes_without_faces(new_object, vertices):
     new_object("Empty", vertices, [])
     result = export()
-    assert result.scene.instances == [] and result.statuses == {"Empty": "has no faces"}
+    assert result.scene.instances == [] and result.statuses == {"Empty": "it has no faces"}
 
 
 # --------------------------------------------------------------------------------------------------

@@ -115,7 +115,7 @@ def test_every_mesh_object_is_baked(name):
         if item_name == "divider_turned":
             assert "no light" in status
         elif name == "instances" and "pillar" in item_name:
-            assert "only reflects" in status
+            assert "reflect and block light" in status
         else:
             assert status == "baked", item_name
     for item_name, item in scene.objects.items():

@@ -211,7 +211,7 @@ OWN = [as_emission_beside, as_base_color, as_factor, as_old_factor, as_half_fact
 
 
 def naming(report):
-    lines = [text for text in report.warnings if "result of a bake is shown" in text]
+    lines = [text for text in report.warnings if "show the result of a bake" in text]
     assert len(lines) <= 1
     return lines[0] if lines else ""
 
@@ -382,7 +382,7 @@ def test_a_result_alone_before_the_first_bake_is_a_guess_that_is_said(corner):
     report = bake()
     before = [read_colors(item) for item in corner]
     for name in ("Grey", "Dark"):
-        assert any(f'"{name}" shows the result of a bake alone' in text
+        assert any(f'"{name}" shows only the result of a bake' in text
                    for text in report.warnings)
     bake()
     assert difference(corner, before) < SAME

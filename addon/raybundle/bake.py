@@ -122,22 +122,22 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[Ligh
     """Raises BakeError if the attributes of the settings and of the light sets cannot be
     written."""
     if not settings.attribute:
-        raise BakeError("The attribute needs a name")
+        raise BakeError("The colour attribute has no name: enter one in the panel Output")
     longest = settings.attribute
     if settings.write_error:
         longest = color_attribute.error_name(longest)
     if len(longest.encode()) > color_attribute.MOST_BYTES:
-        raise BakeError(f'The name of the attribute, "{longest}", is longer than '
-                        f'{color_attribute.MOST_BYTES} bytes')
+        raise BakeError(f'The attribute name "{longest}" is longer than '
+                        f'{color_attribute.MOST_BYTES} bytes: choose a shorter one')
     for item in scene.objects:
         if item.type != 'MESH' or item.raybundle.role != 'BAKE':
             continue
         if item.data.is_editmode:
-            raise BakeError(f'"{item.name}" is in Edit Mode: leave it before baking')
+            raise BakeError(f'"{item.name}" is in Edit Mode: leave Edit Mode before you bake')
         for name in (settings.attribute, *(light_set.attribute for light_set in light_sets)):
             if not color_attribute.name_is_free(item.data, name):
-                raise BakeError(f'"{item.name}" has another attribute of the name '
-                                f'"{name}", which is no colour: choose another name')
+                raise BakeError(f'"{item.name}" already has an attribute or UV map "{name}" that '
+                                f'is not a colour attribute: choose another attribute name')
 
 
 # --------------------------------------------------------------------------------------------------
@@ -162,9 +162,9 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
                               settings.attribute)
     _leave_out_unwritable(export, settings)
     if not export.targets:
-        reasons = "; ".join(f'"{name}" {status}' for name, status in export.statuses.items())
+        reasons = "; ".join(f'"{name}": {status}' for name, status in export.statuses.items())
         what = "selected mesh object" if settings.scope == 'SELECTED' else "visible mesh object"
-        raise BakeError(f"Nothing to bake: no {what} with faces and the role Bake"
+        raise BakeError(f"Nothing to bake: there is no {what} with faces and the role Bake"
                         + (f" ({reasons})" if reasons else ""))
     if refine:
         return export, _refine(export, settings)
@@ -183,8 +183,8 @@ def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
         if owner.library is None and owner.override_library is None:
             writable.append(target)
             continue
-        status = (f"linked from {owner.library.filepath}: cannot be written" if owner.library
-                  else "overrides linked data: cannot be written")
+        status = (f"linked from {owner.library.filepath} and gets no colours: make it local"
+                  if owner.library else "a library override and gets no colours: make it local")
         export.statuses[target.object.name] = status
         export.warnings.add(f'"{target.object.name}" is {status}')
         instances = export.scene.instances
@@ -238,10 +238,10 @@ def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: n
         except ReferenceError:
             is_same = False
         if not is_same:
-            raise BakeError(f'"{target.name}" was removed or changed while it was baked: nothing '
-                            'is written')
+            raise BakeError(f'"{target.name}" was removed or changed during the bake: nothing was '
+                            f'written, bake again')
     if native_bake.is_closed:
-        raise BakeError("The bake was cleared while it ran: nothing is written")
+        raise BakeError("The bake was cleared while it was running: nothing was written")
 
 
 # --------------------------------------------------------------------------------------------------
@@ -355,14 +355,14 @@ def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
             error = None if group[0].error is None else np.max([item.error for item in group], 0)
             group = [replace(item, light=mean, error=error, set_lights=set_means)
                      for item in group]
-            export.warnings.add(f'mesh "{mesh.name}" shows the mean light of its '
-                                f'{len(group)} objects')
+            export.warnings.add(f'mesh "{mesh.name}" shows the mean light of the '
+                                f'{len(group)} objects that share it')
         elif len(group) > 1:
             for item in group[1:]:
                 item.target.object.data = mesh.copy()
             export.warnings.add(
-                f'mesh "{mesh.name}" was shared by {len(group)} baked objects: '
-                f'{len(group) - 1} of them have copies of it now, each with its own light')
+                f'mesh "{mesh.name}" was shared by {len(group)} baked objects: each object now has '
+                f'its own mesh, with its own light')
         resolved += group
     return resolved
 
@@ -376,5 +376,5 @@ def _warn_of_clipping(lights: list[TargetLight], settings: BakeSettings, export:
         if clipped:
             export.warnings.add(
                 f'"{item.target.object.name}": {100.0 * clipped:.3g} % of its values are brighter '
-                f'than 1 and cut off: choose the data type Color to keep them, or lower the '
+                f'than 1 and were cut off: choose the data type Color to keep them, or lower the '
                 f'exposure')

@@ -30,8 +30,8 @@ def write_light(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, li
         attribute = mesh.color_attributes.new(name, data_type, domain)
     count = len(attribute.data)
     if light.shape != (count, 3):
-        raise ValueError(f'"{mesh.name}": {light.shape} values for the {count} elements of '
-                         f'attribute "{name}"')
+        raise ValueError(f'"{mesh.name}": attribute "{name}" needs values of shape ({count}, 3), '
+                         f'got {light.shape}')
     colors = np.ones(count * 4, np.float32)
     if not created:
         attribute.data.foreach_get('color', colors)

@@ -17,12 +17,12 @@ from .warning_lines import listed
 
 # Types of objects that a bake leaves out, and the warning for each.
 UNREAD_TYPES = {
-    'CURVES': "hair curves neither block nor reflect light here: convert them to a mesh with "
+    'CURVES': "hair curves neither block nor reflect light in a bake: convert them to a mesh with "
               "thickness",
-    'POINTCLOUD': "points neither block nor reflect light here: have spheres instanced on them, or "
-                  "convert them to a mesh",
-    'VOLUME': "a volume neither dims nor scatters light here: convert it to a mesh, or hide it in "
-              "renders to compare with Cycles",
+    'POINTCLOUD': "point clouds neither block nor reflect light in a bake: instance spheres on the "
+                  "points, or convert the points to a mesh",
+    'VOLUME': "volumes neither absorb nor scatter light in a bake: convert the volume to a mesh, "
+              "or disable it in renders to compare with Cycles",
 }
 # Blender's defaults. Lower values were chosen by the user.
 _BOUNCES, _DIFFUSE_BOUNCES, _CLAMP_INDIRECT = 12, 4, 10.0
@@ -34,38 +34,40 @@ _DATA_DETAIL = {'CURVE': ('resolution_u', 'render_resolution_u'),
                 'SURFACE': ('resolution_u', 'render_resolution_u'),
                 'FONT': ('resolution_u', 'render_resolution_u'),
                 'META': ('resolution', 'render_resolution')}
-NO_CAUSTICS = "its Shadow Caustics are not read: light goes straight on through glass"
+NO_LINKING = ("Raybundle ignores light linking: the light reaches all objects, and all objects "
+              "block it; use light sets instead")
+NO_CAUSTICS = "Raybundle ignores Shadow Caustics: light passes straight through glass"
 
 
 def of_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
     """Yields warnings of settings of the scene, of its view layer and of Cycles that a bake
     ignores."""
     if scene.background_set is not None:
-        yield (f'the background set "{scene.background_set.name}" is left out: link its objects to '
-               f'the scene')
+        yield (f'Raybundle leaves out the background set "{scene.background_set.name}": to bake '
+               f'with its objects, link them to the scene')
     if view_layer.material_override is not None:
-        yield (f'the material override "{view_layer.material_override.name}" of the view layer is '
-               f'not read: take it off to bake what Cycles bakes')
+        yield (f'Raybundle ignores the material override "{view_layer.material_override.name}" of '
+               f'the view layer: remove the override to compare with Cycles')
     cycles = getattr(scene, 'cycles', None)
     if cycles is None:
         return
     if cycles.film_exposure > 0.0 and abs(cycles.film_exposure - 1.0) > 1e-6:
-        yield (f"Cycles multiplies what it bakes by the film's Exposure of "
-               f"{cycles.film_exposure:.3g}: for the same values set exposure to "
-               f"{math.log2(cycles.film_exposure):.3g}")
+        yield (f"Cycles multiplies its baked values by the film Exposure of "
+               f"{cycles.film_exposure:.3g}, Raybundle does not: for the same values, set "
+               f"Raybundle's exposure to {math.log2(cycles.film_exposure):.3g}")
     if cycles.use_fast_gi:
-        yield ("Fast GI Approximation is not read: reflected light is computed in full; switch it "
-               "off to compare with Cycles")
+        yield ("Raybundle ignores Fast GI Approximation and computes all reflected light: switch "
+               "Fast GI Approximation off to compare with Cycles")
     bounces = min(cycles.max_bounces, cycles.diffuse_bounces)
     if cycles.max_bounces < _BOUNCES or cycles.diffuse_bounces < _DIFFUSE_BOUNCES:
-        yield (f"Cycles reflects diffuse light {bounces} times at most, here it is reflected "
-               f"without end: raise the Max Bounces of the light paths to compare")
+        yield (f"Cycles reflects diffuse light at most {bounces} times, Raybundle without "
+               f"limit: raise Total and Diffuse under Light Paths, Max Bounces to compare")
     if cycles.sample_clamp_direct > 0.0 or 0.0 < cycles.sample_clamp_indirect < _CLAMP_INDIRECT:
-        yield ("Cycles clamps its samples, which takes light away: set the clamping of the light "
-               "paths to 0 to compare")
+        yield ("Cycles clamps its samples, which removes light: set Direct Light and Indirect "
+               "Light under Light Paths, Clamping to 0 to compare")
     if scene.render.use_simplify and (cycles.use_camera_cull or cycles.use_distance_cull):
-        yield ("Simplify leaves out objects by their distance or the camera in Cycles; here all "
-               "take part: hide them in renders instead")
+        yield ("Simplify culls objects by camera or distance in Cycles, but not in Raybundle: "
+               "disable these objects in renders instead")
 
 
 def of_world(world: bpy.types.World | None) -> Iterator[str]:
@@ -78,8 +80,8 @@ def of_world(world: bpy.types.World | None) -> Iterator[str]:
     if getattr(getattr(world, 'cycles', None), 'is_caustics_light', False):
         yield f'world "{world.name}": {NO_CAUSTICS}'
     if output is not None and output.inputs['Volume'].is_linked:
-        yield (f'world "{world.name}": its volume neither dims nor scatters light here: unlink it '
-               f'to compare with Cycles')
+        yield (f'world "{world.name}": its volume neither absorbs nor scatters light in a bake: '
+               f'unlink the volume to compare with Cycles')
 
 
 def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Material, bool]]
@@ -92,29 +94,33 @@ def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Mat
         if output is None or bpy.app.version < (5, 0, 0) and not material.use_nodes:
             continue
         if output.inputs['Displacement'].is_linked and _displacement(material) != 'BUMP':
-            yield (f'material "{material.name}": its displacement does not move the surface here: '
-                   f'use a Displace modifier, or apply it to the mesh')
+            yield (f'material "{material.name}": its displacement does not move the surface in a '
+                   f'bake: use a Displace modifier, or apply the displacement to the mesh')
         if any(_turns_normals(node) for node in _nodes(material.node_tree)):
             turned.append(f'"{material.name}"')
         if output.inputs['Volume'].is_linked:
-            yield (f'material "{material.name}": its volume neither dims nor scatters light here; '
-                   f'where it has no surface light passes as through air')
+            yield (f'material "{material.name}": its volume neither absorbs nor scatters light in '
+                   f'a bake, and a material without a surface lets all light pass: unlink the '
+                   f'volume to compare with Cycles')
         if is_transparent and any(_is_glass(node) for node in _nodes(material.node_tree)):
             glassy.append(f'"{material.name}"')
     yield from _line_about(
-        turned, "normal maps are not read, light is that of the surfaces without them",
-        "unlink them to compare with Cycles")
+        turned, "Raybundle ignores normal maps and linked normals. Materials:",
+        "Unlink the normals to compare with Cycles")
     if not getattr(getattr(scene, 'cycles', None), 'caustics_refractive', True):
         yield from _line_about(
-            glassy, "Refractive Caustics are off, by which glass stops reflected light in Cycles; "
-                    "here it passes", "switch them on to compare")
+            glassy, "Refractive Caustics are off, so that glass blocks reflected light in "
+                    "Cycles, but not in Raybundle. Materials:",
+            "Switch Refractive Caustics on to compare")
 
 
 def _line_about(owners: Iterable[str], what: str, remedy: str) -> Iterator[str]:
-    """Yields one line that names the owners (quoted names), or no line if there are no owners."""
+    """Yields one line that names the owners (quoted names), or no line if there are no owners.
+    what: a sentence, and the kind of the owners with a colon. remedy: a sentence without its full
+    stop."""
     owners = list(owners)
     if owners:
-        yield f"{what}: {listed(owners)}: {remedy}"
+        yield f"{what} {listed(owners)}. {remedy}"
 
 
 def _quoted(names: Iterable[str]) -> list[str]:
@@ -172,12 +178,13 @@ def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
     for item in items:
         yield from _of_hair(item)
         if getattr(getattr(item, 'cycles', None), 'shadow_terminator_offset', 0.0) > 0.0:
-            yield (f'"{item.name}": Shading Offset of its shadow terminator is not read: set it to '
-                   f'0 to compare with Cycles')
+            yield (f'"{item.name}": Raybundle ignores the Shading Offset of the shadow '
+                   f'terminator: set it to 0 to compare with Cycles')
         differing += [f'"{item.name}" ({how})' for how in _differences(item)]
     yield from _line_about(
-        differing, "geometry is as the viewport shows it, and not as renders do",
-        "make both alike")
+        differing, "The viewport and renders show different geometry, and Raybundle bakes that of "
+                   "the viewport. Objects:",
+        "Use the same settings for both")
 
 
 def _of_hair(item: bpy.types.Object) -> Iterator[str]:
@@ -190,7 +197,8 @@ def _of_hair(item: bpy.types.Object) -> Iterator[str]:
         has_strands = settings.count > 0 or system.is_edited
         if settings.type == 'HAIR' and settings.render_type == 'PATH' and has_strands:
             yield (f'"{item.name}": the strands of its particle system "{system.name}" neither '
-                   f'block nor reflect light here: convert them to a mesh with thickness')
+                   f'block nor reflect light in a bake: convert the strands to a mesh with '
+                   f'thickness')
 
 
 def _differences(item: bpy.types.Object) -> Iterator[str]:
@@ -198,17 +206,19 @@ def _differences(item: bpy.types.Object) -> Iterator[str]:
     words."""
     for modifier in item.modifiers:
         if modifier.show_viewport != modifier.show_render:
-            yield f'{modifier.name} is on in one of them'
+            yield f'{modifier.name}: only in {"viewport" if modifier.show_viewport else "renders"}'
         elif modifier.show_render:
             for shown, rendered in _DETAIL:
                 values = [getattr(modifier, name, None) for name in (shown, rendered)]
                 if None not in values and values[0] != values[1]:
-                    yield f'{modifier.name}: {values[0]} and {values[1]} {shown}'
+                    yield (f'{modifier.name}: {shown.removeprefix("viewport_")} {values[0]} in '
+                           f'viewport, {values[1]} in renders')
         if modifier.type == 'PARTICLE_SYSTEM' and modifier.show_render:
             settings = modifier.particle_system.settings
             if (settings.render_type in ('OBJECT', 'COLLECTION')
                     and settings.display_percentage < 100):
-                yield f'{modifier.name}: {settings.display_percentage} % of its particles'
+                yield (f'{modifier.name}: {settings.display_percentage} % of the particles in '
+                       f'viewport')
     if item.modifiers and (_setting(item, 'use_adaptive_subdivision', False) or any(
             getattr(modifier, 'use_adaptive_subdivision', False) for modifier in item.modifiers)):
         yield "adaptive subdivision"
@@ -216,7 +226,8 @@ def _differences(item: bpy.types.Object) -> Iterator[str]:
         shown, rendered = (getattr(item.data, name) for name in _DATA_DETAIL[item.type])
         # A resolution of 0 in renders means that of the viewport.
         if rendered and shown != rendered:
-            yield f'{_DATA_DETAIL[item.type][0]} {shown:.3g} and {rendered:.3g}'
+            yield (f'{_DATA_DETAIL[item.type][0]} {shown:.3g} in viewport, {rendered:.3g} in '
+                   f'renders')
 
 
 def has_light_linking(item: bpy.types.Object) -> bool:
@@ -232,12 +243,13 @@ def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iter
     the bake."""
     yield from _line_about(
         _quoted(dict.fromkeys(lights)),
-        "lights that are hidden in the viewport shine, as in Cycles",
-        "disable them in renders to switch them off")
+        "Lights that are hidden only in the viewport give light, as in Cycles. Lights:",
+        "Disable them in renders to switch them off")
     yield from _line_about(
         _quoted(item.name for item in hidden),
-        "what is hidden in the viewport is left out, though Cycles renders it",
-        "show it, or disable it in renders as well")
+        "Raybundle leaves out objects that are hidden in the viewport, but Cycles renders them. "
+        "Objects:",
+        "Show them in the viewport, or disable them in renders too")
 
 
 def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
@@ -246,7 +258,8 @@ def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
     Boolean modifiers, are not named."""
     yield from _line_about(
         _quoted(item.name for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')),
-        "what is hidden in renders is left out, as by Cycles", "enable it in renders to bake it")
+        "Raybundle leaves out objects that are hidden in renders, as Cycles does. Objects:",
+        "Enable them in renders to bake them")
 
 
 def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str]:
@@ -255,12 +268,14 @@ def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str
     untraced: names of objects whose modifiers do not keep the codes of some corners."""
     yield from _line_about(
         _quoted(copied),
-        "modifiers make several faces of one, and all show the light of that in its place",
-        "apply the modifiers to light each by itself")
+        "Modifiers copy faces, and all copies show the light of the copy in the original's place. "
+        "Objects:",
+        "Apply the modifiers to give each copy its own light")
     yield from _line_about(
         _quoted(untraced),
-        "modifiers keep no trace of some corners, which have the light of what lies nearest",
-        "apply the modifiers for their own")
+        "Modifiers keep no trace of some corners, which get the light of the nearest surface. "
+        "Objects:",
+        "Apply the modifiers to give each corner its own light")
 
 
 def of_normals(turned: Iterable[str]) -> Iterator[str]:
@@ -268,5 +283,6 @@ def of_normals(turned: Iterable[str]) -> Iterator[str]:
     the orientation of the faces."""
     yield from _line_about(
         _quoted(turned),
-        "custom normals that turn faces are not followed, light falls on the faces as they lie",
-        "clear the custom split normals to compare with Cycles")
+        "Raybundle computes light with the normals of the faces and ignores custom normals that "
+        "differ from them. Objects:",
+        "Clear the custom split normals to compare with Cycles")

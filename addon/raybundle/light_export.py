@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Matrix
 
 from .image_export import ImagePixels
-from .left_out import NO_CAUSTICS, has_light_linking
+from .left_out import NO_CAUSTICS, NO_LINKING, has_light_linking
 from .materials.node_links import output_node
 from .materials.node_reader import NodeReader
 from .scene_data import AreaLightData, LightData, PointLightData, SunLightData, Warnings
@@ -33,7 +33,7 @@ def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: I
     given = _strength(light, name, images, warnings)
     strength = np.where(np.isfinite(given), np.maximum(given, 0.0), 0.0)
     if not np.array_equal(strength, given):
-        warnings.add(f'light "{name}": light that is negative, or no number, is left out')
+        warnings.add(f'light "{name}": light that is negative or not a finite number counts as 0')
     if not np.any(strength > 0.0):
         return None
     _warn_of_unread_options(light_object, warnings)
@@ -122,12 +122,12 @@ def _warn_of_unread_options(light_object: bpy.types.Object, warnings: Warnings) 
     name = light_object.name
     bounces = getattr(_cycles_settings(light_object.data), 'max_bounces', _ALL_BOUNCES)
     if bounces < _ALL_BOUNCES:
-        warnings.add(f'light "{name}": its light is reflected without end and not {bounces} times '
-                     f'at most')
+        warnings.add(f'light "{name}": Raybundle ignores its Max Bounces of {bounces} and reflects '
+                     f'its light without limit: set Max Bounces to {_ALL_BOUNCES} to compare')
     if getattr(_cycles_settings(light_object.data), 'is_caustics_light', False):
         warnings.add(f'light "{name}": {NO_CAUSTICS}')
     if has_light_linking(light_object):
-        warnings.add(f'light "{name}": its light linking is not read, it lights all objects')
+        warnings.add(f'light "{name}": {NO_LINKING}')
 
 
 def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray

@@ -38,21 +38,21 @@ def read_light_sets(scene: bpy.types.Scene, main_attribute: str) -> list[LightSe
     """Returns the enabled sets of the scene. Raises BakeError if a set has no name, or if names or
     attributes are too long or occur twice."""
     sets: list[LightSet] = []
-    owners = {main_attribute: "the light of all"}
+    owners = {main_attribute: "the light of all lights"}
     for item in scene.raybundle.light_sets:
         if not item.enabled:
             continue
         if not item.name:
-            raise BakeError("A light set has no name")
+            raise BakeError("A light set has no name: enter one")
         if any(item.name == other.name for other in sets):
-            raise BakeError(f'There are two light sets of the name "{item.name}"')
+            raise BakeError(f'Two light sets have the name "{item.name}": rename one of them')
         attribute = attribute_of(item, main_attribute)
         if len(attribute.encode()) > MOST_BYTES:
-            raise BakeError(f'Light set "{item.name}": the name of its attribute, "{attribute}", '
-                            f'is longer than {MOST_BYTES} bytes')
+            raise BakeError(f'Light set "{item.name}": the attribute name "{attribute}" is longer '
+                            f'than {MOST_BYTES} bytes, choose a shorter one')
         if attribute in owners:
-            raise BakeError(f'Light set "{item.name}" has the same attribute, "{attribute}", as '
-                            f'{owners[attribute]}: choose another name')
+            raise BakeError(f'Light set "{item.name}" has the same attribute "{attribute}" as '
+                            f'{owners[attribute]}: choose another attribute name')
         owners[attribute] = f'the light set "{item.name}"'
         objects = frozenset(item.collection.all_objects) if item.collection else frozenset()
         sets.append(LightSet(item.name, attribute, objects, item.world))
@@ -120,4 +120,5 @@ def _check_single(what: str, sets: list[LightSet]) -> None:
     member of the sets."""
     if len(sets) > 1:
         names = " and ".join(f'"{light_set.name}"' for light_set in sets)
-        raise BakeError(f"{what} belongs to the light sets {names}: light is in one set at most")
+        raise BakeError(f"{what} belongs to the light sets {names}: a light can be in only one "
+                        f"set, remove it from the others")

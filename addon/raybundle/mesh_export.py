@@ -43,18 +43,20 @@ def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExp
     faces.
     """
     if not len(mesh.polygons):
-        raise MeshError("has no faces")
+        raise MeshError("it has no faces")
     vertices = vertex_positions(mesh)
     # The comparison is also False for NaN.
     if not (np.abs(vertices) < COORDINATE_LIMIT).all():
-        raise MeshError("has coordinates that are not finite numbers, or too large to compute with")
+        raise MeshError(f"it has coordinates that are not finite or not below "
+                        f"{COORDINATE_LIMIT:.0e}: delete these vertices")
     starts = read(mesh.polygons, 'loop_start', np.int32)
     face_offsets = np.append(starts, np.int32(len(mesh.loops)))
     sizes = np.diff(face_offsets)
     # Later versions of Blender store no sizes that could contradict the starts.
     if not HAS_ATTRIBUTES and not np.array_equal(sizes, read(mesh.polygons, 'loop_total',
                                                              np.int32)):
-        raise MeshError("has faces out of order; a modifier or script left the mesh invalid")
+        raise MeshError("its faces are stored out of order: remove the modifier or script that "
+                        "made the mesh invalid")
     materials = materials or (default_material,)
     slots = _face_slots(mesh, len(materials))
     face_materials = np.array([item.index for item in materials], np.int32)[slots]

@@ -236,11 +236,12 @@ def load() -> ctypes.CDLL:
     except (OSError, AttributeError) as error:
         raise RaybundleError(
             ErrorCode.INVALID_OPERATION,
-            f"The native library cannot be loaded: {path} ({error})") from error
+            f"The native library cannot be loaded: {path} ({error}). Build it again, or install "
+            f"the add-on from a release for this platform") from error
     if version != ABI_VERSION:
         raise RaybundleError(
             ErrorCode.INVALID_OPERATION,
-            f"The native library {path} has interface version {version}, this add-on needs "
+            f"The native library {path} has interface version {version}, but this add-on needs "
             f"{ABI_VERSION}: build or install both from the same release")
     try:
         _declare(library)

@@ -263,7 +263,8 @@ class _Exporter:
             label = name if parent == name else f"{parent} / {name}"
             plural = "s" if count > 1 else ""
             self.result.statuses[label] = (
-                f"{count} instance{plural} without own data: only reflects and blocks light")
+                f"{count} instance{plural}, not baked: instances reflect and block light, but get "
+                f"no colours; make them real to bake them")
         return self.result
 
     def _hidden(self) -> list[bpy.types.Object]:
@@ -308,9 +309,9 @@ class _Exporter:
             return
         names = ", ".join(f'"{name}"' for name in self.materials.showing)
         self.result.warnings.add(
-            f'the result of a bake is shown by the materials {names}: no light is made of it; its '
-            f'emission counts 0, as a factor it counts 1, and a surface that shows it alone counts '
-            f'as what the last bake took it for')
+            f'the materials {names} show the result of a bake: the result counts as 0 where it is '
+            f'emission and as 1 where it is a factor; a surface that shows only the result keeps '
+            f'the properties that the last bake used')
 
     def _add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         item = instance.object
@@ -331,7 +332,7 @@ class _Exporter:
             return
         transform = np.array(instance.matrix_world)[:3]
         if not np.isfinite(transform).all():
-            self._refuse(item.name, "its transform is not finite")
+            self._refuse(item.name, "its transform is not finite: reset the transform")
             return
         mesh = self._mesh(item, wants_map=role == 'BAKE' and not instance.is_instance)
         if isinstance(mesh, MeshError):
@@ -348,7 +349,8 @@ class _Exporter:
             self._placed.add(place)
             if role == 'BAKE':
                 self.result.statuses[item.name] = (
-                    f"{original.type} objects take part in the light, but have no attribute")
+                    f"takes part in the light, but gets no colours: convert the {original.type} "
+                    f"object to a mesh")
             role = 'OCCLUDE'
         elif instance.is_instance:
             parent = instance.parent.name if instance.parent else item.name
@@ -359,8 +361,9 @@ class _Exporter:
             view_layer=self.context.view_layer)
         if is_holdout or original.is_shadow_catcher and bpy.app.version >= (4, 0, 0):
             what = "holdout" if is_holdout else "shadow catcher"
-            self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, here it '
-                                     f'is an object like others')
+            self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, but '
+                                     f'Raybundle bakes it like other objects; switch the {what} '
+                                     f'off to compare')
         # In Cycles, the ray visibility of the instancing object also applies.
         shown = (item, instance.parent) if instance.is_instance and instance.parent else (item,)
         self.result.scene.instances.append(
@@ -370,8 +373,7 @@ class _Exporter:
         self.members.add_instance(instance)
         if (left_out.has_light_linking(original)
                 and self.result.scene.emits(len(self.result.scene.instances) - 1)):
-            self.result.warnings.add(f'"{item.name}": its light linking is not read, it lights all '
-                                     f'objects')
+            self.result.warnings.add(f'"{item.name}": {left_out.NO_LINKING}')
         if role == 'BAKE':
             index = len(self.result.scene.instances) - 1
             self.result.targets.append(

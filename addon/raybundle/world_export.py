@@ -59,7 +59,7 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
     given = reader.surface(output.inputs['Surface']).emission
     radiance = np.maximum(given, 0.0)
     if np.any(given < 0.0):
-        warnings.add(f'world "{world.name}": light that is negative is left out')
+        warnings.add(f'world "{world.name}": negative light counts as 0')
     # A world that is read without warnings is constant.
     if not unread:
         return WorldData(radiance)
@@ -72,8 +72,8 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
         try:
             evaluated = _split(world_panorama.evaluate(world, scene.frame_current))
         except RuntimeError as error:
-            warnings.add(f'world "{world.name}": Cycles could not evaluate its nodes, and its mean '
-                         f'is used ({error})')
+            warnings.add(f'world "{world.name}": Cycles could not evaluate its nodes ({error}), so '
+                         f'that its mean is used, as far as Raybundle can read it')
             for message in unread:
                 warnings.add(message)
             return WorldData(radiance)

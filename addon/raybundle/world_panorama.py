@@ -320,7 +320,7 @@ def _read(path: Path, shape: tuple[int, int]) -> np.ndarray:
     image = bpy.data.images.load(str(path))
     try:
         if tuple(image.size) != shape[::-1]:
-            raise RuntimeError(f"the world was rendered as {tuple(image.size)}, not {shape[::-1]}")
+            raise RuntimeError(f"its image has the size {tuple(image.size)}, not {shape[::-1]}")
         values = np.empty(shape[0] * shape[1] * image.channels, np.float32)
         image.pixels.foreach_get(values)
     finally:

@@ -117,7 +117,7 @@ class ColorReader:
         behind = self._result_behind(node, path)
         if behind == Result.ALONE:
             return _only_result(source)
-        self._inexact(node, "cannot be read: the colour of the socket it is linked to is used")
+        self._inexact(node, "cannot be read: the colour of the socket that it is linked to is used")
         return ColorExpression(default_color(source.socket) if self.reading.unread_color is None
                                else self.reading.unread_color, result=behind)
 
@@ -153,18 +153,20 @@ class ColorReader:
             return ColorExpression()
         mean = pixels.mean(axis=(0, 1), dtype=np.float64)
         if output.name != 'Color':
-            self._inexact(node, f"is used by its {output.name}: 1 is used")
+            self._inexact(node, f"has a linked output {output.name}, which counts as 1")
             return ColorExpression(WHITE)
         if node.projection != 'FLAT':
-            self._inexact(node, f"is projected as {node.projection}: the image's mean is used")
+            self._inexact(node, f"has the projection {node.projection}: the mean of the image is "
+                                f"used")
             return ColorExpression(mean)
         coordinates = self._coordinates(node.inputs['Vector'], path)
         if coordinates is None:
-            self._inexact(node, "has coordinates that are not a UV map: the image's mean is used")
+            self._inexact(node, "has coordinates other than a UV map: the mean of the image is "
+                                "used")
             return ColorExpression(mean)
         extension = node.extension
         if extension not in ('REPEAT', 'EXTEND', 'CLIP'):
-            self._inexact(node, f"has extension {extension}: REPEAT is used")
+            self._inexact(node, f"has the extension {extension}: REPEAT is used")
             extension = 'REPEAT'
         layer, matrix = coordinates
         return ColorExpression(texture=Texture(node.image, extension, mean, layer, matrix),
@@ -232,7 +234,7 @@ class ColorReader:
             a, b = (self.value(sockets[name], path) for name in ('A_Float', 'B_Float'))
             return ColorExpression(WHITE * (a + (b - a) * share))
         else:
-            self._inexact(node, f"mixes {node.data_type}: grey is used")
+            self._inexact(node, f"mixes values of type {node.data_type}: grey is used")
             return ColorExpression(WHITE * 0.5)
         share = float(np.clip(self.value(factor, path), 0.0, 1.0))
         a, b = self.color(first, path), self.color(second, path)
@@ -249,7 +251,7 @@ class ColorReader:
             return self._plus(a, b.scaled(-share), node)
         if node.blend_type == 'MULTIPLY':
             return self._plus(a.scaled(1.0 - share), self._times(a, b, node).scaled(share), node)
-        self._inexact(node, f"blends by {node.blend_type}: its first colour is used")
+        self._inexact(node, f"has the blend mode {node.blend_type}: its first colour is used")
         return replace(a, result=max(a.result, b.result))
 
     def _filter(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
@@ -261,19 +263,19 @@ class ColorReader:
             return ColorExpression(np.array(node.color_ramp.evaluate(color.constant.mean())[:3]),
                                    result=color.result)
         if node.type == 'VALTORGB':
-            self._inexact(node, "maps a varying colour: its value for the mean is used")
+            self._inexact(node, "maps a colour that varies: the mean colour is mapped instead")
             return ColorExpression(np.array(node.color_ramp.evaluate(color.mean().mean())[:3]),
                                    result=color.result)
         if node.type == 'RGBTOBW' and color.is_constant:
             return ColorExpression(WHITE * (color.constant @ [0.2126, 0.7152, 0.0722]),
                                    result=color.result)
-        self._inexact(node, "is left out: the colour that goes into it is used")
+        self._inexact(node, "is ignored: its input colour is used")
         return color
 
     def _plus(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
               ) -> ColorExpression:
         if not a.can_add(b):
-            self._inexact(node, "joins two images or attributes: the mean of the second is used")
+            self._inexact(node, "adds two images or attributes: the mean of the second is used")
         return a.plus(b).simplified()
 
     def _times(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
@@ -313,8 +315,8 @@ class ColorReader:
             return LIGHT_PATH.get(source.output.name, 0.0)
         if node.type == 'LIGHT_FALLOFF':
             if source.output.name != 'Quadratic' or self.value(node.inputs['Smooth'], path):
-                self._warn(node, f"is used as {source.output.name} with Smooth: the light falls "
-                                 f"off with the square of the distance")
+                self._warn(node, "is not a Quadratic falloff with Smooth 0: the light falls off "
+                                 "with the square of the distance")
             return self.value(node.inputs['Strength'], path)
         if node.type == 'MATH' and node.operation in _MATH:
             a, b = (self.value(socket, path) for socket in node.inputs[:2])
@@ -331,8 +333,8 @@ class ColorReader:
         self._result_values += bool(behind)
         if behind == Result.ALONE:
             return 1.0
-        self._inexact(node, f"is no constant: the value of the socket {source.socket.name} is "
-                            f"used")
+        self._inexact(node, f"is not a constant: the value of the socket {source.socket.name} "
+                            f"that it is linked to is used")
         return default_value(source.socket)
 
     def _warn(self, node: bpy.types.Node, what: str) -> None:

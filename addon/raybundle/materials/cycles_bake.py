@@ -107,8 +107,9 @@ def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, Wan
                     surface = _bake(context, item, mesh, asked, pixel)
             kept[key] = result[item] = surface
         except (RuntimeError, TypeError, ValueError) as error:
-            failures.append(f'"{item.name}": Cycles could not bake its materials, which are read '
-                            f'as far as possible: {str(error).strip()}')
+            failures.append(f'"{item.name}": Cycles could not bake its materials '
+                            f'({str(error).strip()}): values that Raybundle cannot read are '
+                            f'replaced by constants')
     _cache[name] = kept
     return result, failures
 
@@ -191,7 +192,7 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
         context.evaluated_depsgraph_get()).matrix_world), wanted, pixel)
     layer = mesh.uv_layers.new(name=_UV_MAP, do_init=False)
     if layer is None:
-        raise RuntimeError("its mesh has no room for another UV map")
+        raise RuntimeError("the mesh has no room for another UV map, remove one")
     layer.data.foreach_set('uv', atlas.uvs.ravel())
     images = {}
     with _stage(context, item, mesh, asked.results) as stage:
@@ -223,8 +224,9 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
             *(images.get(name, black) for name in (RADIANCE, TRANSMITTANCE, TRANSLUCENCE)))
         materials[slot] = BakedMaterial(
             f'material "{item.material_slots[slot].material.name}": baked by Cycles on '
-            f'"{item.name}", because of {reason}', whole, images.get(RADIANCE), opacity,
-            images.get(TRANSLUCENCE), *_line_through(pixels, diffuse_pixels),
+            f'"{item.name}", because Raybundle cannot read {reason}', whole,
+            images.get(RADIANCE), opacity, images.get(TRANSLUCENCE),
+            *_line_through(pixels, diffuse_pixels),
             *(image.mean(axis=0) if len(image) else np.zeros(3)
               for image in (diffuse_pixels, *others)))
     return BakedSurface(atlas.uvs, materials)

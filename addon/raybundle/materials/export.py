@@ -183,16 +183,16 @@ class MaterialExporter:
 
     def unread(self, slot: SlotMaterial, material: bpy.types.Material) -> str | None:
         """Returns the property of the evaluated material that only Cycles can evaluate, worded as
-        the end of the sentence "because of ...". Returns None if the export can read the whole
-        material."""
+        the end of the sentence "Raybundle cannot read ...". Returns None if the export can read the
+        whole material."""
         key = replace(slot, last=None)
         if key not in self._unread:
             surface = self._surface(material, self._reading(slot), Warnings(), unread := [])
             if not unread and not _share_coordinates(surface.reflectance, surface.radiance):
-                unread.append("its emission, which varies in another way than its reflectance")
+                unread.append("an emission that varies in another way than the reflectance")
             if not unread and not _is_laid_out(surface.translucence, surface.reflectance,
                                                surface.radiance):
-                unread.append("its translucence, which varies in another way than its reflectance")
+                unread.append("a translucence that varies in another way than the reflectance")
             if self._shows(material, slot).only:
                 unread.clear()
             self._unread[key] = unread[0] if unread else None
@@ -260,16 +260,16 @@ class MaterialExporter:
         Its colours are those of its sockets, or grey if these are black. Adds a warning."""
         if any(np.any(side.reflectance.mean() + side.translucence.mean() > 0.0) for side in sides):
             self.warnings.add(
-                f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
-                f'its own colour: that of the socket it is linked to is used; set it there, or '
-                f'link the result through a Multiply node')
+                f'material "{name}" shows only the result of a bake, and no earlier bake stored '
+                f'its own colour: the colour of the socket that the result is linked to is used; '
+                f'set it there, or link the result through a Multiply node')
         else:
             grey = Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
             sides = [replace(grey, transmittance=side.transmittance) for side in sides]
             self.warnings.add(
-                f'material "{name}" shows the result of a bake alone, and no earlier bake tells '
-                f'its own colour: grey of {DEFAULT_REFLECTANCE} is used; bake with its own '
-                f'material first')
+                f'material "{name}" shows only the result of a bake, and no earlier bake stored '
+                f'its own colour: grey of {DEFAULT_REFLECTANCE} is used; bake once with the '
+                f'original material first')
         return self._add(name, sides)
 
     def _results(self, slot: SlotMaterial) -> frozenset[str]:
@@ -305,8 +305,8 @@ class MaterialExporter:
         mean, with a warning."""
         if not sides[0].reflectance.same_variation(sides[1].reflectance):
             # The native library has one image and one weight for the reflectance of both sides.
-            self.warnings.add(f'material "{name}": an image or attribute differs between the '
-                              f'sides: its mean is used')
+            self.warnings.add(f'material "{name}": front and back have different images or '
+                              f'attributes: the mean of each side is used')
             sides = [replace(side, reflectance=ColorExpression(side.reflectance.mean()),
                              diffuse=ColorExpression(side.diffuse.mean())) for side in sides]
         varying = sides[0].reflectance
@@ -321,7 +321,7 @@ class MaterialExporter:
                 or not all(_share_coordinates(side.reflectance, side.radiance)
                            for side in sides)):
             self.warnings.add(f'material "{name}": its emission and its reflectance vary in '
-                              f'different ways: the emission has its mean')
+                              f'different ways: the mean of the emission is used')
             glows = [ColorExpression(glow.mean()) for glow in glows]
             glow_texture = glow_attribute = None
         passed = [side.translucence for side in sides]
@@ -330,17 +330,16 @@ class MaterialExporter:
                 or any(color.texture and not color.texture.same_as(passed_texture)
                        for color in passed)):
             self.warnings.add(f'material "{name}": its translucence and its reflectance vary in '
-                              f'different ways: the translucence has its mean')
+                              f'different ways: the mean of the translucence is used')
             passed = [ColorExpression(color.mean()) for color in passed]
             passed_texture = None
         if any(np.any(color.mean() < -1e-6) for side in sides
                for color in (side.reflectance, side.radiance)):
-            self.warnings.add(f'material "{name}": reflectance or emission that is negative counts '
-                              f'as 0')
+            self.warnings.add(f'material "{name}": negative reflectance or emission counts as 0')
         transmittance = np.clip([side.transmittance for side in sides], 0.0, 1.0)
         if np.ptp(transmittance) > 1e-3:
-            self.warnings.add(f'material "{name}": what it lets through differs between colours '
-                              f'or sides: its mean is used')
+            self.warnings.add(f'material "{name}": its transparency differs between colours or '
+                              f'sides: the mean is used')
         images = [self._image_index(one) if one else None
                   for one in (texture, glow_texture, passed_texture)]
         model = sides[0].scattering.diffuse_model()[0]  # used for both sides
@@ -380,7 +379,8 @@ class MaterialExporter:
             return None, Surface.matt(ColorExpression(np.array(material.diffuse_color[:3])))
         output = output_node(material.node_tree)
         if output is None:
-            warnings.add(f'material "{material.name}" has no output node: it is black')
+            warnings.add(f'material "{material.name}" is black because it has no output node: add '
+                         f'a Material Output')
             return None, Surface()
         if output.inputs['Volume'].is_linked and not output.inputs['Surface'].is_linked:
             # A material with a volume and no surface lets all light pass, as in Cycles.

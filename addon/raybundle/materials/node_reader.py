@@ -34,7 +34,7 @@ CLOTH = ('BSDF_SHEEN', 'BSDF_VELVET')
 # missing.
 CLOTH_ROUGHNESS = ('Roughness', 'Sigma'), 0.5
 EDGE_TINT = ('Edge Tint',), 1.0  # of the Metallic shader
-MIRRORS = "mirrors: what it sends to other surfaces spreads here as by a roughness of 0.45 or more"
+MIRRORS = "mirrors light: it lights other surfaces as if its roughness were at least 0.45"
 
 
 class NodeReader(ColorReader):
@@ -88,7 +88,7 @@ class NodeReader(ColorReader):
         if node.type == 'BSDF_TRANSLUCENT':
             return Surface(translucence=self._own_color(node.inputs['Color'], path))
         if node.type in ('BSDF_GLASS', 'BSDF_REFRACTION'):
-            self._warn(node, "lets light through: it goes straight on here, and nothing is "
+            self._warn(node, "lets light through: the light passes straight through, and none is "
                              "reflected")
             return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
         if node.type == 'MIX_SHADER':
@@ -104,7 +104,7 @@ class NodeReader(ColorReader):
         if node.type == 'SUBSURFACE_SCATTERING':
             self._warn(node, "is read as a diffuse surface")
             return Surface.matt(self._own_color(node.inputs['Color'], path))
-        self._warn(node, "is not diffuse: it reflects nothing and stops the light")
+        self._warn(node, "is not supported: it reflects nothing and blocks light")
         return Surface()
 
     def _principled(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
@@ -119,7 +119,7 @@ class NodeReader(ColorReader):
             self._warn(node, MIRRORS)
         through = float(np.clip(self.value(transmission, path), 0.0, 1.0)) * (1.0 - metallic)
         if through > 0.0:
-            self._warn(node, "lets light through: it goes straight on here")
+            self._warn(node, "lets light through: the light passes straight through")
         mean = np.clip(base.mean(), 0.0, 1.0)
         sockets = PrincipledSockets(
             *self._values(node, GLOSS_SOCKETS, path), node.distribution == 'MULTI_GGX', mean,
