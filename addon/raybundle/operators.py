@@ -66,21 +66,21 @@ class RAYBUNDLE_OT_bake(_NeedsScene, bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_relight(_NeedsScene, bpy.types.Operator):
-    """Bake again after a change of lights or colours; the lines of unchanged geometry are reused"""
+    """Bake again after a change of lights or materials, and reuse the lines of the last bake"""
     bl_idname = "raybundle.relight"
     bl_label = "Relight"
     bl_options = {'REGISTER', 'UNDO'}
 
     def execute(self, context):
         if not bake_cache.has_result(context.scene):
-            self.report({'ERROR'}, "There is nothing to relight: bake first; lines are kept until "
-                                   "the file is closed")
+            self.report({'ERROR'}, "There is nothing to relight: bake first. The lines of a bake "
+                                   "are kept only until the file is closed")
             return {'CANCELLED'}
         return _run_bake(self, context)
 
 
 class RAYBUNDLE_OT_clear(bpy.types.Operator):
-    """Remove the baked attributes and the subdivided copies, and free the kept lines"""
+    """Remove the baked attributes and the subdivided copies, and free the memory of the lines"""
     bl_idname = "raybundle.clear"
     bl_label = "Clear Bake"
     bl_options = {'REGISTER', 'UNDO'}
@@ -101,8 +101,8 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
         LastSurfaces(scene).forget_attributes()
         scene.raybundle.report = ""
         bake_cache.discard(scene)
-        self.report({'INFO'}, f'Attribute "{scene.raybundle.attribute}" removed from {cleared} '
-                              f'meshes, {copies} subdivided copies removed')
+        self.report({'INFO'}, f'Attribute "{scene.raybundle.attribute}" removed from meshes: '
+                              f'{cleared}. Subdivided copies removed: {copies}')
         return {'FINISHED'}
 
 
@@ -124,7 +124,7 @@ class RAYBUNDLE_OT_light_set_add(_NeedsScene, bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_light_set_remove(bpy.types.Operator):
-    """Remove the selected light set; its baked attributes stay until Clear"""
+    """Remove the selected light set. Its baked attributes stay until you press Clear"""
     bl_idname = "raybundle.light_set_remove"
     bl_label = "Remove Light Set"
     bl_options = {'REGISTER', 'UNDO'}
@@ -143,7 +143,7 @@ class RAYBUNDLE_OT_light_set_remove(bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
-    """Show the baked attribute in the 3D views' solid shading, or the earlier shading again"""
+    """Show the baked attribute in all 3D views, or restore their earlier shading"""
     bl_idname = "raybundle.preview"
     bl_label = "Preview"
 

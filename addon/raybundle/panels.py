@@ -70,9 +70,9 @@ class RAYBUNDLE_PT_last_bake(RaybundleRenderPanel, bpy.types.Panel):
         # Reports of earlier releases have no 'error'.
         if error := report.get('error'):
             column.label(text=f"Noise: {100.0 * error['noise']:.2g} %")
-            column.label(text=f"Patch size: {100.0 * error['discretisation']:.2g} %")
+            column.label(text=f"Discretisation: {100.0 * error['discretisation']:.2g} %")
             column.label(text=f"Mesh: {100.0 * error['mesh']:.2g} %")
-            column.label(text=f"Error: {100.0 * error['total']:.2g} %")
+            column.label(text=f"Stated error: {100.0 * error['total']:.2g} %")
         column.label(text=f"Time: {report['seconds']['total']:.2f} s")
         column.label(text=f"Patches: {report['patches']:,}")
         column.label(text=f"Bundles: {report['bundles']:,}")
@@ -103,7 +103,7 @@ class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
         layout.prop(settings, "max_patches", text="Patches")
         layout.prop(settings, "max_bundles", text="Bundles")
         layout.prop(settings, "lines_per_bundle", text="Lines")
-        layout.prop(settings, "memory_limit", text="MB")
+        layout.prop(settings, "memory_limit", text="Memory (MB)")
 
 
 class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):

@@ -18,13 +18,13 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
 enum_scope = (
     ('VISIBLE', "Visible", "Bake all objects that are visible in the viewport and in renders"),
     ('SELECTED', "Selected",
-     "Bake the selected objects; the other visible ones still reflect and block light"),
+     "Bake the selected objects; other visible objects still reflect and block light"),
 )
 
 enum_output = (
     ('LIGHTING', "Lighting",
-     "Light on a white surface: irradiance / pi, as Cycles' Diffuse bake without Color. Multiply "
-     "it by the material's colour"),
+     "Light on a white surface: irradiance / pi, as in Cycles' Diffuse bake without Color. To show "
+     "it, multiply it by the material's colour"),
     ('COMBINED', "Combined",
      "Radiance that leaves the surface: emission and reflected light with the material's colour"),
     ('DIRECT', "Direct",
@@ -33,9 +33,9 @@ enum_output = (
 )
 
 enum_domain = (
-    ('CORNER', "Face Corner", "A value per corner of each face: edges between smooth regions "
-     "stay sharp"),
-    ('POINT', "Vertex", "A value per vertex: the mean of its corners"),
+    ('CORNER', "Face Corner", "One value per corner of each face: light may differ on the two "
+     "sides of a sharp edge"),
+    ('POINT', "Vertex", "One value per vertex: the mean of its corners"),
 )
 
 enum_data_type = (
@@ -44,14 +44,14 @@ enum_data_type = (
 )
 
 enum_topology = (
-    ('KEEP', "Keep", "Write to the vertices that the meshes have"),
+    ('KEEP', "Keep", "Write to the existing vertices of the meshes"),
     ('SUBDIVIDE', "Subdivide",
-     "Write to a finer copy of each object; the original is hidden, and Clear shows it again"),
+     "Write to a finer copy of each object, and hide the original until you press Clear"),
 )
 
 enum_shared_meshes = (
     ('SINGLE_USER', "Copies",
-     "Objects that share a mesh get a copy each, so that each has its own light"),
+     "Objects that share a mesh each get a copy of it, with their own light"),
     ('AVERAGE', "Average", "Objects that share a mesh keep sharing it and show their mean light"),
 )
 
@@ -156,13 +156,13 @@ enum_reconstruction = (
 enum_role = (
     ('BAKE', "Bake", "Takes part in the light and gets colours"),
     ('OCCLUDE', "Occlude", "Reflects and blocks light, but gets no colours"),
-    ('IGNORE', "Ignore", "Left out"),
+    ('IGNORE', "Ignore", "Takes no part in the bake"),
 )
 
 enum_side = (
     ('FRONT', "Front", "Bake the light on the side that the normals point to"),
-    ('BACK', "Back", "Bake the light on the other side, as for a room modelled as a box with "
-     "outward normals"),
+    ('BACK', "Back", "Bake the light on the other side, for example inside a room whose normals "
+     "point outward"),
 )
 
 
@@ -183,8 +183,8 @@ class RaybundleLightSet(bpy.types.PropertyGroup):
         name="World", description="The light of the world belongs to the set", default=False)
     attribute: StringProperty(
         name="Attribute",
-        description="Name of the colour attribute that the set's light is written to; empty is "
-                    "that of the scene and the name of the set")
+        description="Name of the colour attribute for the light of the set. If empty, the name is "
+                    "the scene's attribute followed by the name of the set")
 
 
 class RaybundleSceneSettings(bpy.types.PropertyGroup):
@@ -207,22 +207,22 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         name="Data Type", description="How values are stored", items=enum_data_type,
         default='FLOAT_COLOR')
     exposure: FloatProperty(
-        name="Exposure", description="Stops by which the values are made brighter when they are "
-                                     "written; 0 writes the light as it is",
+        name="Exposure", description="Change of the brightness of the written values, in stops; 0 "
+                                     "writes the light unchanged",
         default=0.0, min=-32.0, max=32.0, soft_min=-10.0, soft_max=10.0, precision=2, step=10)
     clamp: BoolProperty(
-        name="Clamp", description="Cut values off at 1 when they are written, after the exposure",
+        name="Clamp", description="Cut written values off at 1, after the exposure is applied",
         default=False)
     write_error: BoolProperty(
         name="Write Error",
-        description="Also write the stated error of the light, as a number per corner or vertex, "
-                    "to an attribute with the name of the light's and \"Error\"",
+        description="Also write the stated error of the light, one number per corner or vertex, "
+                    "to a second attribute whose name ends with \"Error\"",
         default=False)
     topology: EnumProperty(
-        name="Topology", description="Whether meshes may be refined for their light",
+        name="Topology", description="Whether the bake writes to the meshes or to finer copies",
         items=enum_topology, default='KEEP')
     shared_meshes: EnumProperty(
-        name="Shared", description="What baked objects with a common mesh get",
+        name="Shared", description="How the light of baked objects with the same mesh is written",
         items=enum_shared_meshes, default='SINGLE_USER')
     patch_size: FloatProperty(
         name="Patch Size",
@@ -311,9 +311,9 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         items=enum_skip, options={'ENUM_FLAG'}, default=set())
     light_sets: CollectionProperty(
         name="Light Sets",
-        description="Groups of lights that are baked into attributes of their own along the same "
-                    "lines", type=RaybundleLightSet)
-    light_set_index: IntProperty(name="Light Set", description="The light set that is shown")
+        description="Groups of lights. The light of each group is baked into its own attribute",
+        type=RaybundleLightSet)
+    light_set_index: IntProperty(name="Light Set", description="The selected light set")
     report: StringProperty(
         name="Report", description="The report of the last bake, as JSON")
     last_surfaces: StringProperty(
@@ -323,13 +323,13 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
 
 class RaybundleObjectSettings(bpy.types.PropertyGroup):
     role: EnumProperty(
-        name="Role", description="What the object does in a bake", items=enum_role,
+        name="Role", description="How the object takes part in a bake", items=enum_role,
         default='BAKE')
     side: EnumProperty(
         name="Side", description="The side of the faces whose light is baked", items=enum_side,
         default='FRONT')
     source: PointerProperty(
-        name="Source", description="The object that this one is the subdivided copy of",
+        name="Source", description="The original of this subdivided copy",
         type=bpy.types.Object, poll=_is_mesh_object)
     last_surfaces: StringProperty(
         name="Last Surfaces",
@@ -382,7 +382,7 @@ def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeS
     names = [item.name for item in fields(BakeSettings)]
     for name in overrides:
         if name not in names:
-            raise ValueError(f'there is no setting "{name}"; there are: {", ".join(names)}')
+            raise ValueError(f'unknown setting "{name}": choose one of {", ".join(names)}')
     values = {name: checked_value(name, overrides.get(name, getattr(scene.raybundle, name)))
               for name in names}
     return BakeSettings(**values)
@@ -411,13 +411,13 @@ def checked_value(name: str, value: object) -> object:
     if definition.type == 'ENUM' and definition.is_enum_flag:
         unknown = set(value) - set(definition.enum_items.keys())
         if unknown:
-            raise ValueError(f'{name}: {sorted(unknown)} are none of '
+            raise ValueError(f'{name}: unknown {", ".join(sorted(unknown))}, choose from '
                              f'{", ".join(definition.enum_items.keys())}')
         return set(value)
     if definition.type == 'ENUM':
         choices = [item.identifier for item in definition.enum_items]
         if value not in choices:
-            raise ValueError(f'{name}: "{value}" is none of {", ".join(choices)}')
+            raise ValueError(f'{name}: unknown value "{value}", choose one of {", ".join(choices)}')
         return value
     if definition.type == 'BOOLEAN':
         return _checked_bool(name, value)
