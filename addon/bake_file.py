@@ -34,7 +34,7 @@ MOST_IMBALANCE = 0.01  # as in native/src/bake/bake.cpp
 def main(arguments: list[str]) -> None:
     options = _parse(arguments)
     if not bpy.data.filepath:
-        raise raybundle.BakeError("There is no file to bake: name a .blend before -P")
+        raise raybundle.BakeError("There is no file to bake: name a .blend file before -P")
     raybundle.register()
     name = Path(bpy.data.filepath).stem
     out = options.out.resolve()
@@ -69,7 +69,7 @@ def _draw_picture(baked: set[str], attribute: str, path: Path) -> str:
         # The picture of an earlier bake must not stay.
         path.unlink(missing_ok=True)
         attribute_picture.render(bpy.context, baked, attribute, path)
-        return "" if path.is_file() else "Blender wrote none"
+        return "" if path.is_file() else "Blender wrote no image"
     except Exception as error:  # of any kind: the bake is saved already
         return (str(error).strip() or type(error).__name__).splitlines()[0]
 
@@ -77,7 +77,7 @@ def _draw_picture(baked: set[str], attribute: str, path: Path) -> str:
 def _parse(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="bake", description="Bake a .blend file")
     parser.add_argument("--out", type=Path, default=Path("out"), metavar="DIR",
-                        help="folder of the results (out)")
+                        help="folder for the results (default: out)")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="name=value",
                         help="settings of scene.raybundle, such as target_error=0.01")
     return parser.parse_args(arguments)
@@ -91,7 +91,7 @@ def _apply(scene: bpy.types.Scene, assignment: str) -> None:
              if item.identifier not in ('rna_type', 'name', 'report') and not item.is_hidden]
     names += [f"skip.{item[0]}" for item in enum_skip]
     if name not in names:
-        raise raybundle.BakeError(f'--set "{name}": there is no such setting; there are: '
+        raise raybundle.BakeError(f'--set "{name}": unknown setting, choose one of '
                                   f'{", ".join(names)}')
     assign(scene.raybundle, name, value)
 
@@ -124,7 +124,8 @@ def _write_whole(path: Path, text: str) -> None:
 def _print_summary(report: raybundle.BakeReport, out: Path, name: str, no_picture: str) -> None:
     if report.energy['balance_error'] > MOST_IMBALANCE:
         # This warning comes first, because lost or created light is worse than noise.
-        print(f"warning: {report.warnings[0]}")
+        print("warning: " + next((text for text in report.warnings if "balance" in text),
+                                 report.warnings[0]))
     print(report.summary())
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
                        if stage != 'total')
@@ -136,7 +137,7 @@ def _print_summary(report: raybundle.BakeReport, out: Path, name: str, no_pictur
         if item.status != 'baked':
             print(f"  {item.name}: {item.status}")
         else:
-            print(f"  {item.name}: error {100.0 * item.error['total']:.2g} %")
+            print(f"  {item.name}: stated error {100.0 * item.error['total']:.2g} %")
     for warning in report.warnings:
         print(f"  warning: {warning}")
     if no_picture:

@@ -37,7 +37,7 @@ def test_writes_blend_picture_and_report(saved_box, tmp_path):
     result = bake_file(saved_box, "--out", out, "--set", "max_patches=500", "domain=POINT",
                        "--set", "attribute=Light")
     assert result.returncode == 0, result.stderr
-    assert "1 objects baked" in result.stdout and "bundles" in result.stdout
+    assert "1 object baked" in result.stdout and "bundles" in result.stdout
     assert saved_box.read_bytes() == original
     report = json.loads((out / "box.json").read_text())
     for item in report["objects"]:
@@ -125,7 +125,7 @@ def test_a_picture_of_files_as_people_have_them(closed_box, tmp_path, save):
     result = bake_file(path, "--out", out, "--set", "max_patches=500")
     assert result.returncode == 0, result.stderr
     assert "Traceback" not in result.stderr and "no picture" not in result.stdout
-    assert "objects baked" in result.stdout and f"wrote {out / 'file.png'}" in result.stdout
+    assert "1 object baked" in result.stdout and f"wrote {out / 'file.png'}" in result.stdout
     assert {path.suffix for path in out.iterdir()} == {".blend", ".json", ".png"}
 
 
@@ -136,7 +136,7 @@ def test_a_picture_that_cannot_be_made_is_a_line(saved_box, tmp_path):
     result = bake_file(saved_box, "--out", out, "--set", "max_patches=500")
     assert result.returncode == 0, result.stderr
     assert "Traceback" not in result.stderr
-    assert "1 objects baked" in result.stdout
+    assert "1 object baked" in result.stdout
     lines = [line for line in result.stdout.splitlines() if line.startswith("  no picture: ")]
     assert len(lines) == 1 and "box.png" in lines[0]
     assert "wrote " + str(out / "box.png") not in result.stdout

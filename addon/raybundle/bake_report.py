@@ -68,7 +68,9 @@ class BakeReport:
     def summary(self) -> str:
         """Returns one line for the status bar."""
         baked = sum(item.status.startswith('baked') for item in self.objects)
-        warnings = f", {len(self.warnings)} warnings" if self.warnings else ""
-        return (f"{baked} objects baked in {self.seconds['total']:.2f} s: {self.patches} patches, "
-                f"{self.bundles} bundles, noise {100.0 * self.error['noise']:.2g} %, error "
-                f"{100.0 * self.error['total']:.2g} %{warnings}")
+        objects = "object" if baked == 1 else "objects"
+        count = len(self.warnings)
+        warnings = f", {count} warning{'s' if count > 1 else ''}" if count else ""
+        return (f"{baked} {objects} baked in {self.seconds['total']:.2f} s: {self.patches} "
+                f"patches, {self.bundles} bundles, noise {100.0 * self.error['noise']:.2g} %, "
+                f"stated error {100.0 * self.error['total']:.2g} %{warnings}")
