@@ -48,15 +48,15 @@ def summary(path: Path) -> str:
     shown = [instance.object for instance in graph.object_instances
              if instance.object.type == "MESH"]
     return (f"{path.name}: {len(own)} mesh objects with "
-            f"{sum(len(item.data.polygons) for item in own)} faces; shown: {len(shown)} with "
-            f"{sum(len(item.data.polygons) for item in shown)}; {path.stat().st_size} bytes")
+            f"{sum(len(item.data.polygons) for item in own)} faces; in a render: {len(shown)} with "
+            f"{sum(len(item.data.polygons) for item in shown)} faces; {path.stat().st_size} bytes")
 
 
 def main(names: list[str]) -> None:
     """Builds the named scenes, or all scenes if there are no names. Exits if a name is unknown."""
     unknown = sorted(set(names) - set(SCENES))
     if unknown:
-        sys.exit(f"unknown scene: {', '.join(unknown)}; known: {', '.join(SCENES)}")
+        sys.exit(f"unknown scene: {', '.join(unknown)}; the scenes are: {', '.join(SCENES)}")
     for name in names or SCENES:
         print(summary(build_scene(name)))
 
