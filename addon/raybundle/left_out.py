@@ -268,8 +268,8 @@ def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str
     untraced: names of objects whose modifiers do not keep the codes of some corners."""
     yield from _line_about(
         _quoted(copied),
-        "Modifiers copy faces, and all copies show the light of the copy in the original's place. "
-        "Objects:",
+        "Modifiers copy faces, and all copies show the light of the one nearest to the original "
+        "face. Objects:",
         "Apply the modifiers to give each copy its own light")
     yield from _line_about(
         _quoted(untraced),
