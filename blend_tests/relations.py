@@ -122,7 +122,7 @@ RELATIONS = (
     Relation("black dust", light_changes.dust_added),
     Relation("1000 times the power", light_changes.power_scaled(1e3), factor=1e3),
     Relation("a thousandth of the power", light_changes.power_scaled(1e-3), factor=1e-3),
-    Relation("each lamp two of half", light_changes.lamps_halved, is_quick=True),
+    Relation("each lamp split into two", light_changes.lamps_halved, is_quick=True),
     Relation("area lamps as emissive faces", light_changes.area_lamps_as_faces,
              light_changes.area_lamps_before_plates),
     Relation("the sum of light sets", light_changes.in_light_sets, costs_same=False, is_quick=True),
@@ -289,7 +289,7 @@ def row(name: str, results: list[Result]) -> str:
     if failed:
         outcome = f"FAILS in {len(failed)}: {', '.join(failed)}"
     elif said:
-        outcome = f"holds, or said in {', '.join(said)}"
+        outcome = f"holds, or warned of in {', '.join(said)}"
     return f"| {name} | {len(counted)} | {' | '.join(cells)} | {outcome} |"
 
 
@@ -325,8 +325,8 @@ def main(arguments: list[str]) -> None:
             if result.failures:
                 print(f"FAIL {name}: {relation.name}: {'; '.join(result.failures)}", flush=True)
         print(f"done {name} in {time.perf_counter() - started:.0f} s", flush=True)
-    print("\n| relation | scenes | light, worst of what is allowed | balance, worst | "
-          "bundles, of those before | |\n|---|---|---|---|---|---|")
+    print("\n| relation | scenes | light: largest deviation and its limit | "
+          "largest balance error | bundles, relative to before | |\n|---|---|---|---|---|---|")
     for relation in chosen:
         print(row(relation.name, results[relation.name]), flush=True)
     failed = sum(bool(result.failures) for entries in results.values() for result in entries)

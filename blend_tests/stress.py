@@ -304,15 +304,15 @@ def mesh_cases() -> Iterator[Case]:
     # By their depths, these cubes are a box that fills a room: no light gets between them.
     yield Case("a box that fills a room", box_that_fills_a_room, None)
     yield Case("a cube with a shell of no thickness", lambda: modified('SOLIDIFY', thickness=0.0))
-    yield Case("cubes through each other",
+    yield Case("cubes that intersect",
                lambda: cubes((0, 0, 0), (0.5, 0.5, 0.5), (0.3, -0.4, 0.2)))
-    yield Case("cubes face to face", lambda: cubes((0, 0, 0), (1, 0, 0), (0.5, 1, 0)),
+    yield Case("cubes with touching faces", lambda: cubes((0, 0, 0), (1, 0, 0), (0.5, 1, 0)),
                hides_faces=True)
     yield Case("three interlocked bars", interlocked_bars)
     yield Case("three faces at an edge", fan)
     yield Case("a cube without a lid",
                lambda: polygons(CUBE_VERTICES, *CUBE_FACES[:5]))
-    yield Case("faces of no area, and corners in a line",
+    yield Case("faces without area, and corners on a line",
                lambda: polygons([(0, 0, 0), (1, 0, 0), (2, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)],
                                 (0, 1, 2), (0, 1, 5), (0, 1, 2, 3, 4)),
                says="area", hides_faces=True)
@@ -322,38 +322,39 @@ def mesh_cases() -> Iterator[Case]:
                settings={"target_error": 0.1})
     yield Case("a face that crosses itself",
                lambda: polygons([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], (0, 1, 2, 3)))
-    yield Case("a face that is not plane",
+    yield Case("a face that is not planar",
                lambda: polygons([(0, 0, 0), (1, 0, 0.5), (1, 1, 0), (0, 1, 0.5)], (0, 1, 2, 3)))
     yield Case("one triangle", lambda: polygons([(0, 0, 0), (1, 0, 0), (0, 1, 0)], (0, 1, 2)))
     yield Case("one patch", lambda: polygons([(0, 0, 0), (1, 0, 0), (0, 1, 0)], (0, 1, 2)),
                settings={"patch_size": 100.0})
-    yield Case("a vertex that is no number", lambda: with_vertex(np.nan, 0.0, 0.0), says="Broken")
+    yield Case("a vertex that is not a number", lambda: with_vertex(np.nan, 0.0, 0.0),
+               says="Broken")
     yield Case("a vertex at infinity", lambda: with_vertex(np.inf, 0.0, 0.0), says="Broken")
     yield Case("a vertex 1e30 m away", lambda: with_vertex(1e30, 0.0, 0.0), says="Broken")
     yield Case("an object without faces", without_faces)
-    yield Case("faces of a material that is not there", wrong_material_index, None)
-    yield Case("a modifier that leaves nothing", masked_to_nothing)
+    yield Case("faces of a missing material", wrong_material_index, None)
+    yield Case("a modifier that removes all faces", masked_to_nothing)
     yield Case("a cube in a row of 200",
                lambda: modified('ARRAY', count=200, relative_offset_displace=(1.5, 0.0, 0.0)))
     yield Case("1000 objects", lambda: many_objects(1000))
     yield Case("10 000 objects", lambda: many_objects(10000), is_quick=False)
     yield Case("instances five levels deep", lambda: nested_instances(5))
-    yield Case("nothing", lambda: None, None, "Nothing to bake", True)
+    yield Case("an empty scene", lambda: None, None, "Nothing to bake", True)
 
 
 def value_cases() -> Iterator[Case]:
     """Returns cases of values of materials, the world and lamps."""
     yield Case("an emission of -1 W/m^2", room_of_negative_emission, None, "Grey")
-    yield Case("an emission that is no number", lambda: room(0.5, np.nan), None, "Grey", True)
-    yield Case("a reflectance that is no number", lambda: room(np.nan), None, "Grey", True)
-    yield Case("a world that is no number", lambda: (cube(), create_world((np.nan,) * 3)), None,
+    yield Case("an emission that is not a number", lambda: room(0.5, np.nan), None, "Grey", True)
+    yield Case("a reflectance that is not a number", lambda: room(np.nan), None, "Grey", True)
+    yield Case("a world that is not a number", lambda: (cube(), create_world((np.nan,) * 3)), None,
                "world", True)
     yield Case("a negative world", negative_world, None, "World")
 
     yield Case("a lamp of 0 W", lambda: lamp('POINT', 0.0), None)
     yield Case("a lamp of 1e12 W", lambda: lamp('POINT', 1e12), None)
     yield Case("a lamp of -100 W", lambda: lamp('POINT', -100.0), None, "Lamp")
-    yield Case("a lamp of a power that is no number", lambda: lamp('POINT', np.nan), None, "Lamp")
+    yield Case("a lamp whose power is not a number", lambda: lamp('POINT', np.nan), None, "Lamp")
     yield Case("a point without radius", lambda: lamp('POINT', shadow_soft_size=0.0), None)
     yield Case("an area lamp without area", lambda: lamp('AREA', size=0.0), None)
     yield Case("a spot of 0 degrees", lambda: lamp('SPOT', spot_size=0.0), None)

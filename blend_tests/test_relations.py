@@ -16,8 +16,8 @@ QUICK = [relation for relation in relations.RELATIONS if relation.is_quick]
 CHOSEN = {
     # The only lamp is a mesh, so that the two excluded relations do not apply.
     "cornell_box": [relation.name for relation in QUICK if relation.name not in
-                    ("each lamp two of half", "the sum of light sets")],
-    "room:area_flush": ["each lamp two of half", "mirrored"],
+                    ("each lamp split into two", "the sum of light sets")],
+    "room:area_flush": ["each lamp split into two", "mirrored"],
     "room:panel": ["vertices moved by 1e-6", "quads triangulated"],
     "room:panel_on_wall": ["joined"],
     "room:two_panels": ["emissive meshes joined", "the sum of light sets"],

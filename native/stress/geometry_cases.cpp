@@ -180,15 +180,16 @@ std::vector<Case> geometryCases(bool isQuick) {
         cases.push_back(
             furnaceOf("a million triangles below a pixel", {dust(1000000, 0.0002f), floorOf(3)}));
     cases.push_back(furnaceOf("each face twice", {unitBox(), unitBox()}));
+    cases.push_back(furnaceOf("each face twice, once flipped", {unitBox(), turned(unitBox())}));
     cases.push_back(
-        furnaceOf("each face twice, the other way round", {unitBox(), turned(unitBox())}));
-    cases.push_back(furnaceOf("a shell of two sides", {joined(unitBox(), turned(unitBox()))}));
+        furnaceOf("a shell with light on both sides", {joined(unitBox(), turned(unitBox()))}));
     cases.push_back(
         furnaceOf("each face twice, 1e-7 m apart", {unitBox(), unitBox(glm::vec3(1e-7f))}));
-    cases.push_back(furnaceOf("boxes through each other",
+    cases.push_back(furnaceOf("boxes that intersect",
                               {unitBox(), unitBox(glm::vec3(0.5f)), unitBox({0.3f, -0.4f, 0.2f})}));
     cases.push_back(
-        furnaceOf("boxes face to face", {unitBox(), unitBox({1, 0, 0}), unitBox({0.5f, 1, 0})}));
+        furnaceOf("boxes with touching faces",
+                  {unitBox(), unitBox({1, 0, 0}), unitBox({0.5f, 1, 0})}));
     cases.push_back(interlockedBars());
     cases.push_back(furnaceOf("three faces at an edge",
                               {polygons("fan",
@@ -213,9 +214,9 @@ std::vector<Case> geometryCases(bool isQuick) {
                    {1, 1, 1},
                    {0, 1, 1}},
                   {{0, 1, 2, 3}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}})}));
-    cases.push_back(furnaceOf("normals of all faces turned", {turned(unitBox()), floorOf(3)}));
+    cases.push_back(furnaceOf("all normals flipped", {turned(unitBox()), floorOf(3)}));
     cases.push_back(furnaceOf(
-        "faces of no area, and corners in a line",
+        "faces without area, and corners on a line",
         {polygons("degenerate", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 0}},
                   {{0, 1, 2}, {0, 5, 0}, {0, 1, 2, 3, 4}, {3, 3, 3}})}));
     cases.back().says = "area";
@@ -225,9 +226,9 @@ std::vector<Case> geometryCases(bool isQuick) {
         {polygons("bow tie", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2, 3}}),
          floorOf(3)}));
     cases.push_back(furnaceOf(
-        "a face that is not plane",
+        "a face that is not planar",
         {polygons("saddle", {{0, 0, 0}, {1, 0, 0.5f}, {1, 1, 0}, {0, 1, 0.5f}}, {{0, 1, 2, 3}})}));
-    cases.push_back(furnaceOf("everything along the axes", {aligned(), floorOf(4)}));
+    cases.push_back(furnaceOf("all faces along the axes", {aligned(), floorOf(4)}));
     cases.push_back(furnaceOf(
         "one triangle", {polygons("triangle", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}})}));
     cases.push_back(cases.back());

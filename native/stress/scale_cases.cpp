@@ -58,7 +58,7 @@ std::vector<Case> scaleCases() {
     // many lines each from a quarter of the lines.
     for (double pixels : {0.02, 0.2, 5.0, 50.0, 1000.0}) {
         const bool isWide = pixels >= 1000;
-        Case made = room("pixels", printed("%g pixels a patch", pixels), 1, glm::dvec3(0));
+        Case made = room("pixels", printed("%g pixels per patch", pixels), 1, glm::dvec3(0));
         if (isWide) made.settings.patchSize = made.likeSettings.patchSize = 2 * kPatchSize;
         made.settings.linesPerBundle = int((isWide ? 250 : 1000) * pixels / 4);
         // If there are fewer lines than patches, patches gather light with local rays until they

@@ -216,7 +216,7 @@ void print(const Case& made, const Row& row) {
     };
     std::string expected =
         made.light  ? "irradiance " + number(*made.light) + " within " + number(made.tolerance)
-        : made.like ? "the light of the scene without it within " + number(made.tolerance)
+        : made.like ? "the light of the original scene within " + number(made.tolerance)
                     : "balance";
     if (!made.says.empty()) expected += ", \"" + made.says + "\"";
     std::string noise;
