@@ -187,9 +187,8 @@ std::vector<Case> geometryCases(bool isQuick) {
         furnaceOf("each face twice, 1e-7 m apart", {unitBox(), unitBox(glm::vec3(1e-7f))}));
     cases.push_back(furnaceOf("boxes that intersect",
                               {unitBox(), unitBox(glm::vec3(0.5f)), unitBox({0.3f, -0.4f, 0.2f})}));
-    cases.push_back(
-        furnaceOf("boxes with touching faces",
-                  {unitBox(), unitBox({1, 0, 0}), unitBox({0.5f, 1, 0})}));
+    cases.push_back(furnaceOf("boxes with touching faces",
+                              {unitBox(), unitBox({1, 0, 0}), unitBox({0.5f, 1, 0})}));
     cases.push_back(interlockedBars());
     cases.push_back(furnaceOf("three faces at an edge",
                               {polygons("fan",
