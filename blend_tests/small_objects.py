@@ -181,8 +181,9 @@ def main(arguments: Sequence[str]) -> None:
     options = parser.parse_args(arguments)
     raybundle.register()
     columns = ["scene", "reconstruction", "bundles", "lines", "noise, by seed",
-               "noise off contacts", "noise as seen", "vertices",
-               "surface", "Cycles' bake, surface", "time over that without the extent"]
+               "noise off contacts", "noise between corners", "vertices",
+               "surface", "Cycles' bake, surface",
+               "time relative to a bake without the large surroundings"]
     rows = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
     for name in options.scenes:
         rows += measure(name, options)
