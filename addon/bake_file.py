@@ -28,7 +28,6 @@ from raybundle.properties import assign, enum_skip  # noqa: E402
 
 # Seconds between two lines of progress within a stage.
 PROGRESS_SECONDS = 1.0
-MOST_IMBALANCE = 0.01  # as in native/src/bake/bake.cpp
 
 
 def main(arguments: list[str]) -> None:
@@ -122,10 +121,9 @@ def _write_whole(path: Path, text: str) -> None:
 
 
 def _print_summary(report: raybundle.BakeReport, out: Path, name: str, no_picture: str) -> None:
-    if report.energy['balance_error'] > MOST_IMBALANCE:
-        # This warning comes first, because lost or created light is worse than noise.
-        print("warning: " + next((text for text in report.warnings if "balance" in text),
-                                 report.warnings[0]))
+    if 'ENERGY_BALANCE' in report.warning_ids:
+        # Lost or created light is worse than all else, so this warning is printed before the rest.
+        print(f"warning: {report.warnings[0]}")
     print(report.summary())
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in report.seconds.items()
                        if stage != 'total')

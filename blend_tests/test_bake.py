@@ -469,6 +469,21 @@ def test_reflectance_of_one_is_clamped_and_named(closed_box, new_material):
     assert read_colors(closed_box) == pytest.approx(np.full((24, 3), 10.0), rel=1e-2)
 
 
+def test_a_warning_of_lost_light_comes_first(new_object, new_material, new_world):
+    new_world((1.0, 1.0, 1.0))
+    # Between white boards, which absorb next to nothing, two bundles create or lose light.
+    white = new_material("White", (1.0, 1.0, 1.0))
+    for k in range(2):
+        boards = [(x + 2.06 * k, y, z) for x, y, z in CUBE_VERTICES]
+        new_object(f"Board {k}", boards, CUBE_FACES, white)
+    cloud = bpy.data.volumes.new("Cloud")
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Cloud", cloud))
+    report = bake(max_bundles=2, patch_size=0.2)
+    assert report.energy['balance_error'] > 0.01
+    assert "energy balance" in report.warnings[0]
+    assert any("Cloud" in text for text in report.warnings[1:])
+
+
 def test_edit_mode_is_left_and_entered_again(closed_box):
     bpy.context.view_layer.objects.active = closed_box
     bpy.ops.object.mode_set(mode='EDIT')

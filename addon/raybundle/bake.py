@@ -84,7 +84,9 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
             entry['attribute'] = light_set.attribute
         report.objects = objects + [ObjectReport(name, 0, status)
                                     for name, status in export.statuses.items()]
-        report.warnings = grouped([*export.warnings, *report.warnings])
+        # The library's warnings come first, because one of lost or created light is the first of
+        # them and has to be read before all others.
+        report.warnings = grouped([*report.warnings, *export.warnings])
         finished = time.perf_counter()
         report.seconds.update(export=export_seconds, write_back=finished - write_started,
                               total=finished - started)
