@@ -204,13 +204,7 @@ TEST(RandomWalk, AgreesWithLineReuse) {
         EXPECT_GT(found, 0.7 * stated) << row.name;
         // The error common to all patches is smaller than the noise by the root of their number
         // (1000).
-        double sum = 0, exact = 0;
-        for (size_t i = 0; i < bake.patches().sideCount(); i += 2) {
-            const double area = double(bake.patches().area[i / 2]);
-            sum += area * double(bake.patchIrradiance().indirect[i].y);
-            exact += area * double(reference.patchIrradiance().indirect[i].y);
-        }
-        EXPECT_NEAR(sum / exact, 1, 0.01) << row.name;
+        EXPECT_NEAR(indirectPower(bake) / indirectPower(reference), 1, 0.01) << row.name;
     }
 }
 
@@ -230,15 +224,7 @@ TEST(RandomWalk, EnergyIsBalancedUnderTheSky) {
 }
 
 TEST(RandomWalk, TheNumberOfThreadsDoesNotMatter) {
-    std::vector<glm::vec3> results[2];
-    for (int threads : {1, 2}) {
-        Bake bake;
-        setWalks(bake, 8);
-        bake.settings.threads = threads;
-        bake.run(litRoom());
-        results[threads - 1] = everything(bake);
-    }
-    EXPECT_LT(difference(results[0], results[1]), 1e-5);
+    expectSameForThreads([](Bake& bake) { setWalks(bake, 8); });
 }
 
 TEST(RandomWalk, SeedsAreIndependent) {

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "test_bakes.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "test_scenes.h"
@@ -41,6 +44,13 @@ std::vector<glm::vec3> everything(const Bake& bake) {
     return all;
 }
 
+double indirectPower(const Bake& bake) {
+    double power = 0;
+    for (size_t i = 0; i < bake.patches().sideCount(); i += 2)
+        power += double(bake.patches().area[i / 2]) * double(bake.patchIrradiance().indirect[i].y);
+    return power;
+}
+
 double difference(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
     if (a.size() != b.size()) return INFINITY;
     double most = 0, value = 0;
@@ -65,6 +75,18 @@ Scene litRoom(float reflectance) {
     Scene scene = roomWithBoxes(reflectance);
     scene.addLight(areaLight({2, 1.6, 2.6}, {0.3, 0, 0}, {0, -0.3, 0}, {5, 4, 3}));
     return scene;
+}
+
+void expectSameForThreads(const std::function<void(Bake&)>& set) {
+    std::array<std::vector<glm::vec3>, 2> light;
+    for (int threads : {1, 2}) {
+        Bake bake;
+        set(bake);
+        bake.settings.threads = threads;
+        bake.run(litRoom());
+        light[size_t(threads - 1)] = everything(bake);
+    }
+    EXPECT_LT(difference(light[0], light[1]), 1e-5);
 }
 
 void setQuick(Bake& bake, int bundleCount) {

@@ -3,6 +3,7 @@
 // Bakes of small rooms, and functions that compare bakes.
 #pragma once
 
+#include <functional>
 #include <glm/glm.hpp>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -36,6 +37,9 @@ std::vector<glm::vec3> cornerLight(const Bake& bake, int32_t instance, rb_output
 // Returns all outputs at all corners of the first three instances, which every room has.
 std::vector<glm::vec3> everything(const Bake& bake);
 
+// Returns the power of indirect light that the front sides of all patches get, second channel, W.
+double indirectPower(const Bake& bake);
+
 // Returns the largest absolute difference, relative to the largest absolute value.
 double difference(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b);
 // Returns the relative RMS difference.
@@ -43,6 +47,10 @@ double noise(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b);
 
 // Returns a room with two boxes and a lamp below the ceiling.
 Scene litRoom(float reflectance = 0.6f);
+
+// Bakes litRoom(), with the settings that `set` makes, with one thread and with two, and expects the
+// same light.
+void expectSameForThreads(const std::function<void(Bake&)>& set);
 
 // Sets coarse patches and a fixed number of bundles, for bakes that take little time.
 void setQuick(Bake& bake, int bundleCount = 64);

@@ -9,6 +9,16 @@ namespace {
 
 using HeldBake = Held<rb_bake, Bake>;
 
+// Implements rb_get_bake_int() and rb_get_bake_float(), which differ only by their type.
+template <class T>
+rb_error getNumber(rb_bake bake, const char* name, T* value) {
+    return guarded([&] {
+        const HeldBake held(bake, "bake");
+        need(value, "value");
+        held->settings.get(nameOf(name), *value);
+    });
+}
+
 }  // namespace
 
 rb_error rb_new_bake(rb_bake* bake) {
@@ -42,19 +52,11 @@ rb_error rb_set_bake_string(rb_bake bake, const char* name, const char* value) {
 }
 
 rb_error rb_get_bake_int(rb_bake bake, const char* name, int32_t* value) {
-    return guarded([&] {
-        const HeldBake held(bake, "bake");
-        need(value, "value");
-        held->settings.get(nameOf(name), *value);
-    });
+    return getNumber(bake, name, value);
 }
 
 rb_error rb_get_bake_float(rb_bake bake, const char* name, float* value) {
-    return guarded([&] {
-        const HeldBake held(bake, "bake");
-        need(value, "value");
-        held->settings.get(nameOf(name), *value);
-    });
+    return getNumber(bake, name, value);
 }
 
 rb_error rb_get_bake_string(rb_bake bake, const char* name, const char** value) {
