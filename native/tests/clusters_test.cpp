@@ -174,7 +174,8 @@ TEST(Clusters, LightTheRoomAsSinglePatchesDo) {
 }
 
 TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
-    Scene hidden = roomWithBall(4, 0.5f), shown = hidden;
+    const int level = kFewBakes ? 3 : 4;
+    Scene hidden = roomWithBall(level, 0.5f), shown = hidden;
     for (Scene* scene : {&hidden, &shown}) scene->addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
     shown.instances[3].role = RB_ROLE_BAKE;
     Bake again, fresh;
@@ -190,7 +191,7 @@ TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
                          cornerLight(fresh, 3, RB_OUTPUT_LIGHTING)),
               1e-5);
     // Another paint does not change the clusters.
-    Scene painted = roomWithBall(4, 0.3f);
+    Scene painted = roomWithBall(level, 0.3f);
     painted.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
     again.run(hidden);
     again.run(painted);
@@ -202,7 +203,7 @@ TEST(Clusters, AreFoundAnewWhereTheirLightIsToBeShown) {
 // Each cluster of backs, whose fronts are shown, has a side that gathers for all. A cluster has one
 // material, so if faces get another material, other sides must gather.
 TEST(Clusters, OfOtherMaterialsGatherAnew) {
-    Scene before = roomWithBall(4, 0.5f, 0, 0.3f);
+    Scene before = roomWithBall(kFewBakes ? 3 : 4, 0.5f, 0, 0.3f);
     before.instances[3].role = RB_ROLE_BAKE;
     before.addLight(pointLight({1, 1, 2}, glm::dvec3(5)));
     before.addMaterial(grey("other", 0.5f));
