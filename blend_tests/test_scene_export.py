@@ -17,6 +17,7 @@ from raybundle.light_export import (area_light_radiance,
                                     sun_irradiance_factor)
 from raybundle.materials import cycles_bake
 from raybundle.materials.principled import PrincipledSockets, principled_albedo
+from raybundle.materials.scattering import LAMBERT, OREN_NAYAR
 from raybundle.scene_export import export_scene
 
 # Albedo of the diffuse part of a Principled shader with roughness 0.5, without specular reflection.
@@ -469,13 +470,15 @@ def test_light_under_the_surface_has_a_colour_of_its_own(principled):
     assert material.front.reflectance.constant == pytest.approx(ALBEDO * np.array([0.65, 0.4, 0.3]))
 
 
-def test_backfacing_separates_the_sides(new_material):
+@pytest.mark.parametrize("roughness, model", [(0.0, LAMBERT), (0.5, OREN_NAYAR)])
+def test_backfacing_separates_the_sides(new_material, roughness, model):
     material = new_material("Sides", (1, 0, 0))
     tree = material.node_tree
     output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
     red = output.inputs['Surface'].links[0].from_socket
     blue = tree.nodes.new('ShaderNodeBsdfDiffuse')
     blue.inputs['Color'].default_value = (0, 0, 1, 1)
+    blue.inputs['Roughness'].default_value = roughness
     geometry = tree.nodes.new('ShaderNodeNewGeometry')
     mix = tree.nodes.new('ShaderNodeMixShader')
     tree.links.new(geometry.outputs['Backfacing'], mix.inputs[0])
@@ -483,7 +486,11 @@ def test_backfacing_separates_the_sides(new_material):
     tree.links.new(blue.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs['Surface'])
     exported, result = exported_material(material)
-    assert [side.reflectance.constant.tolist() for side in exported.sides] == [[1, 0, 0], [0, 0, 1]]
+    front, back = (side.reflectance.constant for side in exported.sides)
+    assert front.tolist() == [1, 0, 0]
+    # Roughness takes some light away.
+    assert back.tolist() == [0, 0, 1] if model == LAMBERT else 0.85 < back.sum() == back[2] < 1
+    assert [side.diffuse.model for side in exported.sides] == [LAMBERT, model]
     assert result.warnings == []
 
 

@@ -98,10 +98,10 @@ def _ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return np.divide(part, whole, out=np.zeros(3), where=whole != 0.0)
 
 
-def _surface_data(surface: Surface, model: int, diffuse: PartData, reflectance: ColorData,
+def _surface_data(surface: Surface, diffuse: PartData, reflectance: ColorData,
                   emission: ColorData, translucence: ColorData) -> SurfaceData:
-    """Returns the data of one side of a material. model: of diffuse reflection, one of those in
-    scattering.py. diffuse: the diffuse colour as a function of the reflectance."""
+    """Returns the data of one side of a material. diffuse: the diffuse colour as a function of the
+    reflectance."""
     color = np.maximum(surface.diffuse.mean(), 0.0)
     shown = np.where(color > 1e-6, surface.shown_by_angle / np.maximum(color, 1e-6),
                      lambert().shown)
@@ -116,7 +116,7 @@ def _surface_data(surface: Surface, model: int, diffuse: PartData, reflectance: 
                   SEPARATE if bpy.app.version < (4, 0, 0) else CORRELATED),
         microfibers=lobes[MICROFIBERS], velvet=lobes[VELVET], burley_sheen=lobes[BURLEY_SHEEN],
         several_facets=lobes[SEVERAL_FACETS],
-        diffuse=DiffuseData(model, scattering.diffuse_model()[1], scattering.leaving_factors()))
+        diffuse=DiffuseData(*scattering.diffuse_model(), scattering.leaving_factors()))
 
 
 class MaterialExporter:
@@ -217,8 +217,7 @@ class MaterialExporter:
                 index[name] = len(self.scene.images)
                 self.scene.images.append(ImageData(f"{material.name} ({name})", pixels, 'EXTEND'))
         side = _surface_data(
-            surface, surface.scattering.diffuse_model()[0],
-            PartData(baked.diffuse_scale, baked.diffuse_offset),
+            surface, PartData(baked.diffuse_scale, baked.diffuse_offset),
             *(ColorData(image=index.get(name), image_weight=np.full(3, weight))
               for name, weight in (('reflectance', 1.0), ('radiance', np.pi),
                                    ('translucence', 1.0))))
@@ -342,9 +341,8 @@ class MaterialExporter:
                               f'sides: the mean is used')
         images = [self._image_index(one) if one else None
                   for one in (texture, glow_texture, passed_texture)]
-        model = sides[0].scattering.diffuse_model()[0]  # used for both sides
         data = MaterialData(name, *(_surface_data(
-            side, model, _part_of(side.diffuse, side.reflectance),
+            side, _part_of(side.diffuse, side.reflectance),
             ColorData(np.maximum(side.reflectance.constant, 0.0), images[0],
                       varying.texture_weight, varying.attribute_weight),
             # A surface of radiance L has the exitance pi L.
