@@ -276,6 +276,11 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     const int32_t box = addInstance(mesh);
     expectInvalid(rb_set_result_corners(scene, box, nullptr, 1), "corners");
     expectInvalid(rb_set_result_corners(scene, box, noCorners, 2), "77777");
+    int32_t screen = -1;
+    ASSERT_EQ(rb_add_instance(scene, mesh, "screen", kIdentity, RB_ROLE_OCCLUDE, RB_SIDE_FRONT,
+                              &screen),
+              RB_ERROR_NONE);
+    expectInvalid(rb_set_result_corners(scene, screen, noCorners, 1), "screen");
 }
 
 // Adds the material "fog" with a wrong side or a wrong opacity.

@@ -144,6 +144,27 @@ TEST_P(BrightSpots, AreTheSameWithSomethingDarkFarAway) {
     }
 }
 
+// Something far away has a larger touch distance, which does not apply to the bright wall: a shade
+// in front of the lamp, 10 cm from the wall, does not lie on it.
+TEST_P(BrightSpots, AreJudgedByTheTouchDistanceOfTheirIsland) {
+    size_t spots[2];
+    for (const bool hasFar : {false, true}) {
+        Scene scene = roomWithLampAtWall(0.03, GetParam());
+        place(scene, box("shade", {0.5f, 0.1f, 0.5f}, {1.5f, 0.11f, 1.5f}, false),
+              grey("shade", 0.5f));
+        if (hasFar)
+            place(scene, box("far", {-4, -4, -300008}, {4, 4, -300000}, false), grey("far", 0.5f),
+                  glm::dmat4(1), RB_ROLE_OCCLUDE);
+        Bake bake;
+        bake.settings.patchSize = 0.1f;
+        bake.run(scene);
+        spots[hasFar] = spotsOf(bake);
+        EXPECT_EQ(bake.patches().touchDistance > 0.02f, hasFar);
+    }
+    EXPECT_GT(spots[0], 0u);
+    EXPECT_EQ(spots[0], spots[1]);
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, BrightSpots, testing::Bool(), [](const auto& test) {
     return test.param ? "RoughWalls" : "LambertsWalls";
 });

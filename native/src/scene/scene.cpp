@@ -231,6 +231,9 @@ Instance& Scene::instance(int32_t id) { return checked(instances, id, "instance"
 
 void Scene::setResultCorners(int32_t id, const int32_t* corners, size_t count) {
     Instance& target = instance(id);
+    if (target.role != RB_ROLE_BAKE)
+        throw invalidArgument(quoted("object", target.name) +
+                              " has the role OCCLUDE, so that it has no result corners");
     const Mesh& own = meshes[size_t(target.mesh)];
     std::vector<uint8_t> vertices(own.vertices.size()), faces(own.faceCount());
     for (size_t k = 0; k < count; ++k) {
