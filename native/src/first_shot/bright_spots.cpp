@@ -37,11 +37,10 @@ constexpr uint32_t kLooks = 16;
 // from the rest alone.
 bool isUncovered(const FirstShotInput& input, const Visibility& exchange, uint32_t side) {
     const glm::vec3 normal = input.patches.normal(side);
-    const float touching = input.patches.islands[input.patches.parentAt(side).island].touchDistance;
     for (uint32_t k = 0; k < kLooks; ++k) {
         const glm::vec4 u = sobolPoint(k, side);
         if (exchange.isBlocked(side, input.patches.point(patchOf(side), {u.x, u.y}), normal,
-                               touching))
+                               input.patches.islandAt(side).touchDistance))
             return false;
     }
     return true;

@@ -43,9 +43,8 @@ class FaceCutting {
             patches.warnings.push_back(
                 {WarningId::UNCUT_CROSSINGS,
                  "faces intersect in so many places that the smaller faces were not cut there. "
-                 "Some "
-                 "light may leak through walls; delete or hide the unseen parts of objects that "
-                 "intersect"});
+                 "Some light may leak through walls; delete or hide the unseen parts of objects "
+                 "that intersect"});
         for (uint32_t c = 0; c < patches.cells.size(); ++c) {
             throwIfCancelledAt(c);
             if (patches.cells[c].hasPatches) addParents(c, crossings, shells);
