@@ -84,6 +84,30 @@ TEST(NoisyParts, SmallAndDarkThingsAreAsCleanAsWalls) {
     EXPECT_LT(most, 0.75 * mostOfLines);
 }
 
+// A bed under an even sky. Most of its faces see only sky and have no noise. The noise at the
+// corners of those between mattress and frame, where a fit continues the slopes of what little is
+// exposed, says nothing about them.
+TEST(NoisyParts, NearlyCoveredFacesMakeNoOthersNoisy) {
+    Scene scene;
+    place(scene, box("mattress", {0, 0, 0.3f}, {2, 1, 0.5f}, false), grey("grey", 0.7f));
+    place(scene, box("frame", {-0.05f, -0.05f, 0}, {2.05f, 1.05f, 0.28f}, false),
+          grey("grey", 0.7f));
+    place(scene, box("head", {-0.1f, -0.05f, 0}, {-0.005f, 1.05f, 0.9f}, false),
+          grey("grey", 0.7f));
+    scene.worldRadiance = glm::dvec3(1);
+    constexpr int kSeeds = 4;
+    int bundles = 0;
+    for (int seed = 0; seed < kSeeds; ++seed) {
+        Bake bake;
+        bake.settings.seed = seed;
+        bake.run(scene);
+        bundles += int(reportOf(bake)["bundles"]) / kSeeds;
+    }
+    // Measured 154; it was 939 when each object had one ratio of measured to predicted
+    // noise. The number varies by half from seed to seed.
+    EXPECT_LT(bundles, 400);
+}
+
 TEST(NoisyParts, StatedNoiseIsThatWithRays) {
     const Scene scene = roomOfSmallThings();
     Bake one, two;

@@ -55,7 +55,7 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       halves(lights.size()) {
     if (input.settings.countsLines())
         noisyParts.emplace(NoisyPartsInput{in.tiles, in.trace.looks, in.tiles.sum(area), in.shown,
-                                           growth, overForetold, projectionsOfFaces(in.trace),
+                                           growth, shown, projectionsOfFaces(in.trace),
                                            in.settings.targetError});
 }
 
@@ -160,7 +160,7 @@ BundleSolve::Halves BundleSolve::seen() const {
 // earlier bakes, so that equal light gets equal rays whatever was baked before. It is repeated
 // after extra rays, because their noise differs in kind from that of lines.
 void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen) {
-    overForetold = shownOverForetold(
+    shown = shownNoise(
         in.scene, {in.tiles.patches(), in.tiles.mean(in.trace.exposedShare(), patches.sideAreas())},
         look.ofLights().front(), halvesSeen.front(), in.settings.regularization, growth);
 }
@@ -182,7 +182,7 @@ SideNoise BundleSolve::conclude(Stop stop, Report& report) {
         errors = noise.relative();
     }
     CornerNoise corners = noiseAtCorners(in.scene, in.tiles.patches(), noise.ofLights().front(),
-                                         growth, overForetold);
+                                         growth, shown.overForetold);
     const bool isBelow =
         *std::max_element(errors.begin(), errors.end()) <= target || corners.ofAll <= target;
     if (stop == Stop::NOISE_AT_TARGET && isBelow)

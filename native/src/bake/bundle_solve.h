@@ -71,7 +71,7 @@ class BundleSolve {
     std::vector<std::vector<float>> errorOfSets;
     SetNoise noise;
     const std::vector<double> growth;      // per instance, see cornerGrowth
-    std::vector<double> overForetold;      // per instance, see shownOverForetold
+    ShownNoise shown;                      // at corners, of the last look
     std::optional<NoisyParts> noisyParts;  // empty unless the solver counts lines
     StopRule rule;
     const bool castsRays;

@@ -2,6 +2,7 @@
 #include "stated_error/noisy_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -19,8 +20,13 @@ constexpr uint32_t kNone = UINT32_MAX;
 constexpr double kDarkPart = 0.05;
 // The noise of a part is averaged over its cells and kOfObject cells of the whole object. The
 // latter have the mean noise of the object without its noisiest cells: only the share kUsual of the
-// cells counts, since a few nearly covered cells are not representative.
+// cells counts and never the noisiest one, since a few nearly covered cells are not representative.
 constexpr double kOfObject = 4, kUsual = 0.95;
+// At the corners of a nearly covered cell, the fit continues the slopes of other cells, and its
+// noise has little to do with the noise of the cell: it was up to 6000 times the prediction,
+// instead of 0.5 to 2 times. No cell counts with more than this many times the prediction in the
+// ratio that is used for its whole object.
+constexpr double kMostOverForetold = 8;
 // Factor on the squared noise of a part. The difference of the halves is a single sample, and a
 // bake tends to end when this sample is small by chance. At a target of 2 % with this factor, no
 // object of cornell_box, two_rooms and big_room has more noise than 2.8 % at its 95th percentile (6
@@ -65,7 +71,7 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
       before(input.before),
       partOf(tiles.sideCount(), kNone),
       growth(input.growth),
-      shownOverForetold(input.shownOverForetold),
+      shownNoise(input.shownNoise),
       projections(input.projections),
       target(input.target) {
     const std::vector<float>& weight = input.weight;
@@ -99,7 +105,7 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
     }
 }
 
-std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
+std::vector<double> NoisyParts::lightOf(const Noise& noise) const {
     const std::vector<Noise::OfCell>& of = noise.cells();
     std::vector<double> light(tiles.patches().islands.size(), 0), area(light.size(), 0);
     for (const SeenCell& cell : cells) {
@@ -108,28 +114,78 @@ std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
     }
     const double allArea = std::accumulate(area.begin(), area.end(), 0.0);
     const double mean = std::accumulate(light.begin(), light.end(), 0.0) / std::max(allArea, 1e-30);
+    std::vector<double> result(cells.size(), 0);
+    for (size_t c = 0; c < cells.size(); ++c) {
+        const Noise::OfCell& own = of[cells[c].number];
+        if (!(own.area > 0)) continue;
+        const uint32_t island = cells[c].island;
+        result[c] = std::max(own.light,
+                             kDarkPart * kDarkPart * std::min(mean, light[island] / area[island]));
+    }
+    return result;
+}
+
+NoisyParts::Measured NoisyParts::measure(const Noise& noise) const {
+    const std::vector<Noise::OfCell>& of = noise.cells();
+    const std::vector<double> light = lightOf(noise);
+    Measured result{std::vector<double>(parts.size(), 0), std::vector<double>(parts.size(), 0),
+                    std::vector<double>(growth.size(), kUsuallyOverForetold)};
+    std::vector<double> areas(parts.size(), 0);  // per part: of the measured cells, m^2
+    // Per instance: sums over the cells of the measured and of the predicted squares, and the
+    // number of cells.
+    std::vector<std::array<double, 3>> sums(growth.size(), {0, 0, 0});
+    for (size_t c = 0; c < cells.size(); ++c) {
+        const Noise::OfCell& own = of[cells[c].number];
+        const double squares = shownNoise.ofCells[cells[c].number];
+        if (!(light[c] > 0) || squares < 0) continue;
+        const size_t part = cells[c].part, instance = parts[part].instance;
+        const double share = std::min(1.0, own.area / cells[c].area);
+        const double predicted = bundlesAtCorners(own, growth[instance]);
+        result.squares[part] += own.area * squares / light[c];
+        areas[part] += own.area;
+        result.cells[part] += share;
+        sums[instance][0] += share * std::min(squares, kMostOverForetold * predicted) / light[c];
+        sums[instance][1] += share * predicted / light[c];
+        sums[instance][2] += share;
+    }
+    for (size_t p = 0; p < parts.size(); ++p)
+        if (areas[p] > 0) result.squares[p] /= areas[p];
+    for (size_t i = 0; i < growth.size(); ++i) {
+        const auto& [squares, predicted, count] = sums[i];
+        if (predicted > 0)
+            result.overForetold[i] =
+                (count * squares / predicted + kOfObject * kUsuallyOverForetold) /
+                (count + kOfObject);
+    }
+    return result;
+}
+
+std::vector<double> NoisyParts::foretold(const Noise& noise, const Measured& measured) const {
+    const std::vector<Noise::OfCell>& of = noise.cells();
+    const std::vector<double> light = lightOf(noise);
     // Sums of the squared noise of cells: per part, and per object without its noisiest cells. Each
     // cell is weighted by the share of it that is exposed and has a result.
     std::vector<double> squares(parts.size(), 0), weights(parts.size(), 0);
     std::vector<std::vector<std::pair<double, double>>> ofInstance(growth.size());
-    for (const SeenCell& cell : cells) {
-        const Noise::OfCell& own = of[cell.number];
-        const double dark =
-            kDarkPart * kDarkPart * std::min(mean, light[cell.island] / area[cell.island]);
-        if (!(own.area > 0) || !(std::max(own.light, dark) > 0)) continue;
-        const size_t instance = parts[cell.part].instance;
-        const double share = bundlesAtCorners(own, growth[instance]) / std::max(own.light, dark);
-        const double weight = std::min(1.0, own.area / cell.area);
-        squares[cell.part] += weight * share;
-        weights[cell.part] += weight;
-        ofInstance[instance].push_back({share, weight});
+    for (size_t c = 0; c < cells.size(); ++c) {
+        if (!(light[c] > 0)) continue;
+        const Noise::OfCell& own = of[cells[c].number];
+        const size_t part = cells[c].part, instance = parts[part].instance;
+        const double relative = bundlesAtCorners(own, growth[instance]) / light[c];
+        const double weight = std::min(1.0, own.area / cells[c].area);
+        squares[part] += weight * relative;
+        weights[part] += weight;
+        ofInstance[instance].push_back({relative, weight});
     }
     std::vector<double> usual(growth.size(), 0);
     for (size_t i = 0; i < usual.size(); ++i) {
         std::vector<std::pair<double, double>>& all = ofInstance[i];
+        if (all.empty()) continue;
         std::sort(all.begin(), all.end());
+        const size_t count = std::min(size_t(std::ceil(kUsual * double(all.size()))),
+                                      std::max(all.size() - 1, size_t(1)));
         double sum = 0, weight = 0;
-        for (size_t k = 0; k < size_t(std::ceil(kUsual * double(all.size()))); ++k) {
+        for (size_t k = 0; k < count; ++k) {
             sum += all[k].first * all[k].second;
             weight += all[k].second;
         }
@@ -141,19 +197,26 @@ std::vector<double> NoisyParts::squaresOf(const Noise& noise) const {
         // counts.
         squares[p] = parts[p].isGathered
                          ? ofObject
-                         : kByChance * shownOverForetold[parts[p].instance] *
+                         : measured.overForetold[parts[p].instance] *
                                (squares[p] + kOfObject * ofObject) / (weights[p] + kOfObject);
     }
     return squares;
 }
 
 std::vector<double> NoisyParts::squaresOf(const SetNoise& noise) const {
-    std::vector<double> squares(parts.size(), 0);
-    for (const Noise& one : noise.ofLights()) {
-        const std::vector<double> own = squaresOf(one);
-        for (size_t p = 0; p < parts.size(); ++p) squares[p] = std::max(squares[p], own[p]);
+    const Noise& ofAll = noise.ofLights().front();
+    const Measured measured = measure(ofAll);
+    std::vector<double> result = foretold(ofAll, measured);
+    for (size_t p = 0; p < parts.size(); ++p)
+        if (const double count = measured.cells[p]; !parts[p].isGathered)
+            result[p] = (count * measured.squares[p] + kOfObject * result[p]) / (count + kOfObject);
+    for (size_t k = 1; k < noise.ofLights().size(); ++k) {
+        const std::vector<double> ofSet = foretold(noise.ofLights()[k], measured);
+        for (size_t p = 0; p < parts.size(); ++p) result[p] = std::max(result[p], ofSet[p]);
     }
-    return squares;
+    for (size_t p = 0; p < parts.size(); ++p)
+        if (!parts[p].isGathered) result[p] *= kByChance;
+    return result;
 }
 
 void NoisyParts::look(const SetNoise& noise, uint32_t count, const std::vector<float>& lines,

@@ -5,9 +5,9 @@
 // than more bundles would (transport/extra_rays.h).
 //
 // Source: none; the thesis judges the whole scene (section 4.3.3).
-// - Half the difference of the halves at a cell is one sample of its noise. The samples of all
-//   cells of a part are averaged. Those of the whole object, and the earlier looks, count a little
-//   too.
+// - Half the difference of the halves at the corners of a cell is one sample of its noise. The
+//   samples of all cells of a part are averaged. What the noise of the whole object predicts for
+//   the part, and the earlier looks, count a little too.
 // - A bundle takes time for each of its lines, wherever they go, and for each face in its windows.
 //   As long as the parts that need more lines get so large a share of the lines that rays would
 //   take longer, another bundle is cheaper.
@@ -21,6 +21,7 @@
 #include "patches/tiles.h"
 #include "reconstruction/shown_light.h"
 #include "stated_error/noise.h"
+#include "stated_error/object_noise.h"
 #include "transport/extra_rays.h"
 
 namespace raybundle {
@@ -33,10 +34,10 @@ struct NoisyPartsInput {
     const std::vector<float>& weight;
     // Rays do not help where corners gather instead of showing the light of their side.
     const ShownLight& shown;
-    // Per instance, see cornerGrowth() and shownOverForetold() (stated_error/object_noise.h). The
-    // second must belong to the halves of the last look.
+    // Per instance, see cornerGrowth(); and the noise at corners of the halves of the last look.
+    // Both see stated_error/object_noise.h.
     const std::vector<double>& growth;
-    const std::vector<double>& shownOverForetold;
+    const ShownNoise& shownNoise;
     // Number of sheets and single faces that are projected in each bundle if there are windows of
     // finer lines, otherwise 0.
     const double projections;
@@ -47,8 +48,7 @@ struct NoisyPartsInput {
 // one way (patches/parts.h).
 class NoisyParts {
   public:
-    // Finds the parts. `tiles`, `growth` and `shownOverForetold` of the input must outlive the
-    // object.
+    // Finds the parts. `tiles`, `growth` and `shownNoise` of the input must outlive the object.
     explicit NoisyParts(const NoisyPartsInput& input);
 
     // Takes over the last look of `noise` after `bundles` bundles. `lines` is per side of the tiles
@@ -96,9 +96,25 @@ class NoisyParts {
         uint32_t part, island;
         double area;  // of the whole cell, covered parts included, m^2
     };
-    // Returns per part the squared relative noise at the corners. The second function returns the
-    // largest value over all lights.
-    std::vector<double> squaresOf(const Noise& noise) const;
+    // The squared noise at corners relative to the light there, as measured (ShownNoise).
+    struct Measured {
+        // Per part: the mean over the exposed area of its cells, so that splitting a face changes
+        // nothing; and the number of these cells, each counted with the share of it that is
+        // exposed.
+        std::vector<double> squares, cells;
+        // Per instance: the ratio of the squares to the prediction of bundlesAtCorners().
+        std::vector<double> overForetold;
+    };
+    // Returns per cell the squared light that its noise is relative to, (W/m^2)^2. It is 0 where
+    // the cell has no exposed area, or where there is no light.
+    std::vector<double> lightOf(const Noise& noise) const;
+    // `noise` is that of all light.
+    Measured measure(const Noise& noise) const;
+    // Returns per part the squared relative noise at the corners, as bundlesAtCorners() predicts
+    // it, with the ratio that was measured on the object. Parts whose corners gather get the value
+    // of their whole object.
+    std::vector<double> foretold(const Noise& noise, const Measured& measured) const;
+    // Returns per part the squared relative noise at the corners, the largest of all lights.
     std::vector<double> squaresOf(const SetNoise& noise) const;
     // Returns per instance the quantile over nine tenths of its parts, or of those parts that want
     // rays. `squares` is per part.
@@ -111,7 +127,7 @@ class NoisyParts {
     std::vector<SeenCell> cells;   // with a result
     std::vector<Part> parts;
     const std::vector<double>& growth;
-    const std::vector<double>& shownOverForetold;
+    const ShownNoise& shownNoise;
     // Per instance: squared relative noise with the rays cast so far, over the parts that want more
     // rays, see squaresOfObjects().
     std::vector<double> ofObjects;

@@ -13,8 +13,8 @@
 namespace raybundle {
 namespace {
 
-// The usual value of shownOverForetold() counts as much as the measurement on this many cells of an
-// object.
+// The usual value of ShownNoise::overForetold counts as much as the measurement on this many cells
+// of an object.
 constexpr double kUsualCells = 4;
 // Growth of the variance if there are as many corners as cells, and the power of corners per cell
 // with which it rises.
@@ -42,9 +42,9 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches) {
     return growth;
 }
 
-std::vector<double> shownOverForetold(const Scene& scene, const LitSurfaces& surfaces,
-                                      const Noise& noise, const std::array<Irradiance, 2>& halves,
-                                      float regularization, const std::vector<double>& growth) {
+ShownNoise shownNoise(const Scene& scene, const LitSurfaces& surfaces, const Noise& noise,
+                      const std::array<Irradiance, 2>& halves, float regularization,
+                      const std::vector<double>& growth) {
     const Patches& tiles = surfaces.patches;
     const std::vector<InstanceRange> ranges = instanceRanges(scene, tiles);
     const std::vector<Noise::OfCell>& cells = noise.cells();
@@ -52,8 +52,9 @@ std::vector<double> shownOverForetold(const Scene& scene, const LitSurfaces& sur
     for (size_t h = 0; h < 2; ++h)
         for (size_t side = 0; side < light[h].size(); ++side)
             light[h][side] += halves[h].indirect[side];
-    std::vector<double> result(growth.size(), kUsuallyOverForetold);
-    parallelFor(size_t(0), result.size(), [&](size_t i) {
+    ShownNoise result{std::vector<double>(growth.size(), kUsuallyOverForetold),
+                      std::vector<double>(cells.size(), -1)};
+    parallelFor(size_t(0), growth.size(), [&](size_t i) {
         const Instance& instance = scene.instances[i];
         const InstanceRange& range = ranges[i];
         if (instance.role != RB_ROLE_BAKE || range.firstCell == range.lastCell) return;
@@ -73,12 +74,14 @@ std::vector<double> shownOverForetold(const Scene& scene, const LitSurfaces& sur
                     const glm::dvec3 half(0.5f * (fit.fields[0][node] - fit.fields[1][node]));
                     squares += glm::dot(half, half);
                 }
-                shown += cells[number].area * squares / tiles.cells[c].cornerCount();
+                squares /= tiles.cells[c].cornerCount();
+                if (fit.isSolved) result.ofCells[number] = squares;
+                shown += cells[number].area * squares;
                 foretold += cells[number].area * bundlesAtCorners(cells[number], growth[i]);
                 ++count;
             }
         if (!fit.isSolved || !(foretold > 0)) return;
-        result[i] =
+        result.overForetold[i] =
             (count * shown / foretold + kUsualCells * kUsuallyOverForetold) / (count + kUsualCells);
     });
     return result;

@@ -39,17 +39,26 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches);
 // for the cell's instance.
 double bundlesAtCorners(const Noise::OfCell& cell, double growth);
 
-// The value that shownOverForetold() usually has.
+// The value that ShownNoise::overForetold usually has.
 constexpr double kUsuallyOverForetold = 2;
 
-// Returns per instance the ratio of the squared noise of bundles at its corners, measured with fits
-// to both halves, to the prediction of bundlesAtCorners(). For instances with few cells, or without
-// a measurement, the ratio is near or equal to kUsuallyOverForetold. `tiles` are the tiles and
-// their exposed shares. `halves` are those of the last look of `noise`, per side of the tiles,
-// W/m^2. For `regularization` see leastSquares(); `growth` is the result of cornerGrowth().
-std::vector<double> shownOverForetold(const Scene& scene, const LitSurfaces& tiles,
-                                      const Noise& noise, const std::array<Irradiance, 2>& halves,
-                                      float regularization, const std::vector<double>& growth);
+// The noise of bundles at corners, measured with fits to both halves.
+struct ShownNoise {
+    // Per instance, the ratio of the squared noise at its corners to the prediction of
+    // bundlesAtCorners(). For instances with few cells, or without a measurement, the ratio is near
+    // or equal to kUsuallyOverForetold.
+    std::vector<double> overForetold;
+    // Indexed like Noise::cells(): the mean squared noise at the corners of the cell, summed over
+    // RGB, (W/m^2)^2. Negative where it was not measured.
+    std::vector<double> ofCells;
+};
+
+// Measures the noise at corners. `tiles` are the tiles and their exposed shares. `halves` are those
+// of the last look of `noise`, per side of the tiles, W/m^2. For `regularization` see
+// leastSquares(); `growth` is the result of cornerGrowth().
+ShownNoise shownNoise(const Scene& scene, const LitSurfaces& tiles, const Noise& noise,
+                      const std::array<Irradiance, 2>& halves, float regularization,
+                      const std::vector<double>& growth);
 
 // The noise at corners relative to the RMS of the light, with the noise of the first shot.
 struct CornerNoise {
@@ -61,8 +70,8 @@ struct CornerNoise {
 };
 
 // Returns the stated noise at the corners at the last look of `noise`. `tiles` are the patches of
-// whose cells `noise` was measured. `growth` and `shown` are the results of cornerGrowth() and
-// shownOverForetold().
+// whose cells `noise` was measured. `growth` is the result of cornerGrowth(), and `shown` is
+// ShownNoise::overForetold.
 CornerNoise noiseAtCorners(const Scene& scene, const Patches& tiles, const Noise& noise,
                            const std::vector<double>& growth, const std::vector<double>& shown);
 
