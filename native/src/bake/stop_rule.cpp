@@ -12,10 +12,10 @@ namespace {
 // prediction is not relied on.
 constexpr double kFarAway = 2.5;
 // Multiples of the target that may remain after sides have cast rays. If more than kLeftWithRays
-// remains, the light that the rays met is too noisy. More bundles are then worth their time as long
-// as they reduce what remains to less than kWorthMore of its value. If kOutOfReach or more remains
-// at first, as between the books of a shelf, dozens of times as many bundles would be needed, and
-// all rays again after each look.
+// remains, the light that the rays met is too noisy. More bundles are then worth their time, and
+// that of all rays, which are cast again, as long as they reduce what remains to less than
+// kWorthMore of its value. If kOutOfReach or more remains at first, as between the books of a
+// shelf, dozens of times as many bundles would be needed.
 constexpr double kLeftWithRays = 2, kWorthMore = 0.75, kOutOfReach = 12;
 
 // Rounds up to an even number, since both halves have the same number of bundles.
@@ -46,7 +46,7 @@ Stop StopRule::afterRays(uint32_t bundles, double left) {
     const double before = leftByRays;
     leftByRays = left;
     const bool isWorthMore =
-        left > kLeftWithRays && left < std::min(kWorthMore * before, kOutOfReach);
+        kWorthMore * left > kLeftWithRays && left < std::min(kWorthMore * before, kOutOfReach);
     return isWorthMore ? after(bundles, left / kLeftWithRays) : Stop::NOISE_AT_TARGET;
 }
 
