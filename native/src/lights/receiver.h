@@ -128,6 +128,10 @@ struct Aim {
     float besideShadow = 0;
     // Visibility of the source that surrounds the receiver, or null if it is not known. Not owned.
     const Outlook* outlook = nullptr;
+    // Whether the source gives so little of the light that the receiver could get that it takes few
+    // samples. They prove little if they agree, and if other sources are hidden, this one may give
+    // most of the light.
+    bool isWeak = false;
 };
 
 // The receivers that need more samples after a coarse shot, and the aim of each of them.
