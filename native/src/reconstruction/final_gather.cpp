@@ -18,8 +18,10 @@ namespace {
 // starts with kFirstRays rays and has at most kMostRays.
 constexpr uint32_t kParts = 8, kFewestParts = 2, kFirstRays = 4, kMostRays = 1024;
 // Minimum of the number of rays of all parts times the target error. Features that so few rays miss
-// have a share of the surrounding light of about one over the number of rays.
-constexpr float kFewestTimesTarget = 2.5f;
+// have a share of the surrounding light of about one over the number of rays. The rays are the same
+// whatever the seed of the bake, so that their error looks like light: with half as many, corners
+// of the pebble of instances had 4 % too much at a target of 2 %.
+constexpr float kFewestTimesTarget = 5;
 // Minimum number of patches in a parent for which the light of the patches shows whether the
 // interpolation follows it.
 constexpr uint32_t kTellingPatches = 4;
