@@ -171,9 +171,10 @@ TEST(Shadows, ErrorsOfManyLampsAddUp) {
     EXPECT_LT(found, kDirectShare * kTarget);
 }
 
-// Where the bright lamps are hidden, the part of a weak lamp that is seen gives all of the light.
-// The share of each lamp in what the receiver could get does not tell how much it gives.
-TEST(Shadows, AWeakLampCountsWhereBrightOnesAreHidden) {
+// A face of one patch sees a twenty-fifth of a lamp, and no neighbour reveals what its samples miss.
+// Bright lamps are hidden from it. The share of each lamp in what the face could get does not tell
+// how much it gives.
+TEST(Shadows, AFaceAloneFindsTheLampOfWhichItSeesLittle) {
     constexpr int kSeeds = 20;
     auto light = [](int brightLamps, int seed, float target) {
         Scene scene;
@@ -182,7 +183,7 @@ TEST(Shadows, AWeakLampCountsWhereBrightOnesAreHidden) {
         // The weak lamp lights this floor, or it would be taken for one that lights nothing.
         place(scene, rectangle("floor", {0.5f, -0.2f, 0}, {0.4f, 0, 0}, {0, 0.4f, 0}), grey("", 0));
         const int32_t plate =
-            place(scene, rectangle("plate", {-1, -1, 1}, {1.2f, 0, 0}, {0, 2, 0}), grey("", 0));
+            place(scene, rectangle("plate", {-1, -1, 1}, {1.23f, 0, 0}, {0, 2, 0}), grey("", 0));
         scene.instances[size_t(plate)].role = RB_ROLE_OCCLUDE;
         scene.addLight(areaLight({0, 0, 2}, {0.5, 0, 0}, {0, -0.5, 0}, glm::dvec3(1)));
         for (int k = 0; k < brightLamps; ++k)
@@ -195,15 +196,18 @@ TEST(Shadows, AWeakLampCountsWhereBrightOnesAreHidden) {
         return cornerLight(bake, 0, RB_OUTPUT_DIRECT)[0].x;
     };
     const float right = light(0, 1, 0.001f);
-    double squares = 0;
-    for (int seed = 0; seed < kSeeds; ++seed) {
-        const float found = light(8, seed, 0.02f);
-        squares += (found / right - 1) * (found / right - 1) / kSeeds;
+    for (const int brightLamps : {0, 8}) {
+        double squares = 0;
+        for (int seed = 0; seed < kSeeds; ++seed) {
+            const float found = light(brightLamps, seed, 0.02f);
+            squares += (found / right - 1) * (found / right - 1) / kSeeds;
+        }
+        // The error may be 1.5 % of a quarter of the light of the floor, which sees all of the weak
+        // lamp, or 9 % of the light of the face. Measured 2 %. It was 55 % without bright lamps,
+        // because 16 samples that found the lamp hidden were believed, and more among eight bright
+        // lamps, where the weak one took four.
+        EXPECT_LT(std::sqrt(squares), 0.09) << brightLamps << " bright lamps";
     }
-    // A tenth of the weak lamp is seen, and the error may be 1.5 % of a quarter of the light of the
-    // floor, which sees all of it, or 4 % of this light. Measured 1 %. It was 84 %, with 14 of 20
-    // bakes black, when four samples were believed that found the lamp hidden.
-    EXPECT_LT(std::sqrt(squares), 0.05);
 }
 
 TEST(Shadows, SurfacesBlockFromBothSides) {

@@ -102,11 +102,12 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
                           patches.totalArea;
     if (sources.empty()) return;
     Seen seen(sources.size());
-    std::vector<bool> hasNeighbour(coarse.gathered.size(), false);
-    for (const auto& [a, b] : neighbours) hasNeighbour[a] = hasNeighbour[b] = true;
+    const std::vector<bool> hasNeighbour = haveNeighbours(coarse.gathered.size(), neighbours);
     Aims first{these, {}};
-    for (uint32_t k : these)
+    for (uint32_t k : these) {
         first.aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples});
+        first.aims.back().mayMiss = !hasNeighbour[k];
+    }
     gatherThese(coarse.gathered, first, receiverAt, seen, progress, bySource, sightings);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }

@@ -153,7 +153,7 @@ class DirectLight::SourceGather {
         if (source.surrounds()) return kMissed / n;
         if (!isLit() && !isDark()) return 0;
         const float beside = aim.besideShadow > 0 ? missedBeside(aim.besideShadow / open(), n) : 0;
-        return std::max(beside, aim.isWeak ? kMissed / n : 0);
+        return std::max(beside, aim.mayMiss ? kMissed / n : 0);
     }
 
     // Variance of the light that samples may have missed, (W/m^2)^2. Receivers with a common
@@ -279,8 +279,10 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
             own.samples = kFewSamples;
         else if (share < kMiddleShare)
             own.samples = std::max(kFewSamples, aim.samples / 2);
-        own.isWeak = own.samples < aim.samples;
-        if (own.isWeak) ++sum.weak;
+        if (own.samples < aim.samples) {
+            own.mayMiss = true;
+            ++sum.weak;
+        }
         const LightPart part = gatherFrom(k, receiver, place, own, seen, sightings, sum);
         sum.add(uint32_t(k), part, isUnpowered(k, receiver.side), hash(receiver.seed, uint32_t(k)));
         if (parts) parts[k] = part;

@@ -76,6 +76,12 @@ std::vector<float> besideShadows(const std::vector<Gathered>& results,
 
 }  // namespace
 
+std::vector<bool> haveNeighbours(size_t count, const std::vector<ReceiverPair>& neighbours) {
+    std::vector<bool> result(count, false);
+    for (const auto& [a, b] : neighbours) result[a] = result[b] = true;
+    return result;
+}
+
 Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
                const std::function<Receiver(size_t)>& receiverAt,
                const std::vector<ReceiverPair>& neighbours, float targetError) {
@@ -108,12 +114,14 @@ Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
     const float factor = laxity(results, counts, tolerance, kLaxShare * targetError * meanLight);
     for (float& error : tolerance) error *= factor;
     const std::vector<float> besideShadow = besideShadows(results, neighbours, tolerance);
+    const std::vector<bool> hasNeighbour = haveNeighbours(results.size(), neighbours);
     Aims further;
     const int growth = mostGrowth(targetError);
     for (uint32_t k = 0; k < results.size(); ++k)
         if (besideShadow[k] > 0 || std::sqrt(results[k].variance) > tolerance[k]) {
             further.receivers.push_back(k);
             further.aims.push_back({tolerance[k], kFirstSamples, growth, besideShadow[k]});
+            further.aims.back().mayMiss = !hasNeighbour[k];
         }
     return further;
 }

@@ -128,10 +128,10 @@ struct Aim {
     float besideShadow = 0;
     // Visibility of the source that surrounds the receiver, or null if it is not known. Not owned.
     const Outlook* outlook = nullptr;
-    // Whether the source gives so little of the light that the receiver could get that it takes few
-    // samples. They prove little if they agree, and if other sources are hidden, this one may give
-    // most of the light.
-    bool isWeak = false;
+    // Whether samples that agree may have missed a part that nothing else reveals. The receiver has
+    // no neighbours, or takes few samples, because the source gives little of the light that the
+    // receiver could get. If the other sources are hidden, it may give most of the light.
+    bool mayMiss = false;
 };
 
 // The receivers that need more samples after a coarse shot, and the aim of each of them.
@@ -159,6 +159,9 @@ struct Aims {
         aims.resize(count);
     }
 };
+// Returns for each of `count` receivers whether it is in any pair of `neighbours`.
+std::vector<bool> haveNeighbours(size_t count, const std::vector<ReceiverPair>& neighbours);
+
 // Returns the receivers that need more samples. `results` is the outcome of the coarse shot per
 // receiver, `receiverAt` returns the receiver of an index, and `neighbours` are all adjacent pairs.
 // `targetError` is relative.
