@@ -204,7 +204,7 @@ TEST(Shadows, AFaceAloneFindsTheLampOfWhichItSeesLittle) {
         }
         // The error may be 1.5 % of a quarter of the light of the floor, which sees all of the weak
         // lamp, or 9 % of the light of the face. Measured 2 %. It was 55 % without bright lamps,
-        // because 16 samples that found the lamp hidden were believed, and more among eight bright
+        // because 16 samples that found the lamp hidden were believed, and 97 % among eight bright
         // lamps, where the weak one took four.
         EXPECT_LT(std::sqrt(squares), 0.09) << brightLamps << " bright lamps";
     }

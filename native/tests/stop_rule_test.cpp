@@ -70,6 +70,7 @@ TEST(StopRule, GoesOnAfterRaysOnlyWhereThatIsWorthIt) {
     // A tenth more bundles would do, but all rays would be cast again for a tenth less noise.
     StopRule nearly(settings, kAll, 0);
     EXPECT_EQ(nearly.afterRays(64, 2.1), Stop::NOISE_AT_TARGET);
+    EXPECT_FALSE(nearly.isOutOfReach());  // a lower target would trace these bundles
     StopRule noisy(settings, kAll, 0);
     EXPECT_EQ(noisy.afterRays(64, 6), Stop::NOT_YET);  // more than twice the target is left
     EXPECT_EQ(noisy.excess(), 3);

@@ -51,7 +51,7 @@ Stop StopRule::afterRays(uint32_t bundles, double left) {
 }
 
 bool StopRule::isOutOfReach() const {
-    return std::isfinite(leftByRays) && leftByRays > kLeftWithRays;
+    return std::isfinite(leftByRays) && kWorthMore * leftByRays > kLeftWithRays;
 }
 
 }  // namespace raybundle

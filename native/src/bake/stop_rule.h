@@ -44,8 +44,8 @@ class StopRule {
 
     // Returns the noise of the last decision in multiples of the target.
     double excess() const { return lastExcess; }
-    // Returns whether rays have left more than twice the target, which further bundles would hardly
-    // reduce.
+    // Returns whether rays have left so much more than twice the target that further bundles would
+    // be worth their time, but would hardly reduce it.
     bool isOutOfReach() const;
 
   private:

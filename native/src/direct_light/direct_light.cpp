@@ -104,10 +104,9 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     Seen seen(sources.size());
     const std::vector<bool> hasNeighbour = haveNeighbours(coarse.gathered.size(), neighbours);
     Aims first{these, {}};
-    for (uint32_t k : these) {
-        first.aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples});
-        first.aims.back().mayMiss = !hasNeighbour[k];
-    }
+    for (uint32_t k : these)
+        first.aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples, 1, 0,
+                              nullptr, !hasNeighbour[k]});
     gatherThese(coarse.gathered, first, receiverAt, seen, progress, bySource, sightings);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }

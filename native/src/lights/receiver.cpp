@@ -120,8 +120,8 @@ Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
     for (uint32_t k = 0; k < results.size(); ++k)
         if (besideShadow[k] > 0 || std::sqrt(results[k].variance) > tolerance[k]) {
             further.receivers.push_back(k);
-            further.aims.push_back({tolerance[k], kFirstSamples, growth, besideShadow[k]});
-            further.aims.back().mayMiss = !hasNeighbour[k];
+            further.aims.push_back(
+                {tolerance[k], kFirstSamples, growth, besideShadow[k], nullptr, !hasNeighbour[k]});
         }
     return further;
 }

@@ -159,6 +159,7 @@ struct Aims {
         aims.resize(count);
     }
 };
+
 // Returns for each of `count` receivers whether it is in any pair of `neighbours`.
 std::vector<bool> haveNeighbours(size_t count, const std::vector<ReceiverPair>& neighbours);
 

@@ -125,9 +125,9 @@ std::vector<double> NoisyParts::lightOf(const Noise& noise) const {
     return result;
 }
 
-NoisyParts::Measured NoisyParts::measure(const Noise& noise) const {
+NoisyParts::Measured NoisyParts::measure(const Noise& noise,
+                                         const std::vector<double>& light) const {
     const std::vector<Noise::OfCell>& of = noise.cells();
-    const std::vector<double> light = lightOf(noise);
     Measured result{std::vector<double>(parts.size(), 0), std::vector<double>(parts.size(), 0),
                     std::vector<double>(growth.size(), kUsuallyOverForetold)};
     std::vector<double> areas(parts.size(), 0);  // per part: of the measured cells, m^2
@@ -160,9 +160,9 @@ NoisyParts::Measured NoisyParts::measure(const Noise& noise) const {
     return result;
 }
 
-std::vector<double> NoisyParts::foretold(const Noise& noise, const Measured& measured) const {
+std::vector<double> NoisyParts::foretold(const Noise& noise, const std::vector<double>& light,
+                                         const Measured& measured) const {
     const std::vector<Noise::OfCell>& of = noise.cells();
-    const std::vector<double> light = lightOf(noise);
     // Sums of the squared noise of cells: per part, and per object without its noisiest cells. Each
     // cell is weighted by the share of it that is exposed and has a result.
     std::vector<double> squares(parts.size(), 0), weights(parts.size(), 0);
@@ -205,13 +205,15 @@ std::vector<double> NoisyParts::foretold(const Noise& noise, const Measured& mea
 
 std::vector<double> NoisyParts::squaresOf(const SetNoise& noise) const {
     const Noise& ofAll = noise.ofLights().front();
-    const Measured measured = measure(ofAll);
-    std::vector<double> result = foretold(ofAll, measured);
+    const std::vector<double> light = lightOf(ofAll);
+    const Measured measured = measure(ofAll, light);
+    std::vector<double> result = foretold(ofAll, light, measured);
     for (size_t p = 0; p < parts.size(); ++p)
         if (const double count = measured.cells[p]; !parts[p].isGathered)
             result[p] = (count * measured.squares[p] + kOfObject * result[p]) / (count + kOfObject);
     for (size_t k = 1; k < noise.ofLights().size(); ++k) {
-        const std::vector<double> ofSet = foretold(noise.ofLights()[k], measured);
+        const Noise& one = noise.ofLights()[k];
+        const std::vector<double> ofSet = foretold(one, lightOf(one), measured);
         for (size_t p = 0; p < parts.size(); ++p) result[p] = std::max(result[p], ofSet[p]);
     }
     for (size_t p = 0; p < parts.size(); ++p)

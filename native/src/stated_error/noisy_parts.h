@@ -34,10 +34,8 @@ struct NoisyPartsInput {
     const std::vector<float>& weight;
     // Rays do not help where corners gather instead of showing the light of their side.
     const ShownLight& shown;
-    // Per instance, see cornerGrowth(); and the noise at corners of the halves of the last look.
-    // Both see stated_error/object_noise.h.
-    const std::vector<double>& growth;
-    const ShownNoise& shownNoise;
+    const std::vector<double>& growth;  // per instance, see cornerGrowth()
+    const ShownNoise& shownNoise;       // of the halves of the last look
     // Number of sheets and single faces that are projected in each bundle if there are windows of
     // finer lines, otherwise 0.
     const double projections;
@@ -102,18 +100,21 @@ class NoisyParts {
         // nothing; and the number of these cells, each counted with the share of it that is
         // exposed.
         std::vector<double> squares, cells;
-        // Per instance: the ratio of the squares to the prediction of bundlesAtCorners().
+        // Per instance: the ratio of the squares to the prediction of bundlesAtCorners(). Unlike
+        // ShownNoise::overForetold, which states the noise of the object as a whole, it is relative
+        // to the light of each cell, and no single cell decides it.
         std::vector<double> overForetold;
     };
     // Returns per cell the squared light that its noise is relative to, (W/m^2)^2. It is 0 where
     // the cell has no exposed area, or where there is no light.
     std::vector<double> lightOf(const Noise& noise) const;
-    // `noise` is that of all light.
-    Measured measure(const Noise& noise) const;
+    // Returns the measured noise of all light. `light` is the result of lightOf() for `noise`.
+    Measured measure(const Noise& noise, const std::vector<double>& light) const;
     // Returns per part the squared relative noise at the corners, as bundlesAtCorners() predicts
     // it, with the ratio that was measured on the object. Parts whose corners gather get the value
-    // of their whole object.
-    std::vector<double> foretold(const Noise& noise, const Measured& measured) const;
+    // of their whole object. `light` is the result of lightOf() for `noise`.
+    std::vector<double> foretold(const Noise& noise, const std::vector<double>& light,
+                                 const Measured& measured) const;
     // Returns per part the squared relative noise at the corners, the largest of all lights.
     std::vector<double> squaresOf(const SetNoise& noise) const;
     // Returns per instance the quantile over nine tenths of its parts, or of those parts that want
