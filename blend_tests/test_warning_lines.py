@@ -4,7 +4,7 @@
 import bpy
 import pytest
 import raybundle
-from raybundle.warning_lines import grouped
+from raybundle.warning_lines import grouped, owners
 
 MIRRORS = ': node "Glossy BSDF" (Glossy BSDF) reflects like a mirror: it counts as matt'
 COPY_MIRRORS = MIRRORS.replace('"Glossy BSDF"', '"Glossy BSDF.001"')
@@ -27,12 +27,38 @@ COPY_MIRRORS = MIRRORS.replace('"Glossy BSDF"', '"Glossy BSDF.001"')
      ['material "a "quoted" name" is black', 'material "B" is black']),
 ])
 def test_lines(lines, expected):
-    assert grouped(lines) == expected
+    assert [group.text for group in grouped(lines)] == expected
 
 
 def test_all_of_many_are_counted():
-    line, = grouped(f'material "{k}"{MIRRORS}' for k in range(45))
-    assert line.startswith('material "0", "1", ') and f'and 33 more{MIRRORS}' in line
+    group, = grouped(f'material "{k}"{MIRRORS}' for k in range(45))
+    assert group.text.startswith('material "0", "1", ') and f'and 33 more{MIRRORS}' in group.text
+    assert (group.kind, group.names) == ('material', tuple(map(str, range(45))))
+
+
+@pytest.mark.parametrize("line, kind, names", [
+    ('"Sphere" is left out: it has no faces', 'object', ("Sphere",)),
+    ('object "A b": its faces are too coarse', 'object', ("A b",)),
+    ('mesh "M" was shared by 3 baked objects', 'mesh', ("M",)),
+    ('light "Sun": Raybundle ignores light linking', 'light', ("Sun",)),
+    ('material "Wood": node "Noise" (Noise Texture) varies', 'material', ("Wood",)),
+    ('some objects are noisier than twice the target of 2 %: object "A" (5 %), "B" (4.1 %) and 2 '
+     'more (the report lists the noise of each object)', 'object', ("A", "B")),
+    ('the largest part is in the light of Lamp on object "Crate". More bundles do not reduce it',
+     'object', ("Crate",)),
+    ('fewer than 20 lines meet each patch of "A", "B", so that the noise', 'object', ("A", "B")),
+    ('Lights that are hidden only in the viewport give light. Lights: "L". Disable them', 'light',
+     ("L",)),
+    ('The viewport and renders show different geometry. Objects: "A" (Subsurf: levels 1 in '
+     'viewport, 2 in renders), "B" (adaptive subdivision) and 3 more. Use', 'object', ("A", "B")),
+    ('the materials "A", "B" and 5 more show the result of a bake', 'material', ("A", "B")),
+    ('object "A": the strands of its particle system "Hair" neither block', 'object', ("A",)),
+    ('world "World": its volume neither absorbs', "", ()),
+    ('image "Wood" contains pixels', "", ()),
+    ("max_bundles was reached at 64 bundles", "", ()),
+])
+def test_owners_of_a_line(line, kind, names):
+    assert owners(line) == (kind, names)
 
 
 @pytest.mark.needs_library
@@ -45,3 +71,7 @@ def test_a_bake_says_it_once(new_object, new_material, new_light):
     report = raybundle.bake(bpy.context)
     line, = (text for text in report.warnings if "lie on others" in text)
     assert line.startswith('object "Square 0", "Square 1", "Square 2": 3 faces')
+    assert len(report.warning_owners) == len(report.warnings)
+    assert report.warning_owners[report.warnings.index(line)] == {
+        'id': 'DOUBLED_FACES', 'kind': 'object', 'names': ["Square 0", "Square 1", "Square 2"]}
+    assert 'DOUBLED_FACES' in report.warning_ids

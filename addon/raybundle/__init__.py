@@ -9,7 +9,8 @@ import atexit
 
 import bpy
 
-from . import bake_cache, operators, panels, properties
+from . import (bake_cache, error_view, menus, object_roles, operators, panels, preferences, presets,
+               properties, report_panel, report_remedies, translations)
 from .bake import bake
 from .bake_report import BakeError, BakeReport
 from .native import RaybundleError
@@ -27,7 +28,8 @@ bl_info = {
 }
 
 # In the order of registration: panels refer to operators and properties.
-_MODULES = (properties, bake_cache, operators, panels)
+_MODULES = (translations, preferences, properties, bake_cache, operators, report_remedies,
+            error_view, object_roles, presets, panels, report_panel, menus)
 
 
 def register() -> None:

@@ -22,11 +22,11 @@ from .mesh_arrays import corner_vertices
 from .native import ErrorCode, Progress, RaybundleError
 from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings
+from .quality import full_bake
 from .scene_data import MeshData
 from .scene_export import BakeTarget, SceneExport, export_scene
 from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
                               subdivide)
-from .warning_lines import grouped
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,11 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
             entry['attribute'] = light_set.attribute
         report.objects = objects + [ObjectReport(name, 0, status)
                                     for name, status in export.statuses.items()]
-        # The library's warnings come first, because one of lost or created light is the first of
-        # them and has to be read before all others.
-        report.warnings = grouped([*report.warnings, *export.warnings])
+        report.add_warnings(export.warnings)
         finished = time.perf_counter()
         report.seconds.update(export=export_seconds, write_back=finished - write_started,
                               total=finished - started)
+        report.full_bake = full_bake(report, settings.target_error, scene.raybundle.report)
         scene.raybundle.report = report.to_json()
     return report
 

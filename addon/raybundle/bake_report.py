@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
+
+from .warning_lines import grouped
 
 
 class BakeError(RuntimeError):
@@ -46,8 +49,14 @@ class BakeReport:
     warnings: list[str] = field(default_factory=list)
     # Identifiers of the library's warnings for programs, such as "MAX_BUNDLES", without duplicates.
     warning_ids: list[str] = field(default_factory=list)
+    # For each of the warnings; keys: id (see above, "" for warnings of the add-on), kind ('object',
+    # 'material', 'light', 'mesh' or "") and names of the owners. A warning that joins many lines
+    # lists only the first owners in its text, but all of them here.
+    warning_owners: list[dict] = field(default_factory=list)
     # Work that was skipped because the scene did not need it; keys: id, what, why, count.
     skipped: list[dict] = field(default_factory=list)
+    # The last bake that reused nothing, to estimate times; keys: target_error, seconds (by stage).
+    full_bake: dict = field(default_factory=dict)
 
     @classmethod
     def from_native(cls, values: dict) -> BakeReport:
@@ -58,8 +67,20 @@ class BakeReport:
                      'light_sets', 'warnings', 'warning_ids', 'skipped'):
             if name in values:
                 setattr(report, name, values[name])
+        report.warning_owners = [{'id': identifier} for identifier in report.warning_ids]
         report.warning_ids = list(dict.fromkeys(report.warning_ids))
         return report
+
+    def add_warnings(self, lines: Iterable[str]) -> None:
+        """Adds the add-on's lines to the library's warnings, joins those with the same message
+        about several owners, and lists the owners. To be called once."""
+        ids = dict(zip(self.warnings, (item['id'] for item in self.warning_owners)))
+        # The library's warnings come first, because one of lost or created light is the first of
+        # them and has to be read before all others.
+        groups = grouped([*self.warnings, *lines])
+        self.warnings = [group.text for group in groups]
+        self.warning_owners = [{'id': ids.get(group.first, ""), 'kind': group.kind,
+                                'names': list(group.names)} for group in groups]
 
     def to_json(self, indent: int | None = None) -> str:
         """Returns the report as JSON. indent: as in json.dumps."""

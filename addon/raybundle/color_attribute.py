@@ -47,6 +47,12 @@ def error_name(name: str) -> str:
     return f"{name} Error"
 
 
+def error_colors_name(name: str) -> str:
+    """Returns the name of the colour attribute that shows the stated error of the light in
+    attribute `name`."""
+    return f"{name} Error Colors"
+
+
 def write_error(mesh: bpy.types.Mesh, name: str, domain: str, error: np.ndarray) -> None:
     """Writes the stated error of light to a float attribute. An earlier attribute is replaced.
 
@@ -60,7 +66,11 @@ def write_error(mesh: bpy.types.Mesh, name: str, domain: str, error: np.ndarray)
 
 
 def clear_error(mesh: bpy.types.Mesh, name: str) -> None:
-    """Removes the stated error of the light in attribute `name`, if the mesh has it."""
+    """Removes the stated error of the light in attribute `name`, and the colours that show it, if
+    the mesh has them."""
+    colors = mesh.color_attributes.get(error_colors_name(name))
+    if colors is not None:
+        mesh.color_attributes.remove(colors)
     attribute = mesh.attributes.get(error_name(name))
     if attribute is not None and attribute.data_type == 'FLOAT':
         mesh.attributes.remove(attribute)
@@ -84,6 +94,13 @@ def activate(mesh: bpy.types.Mesh, name: str) -> bool:
             mesh.color_attributes.render_color_index = index
             return True
     return False
+
+
+def show(mesh: bpy.types.Mesh, name: str) -> None:
+    """Makes a colour attribute the active one (of the viewport). Renders keep theirs."""
+    for index, attribute in enumerate(mesh.color_attributes):
+        if attribute.name == name:
+            mesh.color_attributes.active_color_index = index
 
 
 def rendered_attribute(mesh: bpy.types.Mesh) -> bpy.types.Attribute | None:

@@ -3,6 +3,7 @@
 result."""
 
 import bpy
+from bpy.app.translations import pgettext_tip as tip_
 
 from . import bake_cache, color_attribute, viewport_preview
 from .bake import bake
@@ -71,11 +72,15 @@ class RAYBUNDLE_OT_relight(_NeedsScene, bpy.types.Operator):
     bl_label = "Relight"
     bl_options = {'REGISTER', 'UNDO'}
 
+    @classmethod
+    def poll(cls, context):
+        if context.scene is None or not bake_cache.has_result(context.scene):
+            cls.poll_message_set(tip_("There is nothing to relight: bake first. The lines of a "
+                                      "bake are kept only until the file is closed"))
+            return False
+        return True
+
     def execute(self, context):
-        if not bake_cache.has_result(context.scene):
-            self.report({'ERROR'}, "There is nothing to relight: bake first. The lines of a bake "
-                                   "are kept only until the file is closed")
-            return {'CANCELLED'}
         return _run_bake(self, context)
 
 

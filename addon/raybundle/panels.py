@@ -1,12 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panels of the add-on: in Render properties, Object properties and the 3D view's sidebar."""
+"""The panels of the add-on: in Render properties, Object properties and the 3D view's sidebar.
 
-import json
+The panel of the last report is in report_panel.py, that of collections in object_roles.py.
+"""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
-from . import native
+from . import native, preferences
 from .light_sets import attribute_of
+from .presets import RAYBUNDLE_PT_presets
+from .properties import automatic_values
+from .quality import TARGETS, enum_quality, estimated_seconds
+from .report_data import read_report, time_text
+from .text_wrap import draw_wrapped
+
+# The settings of the panel Method.
+METHODS = ("solver", "estimator", "first_shot", "local_rays", "directions", "projector",
+           "plane_count", "plane_placement", "small_patches")
+_BUTTON = 24.0  # width of a button with an icon, in pixels at a resolution scale of 1
 
 
 def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
@@ -15,6 +27,43 @@ def property_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
     panel.layout.use_property_split = True
     panel.layout.use_property_decorate = False
     return panel.layout
+
+
+def draw_quality(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draws the buttons Draft, Good and Final, and below each what a bake would take."""
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.use_property_split = False
+    for name in TARGETS:
+        row.prop_enum(scene.raybundle, "quality", name)
+    report = read_report(scene)
+    costs = [estimated_seconds(report, target) for target in TARGETS.values()]
+    row = column.row(align=True)
+    row.active = False
+    row.alignment = 'CENTER' if None in costs else 'EXPAND'
+    if None in costs:
+        row.label(text="Times are shown after the first bake")
+        return
+    for cost in costs:
+        cell = row.row()
+        cell.alignment = 'CENTER'
+        cell.label(text=f"\N{ALMOST EQUAL TO} {time_text(cost)}", translate=False)
+
+
+def draw_bake(layout: bpy.types.UILayout) -> None:
+    """Draws the buttons that bake, relight and clear."""
+    row = layout.row(align=True)
+    row.operator("raybundle.bake", text="Bake", icon='LIGHT')
+    row.operator("raybundle.relight")
+    row.operator("raybundle.clear", text="", icon='TRASH')
+
+
+def changed_methods(settings: bpy.types.PropertyGroup) -> list[str]:
+    """Returns the names, as shown, of the settings of the panel Method that differ from their
+    defaults."""
+    definitions = [settings.bl_rna.properties[name] for name in METHODS]
+    return [iface_(item.name) for item in definitions
+            if getattr(settings, item.identifier) != item.default]
 
 
 def draw_used(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str,
@@ -45,49 +94,50 @@ class RaybundleRenderPanel:
 class RAYBUNDLE_PT_render(RaybundleRenderPanel, bpy.types.Panel):
     bl_label = "Raybundle"
 
+    def draw_header_preset(self, context):
+        RAYBUNDLE_PT_presets.draw_panel_header(self.layout)
+
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        row = layout.row(align=True)
-        row.operator("raybundle.bake", text="Bake", icon='LIGHT')
-        row.operator("raybundle.relight")
-        row.operator("raybundle.clear", text="", icon='TRASH')
+        draw_quality(layout, context.scene)
+        draw_bake(layout)
         layout.prop(settings, "scope")
+        methods = changed_methods(settings)
+        if methods and not preferences.studies_methods():
+            row = layout.row()
+            text = iface_("Not the default: {methods}").format(methods=", ".join(methods))
+            draw_wrapped(row.column(), context, text, 'INFO', _BUTTON)
+            row.operator("raybundle.reset_methods", text="", icon='LOOP_BACK')
 
 
-class RAYBUNDLE_PT_last_bake(RaybundleRenderPanel, bpy.types.Panel):
-    bl_label = "Last Bake"
-    bl_parent_id = "RAYBUNDLE_PT_render"
+class RAYBUNDLE_OT_reset_methods(bpy.types.Operator):
+    """Set all methods to their defaults, which are nearly always the fastest"""
+    bl_idname = "raybundle.reset_methods"
+    bl_label = "Reset Methods"
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and context.scene.raybundle.report != ""
+        return context.scene is not None
 
-    def draw(self, context):
-        layout = self.layout
-        report = json.loads(context.scene.raybundle.report)
-        column = layout.column(align=True)
-        # Reports of earlier releases have no 'error'.
-        if error := report.get('error'):
-            column.label(text=f"Noise: {100.0 * error['noise']:.2g} %")
-            column.label(text=f"Discretisation: {100.0 * error['discretisation']:.2g} %")
-            column.label(text=f"Mesh: {100.0 * error['mesh']:.2g} %")
-            column.label(text=f"Stated error: {100.0 * error['total']:.2g} %")
-        column.label(text=f"Time: {report['seconds']['total']:.2f} s")
-        column.label(text=f"Patches: {report['patches']:,}")
-        column.label(text=f"Bundles: {report['bundles']:,}")
-        for warning in report['warnings']:
-            layout.label(text=warning, icon='ERROR')
+    def execute(self, context):
+        for name in METHODS:
+            context.scene.raybundle.property_unset(name)
+        return {'FINISHED'}
 
 
 class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
     bl_label = "Quality"
     bl_parent_id = "RAYBUNDLE_PT_render"
+    bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 30
 
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        for name in ("target_error", "topology", "patch_size", "refine", "contacts"):
+        for name in ("target_percent", "topology", "patch_size", "refine", "contacts",
+                     "reconstruction", "final_gather"):
             layout.prop(settings, name)
 
 
@@ -104,27 +154,43 @@ class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
         layout.prop(settings, "max_bundles", text="Bundles")
         layout.prop(settings, "lines_per_bundle", text="Lines")
         layout.prop(settings, "memory_limit", text="Memory (MB)")
+        layout.prop(settings, "threads")
+        layout.prop(settings, "seed")
+        automatic = automatic_values(settings)
+        if automatic.get('threads'):
+            self._draw_automatic(iface_("Preferences: {count} threads"), automatic['threads'])
+        if 'memory_limit' in automatic and \
+                automatic['memory_limit'] != settings.bl_rna.properties['memory_limit'].default:
+            self._draw_automatic(iface_("Preferences: {count} MB"), automatic['memory_limit'])
+
+    def _draw_automatic(self, text: str, value: float) -> None:
+        """Names a value of the add-on's preferences that applies instead of the scene's."""
+        self.layout.label(text=text.format(count=f"{value:,.0f}"), icon='INFO', translate=False)
 
 
 class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):
     bl_label = "Method"
     bl_parent_id = "RAYBUNDLE_PT_render"
     bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 50
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and preferences.studies_methods()
 
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        for name in ("solver", "estimator", "first_shot", "local_rays", "directions", "projector",
-                     "plane_count"):
-            draw_used(layout, settings, name)
-        draw_used(layout, settings, "plane_placement", text="Placement")
-        for name in ("small_patches", "reconstruction", "final_gather", "seed", "threads"):
-            draw_used(layout, settings, name)
+        for name in METHODS:
+            # Its name is too long for the editor.
+            options = {'text': iface_("Placement")} if name == "plane_placement" else {}
+            draw_used(layout, settings, name, **options)
 
 
 class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
     bl_label = "Output"
     bl_parent_id = "RAYBUNDLE_PT_render"
+    bl_order = 10
 
     def draw(self, context):
         layout = property_layout(self)
@@ -149,6 +215,7 @@ class RAYBUNDLE_PT_light_sets(RaybundleRenderPanel, bpy.types.Panel):
     bl_label = "Light Sets"
     bl_parent_id = "RAYBUNDLE_PT_render"
     bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 40
 
     def draw(self, context):
         layout = property_layout(self)
@@ -165,8 +232,8 @@ class RAYBUNDLE_PT_light_sets(RaybundleRenderPanel, bpy.types.Panel):
             layout.prop(item, "world")
             layout.prop(item, "attribute")
             if not item.attribute:
-                layout.label(text=f'Attribute "{attribute_of(item, settings.attribute)}"',
-                             icon='BLANK1')
+                layout.label(text=iface_("Attribute \"{name}\"").format(
+                    name=attribute_of(item, settings.attribute)), icon='BLANK1', translate=False)
 
 
 class RAYBUNDLE_PT_object(bpy.types.Panel):
@@ -198,6 +265,7 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
+        draw_quality(layout, context.scene)
         column = layout.column(align=True)
         column.operator("raybundle.bake", text="Bake", icon='LIGHT')
         column.operator("raybundle.relight")
@@ -207,13 +275,14 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
 
 register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_PT_render,
-    RAYBUNDLE_PT_last_bake,
+    RAYBUNDLE_OT_reset_methods,
+    # In the order of bl_order. 20 is left to a panel about the use of the result.
+    RAYBUNDLE_PT_output,
     RAYBUNDLE_PT_quality,
     RAYBUNDLE_PT_limits,
-    RAYBUNDLE_PT_method,
-    RAYBUNDLE_PT_output,
     RAYBUNDLE_UL_light_sets,
     RAYBUNDLE_PT_light_sets,
+    RAYBUNDLE_PT_method,
     RAYBUNDLE_PT_object,
     RAYBUNDLE_PT_sidebar,
 ))

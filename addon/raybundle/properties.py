@@ -15,6 +15,8 @@ import bpy
 from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty,
                        PointerProperty, StringProperty)
 
+from . import preferences, quality
+
 enum_scope = (
     ('VISIBLE', "Visible", "Bake all objects that are visible in the viewport and in renders"),
     ('SELECTED', "Selected",
@@ -194,6 +196,16 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     target_error: FloatProperty(
         name="Noise", description="Relative noise of the light at which the bake stops",
         default=0.02, min=0.0005, max=1.0, soft_max=0.2, precision=4, step=0.1)
+    # These two show target_error and set it; they store nothing.
+    quality: EnumProperty(
+        name="Quality", description="The noise at which the bake stops, in three steps",
+        items=quality.enum_quality, get=quality.get_quality, set=quality.set_quality)
+    target_percent: FloatProperty(
+        name="Noise",
+        description="Noise of the light at which the bake stops, in % of the light there. 95 of "
+                    "100 vertices are then within about twice this value of a converged bake",
+        min=0.05, max=100.0, soft_max=20.0, precision=2, step=10, subtype='PERCENTAGE',
+        get=quality.get_percent, set=quality.set_percent)
     output: EnumProperty(
         name="Output", description="Which quantity is written", items=enum_output,
         default='LIGHTING')
@@ -378,14 +390,29 @@ class BakeSettings:
 def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
     """Returns the settings of a scene, with overrides by name. Raises ValueError for an override
     that is unknown, and for a value, overridden or stored, that the property does not allow. Stored
-    values are checked because Blender stores NaN in spite of a property's limits."""
+    values are checked because Blender stores NaN in spite of a property's limits. Threads and
+    memory that the scene leaves at automatic are those of the add-on's preferences."""
     names = [item.name for item in fields(BakeSettings)]
     for name in overrides:
         if name not in names:
             raise ValueError(f'unknown setting "{name}": choose one of {", ".join(names)}')
-    values = {name: checked_value(name, overrides.get(name, getattr(scene.raybundle, name)))
-              for name in names}
+    stored = {name: getattr(scene.raybundle, name) for name in names}
+    values = {name: checked_value(name, value) for name, value in
+              {**stored, **automatic_values(scene.raybundle), **overrides}.items()}
     return BakeSettings(**values)
+
+
+def automatic_values(settings: RaybundleSceneSettings) -> dict[str, object]:
+    """Returns the add-on's preferences for the settings that a scene leaves at automatic, by name:
+    threads if they are 0, memory_limit if it was never set. {}: the add-on has no preferences,
+    because a script registered it."""
+    user = preferences.get()
+    values = {}
+    if user is not None and settings.threads == 0:
+        values['threads'] = user.threads
+    if user is not None and not settings.is_property_set('memory_limit'):
+        values['memory_limit'] = user.memory_limit
+    return values
 
 
 def assign(settings: RaybundleSceneSettings, name: str, value: object) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..color_attribute import error_name, rendered_attribute
+from ..color_attribute import error_colors_name, error_name, rendered_attribute
 
 # The name by which nodes read the render colour attribute. A bake makes its result the render
 # colour attribute.
@@ -25,7 +25,8 @@ def result_names(attributes: Iterable[str]) -> frozenset[str]:
     """Returns the names of the attributes that contain light, and of the attributes that contain
     its stated error."""
     names = set(attributes)
-    return frozenset(names | {error_name(name) for name in names}) - {RENDERED}
+    of_errors = {error(name) for name in names for error in (error_name, error_colors_name)}
+    return frozenset(names | of_errors) - {RENDERED}
 
 
 def renders_result(mesh: bpy.types.Mesh, names: frozenset[str], is_target: bool) -> bool:

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The last report of a scene as panels and operators read it. Files may hold reports of earlier
+releases, in which keys are missing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+
+import bpy
+
+from .warning_lines import owners
+
+
+@dataclass(frozen=True)
+class Line:
+    """A warning of the report."""
+
+    text: str
+    id: str  # identifier of the library's warning, "" for warnings of the add-on or unknown
+    kind: str  # of the owners: 'object', 'material', 'light', 'mesh', or "" if it names none
+    names: tuple[str, ...]  # of the owners
+
+
+def read_report(scene: bpy.types.Scene) -> dict:
+    """Returns the scene's last report, {} if there is none. The caller must not change it."""
+    return _parsed(scene.raybundle.report)
+
+
+# Panels are drawn at every movement of the mouse.
+@lru_cache(maxsize=4)
+def _parsed(text: str) -> dict:
+    try:
+        report = json.loads(text) if text else {}
+    except ValueError:  # a script may have stored anything
+        return {}
+    return report if isinstance(report, dict) else {}
+
+
+def warning_lines(report: dict) -> list[Line]:
+    """Returns the warnings of a report with their owners."""
+    texts = report.get('warnings', [])
+    known = report.get('warning_owners', [])
+    if len(known) == len(texts):
+        return [Line(text, item.get('id', ""), item['kind'], tuple(item['names']))
+                for text, item in zip(texts, known)]
+    return [Line(text, "", *owners(text)) for text in texts]
+
+
+def left_out_objects(report: dict) -> list[tuple[str, str]]:
+    """Returns the name of each object that was not baked, and the reason."""
+    return [(item['name'], item['status']) for item in report.get('objects', [])
+            if not item['status'].startswith('baked')]
+
+
+def time_text(seconds: float) -> str:
+    """Returns a time with two digits and its unit, which are the same in all languages."""
+    if seconds < 100.0:
+        return f"{float(f'{seconds:.2g}'):g} s"
+    if seconds < 6000.0:
+        return f"{seconds / 60.0:.0f} min"
+    return f"{seconds / 3600.0:.1f} h"
