@@ -20,7 +20,7 @@ class DrawnLayout:
         def call(*arguments, **options):
             shown = SimpleNamespace()  # properties of an operator's button
             self.record.append((method, arguments, options, self, shown))
-            if method in ('row', 'column', 'box', 'split'):
+            if method in ('row', 'column', 'box', 'split', 'grid_flow'):
                 return DrawnLayout(self.record)
             return shown if method == 'operator' else None
         return call

@@ -57,7 +57,7 @@ def test_every_setting_of_a_bake_is_in_a_panel():
     for panel in (panels.RAYBUNDLE_PT_render, panels.RAYBUNDLE_PT_output,
                   panels.RAYBUNDLE_PT_quality, panels.RAYBUNDLE_PT_limits):
         shown |= set(drawn(panel).props())
-    missing = set(properties.BakeSettings.__dataclass_fields__) - shown - set(panels.METHODS)
+    missing = set(properties.BakeSettings.names()) - shown - set(panels.METHODS)
     # target_error is shown in %. Skips are switched off by scripts, to test that light is equal.
     assert missing == {'target_error', 'skips_off'}
 
@@ -105,6 +105,16 @@ def test_preferences_apply_where_the_scene_is_automatic(user):
     settings().threads, settings().memory_limit = 2, 4096.0
     values = properties.read_settings(bpy.context.scene, {})
     assert (values.threads, values.memory_limit) == (2, 4096.0)
+
+
+def test_a_scene_returns_to_the_preferences(user):
+    user.memory_limit = 512.0
+    settings().threads, settings().memory_limit = 2, 100.0
+    assert "raybundle.use_preferences" in drawn(panels.RAYBUNDLE_PT_limits).operators()
+    assert bpy.ops.raybundle.use_preferences() == {'FINISHED'}
+    values = properties.read_settings(bpy.context.scene, {})
+    assert (values.threads, values.memory_limit) == (0, 512.0)
+    assert "raybundle.use_preferences" not in drawn(panels.RAYBUNDLE_PT_limits).operators()
 
 
 def test_the_panel_names_the_preferences_that_apply(user):
@@ -224,7 +234,7 @@ def _folder(path) -> str:
 
 def test_presets_have_every_setting_but_those_of_the_computer():
     stored = {name.partition(".")[2] for name in presets.RAYBUNDLE_OT_preset_add.preset_values}
-    assert set(properties.BakeSettings.__dataclass_fields__) - stored == presets._LEFT_OUT
+    assert set(properties.BakeSettings.names()) - stored == presets._LEFT_OUT
 
 
 # --------------------------------------------------------------------------------------------------

@@ -49,8 +49,7 @@ def test_the_noise_in_percent_is_the_target():
 
 
 def test_neither_is_a_setting_of_a_bake():
-    names = raybundle.properties.BakeSettings.__dataclass_fields__
-    assert not {'quality', 'target_percent'} & set(names)
+    assert not {'quality', 'target_percent'} & set(raybundle.properties.BakeSettings.names())
 
 
 def test_the_time_at_the_same_target_is_that_of_the_bake():

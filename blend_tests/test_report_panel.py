@@ -38,6 +38,7 @@ def store(*warnings: str, **values) -> list:
 
 
 def owned(*entries: tuple) -> list[dict]:
+    """Returns the owners of warnings, each an identifier, a kind and names."""
     return [{'id': identifier, 'kind': kind, 'names': names} for identifier, kind, names in entries]
 
 
@@ -82,6 +83,17 @@ def test_a_bake_is_drawn_with_the_unit_of_the_field(closed_box):
     skipped = " ".join(drawn(report_panel.RAYBUNDLE_PT_skipped).texts())
     for item in read_report(bpy.context.scene)['skipped']:
         assert item['what'].split()[0] in skipped
+
+
+def test_the_noisiest_object_is_named():
+    def entry(name, noise):
+        return {'name': name, 'corners': 4, 'status': "baked",
+                'error': {'noise': noise} if noise else {}}
+    store(objects=[entry("A", 0.02), entry("B", 0.0312), entry("C", None)])
+    assert drawn(report_panel.RAYBUNDLE_PT_last_bake).texts()[2:4] == [
+        "Noisiest Object", "3.1 %, B"]
+    store(objects=[entry("A", 0.02)])
+    assert "Noisiest Object" not in drawn(report_panel.RAYBUNDLE_PT_last_bake).texts()
 
 
 def test_warnings_are_in_lines():
@@ -133,11 +145,29 @@ def test_advice_of_texts(text, advised):
     assert advised_settings(line, settings()) == advised
 
 
-def test_more_bundles_are_advised():
-    line, = store("max_bundles was reached", warning_owners=owned(('MAX_BUNDLES', "", [])))
-    assert advised_settings(line, settings()) == {'max_bundles': 4 * 65536}
-    settings().max_bundles = 2 ** 23
-    assert advised_settings(line, settings()) == {'max_bundles': 2 ** 24}
+@pytest.mark.parametrize("reached, present, advised", [
+    (64, 64, 256), (64, 1000, 1000), (2 ** 23, 2 ** 23, 2 ** 24)])
+def test_more_bundles_are_advised(reached, present, advised):
+    line, = store(f"max_bundles was reached at {reached} bundles: the noise is 5 %; the target is "
+                  f"2 %. Increase max_bundles to reach the target")
+    settings().max_bundles = present
+    assert advised_settings(line, settings()) == {'max_bundles': advised}
+
+
+@pytest.mark.parametrize("target, present, advised", [
+    (10, 0.1, 0.05), (10, 0.02, 0.02), (0.06, 0.0006, 0.0005)])
+def test_half_the_noise_is_advised(target, present, advised):
+    line, = store(f'some objects are noisier than twice the target of {target} %: object "shelf" '
+                  f'(23 %); lower target_error, or increase max_bundles if the bake reached it')
+    settings().target_error = present
+    assert advised_settings(line, settings()) == {'target_error': pytest.approx(advised)}
+
+
+def test_less_noise_is_not_advised_if_it_is_out_of_reach():
+    line, = store('some objects are noisier than twice the target of 2 %: object "shelf" (5 %). '
+                  'Only few lines bring light to these objects, so that a lower target_error takes '
+                  'long and gains little; add lamps, or accept the noise')
+    assert advised_settings(line, settings()) == {}
 
 
 def test_a_patch_size_is_never_increased():

@@ -156,6 +156,8 @@ class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
         layout.prop(settings, "memory_limit", text="Memory (MB)")
         layout.prop(settings, "threads")
         layout.prop(settings, "seed")
+        if settings.threads != 0 or settings.is_property_set('memory_limit'):
+            layout.operator("raybundle.use_preferences", icon='LOOP_BACK')
         automatic = automatic_values(settings)
         if automatic.get('threads'):
             self._draw_automatic(iface_("Preferences: {count} threads"), automatic['threads'])
@@ -166,6 +168,22 @@ class RAYBUNDLE_PT_limits(RaybundleRenderPanel, bpy.types.Panel):
     def _draw_automatic(self, text: str, value: float) -> None:
         """Names a value of the add-on's preferences that applies instead of the scene's."""
         self.layout.label(text=text.format(count=f"{value:,.0f}"), icon='INFO', translate=False)
+
+
+class RAYBUNDLE_OT_use_preferences(bpy.types.Operator):
+    """Leave the number of threads and the memory limit to the preferences of the add-on"""
+    bl_idname = "raybundle.use_preferences"
+    bl_label = "Use Preferences"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+    def execute(self, context):
+        for name in ("threads", "memory_limit"):
+            context.scene.raybundle.property_unset(name)
+        return {'FINISHED'}
 
 
 class RAYBUNDLE_PT_method(RaybundleRenderPanel, bpy.types.Panel):
@@ -276,6 +294,7 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
 register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_PT_render,
     RAYBUNDLE_OT_reset_methods,
+    RAYBUNDLE_OT_use_preferences,
     # In the order of bl_order. 20 is left to a panel about the use of the result.
     RAYBUNDLE_PT_output,
     RAYBUNDLE_PT_quality,

@@ -96,16 +96,17 @@ class RAYBUNDLE_OT_copy_bug_report(bpy.types.Operator):
 
 def bug_report(scene: bpy.types.Scene | None) -> str:
     """Returns a text for the report of a bug: versions, and settings and report of the scene."""
-    from . import bl_info  # The package is complete only after this module was imported.
+    # The package and the settings are complete only after this module was imported.
+    from . import bl_info
+    from .properties import BakeSettings
     lines = [f"Raybundle {'.'.join(map(str, bl_info['version']))}",
              f"Blender {bpy.app.version_string}, {bpy.app.build_platform.decode()}",
              f"System {platform.platform()}", f"Python {platform.python_version()}"]
     if scene is not None:
         settings = scene.raybundle
-        changed = [f"{item.identifier} = {getattr(settings, item.identifier)!r}"
-                   for item in settings.bl_rna.properties
-                   if item.type in ('BOOLEAN', 'INT', 'FLOAT', 'ENUM')
-                   and settings.is_property_set(item.identifier)]
+        # The attribute's name may be private.
+        changed = [f"{name} = {getattr(settings, name)!r}" for name in BakeSettings.names()
+                   if name != 'attribute' and settings.is_property_set(name)]
         lines.append("Settings: " + (", ".join(changed) or "default"))
         report = json.loads(scene.raybundle.report or "{}")
         # Names of objects may be private, and are not needed to find most bugs.

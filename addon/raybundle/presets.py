@@ -6,8 +6,6 @@ None is shipped: Draft, Good and Final are buttons, and the other defaults suit 
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
@@ -26,8 +24,7 @@ class RAYBUNDLE_OT_preset_add(AddPresetBase, bpy.types.Operator):
     preset_menu = "RAYBUNDLE_PT_presets"
     preset_subdir = _FOLDER
     preset_defines = ["settings = bpy.context.scene.raybundle"]
-    preset_values = [f"settings.{item.name}" for item in fields(BakeSettings)
-                     if item.name not in _LEFT_OUT]
+    preset_values = [f"settings.{name}" for name in BakeSettings.names() if name not in _LEFT_OUT]
 
 
 class RAYBUNDLE_PT_presets(PresetPanel, bpy.types.Panel):

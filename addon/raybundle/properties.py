@@ -386,13 +386,18 @@ class BakeSettings:
     threads: int
     skips_off: set[str]
 
+    @classmethod
+    def names(cls) -> list[str]:
+        """Returns the names of all settings."""
+        return [item.name for item in fields(cls)]
+
 
 def read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
     """Returns the settings of a scene, with overrides by name. Raises ValueError for an override
     that is unknown, and for a value, overridden or stored, that the property does not allow. Stored
     values are checked because Blender stores NaN in spite of a property's limits. Threads and
     memory that the scene leaves at automatic are those of the add-on's preferences."""
-    names = [item.name for item in fields(BakeSettings)]
+    names = BakeSettings.names()
     for name in overrides:
         if name not in names:
             raise ValueError(f'unknown setting "{name}": choose one of {", ".join(names)}')

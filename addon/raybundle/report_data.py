@@ -54,6 +54,15 @@ def left_out_objects(report: dict) -> list[tuple[str, str]]:
             if not item['status'].startswith('baked')]
 
 
+def noisiest_object(report: dict) -> tuple[float, str] | None:
+    """Returns the noise, relative to its own light, and the name of the noisiest of several baked
+    objects. The target is about this noise, as far as it is seen. Returns None if the report does
+    not tell."""
+    noises = [(item['error']['noise'], item['name']) for item in report.get('objects', [])
+              if item.get('error')]
+    return max(noises) if len(noises) > 1 else None
+
+
 def time_text(seconds: float) -> str:
     """Returns a time with two digits and its unit, which are the same in all languages."""
     if seconds < 100.0:

@@ -7,7 +7,8 @@ from __future__ import annotations
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .report_data import Line, left_out_objects, read_report, time_text, warning_lines
+from .report_data import (Line, left_out_objects, noisiest_object, read_report, time_text,
+                          warning_lines)
 from .report_remedies import (advice_text, advised_settings, exist, is_about_error, is_about_side,
                               is_applied)
 from .text_wrap import draw_wrapped
@@ -49,6 +50,9 @@ class RAYBUNDLE_PT_last_bake(_LastBakePanel, bpy.types.Panel):
                               (iface_("Discretisation"), 'discretisation'),
                               (iface_("Mesh"), 'mesh')):
                 self._draw_row(column, name, percent(error[key]))
+        if noisiest := noisiest_object(report):
+            self._draw_row(column, iface_("Noisiest Object"),
+                           f"{percent(noisiest[0])}, {noisiest[1]}")
         self._draw_row(column, iface_("Patches"), f"{report['patches']:,}")
         self._draw_row(column, iface_("Bundles"), f"{report['bundles']:,}")
 
@@ -83,8 +87,9 @@ def _draw_remedies(layout: bpy.types.UILayout, context: bpy.types.Context, line:
                    ) -> None:
     """Draws the buttons beside a warning. index: position of the warning in the report."""
     settings = context.scene.raybundle
-    column = layout.column(align=True)
-    row = column.row(align=True)
+    # As many buttons beside each other as the width allows.
+    grid = layout.grid_flow(row_major=True, even_columns=False, align=True)
+    row = grid.row(align=True)
     # Everything that the warning is about may have been deleted since the bake.
     row.enabled = exist(line.kind, line.names)
     if line.kind == 'material':
@@ -95,9 +100,9 @@ def _draw_remedies(layout: bpy.types.UILayout, context: bpy.types.Context, line:
         row.operator("raybundle.bake_other_side", icon='UV_SYNC_SELECT').index = index
     if is_about_error(line):
         # It shows the error of all objects, even if those named are gone.
-        column.row(align=True).operator("raybundle.show_error", icon='HIDE_OFF')
+        grid.row(align=True).operator("raybundle.show_error", icon='HIDE_OFF')
     if advised := advised_settings(line, settings):
-        row = column.row(align=True)
+        row = grid.row(align=True)
         row.enabled = not is_applied(advised, settings)
         row.operator("raybundle.apply_advice", text=advice_text(advised, settings),
                      icon='CHECKMARK', translate=False).index = index

@@ -19,7 +19,9 @@ from .subdivided_copy import find_copies
 # Advice ends a warning: "choose solver LINE_REUSE and first_shot GATHER".
 _ADVICE = re.compile(r'\b(solver|first_shot|projector|small_patches|topology) ([A-Z][A-Z_]+)\b'
                      r'|\b(patch_size) (\d[\d.e+-]*) m\b|(the data type) (Color)\b')
+_REACHED = re.compile(r'max_bundles was reached at (\d+) bundles')
 _BUNDLES_FACTOR = 4
+_NOISY = re.compile(r'the target of ([\d.]+) %.*; lower target_error')
 # Warnings of the library about an error that the attribute of the error shows.
 _ABOUT_ERROR = {'NOISY_OBJECTS', 'DIRECT_NOISE', 'MAX_BUNDLES', 'FEW_LINES', 'COARSE_MESH'}
 _ABOUT_ERROR_TEXT = re.compile(r'noisier than|the noise is|too coarse for')  # of earlier releases
@@ -36,11 +38,16 @@ def is_about_side(line: Line) -> bool:
 
 
 def advised_settings(line: Line, settings: bpy.types.PropertyGroup) -> dict[str, object]:
-    """Returns the settings that a warning advises to change, by name. A patch size is never
-    increased, because another warning may have advised a smaller one."""
-    if line.id == 'MAX_BUNDLES':
-        most = settings.bl_rna.properties['max_bundles'].hard_max
-        return {'max_bundles': min(_BUNDLES_FACTOR * settings.max_bundles, most)}
+    """Returns the settings that a warning advises to change, by name. Values that another warning
+    has already improved more than this one advises are kept."""
+    definitions = settings.bl_rna.properties
+    if match := _REACHED.match(line.text):
+        most = definitions['max_bundles'].hard_max
+        return {'max_bundles': max(settings.max_bundles,
+                                   min(_BUNDLES_FACTOR * int(match[1]), most))}
+    if match := _NOISY.search(line.text):
+        half = max(0.005 * float(match[1]), definitions['target_error'].hard_min)
+        return {'target_error': min(settings.target_error, half)}
     advised: dict[str, object] = {}
     for match in _ADVICE.finditer(line.text.rpartition("choose ")[2]):
         name, value = (group for group in match.groups() if group is not None)
@@ -48,7 +55,7 @@ def advised_settings(line: Line, settings: bpy.types.PropertyGroup) -> dict[str,
             advised['data_type'] = 'FLOAT_COLOR'
         elif name == 'patch_size':
             advised[name] = float(value)
-        elif value in settings.bl_rna.properties[name].enum_items:
+        elif value in definitions[name].enum_items:
             advised[name] = value
     if 'patch_size' in advised and settings.topology == 'SUBDIVIDE' and settings.patch_size > 0.0:
         advised['patch_size'] = min(advised['patch_size'], settings.patch_size)
@@ -59,6 +66,8 @@ def advice_text(advised: dict[str, object], settings: bpy.types.PropertyGroup) -
     """Returns the text of the button that applies advised settings, translated."""
     if 'patch_size' in advised:
         return iface_("Subdivide to {size} m").format(size=f"{advised['patch_size']:.3g}")
+    if 'target_error' in advised:
+        return f"{iface_('Noise')}: {100.0 * advised['target_error']:.3g} %"
     return ", ".join(f"{iface_(settings.bl_rna.properties[name].name)}: "
                      f"{_value_text(settings, name, value)}" for name, value in advised.items())
 
