@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes the pictures of panels in docs/user_guide.md from a Blender with a window.
+
+    LIBGL_ALWAYS_SOFTWARE=1 xvfb-run -a -s "-screen 0 1280x1400x24" \\
+        blender --factory-startup --window-geometry 0 0 1280 1400 \\
+        -P docs/images/make_panels.py -- OUT_DIR
+
+The picture in German needs a Blender with languages.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "blend_tests"))
+
+import ui_test  # noqa: E402
+from ui_test import leave, raybundle, window  # noqa: E402
+
+PAUSE = 0.5  # s, in which Blender draws
+# Widths of the editor of properties, as share of the window.
+WIDE, NARROW = 0.36, 0.2
+
+
+def editor() -> bpy.types.Area:
+    """Returns the editor of properties that the pictures show, the one that was added last."""
+    return min((area for area in window().screen.areas if area.type == 'PROPERTIES'),
+               key=lambda area: area.x)
+
+
+def show_editor(width: float) -> Iterator[float]:
+    """Divides the 3D view, so that its right part is an editor of properties of this width. Yields
+    pauses, s."""
+    view = max((area for area in window().screen.areas if area.type == 'VIEW_3D'),
+               key=lambda area: area.width)
+    with bpy.context.temp_override(window=window(), area=view):
+        bpy.ops.screen.area_split(direction='VERTICAL',
+                                  factor=1.0 - width * window().width / view.width)
+    yield PAUSE  # Its areas have their places only after it was drawn.
+    right = max((area for area in window().screen.areas if area.type == 'VIEW_3D'),
+                key=lambda area: area.x)
+    right.type = 'PROPERTIES'
+    yield PAUSE  # Its tabs exist only after it was drawn.
+    right.spaces.active.context = 'RENDER'
+
+
+def save(path: Path) -> None:
+    """Saves a picture of the editor's panels, cut off below the last one."""
+    pixels = ui_test.screenshot(path)
+    region = next(region for region in editor().regions if region.type == 'WINDOW')
+    inside = pixels[region.y:region.y + region.height, region.x:region.x + region.width]
+    # Rows from the bottom, without the border of the region and the scroll bar.
+    border = 8
+    drawn = (np.abs(inside[border:, border:-16] - inside[border, border]) > 0.01).any(axis=(1, 2))
+    inside = inside[int(drawn.argmax()):]
+    colors = np.ones((*inside.shape[:2], 4), np.float32)
+    colors[:, :, :3] = inside
+    image = bpy.data.images.new(path.stem, colors.shape[1], colors.shape[0])
+    image.pixels.foreach_set(colors.ravel())
+    image.filepath_raw, image.file_format = str(path), 'PNG'
+    image.save()
+    bpy.data.images.remove(image)
+
+
+def bake(scene: str, **settings: object) -> Iterator[float]:
+    """Opens a scene, keeps the screen, and bakes. Yields pauses, s."""
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "scenes" / f"{scene}.blend"), load_ui=False)
+    yield PAUSE
+    for name, value in settings.items():
+        setattr(bpy.context.scene.raybundle, name, value)
+    raybundle.bake(bpy.context)
+    yield PAUSE
+
+
+def steps(out: Path) -> Iterator[float]:
+    """Makes all pictures. Yields the pauses between the steps, s."""
+    ui_test.show_panel()
+    yield from show_editor(WIDE)
+    yield from bake("house_on_plain", quality='DRAFT')
+    save(out / "panel.png")
+    view = bpy.context.preferences.view
+    view.language = "de_DE"
+    view.use_translate_interface = True
+    yield from bake("cornell_box")
+    save(out / "panel_german.png")
+    view.language = "en_US"
+    yield from show_editor(NARROW)
+    yield from bake("house_on_plain", quality='DRAFT')
+    save(out / "panel_narrow.png")
+
+
+def advance(script: Iterator[float]) -> Callable[[], float | None]:
+    def next_step() -> float | None:
+        try:
+            return next(script)
+        except StopIteration:
+            leave(0, "the pictures are made")
+        except Exception as error:
+            leave(1, repr(error))
+        return None
+    return next_step
+
+
+def main(out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    bpy.context.preferences.view.show_splash = False
+    raybundle.register()
+    bpy.app.timers.register(advance(steps(out)), first_interval=1.0, persistent=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[sys.argv.index("--") + 1]).resolve())
