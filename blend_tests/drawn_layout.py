@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A stand-in for bpy.types.UILayout that records what a panel draws, because a Blender without a
-window has no layouts."""
+window has no layouts. Methods, options and icons that this Blender does not have raise an error."""
 
 from __future__ import annotations
 
 from types import SimpleNamespace
 
 import bpy
+
+
+# Of methods without an icon.
+_NO_ICON = SimpleNamespace(enum_items={'NONE'})
 
 
 class DrawnLayout:
@@ -17,7 +21,13 @@ class DrawnLayout:
         self.enabled = True
 
     def __getattr__(self, method: str):
+        if method not in bpy.types.UILayout.bl_rna.functions:
+            raise AttributeError(method)
+        parameters = bpy.types.UILayout.bl_rna.functions[method].parameters
+
         def call(*arguments, **options):
+            assert set(options) <= set(parameters.keys()), method
+            assert options.get('icon', 'NONE') in parameters.get('icon', _NO_ICON).enum_items
             shown = SimpleNamespace()  # properties of an operator's button
             self.record.append((method, arguments, options, self, shown))
             if method in ('row', 'column', 'box', 'split', 'grid_flow'):

@@ -45,6 +45,22 @@ def test_costs_are_shown_after_the_first_bake():
     assert [text for text in texts if text.startswith("≈")] == ["≈ 4.2 s", "≈ 10 s", "≈ 54 s"]
 
 
+def test_the_sidebar_and_the_preferences_are_drawn():
+    assert {"raybundle.bake", "raybundle.preview"} <= set(
+        drawn(panels.RAYBUNDLE_PT_sidebar).operators())
+    assert {"raybundle.open_guide", "raybundle.copy_bug_report"} == set(
+        drawn(preferences.RaybundlePreferences).operators())
+
+
+def test_all_panels_are_drawn_with_what_this_blender_has(closed_box):
+    settings().light_sets.add()
+    bpy.context.view_layer.objects.active = closed_box
+    for panel in (panels.RAYBUNDLE_PT_output, panels.RAYBUNDLE_PT_quality,
+                  panels.RAYBUNDLE_PT_limits, panels.RAYBUNDLE_PT_light_sets,
+                  panels.RAYBUNDLE_PT_object):
+        assert drawn(panel).props()
+
+
 def test_sub_panels_leave_a_place_after_the_output():
     orders = {panel.bl_label: panel.bl_order for panel in
               (panels.RAYBUNDLE_PT_output, panels.RAYBUNDLE_PT_quality,
@@ -82,6 +98,14 @@ def test_hidden_methods_that_differ_are_named(user):
     assert "raybundle.reset_methods" in drawn(panels.RAYBUNDLE_PT_render).operators()
     user.study_methods = True
     assert "raybundle.reset_methods" not in drawn(panels.RAYBUNDLE_PT_render).operators()
+
+
+def test_the_study_of_methods_changes_no_setting(user):
+    settings().solver = 'MULTIPATH'
+    values = properties.read_settings(bpy.context.scene, {})
+    user.study_methods = True
+    assert properties.read_settings(bpy.context.scene, {}) == values
+    assert values.solver == 'MULTIPATH'
 
 
 def test_methods_are_reset():
@@ -213,6 +237,8 @@ def test_a_preset_is_stored_and_restored(tmp_path, monkeypatch):
     monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(tmp_path))
     monkeypatch.setattr(bpy.utils, "user_resource",
                         lambda kind, path="", create=False: _folder(tmp_path / path))
+    # Blender replaces the label of the menu by the name of the preset.
+    monkeypatch.setattr(presets.RAYBUNDLE_PT_presets, "bl_label", "Raybundle Presets")
     settings().quality = 'FINAL'
     settings().domain = 'POINT'
     settings().memory_limit = 100.0

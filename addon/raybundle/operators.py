@@ -92,7 +92,11 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and context.mode == 'OBJECT'
+        if context.scene is None or context.mode != 'OBJECT':
+            cls.poll_message_set(tip_("Leave the present mode: attributes are removed in Object "
+                                      "Mode"))
+            return False
+        return True
 
     def execute(self, context):
         scene = context.scene

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import lru_cache
 
 import blf
 import bpy
@@ -64,13 +65,21 @@ def draw_wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: s
     width = context.region.width if context.region is not None else 400.0
     scale = _ui_scale(context)
     width -= (_MARGIN + indent + (_ICON if icon != 'NONE' else 0.0)) * scale
-    blf.size(0, context.preferences.ui_styles[0].widget.points * scale)
     column = layout.column(align=True)
     column.scale_y = _LINE_HEIGHT
-    for line in wrapped(text, max(width, 40.0 * scale), lambda part: blf.dimensions(0, part)[0]):
+    size = context.preferences.ui_styles[0].widget.points * scale
+    for line in _lines(text, max(width, 40.0 * scale), size):
         column.label(text=line, icon=icon, translate=False)
         if icon != 'NONE':
             icon = 'BLANK1'
+
+
+# Panels are drawn at every movement of the mouse, and measuring text takes time.
+@lru_cache(maxsize=256)
+def _lines(text: str, width: float, size: float) -> list[str]:
+    """Returns the text in lines of Blender's own font. width, size: in pixels."""
+    blf.size(0, size)
+    return wrapped(text, width, lambda part: blf.dimensions(0, part)[0])
 
 
 def _ui_scale(context: bpy.types.Context) -> float:
