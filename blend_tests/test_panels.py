@@ -2,6 +2,7 @@
 """What the panels and menus show, and preferences and presets."""
 
 import json
+from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -39,7 +40,7 @@ def test_the_quality_comes_first():
 
 
 def test_costs_are_shown_after_the_first_bake():
-    assert "Times are shown after the first bake" in drawn(panels.RAYBUNDLE_PT_render).texts()
+    assert "Times after first bake" in drawn(panels.RAYBUNDLE_PT_render).texts()
     settings().report = json.dumps(FULL)
     texts = drawn(panels.RAYBUNDLE_PT_render).texts()
     assert [text for text in texts if text.startswith("≈")] == ["≈ 4.2 s", "≈ 10 s", "≈ 54 s"]
@@ -256,6 +257,14 @@ def test_a_preset_is_stored_and_restored(tmp_path, monkeypatch):
 def _folder(path) -> str:
     path.mkdir(parents=True, exist_ok=True)
     return str(path)
+
+
+def test_the_menu_without_presets_only_adds_one(monkeypatch):
+    monkeypatch.setattr(bpy.utils, "preset_paths", lambda folder: [])
+    layout = DrawnLayout()
+    stand_in = SimpleNamespace(layout=layout, preset_add_operator="raybundle.preset_add")
+    presets.RAYBUNDLE_PT_presets.draw(stand_in, bpy.context)
+    assert (layout.props(), layout.operators()) == (["preset_name"], ["raybundle.preset_add"])
 
 
 def test_presets_have_every_setting_but_those_of_the_computer():

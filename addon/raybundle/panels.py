@@ -42,7 +42,7 @@ def draw_quality(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     row.active = False
     row.alignment = 'CENTER' if None in costs else 'EXPAND'
     if None in costs:
-        row.label(text="Times are shown after the first bake")
+        row.label(text="Times after first bake")
         return
     for cost in costs:
         cell = row.row()

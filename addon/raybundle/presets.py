@@ -33,6 +33,17 @@ class RAYBUNDLE_PT_presets(PresetPanel, bpy.types.Panel):
     preset_operator = "script.execute_preset"
     preset_add_operator = "raybundle.preset_add"
 
+    def draw(self, context):
+        if bpy.utils.preset_paths(_FOLDER):
+            super().draw(context)
+            return
+        # Blender would draw "* Missing Paths *" as long as there is no preset.
+        window_manager = context.window_manager
+        row = self.layout.row()
+        row.prop(window_manager, "preset_name", text="")
+        row.operator(self.preset_add_operator, text="",
+                     icon='ADD').name = window_manager.preset_name
+
 
 register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_OT_preset_add,
