@@ -91,9 +91,9 @@ def test_the_noisiest_object_is_named():
                 'error': {'noise': noise} if noise else {}}
     store(objects=[entry("A", 0.02), entry("B", 0.0312), entry("C", None)])
     assert drawn(report_panel.RAYBUNDLE_PT_last_bake).texts()[2:4] == [
-        "Noisiest Object", "3.1 %, B"]
+        "Noisiest", "3.1 %, B"]
     store(objects=[entry("A", 0.02)])
-    assert "Noisiest Object" not in drawn(report_panel.RAYBUNDLE_PT_last_bake).texts()
+    assert "Noisiest" not in drawn(report_panel.RAYBUNDLE_PT_last_bake).texts()
 
 
 def test_warnings_are_in_lines():

@@ -51,7 +51,7 @@ class RAYBUNDLE_PT_last_bake(_LastBakePanel, bpy.types.Panel):
                               (iface_("Mesh"), 'mesh')):
                 self._draw_row(column, name, percent(error[key]))
         if noisiest := noisiest_object(report):
-            self._draw_row(column, iface_("Noisiest Object"),
+            self._draw_row(column, iface_("Noisiest"),
                            f"{percent(noisiest[0])}, {noisiest[1]}")
         self._draw_row(column, iface_("Patches"), f"{report['patches']:,}")
         self._draw_row(column, iface_("Bundles"), f"{report['bundles']:,}")
