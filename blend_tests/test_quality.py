@@ -33,6 +33,13 @@ def test_a_quality_sets_the_target_and_is_read_from_it(name, target):
     assert settings().quality == name
 
 
+def test_scripts_set_a_quality_by_name():
+    raybundle.properties.assign(settings(), 'quality', 'DRAFT')
+    assert settings().target_error == pytest.approx(0.1)
+    with pytest.raises(ValueError, match="DRAFT, GOOD, FINAL"):
+        raybundle.properties.assign(settings(), 'quality', 'BEST')
+
+
 def test_custom_changes_nothing():
     settings().target_error = 0.03
     settings().quality = 'CUSTOM'
