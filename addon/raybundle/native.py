@@ -23,7 +23,7 @@ import numpy as np
 
 from .surface_data import SurfaceData
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 
 
 class ErrorCode(enum.IntEnum):

@@ -7,8 +7,6 @@ using namespace raybundle;
 
 namespace {
 
-using HeldBake = Held<rb_bake, Bake>;
-
 // Implements rb_get_bake_int() and rb_get_bake_float(), which differ only by their type.
 template <class T>
 rb_error getNumber(rb_bake bake, const char* name, T* value) {
@@ -81,16 +79,6 @@ rb_error rb_execute_bake(rb_bake bake, rb_scene scene) {
         held->run(*heldScene);
     });
 }
-
-namespace {
-
-void copyLight(const std::vector<glm::vec3>& light, float* rgb, size_t count) {
-    needCount(count, light.size(), "count");
-    needArray(rgb, count, "rgb");
-    if (count) std::memcpy(rgb, light.data(), count * sizeof(glm::vec3));
-}
-
-}  // namespace
 
 rb_error rb_get_corner_light(rb_bake bake, int32_t instance, rb_output output, float* rgb,
                              size_t count) {

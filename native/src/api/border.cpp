@@ -71,6 +71,12 @@ void needFinite(const float* values, size_t count, const char* what) {
                                   " is not a finite number");
 }
 
+void copyLight(const std::vector<glm::vec3>& light, float* rgb, size_t count) {
+    needCount(count, light.size(), "count");
+    needArray(rgb, count, "rgb");
+    if (count) std::memcpy(rgb, light.data(), count * sizeof(glm::vec3));
+}
+
 Mesh makeMesh(const char* name, const float* vertices, size_t vertexCount,
               const int32_t* cornerVertices, size_t cornerCount, const int32_t* faceOffsets,
               size_t faceCount) {

@@ -48,7 +48,9 @@ rb_error guarded(const Body& body) noexcept {
     }
 }
 
+class Bake;
 using HeldScene = Held<rb_scene, Scene>;
+using HeldBake = Held<rb_bake, Bake>;
 
 // Each of these functions throws Error(INVALID_ARGUMENT) with the name of the argument if its check
 // fails.
@@ -66,6 +68,23 @@ std::vector<V> vectors(const float* values, size_t count) {
     if (count) std::memcpy(static_cast<void*>(result.data()), values, count * sizeof(V));
     return result;
 }
+
+// Copies `value` to a struct of the caller, whose member `size` holds its size in the caller's
+// header. Structs of older callers are shorter. Throws Error(INVALID_ARGUMENT) if the size is 0 or
+// larger than that of this library.
+template <class Struct>
+void fillStruct(Struct* target, Struct value, const char* name) {
+    need(target, name);
+    if (target->size == 0 || target->size > sizeof(Struct))
+        throw invalidArgument(std::string(name) + ": its size must be 1 to " +
+                              std::to_string(sizeof(Struct)) + " bytes, the sizeof of the struct");
+    value.size = target->size;
+    std::memcpy(target, &value, value.size);
+}
+
+// Copies light to the caller's array of 3 * `count` floats. Throws Error(INVALID_ARGUMENT) if the
+// array is NULL or has another length.
+void copyLight(const std::vector<glm::vec3>& light, float* rgb, size_t count);
 
 // Copies the arrays of rb_add_mesh into a Mesh. Throws Error(INVALID_ARGUMENT) if an array is NULL
 // or too long. Scene::addMesh checks the indices.

@@ -60,17 +60,10 @@ size_t rb_get_setting_count(void) { return std::size(kSettings); }
 
 rb_error rb_get_setting_info(size_t index, rb_setting_info* info) {
     return guarded([&] {
-        need(info, "info");
         if (index >= std::size(kSettings))
             throw invalidArgument("index must be less than " +
                                   std::to_string(std::size(kSettings)) +
                                   ", the number of settings");
-        if (info->size == 0 || info->size > sizeof(rb_setting_info))
-            throw invalidArgument("info: its size must be 1 to " +
-                                  std::to_string(sizeof(rb_setting_info)) +
-                                  " bytes; set it to sizeof(rb_setting_info)");
-        rb_setting_info described = describe(kSettings[index]);
-        described.size = info->size;
-        std::memcpy(info, &described, described.size);
+        fillStruct(info, describe(kSettings[index]), "info");
     });
 }

@@ -15,6 +15,7 @@
 #include "bake/bundle_solve.h"
 #include "bake/first_shots.h"
 #include "bake/geometry_hash.h"
+#include "bake/interim.h"
 #include "bake/stopwatch.h"
 #include "bake/trace.h"
 #include "job/cancellation.h"
@@ -138,13 +139,15 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         const std::vector<CoarseShot> coarse = startLines(scene, report);
         const ShownLight shown(scene, trace->patches, gathersSparseResults(settings));
         report.skip(SkippedWork::UNWANTED_CORNERS, scene.cornersWithoutResult());
-        SetLights lights = shootSources({scene, settings, progress, *trace}, shown, coarse, report);
+        const StageInput shots{scene, settings, progress, *trace, interim};
+        SetLights lights = shootSources(shots, shown, coarse, report);
+        offerFirstShots(shots, shown, lights);
         warnOfVisibility(scene, lights, settings, report);
         warnOfTranslucence(scene, settings, report);
         warnOfAngles(trace->patches, settings, report);
         warnOfGaps(trace->uncutGaps, report);
         const Tiles tiles(trace->patches);
-        const SolveInput input{{scene, settings, progress, *trace}, tiles, shown};
+        const SolveInput input{shots, tiles, shown};
         Exchanged exchanged = exchange(input, lights, report);
         irradiance = sumOf(lights);
         made = show(input, lights, exchanged, report);
@@ -230,7 +233,9 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     }
     std::vector<CoarseShot> shots;
     if (settings.refine) {
-        shots = shootCoarsely({scene, settings, progress, *trace}, report);
+        const StageInput in{scene, settings, progress, *trace, interim};
+        shots = shootCoarsely(in, report);
+        offerCoarseShots(in, shots);
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
         const size_t most =
             size_t(settings.maxPatches) - std::min(size_t(settings.maxPatches), cuts.morePatches());
@@ -323,12 +328,7 @@ const CornerLight& Bake::setLight(int32_t set, int32_t instance) const {
 const InstanceLight& Bake::instanceLight(int32_t instance) const {
     if (!ran)
         throw Error(RB_ERROR_INVALID_OPERATION, "there is no result before a successful bake");
-    if (instance < 0 || size_t(instance) >= light.size())
-        throw invalidArgument("there is no instance " + std::to_string(instance));
-    if (!light[size_t(instance)].isBaked)
-        throw invalidArgument("object \"" + light[size_t(instance)].name +
-                              "\" has the role OCCLUDE, so that it has no result");
-    return light[size_t(instance)];
+    return bakedInstance(light, instance);
 }
 
 }  // namespace raybundle

@@ -24,6 +24,7 @@
 
 namespace raybundle {
 
+class Interim;
 class Threads;
 struct SolveInput;
 struct Trace;
@@ -37,6 +38,8 @@ class Bake {
 
     Settings settings;
     Progress progress;
+    // Receives light and noise while the bake runs. Null: nobody looks. Must outlive the run.
+    Interim* interim = nullptr;
 
     // Runs all stages of the bake. The results of the previous run remain if the run fails. Throws
     // Error(INVALID_ARGUMENT) if the settings or the scene cannot be baked, Error(CANCELLED) if the

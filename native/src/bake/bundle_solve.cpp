@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "bake/bake_warnings.h"
+#include "bake/interim.h"
 #include "bake/stopwatch.h"
 #include "bundles/line_windows.h"
 #include "stated_error/energy_balance.h"
@@ -30,6 +31,15 @@ constexpr uint32_t kRaysOfFirstPass = 512, kMostPasses = 5;
 double projectionsOfFaces(const Trace& trace) {
     const Sheets& sheets = trace.patches.sheets;
     return trace.density.windows.empty() ? 0.0 : double(sheets.loose.size() + sheets.sheets.size());
+}
+
+// Returns the mean of two estimates of the light.
+Irradiance meanOf(const std::array<Irradiance, 2>& halves) {
+    Irradiance mean = halves[0];
+    mean.add(halves[1]);
+    for (auto* light : {&mean.direct, &mean.ofSources, &mean.indirect})
+        for (glm::vec3& value : *light) value *= 0.5f;
+    return mean;
 }
 
 }  // namespace
@@ -74,14 +84,16 @@ SideNoise BundleSolve::run(Report& report) {
 void BundleSolve::trace(Report& report) {
     if (rule.wanted() <= tracer.bundleCount()) return;
     Stopwatch stage(report.seconds[RB_STAGE_BUNDLES]);
-    tracer.advance(rule.wanted() - tracer.bundleCount(), in.progress);
+    const uint32_t before = tracer.bundleCount();
+    const double all = double(rule.foreseen());
+    tracer.advance(rule.wanted() - before, in.progress.between(before / all, rule.wanted() / all));
 }
 
 // Solves for the light of each half of the bundles, and measures the difference between the halves.
 void BundleSolve::look() {
     in.trace.measureExposedShare(uint32_t(in.settings.seed));
     const uint32_t bundles = tracer.bundleCount();
-    in.progress.report(RB_STAGE_SOLVE, std::min(1.0, double(bundles) / in.settings.maxBundles));
+    in.progress.report(RB_STAGE_SOLVE, 0);
     const std::vector<float> exposed = in.trace.exposedShare();
     for (size_t side = 0; side < weight.size(); ++side) weight[side] = area[side] * exposed[side];
     tileWeight = in.tiles.sum(weight);
@@ -99,10 +111,20 @@ void BundleSolve::look() {
     in.trace.looks.shareOfParts = noisyParts->shares();
 }
 
+// Offers the mean of the halves as interim light.
+void BundleSolve::offerHalves() {
+    if (!in.interim) return;
+    in.interim->setNoise(rule.excess() * double(in.settings.targetError));
+    if (!in.interim->wantsLight()) return;
+    for (size_t k = 0; k < lights.size(); ++k) lights[k].irradiance = meanOf(halves[k]);
+    offerLight(in, in.shown, lights, in.trace.exposedShare());
+}
+
 Stop BundleSolve::stopAfterLook() {
     const uint32_t bundles = tracer.bundleCount();
     const Stop stop = rule.after(
         bundles, noisyParts ? noisyParts->excess() : noise.excess(in.settings.targetError));
+    offerHalves();
     if (stop == Stop::NOT_YET) return stop;
     finish();
     return castsRays && stop == Stop::NOISE_AT_TARGET ? rule.afterRays(bundles, castRays()) : stop;
@@ -140,6 +162,8 @@ double BundleSolve::castRays() {
         withRays.look(withThese, bundles, tracer.bias());
         measureCorners(withRays, withThese);
         left = noisyParts->lookWithRays(withRays, kMostPasses - 1 - pass);
+        in.progress.report(RB_STAGE_SOLVE, double(pass + 1) / kMostPasses);
+        offerLight(in, in.shown, lights, in.trace.exposedShare());
     }
     return left;
 }

@@ -49,6 +49,7 @@ class BundleSolve {
 
     void trace(Report& report);
     void look();
+    void offerHalves();
     Stop stopAfterLook();
     double castRays();
     void finish();

@@ -39,6 +39,7 @@ Stop StopRule::after(uint32_t bundles, double excess) {
         settings.skipBundles ? 1.05 * std::pow(excess, 1 / kNoiseSlope) : INFINITY;
     wantedBundles =
         std::min(mostBundles, (uint32_t(bundles * (factor < kFarAway ? factor : 2.0)) + 2) & ~1u);
+    foreseenBundles = uint32_t(std::min(bundles * factor, double(mostBundles)));
     return Stop::NOT_YET;
 }
 

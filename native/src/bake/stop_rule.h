@@ -11,6 +11,7 @@
 //   too.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -34,6 +35,9 @@ class StopRule {
     uint32_t wanted() const { return wantedBundles; }
     // Returns the largest number of bundles that this bake may use.
     uint32_t most() const { return mostBundles; }
+    // Returns how many bundles the bake will probably use: as many as the slope of the noise
+    // predicts, at least wanted().
+    uint32_t foreseen() const { return std::max(foreseenBundles, wantedBundles); }
 
     // Decides after a look at `bundles` bundles, whose noise is `excess` times the target.
     Stop after(uint32_t bundles, double excess);
@@ -52,7 +56,7 @@ class StopRule {
     const Settings& settings;
     const bool isCountable;  // whether the lines of max_bundles bundles can be counted
     const uint32_t mostBundles;
-    uint32_t wantedBundles;
+    uint32_t wantedBundles, foreseenBundles = 0;
     double lastExcess = 0;
     double leftByRays = INFINITY;  // noise at the last afterRays(), in multiples of the target
 };

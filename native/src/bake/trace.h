@@ -114,12 +114,15 @@ struct Trace {
     std::map<int32_t, LineSolutions> solutions;  // of each light set, per side of the clusters
 };
 
+class Interim;
+
 // The input of every stage of a bake. All references must outlive it.
 struct StageInput {
     const Scene& scene;
     const Settings& settings;
     const Progress& progress;
     Trace& trace;
+    Interim* interim;  // receives light and noise while the bake runs; null: nobody looks
 };
 
 }  // namespace raybundle

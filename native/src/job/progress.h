@@ -32,9 +32,13 @@ class Progress {
 
     // Returns a Progress whose range 0 to 1 is the part k (from 0) of n equal parts of this one.
     Progress part(size_t k, size_t n) const {
+        return between(double(k) / double(n), double(k + 1) / double(n));
+    }
+    // Returns a Progress whose range 0 to 1 is the range `from` to `to` of this one.
+    Progress between(double from, double to) const {
         Progress progress = *this;
-        progress.share = share / double(n);
-        progress.begin = begin + double(k) * progress.share;
+        progress.begin = begin + from * share;
+        progress.share = (to - from) * share;
         return progress;
     }
 

@@ -53,4 +53,14 @@ std::vector<glm::vec3> InstanceLight::perVertex(const CornerLight& light, rb_out
     return vertices;
 }
 
+const InstanceLight& bakedInstance(const std::vector<InstanceLight>& light, int32_t instance) {
+    if (instance < 0 || size_t(instance) >= light.size())
+        throw invalidArgument("there is no instance " + std::to_string(instance));
+    const InstanceLight& found = light[size_t(instance)];
+    if (!found.isBaked)
+        throw invalidArgument("object \"" + found.name +
+                              "\" has the role OCCLUDE, so that it has no result");
+    return found;
+}
+
 }  // namespace raybundle

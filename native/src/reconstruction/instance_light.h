@@ -46,4 +46,8 @@ struct InstanceLight : CornerLight {
     std::vector<glm::vec3> perVertex(const CornerLight& light, rb_output output) const;
 };
 
+// Returns the light of an instance with role BAKE. Throws Error(INVALID_ARGUMENT) if there is no
+// such instance or it has another role.
+const InstanceLight& bakedInstance(const std::vector<InstanceLight>& light, int32_t instance);
+
 }  // namespace raybundle

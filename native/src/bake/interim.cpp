@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bake/interim.h"
+
+#include <utility>
+
+#include "job/error.h"
+#include "reconstruction/interim_light.h"
+
+namespace raybundle {
+
+void Interim::offer(const std::function<std::vector<InstanceLight>()>& make) {
+    if (!isWanted) return;
+    std::vector<InstanceLight> next = make();
+    const std::lock_guard lock(mutex);
+    light = std::move(next);
+    isWanted = false;
+    ++made;
+}
+
+std::vector<glm::vec3> Interim::read(int32_t instance, rb_output output) {
+    const std::lock_guard lock(mutex);
+    if (made == 0) throw Error(RB_ERROR_INVALID_OPERATION, "the run has made no interim light yet");
+    const InstanceLight& wanted = bakedInstance(light, instance);
+    isWanted = true;
+    return wanted.perCorner(output);
+}
+
+void offerCoarseShots(const StageInput& in, const std::vector<CoarseShot>& shots) {
+    if (!in.interim) return;
+    in.interim->offer([&] {
+        const Patches& patches = in.trace.patches;
+        Irradiance light(patches.sideCount());
+        for (const CoarseShot& shot : shots)
+            for (size_t side = 0; side < light.direct.size(); ++side)
+                light.direct[side] += shot.gathered[side].irradiance;
+        const std::vector<float> exposed(patches.sideCount(), 1.0f);
+        const ShownLight shown(in.scene, patches, false);
+        return interimLight(in.scene, {patches, exposed}, shown, shown.of(light, exposed));
+    });
+}
+
+void offerFirstShots(const StageInput& in, const ShownLight& shown, SetLights& lights) {
+    if (!in.interim) return;
+    for (SetLight& light : lights) {
+        light.irradiance.direct = light.irradiance.ofSources = light.shot.irradiance;
+        if (!light.shot.indirect.empty()) light.irradiance.indirect = light.shot.indirect;
+    }
+    offerLight(in, shown, lights, std::vector<float>(in.trace.patches.sideCount(), 1.0f));
+}
+
+void offerLight(const StageInput& in, const ShownLight& shown, const SetLights& lights,
+                const std::vector<float>& exposed) {
+    if (!in.interim) return;
+    in.interim->offer([&] {
+        return interimLight(in.scene, {in.trace.patches, exposed}, shown,
+                            shown.of(lights, exposed));
+    });
+}
+
+}  // namespace raybundle
