@@ -43,6 +43,22 @@ class TargetLight:
     set_lights: dict[str, np.ndarray] = field(default_factory=dict)
 
 
+@dataclass
+class PreparedBake:
+    """A bake whose scene has been exported, ready for the native library."""
+
+    scene: bpy.types.Scene
+    settings: BakeSettings
+    light_sets: list[LightSet]
+    export: SceneExport
+    # The finer mesh of each target, by the target's position in SceneData.instances.
+    subdivided: dict[int, SubdividedMesh]
+    native_bake: native.Bake
+    native_scene: native.Scene  # the owner of this object closes it
+    started: float  # time.perf_counter() at the beginning
+    export_seconds: float
+
+
 def bake(context: bpy.types.Context, progress: Progress | None = None,
          **overrides: object) -> BakeReport:
     """Bakes the context's scene into colour attributes of its meshes, and returns the report.
@@ -52,44 +68,64 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
     BakeError, with a message for the user, for settings or scenes that cannot be baked. Raises
     RaybundleError if the native library is missing or fails; its code is CANCELLED after a cancel.
     """
-    started = time.perf_counter()
     report_progress = _checked_progress(progress)
     native.load()
     # Call the function before anything is read, because it may change the file.
     report_progress('export', 0.0)
+    with object_mode(context):
+        prepared = prepare(context, overrides)
+        with prepared.native_scene:
+            prepared.native_bake.execute(prepared.native_scene, report_progress)
+        report_progress('write_back', 0.0)
+        return write_results(context, prepared)
+
+
+def prepare(context: bpy.types.Context, overrides: dict[str, object]) -> PreparedBake:
+    """Exports the context's scene, in Object Mode. overrides, and errors: as in bake()."""
+    started = time.perf_counter()
     scene = context.scene
     try:
         settings = read_settings(scene, overrides)
     except ValueError as error:
         raise BakeError(str(error)) from error
+    light_sets = read_light_sets(scene, settings.attribute)
+    _check(scene, settings, light_sets)
+    export, subdivided = _export(context, settings, light_sets)
+    native_bake = bake_cache.get_or_create(scene)
+    native_scene = build_native_scene(export.scene)
+    export_seconds = time.perf_counter() - started
+    try:
+        _apply_settings(native_bake, settings)
+    except BaseException:
+        native_scene.close()
+        raise
+    return PreparedBake(scene, settings, light_sets, export, subdivided, native_bake, native_scene,
+                        started, export_seconds)
 
-    with _object_mode(context):
-        light_sets = read_light_sets(scene, settings.attribute)
-        _check(scene, settings, light_sets)
-        export, subdivided = _export(context, settings, light_sets)
-        with build_native_scene(export.scene) as native_scene:
-            export_seconds = time.perf_counter() - started
-            native_bake = bake_cache.get_or_create(scene)
-            _apply_settings(native_bake, settings)
-            native_bake.execute(native_scene, report_progress)
 
-        report_progress('write_back', 0.0)
-        write_started = time.perf_counter()
-        _check_unchanged(scene, export, native_bake)
-        lights = _read_results(native_bake, export, subdivided, settings, light_sets)
-        native_report = native_bake.report()
-        objects = _write(context, lights, settings, export, native_report)
-        report = BakeReport.from_native(native_report)
-        for entry, light_set in zip(report.light_sets, light_sets):
-            entry['attribute'] = light_set.attribute
-        report.objects = objects + [ObjectReport(name, 0, status)
-                                    for name, status in export.statuses.items()]
-        report.add_warnings(export.warnings)
-        finished = time.perf_counter()
-        report.seconds.update(export=export_seconds, write_back=finished - write_started,
-                              total=finished - started)
-        report.full_bake = full_bake(report, settings.target_error, scene.raybundle.report)
-        scene.raybundle.report = report.to_json()
+def write_results(context: bpy.types.Context, prepared: PreparedBake) -> BakeReport:
+    """Writes the light of an executed bake to the meshes, in Object Mode, and returns the report.
+    Raises BakeError, before anything is written, if a target has changed since prepare()."""
+    write_started = time.perf_counter()
+    native_bake, export = prepared.native_bake, prepared.export
+    _check_unchanged(prepared.scene, export, native_bake)
+    lights = _read_results(prepared)
+    native_report = native_bake.report()
+    objects = _write(context, lights, prepared.settings, export, native_report)
+    report = BakeReport.from_native(native_report)
+    for entry, light_set in zip(report.light_sets, prepared.light_sets):
+        entry['attribute'] = light_set.attribute
+    report.objects = objects + [ObjectReport(name, 0, status)
+                                for name, status in export.statuses.items()]
+    # The library's warnings come first, because one of lost or created light is the first of them
+    # and has to be read before all others.
+    report.add_warnings(export.warnings)
+    finished = time.perf_counter()
+    report.seconds.update(export=prepared.export_seconds, write_back=finished - write_started,
+                          total=finished - prepared.started)
+    report.full_bake = full_bake(report, prepared.settings.target_error,
+                                 prepared.scene.raybundle.report)
+    prepared.scene.raybundle.report = report.to_json()
     return report
 
 
@@ -106,7 +142,7 @@ def _checked_progress(progress: Progress | None) -> Progress:
 
 
 @contextmanager
-def _object_mode(context: bpy.types.Context) -> Iterator[None]:
+def object_mode(context: bpy.types.Context) -> Iterator[None]:
     """Switches to Object Mode in the with block, because meshes in Edit Mode can be neither
     evaluated nor written."""
     was_editing = context.mode.startswith('EDIT')
@@ -230,15 +266,12 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
 def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: native.Bake) -> None:
     """Raises BakeError if a target or the bake has changed since the export. The progress function
     may have undone a step, opened a file or edited a mesh."""
+    try:
+        is_scene = bool(scene.name)
+    except ReferenceError:
+        is_scene = False
     for target in export.targets:
-        try:
-            mesh = target.object.data
-            size = (len(mesh.vertices), len(mesh.loops))
-            is_same = (size == (target.vertex_count, target.corner_map.original_count)
-                       and not mesh.is_editmode and scene.name)
-        except ReferenceError:
-            is_same = False
-        if not is_same:
+        if not is_scene or target.unchanged_mesh() is None:
             raise BakeError(f'"{target.name}" was removed or changed during the bake: nothing was '
                             f'written, bake again')
     if native_bake.is_closed:
@@ -250,33 +283,41 @@ def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: n
 # --------------------------------------------------------------------------------------------------
 
 
-def _read_results(native_bake: native.Bake, export: SceneExport,
-                  subdivided: dict[int, SubdividedMesh], settings: BakeSettings,
-                  light_sets: list[LightSet]) -> list[TargetLight]:
+def _read_results(prepared: PreparedBake) -> list[TargetLight]:
     """Returns the light of each target, at the corners or vertices of the mesh that receives it."""
+    native_bake, export, settings = prepared.native_bake, prepared.export, prepared.settings
     results = []
     for target in export.targets:
         mesh = export.scene.meshes[export.scene.instances[target.instance].mesh]
-        finer = subdivided.get(target.instance)
+        finer = prepared.subdivided.get(target.instance)
         corner_map = target.corner_map if finer is None else CornerMap(mesh.corner_count)
 
         def read_light(light_set: int | None = None) -> np.ndarray:
             if settings.domain == 'POINT' and corner_map.is_identity:
                 return native_bake.vertex_light(target.instance, settings.output,
                                                 len(mesh.vertices), light_set)
-            light = corner_map.to_original(native_bake.corner_light(
-                target.instance, settings.output, mesh.corner_count, light_set))
-            if settings.domain == 'POINT':
-                original = target.object.data
-                light = grouped_mean(light, corner_vertices(original), len(original.vertices))
-            return light
+            return at_elements(
+                native_bake.corner_light(target.instance, settings.output, mesh.corner_count,
+                                         light_set),
+                corner_map, target.object.data, settings.domain)
 
         error = None
         if settings.write_error:
             error = _read_error(native_bake, target, mesh, corner_map, settings.domain)
         results.append(TargetLight(target, read_light(), error, finer, {
-            light_set.attribute: read_light(index) for index, light_set in enumerate(light_sets)}))
+            light_set.attribute: read_light(index)
+            for index, light_set in enumerate(prepared.light_sets)}))
     return results
+
+
+def at_elements(light: np.ndarray, corner_map: CornerMap, original: bpy.types.Mesh, domain: str
+                ) -> np.ndarray:
+    """Converts light at the corners of an exported mesh, (c, 3), to light at the corners or
+    vertices (domain) of the original mesh, (n, 3)."""
+    light = corner_map.to_original(light)
+    if domain == 'POINT':
+        light = grouped_mean(light, corner_vertices(original), len(original.vertices))
+    return light
 
 
 def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
@@ -307,7 +348,7 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
         copies = create_copies(context, {item.target.object: item.subdivided for item in lights})
     else:
         lights = _resolve_shared_meshes(lights, settings, export)
-    lights = [replace(item, light=_exposed(item.light, settings)) for item in lights]
+    lights = [replace(item, light=exposed(item.light, settings)) for item in lights]
     reports = []
     for item in lights:
         receiver = copies.get(item.target.object, item.target.object)
@@ -332,7 +373,7 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
     return reports
 
 
-def _exposed(light: np.ndarray, settings: BakeSettings) -> np.ndarray:
+def exposed(light: np.ndarray, settings: BakeSettings) -> np.ndarray:
     """Returns light with the settings' exposure and clamping applied."""
     light = light * np.float32(2.0 ** settings.exposure)
     return np.clip(light, 0.0, 1.0) if settings.clamp else light

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
 
@@ -83,6 +85,52 @@ def name_is_free(mesh: bpy.types.Mesh, name: str) -> bool:
         return True
     # UV maps share the names of attributes, but only Blender 3.5 and later list them as attributes.
     return name not in mesh.attributes and name not in mesh.uv_layers
+
+
+@dataclass(frozen=True)
+class KeptAttribute:
+    """What a mesh had under the name of a colour attribute, to be put back later."""
+
+    name: str
+    domain: str
+    data_type: str
+    colors: np.ndarray | None  # (4 n,), scene-linear; None: the mesh did not have the attribute
+    # Names of the colour attributes that were active in the viewport and in renders; None: none.
+    active: str | None
+    rendered: str | None
+
+    @classmethod
+    def of(cls, mesh: bpy.types.Mesh, name: str) -> KeptAttribute:
+        """Copies the colour attribute of a mesh that is not in Edit Mode."""
+        attribute = mesh.color_attributes.get(name)
+        active = mesh.color_attributes.active_color
+        rendered = rendered_attribute(mesh)
+        colors = None
+        if attribute is not None:
+            colors = np.empty(4 * len(attribute.data), np.float32)
+            attribute.data.foreach_get('color', colors)
+        return cls(name, attribute.domain if attribute else "",
+                   attribute.data_type if attribute else "", colors,
+                   active.name if active else None, rendered.name if rendered else None)
+
+    def put_back(self, mesh: bpy.types.Mesh) -> None:
+        """Gives the mesh what it had. Its number of elements must not have changed."""
+        colors = mesh.color_attributes
+        attribute = colors.get(self.name)
+        if attribute is not None and (self.colors is None or (
+                attribute.domain, attribute.data_type) != (self.domain, self.data_type)):
+            colors.remove(attribute)
+            attribute = None
+        if self.colors is not None:
+            if attribute is None:
+                attribute = colors.new(self.name, self.data_type, self.domain)
+            attribute.data.foreach_set('color', self.colors)
+        names = [item.name for item in colors]
+        if self.active in names:
+            colors.active_color_index = names.index(self.active)
+        if self.rendered in names:
+            colors.render_color_index = names.index(self.rendered)
+        mesh.update()
 
 
 def activate(mesh: bpy.types.Mesh, name: str) -> bool:

@@ -142,6 +142,19 @@ class _SettingInfo(ctypes.Structure):
     )
 
 
+class _RunState(ctypes.Structure):
+    """rb_run_state."""
+
+    _fields_ = (
+        ('size', _size),
+        ('is_running', ctypes.c_bool),
+        ('stage', _enum),
+        ('fraction', ctypes.c_double),
+        ('noise', ctypes.c_double),
+        ('interim', _int),
+    )
+
+
 # Argument types of all functions that return an rb_error.
 _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_new_scene': (_out(_handle),),
@@ -178,6 +191,11 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_get_bake_string': (_handle, _text, _out(_text)),
     'rb_set_bake_progress': (_handle, _ProgressFunction, ctypes.c_void_p),
     'rb_execute_bake': (_handle, _handle),
+    'rb_start_bake': (_handle, _handle, _out(_handle)),
+    'rb_get_run_state': (_handle, _out(_RunState)),
+    'rb_get_run_light': (_handle, _int, _enum, _floats, _size),
+    'rb_cancel_run': (_handle,),
+    'rb_finish_run': (_handle,),
     'rb_get_corner_light': (_handle, _int, _enum, _floats, _size),
     'rb_get_vertex_light': (_handle, _int, _enum, _floats, _size),
     'rb_get_set_corner_light': (_handle, _int, _int, _enum, _floats, _size),
@@ -196,6 +214,7 @@ _INFALLIBLE: dict[str, tuple[object, Sequence[object]]] = {
     'rb_get_error_message': (_text, ()),
     'rb_release_scene': (None, (_handle,)),
     'rb_release_bake': (None, (_handle,)),
+    'rb_release_run': (None, (_handle,)),
     'rb_get_setting_count': (_size, ()),
     'rb_release_subdivision': (None, (_handle,)),
 }
@@ -727,6 +746,54 @@ class Bake(_Handle):
         text = _text()
         self._library.rb_get_report(self._pointer, ctypes.byref(text))
         return json.loads(text.value.decode())
+
+
+@dataclasses.dataclass(frozen=True)
+class RunState:
+    """What a run is doing."""
+
+    is_running: bool
+    stage: str  # one of STAGES, the present or the last one
+    fraction: float  # finished share of the stage, 0 to 1
+    noise: float | None  # the noise so far, relative to the light; None: not known yet
+    interim: int  # number of times that interim light was made
+
+
+class Run(_Handle):
+    """A bake in a thread of the native library. The bake and the scene are in use until it has
+    ended. close() cancels a run that goes on, and waits for its end."""
+
+    _release = 'rb_release_run'
+
+    def __init__(self, bake: Bake, scene: Scene) -> None:
+        """Starts the run. Raises RaybundleError if the bake or the scene is in use."""
+        super().__init__()
+        self._library.rb_start_bake(bake._pointer, scene._pointer, ctypes.byref(self._pointer))
+
+    def state(self) -> RunState:
+        """Returns what the run is doing now."""
+        state = _RunState(size=ctypes.sizeof(_RunState))
+        self._library.rb_get_run_state(self._pointer, ctypes.byref(state))
+        return RunState(state.is_running, STAGES[state.stage], state.fraction,
+                        state.noise if state.noise >= 0.0 else None, state.interim)
+
+    def light(self, instance: int, output: str, count: int) -> np.ndarray:
+        """Returns the interim light at the corners of an instance's mesh, (count, 3) float32.
+        output: a key of OUTPUTS. count: number of corners. Raises RaybundleError while
+        state().interim is 0."""
+        light = np.empty((count, 3), np.float32)
+        self._library.rb_get_run_light(self._pointer, instance, OUTPUTS[output], _as_floats(light),
+                                       count)
+        return light
+
+    def cancel(self) -> None:
+        """Asks the run to end, and does not wait for its end."""
+        self._library.rb_cancel_run(self._pointer)
+
+    def finish(self) -> None:
+        """Waits for the end of the run. Raises RaybundleError if the bake failed, with code
+        CANCELLED if it was cancelled."""
+        self._library.rb_finish_run(self._pointer)
 
 
 # --------------------------------------------------------------------------------------------------

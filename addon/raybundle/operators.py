@@ -2,50 +2,131 @@
 """The operators of the add-on. Each checks whether it may run, calls the bake, and reports the
 result."""
 
+import time
+
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_tip as tip_
 
-from . import bake_cache, color_attribute, viewport_preview
+from . import bake_cache, bake_run, color_attribute, viewport_preview
 from .bake import bake
-from .bake_report import BakeError
+from .bake_progress import BakeProgress
+from .bake_report import BakeError, BakeReport
 from .light_sets import written_attributes
 from .materials.last_surfaces import LastSurfaces
 from .native import ErrorCode, RaybundleError
 from .subdivided_copy import remove_copies
 
-# Position on the progress bar, from 0 to 1, at which each stage starts. Bundles take most of the
-# time.
-_STAGE_STARTS = {'export': 0.0, 'patches': 0.05, 'first_shot': 0.1, 'bundles': 0.3, 'solve': 0.85,
-                 'reconstruction': 0.9, 'write_back': 0.97, 'done': 1.0}
+# Seconds between two looks at a running bake, and between two drawings of its progress. Software
+# renderers take a tenth of a second to draw.
+_LOOK_SECONDS, _DRAW_SECONDS = 0.03, 0.25
 
 
-def _overall_fraction(stage: str, fraction: float) -> float:
-    """Returns the position on the progress bar, 0 to 1, for a fraction of a stage."""
-    starts = list(_STAGE_STARTS.values())
-    index = list(_STAGE_STARTS).index(stage)
-    return starts[index] + fraction * (starts[index + 1] - starts[index])
-
-
-def _run_bake(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
-    """Bakes with a progress bar, and reports errors, warnings and the summary to the user."""
-    window_manager = context.window_manager
-
-    def show_progress(stage: str, fraction: float) -> None:
-        window_manager.progress_update(1000.0 * _overall_fraction(stage, fraction))
-
-    window_manager.progress_begin(0.0, 1000.0)
-    try:
-        report = bake(context, show_progress)
-    except (BakeError, RaybundleError) as error:
-        cancelled = isinstance(error, RaybundleError) and error.code == ErrorCode.CANCELLED
-        operator.report({'WARNING' if cancelled else 'ERROR'}, str(error))
-        return {'CANCELLED'}
-    finally:
-        window_manager.progress_end()
+def _say(operator: bpy.types.Operator, report: BakeReport) -> set[str]:
+    """Reports the warnings and the summary of a bake to the user."""
     for warning in report.warnings:
         operator.report({'WARNING'}, warning)
     operator.report({'INFO'}, report.summary())
     return {'FINISHED'}
+
+
+def _refuse(operator: bpy.types.Operator, error: BakeError | RaybundleError) -> set[str]:
+    """Reports why there is no bake."""
+    cancelled = isinstance(error, RaybundleError) and error.code == ErrorCode.CANCELLED
+    operator.report({'WARNING' if cancelled else 'ERROR'}, str(error))
+    return {'CANCELLED'}
+
+
+def _redraw(context: bpy.types.Context) -> None:
+    """Draws the panels again that show the progress, and not the 3D views beside them."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if (area.type, region.type) in (('PROPERTIES', 'WINDOW'), ('VIEW_3D', 'UI')):
+                    region.tag_redraw()
+
+
+class _Bakes:
+    """Mixin of operators that bake: at once if a script calls them, and in the background if a
+    button does, while Blender stays usable."""
+
+    def execute(self, context):
+        progress = BakeProgress({})
+        window_manager = context.window_manager
+
+        def show_progress(stage: str, fraction: float) -> None:
+            progress.note(stage, fraction)
+            window_manager.progress_update(1000.0 * progress.fraction)
+
+        window_manager.progress_begin(0.0, 1000.0)
+        try:
+            return _say(self, bake(context, show_progress))
+        except (BakeError, RaybundleError) as error:
+            return _refuse(self, error)
+        finally:
+            window_manager.progress_end()
+
+    def invoke(self, context, _event):
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        context.window.cursor_modal_set('WAIT')
+        try:
+            self._run = bake_run.BakeRun(context)
+        except (BakeError, RaybundleError) as error:
+            return _refuse(self, error)
+        finally:
+            context.window.cursor_modal_restore()
+        self._next_draw = 0.0
+        self._timer = context.window_manager.event_timer_add(_LOOK_SECONDS, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context, event):
+        run = self._run
+        if event.type == 'ESC' and event.value == 'PRESS':
+            run.stop("The bake was cancelled: the attributes are as before")
+        elif event.type != 'TIMER':
+            return {'PASS_THROUGH'}
+        try:
+            result = self._advance(context)
+        except (BakeError, RaybundleError) as error:
+            result = _refuse(self, error)
+        except BaseException:
+            # Blender ends the operator, without calling cancel().
+            self.cancel(context)
+            raise
+        if result is None:
+            self._show_progress(context)
+            return {'PASS_THROUGH'}
+        self.cancel(context)
+        return result
+
+    def _advance(self, context) -> set[str] | None:
+        """Takes the next step of the bake. Returns the operator's result if it was the last."""
+        run = self._run
+        if run.stopped_because:
+            self.report({'WARNING'}, run.stopped_because)
+            return {'FINISHED'} if run.is_kept else {'CANCELLED'}
+        goes_on = run.advance()
+        if run.shows_light and context.scene.raybundle.show_result:
+            viewport_preview.show(context.window_manager)
+        return None if goes_on else _say(self, run.finish(context))
+
+    def _show_progress(self, context) -> None:
+        if time.perf_counter() < self._next_draw:
+            return
+        self._next_draw = time.perf_counter() + _DRAW_SECONDS
+        context.workspace.status_text_set(
+            f"{iface_('Bake')}: {self._run.progress.text(self._run.state)}    "
+            f"{iface_('Esc: cancel')}")
+        _redraw(context)
+
+    def cancel(self, context):
+        """Ends the bake. Blender calls this if it ends the operator itself."""
+        self._run.leave()
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+        _redraw(context)
 
 
 class _NeedsScene:
@@ -56,17 +137,26 @@ class _NeedsScene:
         return context.scene is not None
 
 
-class RAYBUNDLE_OT_bake(_NeedsScene, bpy.types.Operator):
+def _can_begin(operator: type[bpy.types.Operator]) -> bool:
+    """Returns whether no bake is running. Otherwise sets the reason that the button shows."""
+    if bake_run.active() is not None:
+        operator.poll_message_set(tip_("A bake is running"))
+        return False
+    return True
+
+
+class RAYBUNDLE_OT_bake(_Bakes, bpy.types.Operator):
     """Write direct and indirect light into the colour attributes of the scene's meshes"""
     bl_idname = "raybundle.bake"
     bl_label = "Bake Radiosity"
     bl_options = {'REGISTER', 'UNDO'}
 
-    def execute(self, context):
-        return _run_bake(self, context)
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None and _can_begin(cls)
 
 
-class RAYBUNDLE_OT_relight(_NeedsScene, bpy.types.Operator):
+class RAYBUNDLE_OT_relight(_Bakes, bpy.types.Operator):
     """Bake again after a change of lights or materials, and reuse the lines of the last bake"""
     bl_idname = "raybundle.relight"
     bl_label = "Relight"
@@ -74,14 +164,33 @@ class RAYBUNDLE_OT_relight(_NeedsScene, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not bake_cache.has_result(context.scene):
+        if context.scene is None or not _can_begin(cls):
+            return False
+        if not bake_cache.has_result(context.scene):
             cls.poll_message_set(tip_("There is nothing to relight: bake first. The lines of a "
                                       "bake are kept only until the file is closed"))
             return False
         return True
 
+
+class RAYBUNDLE_OT_stop(bpy.types.Operator):
+    """Stop the bake that is running"""
+    bl_idname = "raybundle.stop"
+    bl_label = "Stop Bake"
+
+    keep: bpy.props.BoolProperty(
+        name="Keep", description="Keep the light so far, with its noise, instead of restoring "
+                                 "what the attributes held before")
+
+    @classmethod
+    def poll(cls, context):
+        return bake_run.active() is not None
+
     def execute(self, context):
-        return _run_bake(self, context)
+        bake_run.active().stop("The bake was stopped: the attributes keep the light so far"
+                               if self.keep else
+                               "The bake was cancelled: the attributes are as before", self.keep)
+        return {'FINISHED'}
 
 
 class RAYBUNDLE_OT_clear(bpy.types.Operator):
@@ -92,7 +201,9 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or context.mode != 'OBJECT':
+        if context.scene is None or not _can_begin(cls):
+            return False
+        if context.mode != 'OBJECT':
             cls.poll_message_set(tip_("Leave the present mode: attributes are removed in Object "
                                       "Mode"))
             return False
@@ -169,6 +280,7 @@ class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
 register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_OT_bake,
     RAYBUNDLE_OT_relight,
+    RAYBUNDLE_OT_stop,
     RAYBUNDLE_OT_clear,
     RAYBUNDLE_OT_light_set_add,
     RAYBUNDLE_OT_light_set_remove,

@@ -10,6 +10,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from . import native, preferences
 from .light_sets import attribute_of
 from .presets import RAYBUNDLE_PT_presets
+from .progress_panel import draw_progress
 from .properties import automatic_values
 from .quality import TARGETS, enum_quality, estimated_seconds
 from .report_data import read_report, time_text
@@ -101,7 +102,8 @@ class RAYBUNDLE_PT_render(RaybundleRenderPanel, bpy.types.Panel):
         layout = property_layout(self)
         settings = context.scene.raybundle
         draw_quality(layout, context.scene)
-        draw_bake(layout)
+        if not draw_progress(layout):
+            draw_bake(layout)
         layout.prop(settings, "scope")
         methods = changed_methods(settings)
         if methods and not preferences.studies_methods():
@@ -284,10 +286,11 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         draw_quality(layout, context.scene)
-        column = layout.column(align=True)
-        column.operator("raybundle.bake", text="Bake", icon='LIGHT')
-        column.operator("raybundle.relight")
-        column.operator("raybundle.clear", text="Clear")
+        if not draw_progress(layout):
+            column = layout.column(align=True)
+            column.operator("raybundle.bake", text="Bake", icon='LIGHT')
+            column.operator("raybundle.relight")
+            column.operator("raybundle.clear", text="Clear")
         layout.operator("raybundle.preview")
 
 

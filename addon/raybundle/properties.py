@@ -225,6 +225,10 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     clamp: BoolProperty(
         name="Clamp", description="Cut written values off at 1, after the exposure is applied",
         default=False)
+    show_result: BoolProperty(
+        name="Show Result", default=True,
+        description="While a bake runs and after it, show the baked colours in all 3D views. "
+                    "Preview switches back to the earlier shading")
     write_error: BoolProperty(
         name="Write Error",
         description="Also write the stated error of the light, one number per corner or vertex, "

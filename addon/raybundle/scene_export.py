@@ -44,6 +44,17 @@ class BakeTarget:
     name: str  # of the object, at the time of the export
     vertex_count: int  # of the object's own mesh, at the time of the export
 
+    def unchanged_mesh(self) -> bpy.types.Mesh | None:
+        """Returns the object's own mesh. Returns None if it cannot be written: if it or the object
+        was removed, if it is in Edit Mode, or if it has another size than at the export."""
+        try:
+            mesh = self.object.data
+            size = (len(mesh.vertices), len(mesh.loops))
+            is_same = size == (self.vertex_count, self.corner_map.original_count)
+            return mesh if is_same and not mesh.is_editmode else None
+        except ReferenceError:
+            return None
+
 
 @dataclass
 class SceneExport:

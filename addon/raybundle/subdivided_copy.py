@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from .corner_map import grouped_mean
 from .mesh_arrays import corner_vertices, read
 from .native import Subdivision
 from .scene_data import MeshData
@@ -31,11 +32,19 @@ class SubdividedMesh:
     # float32, which sum to 1.
     source_corners: np.ndarray
     source_weights: np.ndarray
+    source_corner_count: int
 
     def interpolated(self, values: np.ndarray) -> np.ndarray:
         """Interpolates values at the corners of the source mesh, (source corners, n), at the
         corners of the finer mesh, (3 t, n)."""
         return np.einsum('cj,cjn->cn', self.source_weights, values[self.source_corners])
+
+    def at_source(self, values: np.ndarray) -> np.ndarray:
+        """Returns the values at the corners of the source mesh, (source corners, 3), of values at
+        the corners of the finer mesh, (3 t, 3). It is 0 at source corners without a triangle."""
+        corner, which = np.nonzero(self.source_weights > 0.999)
+        return grouped_mean(values[corner], self.source_corners[corner, which],
+                            self.source_corner_count)
 
 
 def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> SubdividedMesh:
@@ -46,7 +55,7 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> Subdivi
         vertices_of_corners = subdivision.triangles.reshape(-1)
         result = SubdividedMesh(mesh, subdivision.source_faces,
                                 subdivision.source_corners.reshape(-1, 3),
-                                subdivision.source_weights.reshape(-1, 3))
+                                subdivision.source_weights.reshape(-1, 3), mesh.corner_count)
         vertex_count = len(subdivision.vertices)
     # Interpolate in object space, because the transform may be flat and have no inverse.
     vertices = np.zeros((vertex_count, 3), np.float32)

@@ -27,14 +27,20 @@ def toggle(window_manager: bpy.types.WindowManager) -> bool:
     """Switches the preview on in all 3D views, or off if it is on in all of them. Returns whether
     it is on now."""
     views = list(_views(window_manager))
-    show = any(_read(view) != _PREVIEW for view in views)
-    for view in views:
-        if not show:
+    if all(_read(view) == _PREVIEW for view in views):
+        for view in views:
             _apply(view, _earlier.pop(view.as_pointer(), _DEFAULT))
-        elif _read(view) != _PREVIEW:
+        return False
+    show(window_manager)
+    return True
+
+
+def show(window_manager: bpy.types.WindowManager) -> None:
+    """Switches the preview on in all 3D views."""
+    for view in _views(window_manager):
+        if _read(view) != _PREVIEW:
             _earlier[view.as_pointer()] = _read(view)
             _apply(view, _PREVIEW)
-    return show
 
 
 def _views(window_manager: bpy.types.WindowManager) -> Iterator[bpy.types.SpaceView3D]:

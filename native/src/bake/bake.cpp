@@ -233,9 +233,7 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     }
     std::vector<CoarseShot> shots;
     if (settings.refine) {
-        const StageInput in{scene, settings, progress, *trace, interim};
-        shots = shootCoarsely(in, report);
-        offerCoarseShots(in, shots);
+        shots = shootCoarsely({scene, settings, progress, *trace, interim}, report);
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
         const size_t most =
             size_t(settings.maxPatches) - std::min(size_t(settings.maxPatches), cuts.morePatches());

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <optional>
 
+#include "bake/interim.h"
 #include "bake/light_hash.h"
 #include "bake/stopwatch.h"
 #include "first_shot/bright_spots.h"
@@ -50,7 +51,8 @@ std::vector<CoarseShot> shootCoarsely(const StageInput& in, Report& report) {
     for (int32_t set = kNoLightSet; set < int32_t(in.scene.lightSets.size()); ++set) {
         const DirectLight direct(in.scene, patches, in.trace.visibilityOfLights(),
                                  uint32_t(in.settings.seed), set, in.settings);
-        CoarseShot shot{std::vector<Gathered>(all.size()), {}};
+        CoarseShot shot;
+        shot.gathered.resize(all.size());
         direct.shootCoarsely(
             shot, all,
             [&](size_t side) {
@@ -80,17 +82,22 @@ SetLights shootSources(const StageInput& in, const ShownLight& shown,
         DirectLight direct(in.scene, patches, visibility, uint32_t(settings.seed), set, settings);
         Trace::Shot& last = trace.shots[set];
         const bool mayScale = settings.skipLights && isGather && last.aims == aims;
-        const FirstShotInput input{direct,
-                                   patches,
-                                   visibility,
-                                   settings,
-                                   share,
-                                   trace.linesPerBundle(),
-                                   &trace.visibility,
-                                   coarse.empty() ? nullptr : &coarse[lights.size()],
-                                   mayScale ? last.shot.bySource : nullptr,
-                                   &shown.sides(),
-                                   &standIns};
+        FirstShotInput input{direct,
+                             patches,
+                             visibility,
+                             settings,
+                             share,
+                             trace.linesPerBundle(),
+                             &trace.visibility,
+                             coarse.empty() ? nullptr : &coarse[lights.size()],
+                             mayScale ? last.shot.bySource : nullptr,
+                             &shown.sides(),
+                             &standIns};
+        // The light of further sets is not waited for.
+        if (in.interim && lights.empty())
+            input.showCoarse = [&](std::vector<glm::vec3> irradiance) {
+                offerDirect(in, shown, std::move(irradiance));
+            };
         FirstShot shot = shootOrKeep(in, input, aims, last, report);
         if (isGather && settings.countsLines())
             if (const size_t spots =

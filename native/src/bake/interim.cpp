@@ -25,16 +25,13 @@ std::vector<glm::vec3> Interim::read(int32_t instance, rb_output output) {
     return wanted.perCorner(output);
 }
 
-void offerCoarseShots(const StageInput& in, const std::vector<CoarseShot>& shots) {
+void offerDirect(const StageInput& in, const ShownLight& shown, std::vector<glm::vec3> direct) {
     if (!in.interim) return;
     in.interim->offer([&] {
         const Patches& patches = in.trace.patches;
         Irradiance light(patches.sideCount());
-        for (const CoarseShot& shot : shots)
-            for (size_t side = 0; side < light.direct.size(); ++side)
-                light.direct[side] += shot.gathered[side].irradiance;
+        light.direct = std::move(direct);
         const std::vector<float> exposed(patches.sideCount(), 1.0f);
-        const ShownLight shown(in.scene, patches, false);
         return interimLight(in.scene, {patches, exposed}, shown, shown.of(light, exposed));
     });
 }

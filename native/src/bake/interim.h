@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "bake/trace.h"
-#include "direct_light/direct_light.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/shown_light.h"
 #include "transport/set_light.h"
@@ -44,10 +43,10 @@ class Interim {
 };
 
 // These functions offer the light so far to the bake's Interim, and do nothing if there is none:
-// the direct light of coarse shots; the light of first shots, which becomes the irradiance of
+// direct irradiance per side, W/m^2; the light of first shots, which becomes the irradiance of
 // `lights`; and the irradiance that `lights` have. `exposed` is per side, the share that no other
 // surface covers, 0 to 1.
-void offerCoarseShots(const StageInput& in, const std::vector<CoarseShot>& shots);
+void offerDirect(const StageInput& in, const ShownLight& shown, std::vector<glm::vec3> direct);
 void offerFirstShots(const StageInput& in, const ShownLight& shown, SetLights& lights);
 void offerLight(const StageInput& in, const ShownLight& shown, const SetLights& lights,
                 const std::vector<float>& exposed);

@@ -94,7 +94,7 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
                                 const std::function<Receiver(size_t)>& receiverAt,
                                 const std::function<void(double)>& progress,
                                 const std::vector<ReceiverPair>& neighbours,
-                                LightBySource* bySource, std::vector<Sightings>* sightings) const {
+                                LightBySource* bySource) const {
     coarse.seen.resize(sources.size());
     coarse.bundled = 0;
     for (size_t side = 0; side < split->bundled.size(); ++side)
@@ -107,30 +107,38 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     for (uint32_t k : these)
         first.aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples, 1, 0,
                               nullptr, !hasNeighbour[k]});
-    gatherThese(coarse.gathered, first, receiverAt, seen, progress, bySource, sightings);
+    gatherThese(coarse.gathered, first, receiverAt, seen, progress, bySource,
+                coarse.sightings.empty() ? nullptr : &coarse.sightings);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
+}
+
+CoarseShot DirectLight::shootCoarsely(size_t count,
+                                      const std::function<Receiver(size_t)>& receiverAt,
+                                      const std::function<void(double)>& progress,
+                                      const std::vector<ReceiverPair>& neighbours,
+                                      LightBySource* bySource) const {
+    CoarseShot coarse;
+    if (surrounding() && count <= kMostLookingAround) coarse.sightings.resize(count);
+    coarse.gathered.resize(count);
+    std::vector<uint32_t> all(count);
+    std::iota(all.begin(), all.end(), 0u);
+    shootCoarsely(coarse, all, receiverAt, progress, neighbours, bySource);
+    return coarse;
 }
 
 std::vector<Gathered> DirectLight::gather(
     size_t count, const std::function<Receiver(size_t)>& receiverAt, float targetError,
     const std::function<void(double)>& progress, CoarseShot first,
     const std::vector<ReceiverPair>& neighbours, LightBySource* bySource) const {
-    std::vector<Sightings> sightings;
-    if (first.gathered.empty()) {
-        if (surrounding() && count <= kMostLookingAround) sightings.resize(count);
-        first.gathered.resize(count);
-        std::vector<uint32_t> these(count);
-        std::iota(these.begin(), these.end(), 0u);
-        shootCoarsely(first, these, receiverAt, progress, neighbours, bySource,
-                      sightings.empty() ? nullptr : &sightings);
-    }
+    if (first.gathered.empty())
+        first = shootCoarsely(count, receiverAt, progress, neighbours, bySource);
     std::vector<Gathered> results = std::move(first.gathered);
     if (sources.empty()) return results;
     Seen seen(sources.size());
     for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
 
     Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
-    const auto outlooks = lookAround(further, results, receiverAt, std::move(sightings));
+    const auto outlooks = lookAround(further, results, receiverAt, std::move(first.sightings));
     std::vector<Aim> last(neighbours.empty() ? 0 : count);  // per receiver
     for (int pass = 0; pass < kMostPasses && !further.receivers.empty(); ++pass) {
         gatherThese(

@@ -41,6 +41,8 @@ struct CoarseShot {
     std::vector<Gathered> gathered;  // per receiver
     std::vector<bool> seen;          // per source: whether it lights any receiver
     double bundled = 0;              // estimated irradiance by emission left to the bundles, W/m^2
+    // Per receiver: where the samples of a source that surrounds it went. Empty: not kept.
+    std::vector<Sightings> sightings;
 };
 
 struct ReceiverPlace;
@@ -73,15 +75,15 @@ class DirectLight {
     // large compared with the mean light. If a source surrounds the receivers, further samples are
     // concentrated on its visible parts (direct_light/outlook.h).
     //   progress    receives the finished share, 0 to 1
-    //   coarse      result of the coarse pass at all receivers, or empty to compute it here
+    //   first       result of the coarse pass at all receivers, or empty to compute it here
     //   neighbours  pairs of receivers beside each other. A receiver with a neighbour starts with
     //               half the samples and gets more if its neighbours disagree with it about a
     //               shadow.
     //   bySource    receives the light of each source; null, or sized for `count` receivers. It is
-    //               complete only if `coarse` is empty.
+    //               complete only if the coarse pass got it too.
     std::vector<Gathered> gather(size_t count, const std::function<Receiver(size_t)>& receiverAt,
                                  float targetError, const std::function<void(double)>& progress,
-                                 CoarseShot coarse = {},
+                                 CoarseShot first = {},
                                  const std::vector<ReceiverPair>& neighbours = {},
                                  LightBySource* bySource = nullptr) const;
 
@@ -95,13 +97,18 @@ class DirectLight {
                                 const std::function<void(double)>& progress) const;
 
     // Runs the coarse pass of gather() at the receivers `these`. See gather() for `neighbours` and
-    // `bySource`. `sightings`, per receiver, receives where the samples went; may be null.
+    // `bySource`.
     void shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>& these,
                        const std::function<Receiver(size_t)>& receiverAt,
                        const std::function<void(double)>& progress,
                        const std::vector<ReceiverPair>& neighbours = {},
-                       LightBySource* bySource = nullptr,
-                       std::vector<Sightings>* sightings = nullptr) const;
+                       LightBySource* bySource = nullptr) const;
+    // Runs the coarse pass of gather() at all of `count` receivers, and returns its result, from
+    // which gather() goes on. The other arguments are those of gather().
+    CoarseShot shootCoarsely(size_t count, const std::function<Receiver(size_t)>& receiverAt,
+                             const std::function<void(double)>& progress,
+                             const std::vector<ReceiverPair>& neighbours,
+                             LightBySource* bySource) const;
 
     // Returns an unbiased estimate of the irradiance at a receiver from one sample of each source,
     // W/m^2. `index` is the index of the sample.

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <string>
@@ -68,6 +69,8 @@ struct FirstShotInput {
     const std::vector<bool>* isShown = nullptr;
     // GATHER only: which sides gather for other sides. Null: each side gathers for itself.
     const StandIns* standIns = nullptr;
+    // GATHER only: receives the irradiance per side, W/m^2, after the coarse pass. May be empty.
+    std::function<void(std::vector<glm::vec3>)> showCoarse = {};
 };
 
 // The kinds of first shot, one per row of the table.

@@ -77,13 +77,12 @@ float othersError(const Patches& patches, const StandIns& standIns, uint32_t sid
            std::max(1.0f, edge / std::sqrt(std::max(patches.area[patchOf(side)], 1e-30f)));
 }
 
-// Returns the coarse shot of the tiles, if there is one, extended to the patches of cut tiles. Only
-// these are sampled here. Returns an empty coarse shot if there is none of the tiles.
+// Returns the coarse shot of the tiles, extended to the patches of cut tiles. Only these are sampled
+// here.
 CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32_t>& gatherers,
                            const std::function<Receiver(size_t)>& receiverAt,
                            const std::function<void(double)>& report) {
     CoarseShot coarse;
-    if (!input.fromTiles) return coarse;
     const Patches& patches = input.patches;
     coarse.seen = input.fromTiles->seen;
     coarse.gathered.resize(gatherers.size());
@@ -99,6 +98,15 @@ CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32
     }
     input.light.shootCoarsely(coarse, cut, receiverAt, report);
     return coarse;
+}
+
+// Returns the irradiance of each of `count` sides, W/m^2. `gathered` is per gatherer.
+std::vector<glm::vec3> irradianceOfSides(const std::vector<Gathered>& gathered,
+                                         const StandIns& standIns, size_t count) {
+    std::vector<glm::vec3> irradiance(count);
+    for (uint32_t side = 0; side < count; ++side)
+        irradiance[side] = gathered[standIns.numberOf(side)].irradiance;
+    return irradiance;
 }
 
 }  // namespace
@@ -145,10 +153,14 @@ FirstShot gather(const FirstShotInput& input) {
     } else {
         auto bySource = std::make_shared<LightBySource>(sources, gatherers.size());
         bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
-        results = light.gather(gatherers.size(), receiverAt, target, report,
-                               coarseOfPatches(input, gatherers, receiverAt, report),
-                               neighbouringGatherers(patches, standIns),
-                               bySource->isWhole ? bySource.get() : nullptr);
+        LightBySource* const whole = bySource->isWhole ? bySource.get() : nullptr;
+        const std::vector<ReceiverPair> neighbours = neighbouringGatherers(patches, standIns);
+        CoarseShot coarse = input.fromTiles ? coarseOfPatches(input, gatherers, receiverAt, report)
+                                            : light.shootCoarsely(gatherers.size(), receiverAt,
+                                                                  report, neighbours, whole);
+        if (input.showCoarse) input.showCoarse(irradianceOfSides(coarse.gathered, standIns, n));
+        results = light.gather(gatherers.size(), receiverAt, target, report, std::move(coarse),
+                               neighbours, whole);
         shares = bySource->powerShares = light.powerShares();
         shot.bySource = std::move(bySource);
     }

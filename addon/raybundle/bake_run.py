@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake in a thread of the native library, while Blender's window stays usable.
+
+The main thread exports the scene, asks for the state of the run in a timer, and writes the light.
+Nothing of Blender is used in another thread. At most one bake runs at a time.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import native
+from .bake import object_mode, prepare, write_results
+from .bake_progress import BakeProgress
+from .bake_report import BakeError, BakeReport
+from .interim_light import InterimLight
+
+# Interim light is shown so rarely that writing and drawing it take at most this share of the time.
+_SHOWING_SHARE = 0.2
+
+_active: BakeRun | None = None
+
+
+def active() -> BakeRun | None:
+    """Returns the bake that is running, or whose result is not written yet."""
+    return _active
+
+
+class BakeRun:
+    """A bake from the export of the scene to the end of the native run."""
+
+    def __init__(self, context: bpy.types.Context) -> None:
+        """Exports the context's scene, starts the native run, and makes this the active run.
+        Errors: as in bake()."""
+        global _active
+        last = json.loads(context.scene.raybundle.report or "{}")
+        self.progress = BakeProgress(last.get('seconds', {}))
+        self.stopped_because = ""  # why the run was stopped, for the user; "": it was not
+        self.is_kept = False  # whether the light so far was kept when the run was stopped
+        self.was_scene_changed = False  # whether lights, materials or places changed meanwhile
+        native.load()
+        with object_mode(context):
+            self._prepared = prepare(context, {})
+        # The run keeps the native scene until it ends.
+        with self._prepared.native_scene:
+            self._run = native.Run(self._prepared.native_bake, self._prepared.native_scene)
+        self._interim = InterimLight(self._prepared)
+        self.state = self._run.state()
+        # time.perf_counter() when light was last shown, or None if that has been drawn; and before
+        # which none is shown again
+        self._shown: float | None = None
+        self._next_show = 0.0
+        _active = self
+
+    @property
+    def shows_light(self) -> bool:
+        """Returns whether interim light is in the attributes."""
+        return self._interim.is_shown
+
+    def advance(self) -> bool:
+        """Reads the state of the run and shows its light. Returns whether it goes on."""
+        if self.stopped_because:
+            return False
+        self.state = self._run.state()
+        self.progress.note(self.state.stage, self.state.fraction)
+        now = time.perf_counter()
+        if self._shown is not None:
+            # By now the light is written and drawn.
+            self._next_show = now + (now - self._shown) * (1.0 / _SHOWING_SHARE - 1.0)
+            self._shown = None
+        if self.state.interim > 0 and self.state.is_running and now >= self._next_show:
+            self._interim.show(self._run)
+            self._shown = now
+        return self.state.is_running
+
+    def hide_light(self) -> None:
+        """Gives the attributes what they held before, until the next light is shown."""
+        self._interim.put_back()
+
+    def stop(self, because: str, keep: bool = False) -> None:
+        """Ends the run within about 100 ms. because: a sentence for the user. keep: whether the
+        attributes keep the light so far, or get back what they held before."""
+        if self.stopped_because:
+            return
+        self.stopped_because = because
+        self._run.cancel()
+        self.is_kept = keep and self.shows_light
+        if self.is_kept:
+            # The last report describes other light.
+            self._prepared.scene.raybundle.report = ""
+        else:
+            self._interim.put_back()
+        self._run.close()
+
+    def finish(self, context: bpy.types.Context) -> BakeReport:
+        """Writes the result of a run that has ended by itself, and returns the report. Errors: as
+        in bake(); the attributes then get back what they held before."""
+        self.progress.note('write_back', 0.0)
+        try:
+            self._run.finish()
+            with object_mode(context):
+                report = write_results(context, self._prepared)
+        except (BakeError, native.RaybundleError):
+            self._interim.put_back()
+            raise
+        if self.was_scene_changed:
+            report.warnings.insert(0, "The scene was changed while the bake ran, and the light is "
+                                      "that of the scene before: bake again, or relight")
+            self._prepared.scene.raybundle.report = report.to_json()
+        return report
+
+    def leave(self) -> None:
+        """Ends the run if it goes on, and makes room for the next one."""
+        global _active
+        self._run.close()
+        if _active is self:
+            _active = None
+
+
+# --------------------------------------------------------------------------------------------------
+# What happens to the file meanwhile
+# --------------------------------------------------------------------------------------------------
+
+
+@persistent
+def _before_undo(*_arguments: object) -> None:
+    if _active is not None:
+        # Undo compares meshes with its own copies, which do not have the interim light.
+        _active.stop("The bake was stopped by Undo or Redo: nothing was written")
+
+
+@persistent
+def _before_load(*_arguments: object) -> None:
+    if _active is not None:
+        _active.stop("The bake was stopped because a file was opened: nothing was written")
+        _active.leave()
+
+
+@persistent
+def _before_save(*_arguments: object) -> None:
+    # The file gets what the attributes held before. The next interim light is written again.
+    if _active is not None and not _active.stopped_because:
+        _active.hide_light()
+
+
+@persistent
+def _after_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if _active is None:
+        return
+    for update in depsgraph.updates:
+        item = update.id
+        if isinstance(item, (bpy.types.Light, bpy.types.World, bpy.types.Material)) or (
+                isinstance(item, bpy.types.Object) and update.is_updated_transform):
+            _active.was_scene_changed = True
+
+
+def _before_exit() -> None:
+    # A thread of the library must not outlive Blender.
+    if _active is not None:
+        _active.leave()
+
+
+_HANDLERS = (('undo_pre', _before_undo), ('redo_pre', _before_undo), ('load_pre', _before_load),
+             ('save_pre', _before_save), ('depsgraph_update_post', _after_update))
+
+
+def register() -> None:
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+    atexit.register(_before_exit)
+
+
+def unregister() -> None:
+    atexit.unregister(_before_exit)
+    _before_exit()
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).remove(handler)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draws the progress of a running bake, with the buttons that stop it."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import bake_run
+
+
+def draw_progress(layout: bpy.types.UILayout) -> bool:
+    """Draws the progress of the running bake. Returns False, and draws nothing, if none runs."""
+    run = bake_run.active()
+    if run is None:
+        return False
+    text = run.progress.text(run.state)
+    column = layout.column(align=True)
+    if hasattr(column, 'progress'):  # from Blender 4.0 on
+        column.progress(factor=run.progress.fraction, type='BAR', text=text)
+    else:
+        column.label(text=text, icon='TIME')
+    row = column.row(align=True)
+    row.operator("raybundle.stop", text="Cancel", icon='CANCEL').keep = False
+    kept = row.row(align=True)
+    kept.enabled = run.shows_light
+    kept.operator("raybundle.stop", text="Stop and Keep", icon='CHECKMARK').keep = True
+    return True
