@@ -4,8 +4,9 @@
     blender --factory-startup FILE.blend -P blend_tests/ui_test.py -- --out DIR
 
 Shows the Raybundle panel in the Render properties, finds its Bake button on the screen, clicks it
-with xdotool, and checks the result of the click. The exit code is 0 or 1. Pictures of the window
-are saved in DIR.
+with xdotool, and checks the result of the click: the light in the attributes and in the 3D view,
+Undo and Redo by their keys, and Esc during a bake that would never end. The exit code is 0 or 1.
+Pictures of the window are saved in DIR.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
@@ -27,6 +28,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "addon"))
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
+from raybundle import bake_run  # noqa: E402
 
 # Buttons of operators have this colour while the test searches for them. Nothing else in Blender
 # has it.
@@ -160,14 +162,67 @@ def steps(out: Path) -> Iterator[float]:
     yield PAUSE
     screenshot(out / "raybundle_panel_before.png")
     yield from click(x, y)
-    deadline = time.monotonic() + BAKE_SECONDS
-    while not bpy.context.scene.raybundle.report:
-        if time.monotonic() > deadline:
-            raise UiError(f"nothing was baked {BAKE_SECONDS:.0f} s after a click at {x}, {y}")
-        yield PAUSE
-    yield 2.0 * PAUSE
+    yield from until(lambda: bpy.context.scene.raybundle.report, "nothing was baked")
     screenshot(out / "raybundle_panel.png")
     check_result()
+    view = next(area for area in window().screen.areas if area.type == 'VIEW_3D').spaces.active
+    if (view.shading.type, view.shading.color_type) != ('SOLID', 'VERTEX'):
+        raise UiError("the 3D view does not show the colours")
+    baked = colors()
+    yield from press("ctrl+z")
+    yield from until(lambda: not baked_objects(), "Undo has not removed the light")
+    yield from press("ctrl+shift+z")
+    yield from until(lambda: same(colors(), baked), "Redo has not brought the light back")
+    yield from escape(x, y, out)
+
+
+def escape(x: int, y: int, out: Path) -> Iterator[float]:
+    """Starts a bake that would never end, looks at its light, and cancels it with Esc. x, y: the
+    Bake button. Yields pauses, s."""
+    settings = bpy.context.scene.raybundle
+    settings.seed, settings.skips_off, settings.max_bundles = 1, {'bundles'}, 2 ** 24
+    before = colors()
+    yield from click(x, y)
+    yield from until(lambda: bake_run.active() is not None and not same(colors(), before),
+                     "a running bake shows no light")
+    screenshot(out / "raybundle_running.png")
+    yield from press("Escape")
+    yield from until(lambda: bake_run.active() is None, "Esc has not ended the bake")
+    if not same(colors(), before):
+        raise UiError("Esc has not restored the attributes")
+
+
+def until(is_done: Callable[[], object], otherwise: str) -> Iterator[float]:
+    """Waits until something is done. Yields pauses, s. otherwise: the message of the UiError that
+    is raised after BAKE_SECONDS."""
+    deadline = time.monotonic() + BAKE_SECONDS
+    while not is_done():
+        if time.monotonic() > deadline:
+            raise UiError(f"{otherwise} within {BAKE_SECONDS:.0f} s")
+        yield PAUSE
+    yield 2.0 * PAUSE
+
+
+def press(keys: str) -> Iterator[float]:
+    """Presses keys, as xdotool names them, in the window. Yields pauses, s."""
+    xdotool("key", keys)
+    yield PAUSE
+
+
+def colors() -> dict[str, np.ndarray]:
+    """Returns the colours of all baked objects by name."""
+    result = {}
+    for item in baked_objects():
+        attribute = item.data.color_attributes["Radiosity"]
+        values = np.empty(4 * len(attribute.data), np.float32)
+        attribute.data.foreach_get('color', values)
+        result[item.name] = values
+    return result
+
+
+def same(some: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> bool:
+    return some.keys() == others.keys() and all(
+        np.array_equal(values, others[name]) for name, values in some.items())
 
 
 def check_result() -> None:
@@ -176,13 +231,10 @@ def check_result() -> None:
     meshes = {item.name for item in bpy.context.scene.objects if item.type == 'MESH'}
     if names != meshes:
         raise UiError(f"baked are {sorted(names)}, in the scene are {sorted(meshes)}")
-    for item in baked_objects():
-        attribute = item.data.color_attributes["Radiosity"]
-        colors = np.empty(4 * len(attribute.data), np.float32)
-        attribute.data.foreach_get('color', colors)
-        if not np.isfinite(colors).all() or colors.reshape(-1, 4)[:, :3].max() <= 0.0:
-            raise UiError(f'"{item.name}" has no light in its attribute')
-    if {item.name for item in baked_objects()} != meshes:
+    for name, values in colors().items():
+        if not np.isfinite(values).all() or values.reshape(-1, 4)[:, :3].max() <= 0.0:
+            raise UiError(f'"{name}" has no light in its attribute')
+    if colors().keys() != meshes:
         raise UiError("not every mesh has the attribute")
 
 

@@ -52,12 +52,16 @@ class BakeProgress:
         elapsed = time.perf_counter() - self._started
         return elapsed * (1.0 - self.fraction) / self.fraction
 
-    def text(self, state: RunState | None) -> str:
-        """Returns one line for the user: the stage, the noise so far and the time left."""
-        parts = [f"{iface_(STAGE_NAMES[self.stage])} ({100.0 * self.fraction:.0f} %)"]
-        if state is not None and state.noise is not None:
+    def stage_name(self) -> str:
+        """Returns the name of the stage for the user."""
+        return iface_(STAGE_NAMES[self.stage])
+
+    def text(self, state: RunState) -> str:
+        """Returns the finished share, the noise so far and the time left for the user."""
+        parts = [f"{100.0 * self.fraction:.0f} %"]
+        if state.noise is not None:
             parts.append(iface_("noise {:.2g} %").format(100.0 * state.noise))
         left = self.seconds_left()
         if left is not None and left >= 1.0:
-            parts.append(iface_("about {:.0f} s left").format(left))
+            parts.append(iface_("{:.0f} s left").format(left))
         return ", ".join(parts)

@@ -116,8 +116,9 @@ class _Bakes:
         if time.perf_counter() < self._next_draw:
             return
         self._next_draw = time.perf_counter() + _DRAW_SECONDS
+        progress = self._run.progress
         context.workspace.status_text_set(
-            f"{iface_('Bake')}: {self._run.progress.text(self._run.state)}    "
+            f"{progress.stage_name()}: {progress.text(self._run.state)}    "
             f"{iface_('Esc: cancel')}")
         _redraw(context)
 

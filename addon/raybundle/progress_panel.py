@@ -15,10 +15,11 @@ def draw_progress(layout: bpy.types.UILayout) -> bool:
         return False
     text = run.progress.text(run.state)
     column = layout.column(align=True)
+    column.label(text=run.progress.stage_name(), icon='TIME')
     if hasattr(column, 'progress'):  # from Blender 4.0 on
         column.progress(factor=run.progress.fraction, type='BAR', text=text)
     else:
-        column.label(text=text, icon='TIME')
+        column.label(text=text, icon='BLANK1')
     row = column.row(align=True)
     row.operator("raybundle.stop", text="Cancel", icon='CANCEL').keep = False
     kept = row.row(align=True)

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+r"""Prints the table of docs/performance.md about bakes in the background: how long Blender waits.
+
+    blender -b --factory-startup -P blend_tests/interaction.py -- [--runs 5] [--file FILE.blend ...]
+
+Without --file measures office, big_room and a room of 467,000 faces. The columns are, in ms, the
+largest of --runs runs: how long Blender's window stands still for the export of the scene, for one
+showing of interim light, and for the writing of the result; the time from the call to the first
+light in the attributes; and from a stop to its end, in each stage. Drawing is not part of it.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent / "addon"), str(HERE)]
+sys.dont_write_bytecode = True
+
+import command_line  # noqa: E402
+import raybundle  # noqa: E402
+from raybundle import bake_run, native  # noqa: E402
+
+SCENES = HERE.parent / "scenes"
+COLUMNS = ("export", "first light", "showing", "writing", *(f"stop: {s}" for s in native.STAGES))
+# Seconds between two looks at a run, as in the add-on's operator.
+LOOK_SECONDS = 0.03
+# A stop comes at a random time of this length after a stage has begun, s.
+LATEST_STOP = 0.3
+
+
+def make_big_room() -> None:
+    """Makes a room of 10 m with 60 smooth spheres: 467,000 triangles and three lamps."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    place = random.Random(1)
+    bpy.ops.mesh.primitive_cube_add(size=10.0, location=(0.0, 0.0, 5.0))
+    bpy.ops.object.mode_set(mode='EDIT')
+    bpy.ops.mesh.subdivide(number_cuts=31)
+    bpy.ops.mesh.flip_normals()
+    bpy.ops.object.mode_set(mode='OBJECT')
+    for k in range(60):
+        bpy.ops.mesh.primitive_ico_sphere_add(
+            subdivisions=6 if k < 10 else 5, radius=0.3,
+            location=(place.uniform(-4, 4), place.uniform(-4, 4), place.uniform(0.4, 8)))
+        bpy.ops.object.shade_smooth()
+    for x in (-3.0, 0.0, 3.0):
+        bpy.ops.object.light_add(type='POINT', location=(x, 0.0, 9.0))
+        bpy.context.object.data.energy = 500.0
+
+
+def seconds_of(work) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+def first_light() -> Iterator[tuple[str, float]]:
+    """Starts a bake, waits for its first light, and stops it. Yields columns and seconds."""
+    started = time.perf_counter()
+    run = bake_run.BakeRun(bpy.context)
+    yield "export", time.perf_counter() - started
+    while run.advance() and not run.shows_light:
+        time.sleep(LOOK_SECONDS)
+    yield "first light", time.perf_counter() - started
+    if run.state.is_running:
+        yield "showing", seconds_of(lambda: run._interim.show(run._run))
+    run.stop("measured")
+    run.leave()
+
+
+def stop_in(stage: str, delay: float) -> Iterator[tuple[str, float]]:
+    """Starts a bake, and stops it in a stage, `delay` seconds after the stage has begun or in the
+    last look before it ends. Yields columns and seconds."""
+    run = bake_run.BakeRun(bpy.context)
+    stages = native.STAGES
+    while run.advance() and stages.index(run.state.stage) < stages.index(stage):
+        time.sleep(0.001)
+    deadline = time.perf_counter() + delay
+    while run.advance() and run.state.stage == stage and time.perf_counter() < deadline:
+        time.sleep(0.001)
+    if run.state.is_running:
+        yield f"stop: {stage}", seconds_of(lambda: run.stop("measured"))
+    run.leave()
+
+
+def whole_bake() -> Iterator[tuple[str, float]]:
+    yield "writing", raybundle.bake(bpy.context).seconds['write_back']
+
+
+def measure(runs: int) -> dict[str, float]:
+    """Returns the largest number of seconds by column."""
+    largest: dict[str, float] = {}
+    delays = random.Random(2)
+    tries = [first_light for _ in range(runs)]
+    tries += [lambda stage=stage: stop_in(stage, delays.uniform(0.0, LATEST_STOP))
+              for stage in native.STAGES for _ in range(runs)]
+    for attempt in [*tries, whole_bake]:
+        for column, seconds in attempt():
+            largest[column] = max(seconds, largest.get(column, 0.0))
+        # Each run begins anew, as the first one does.
+        bpy.ops.raybundle.clear()
+    return largest
+
+
+def main() -> None:
+    parser = command_line.parser(__file__, __doc__)
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--file", type=Path, nargs="+", default=[])
+    options = parser.parse_args(command_line.arguments())
+    raybundle.register()
+    print(f"| scene | {' | '.join(COLUMNS)} |\n|---|{'---|' * len(COLUMNS)}")
+    for path in options.file or (SCENES / "office.blend", SCENES / "big_room.blend", None):
+        if path is None:
+            make_big_room()
+        else:
+            bpy.ops.wm.open_mainfile(filepath=str(path))
+        largest = measure(options.runs)
+        cells = [f"{1000.0 * largest[column]:.0f}" if column in largest else "-"
+                 for column in COLUMNS]
+        name = path.stem if path is not None else "467,000 faces"
+        print(f"| {name} | {' | '.join(cells)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
