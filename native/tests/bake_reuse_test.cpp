@@ -127,6 +127,39 @@ TEST(Relighting, OneLightIsExactlyScaled) {
     EXPECT_LT(difference(everything(again), everything(fresh)), 1e-5);
 }
 
+// Four lamps, the last of which is at `x` (m), or absent if `x` is not finite.
+Scene roomOfFour(double x) {
+    Scene scene = roomOfThree({1, 1, 1}, {8, 8, 8}, 60);
+    if (std::isfinite(x)) scene.addLight(pointLight({x, 1, 1.5}, {0.5, 0.4, 0.3}));
+    return scene;
+}
+
+TEST(Relighting, GathersOnlyTheLampThatMoved) {
+    Bake again;
+    setQuick(again);
+    again.run(roomOfFour(1));
+    // The lamp moves step by step, goes and comes back. All other lamps stay.
+    for (double x : {1.1, 1.2, 2.5, double(INFINITY), 1.0, 0.4}) {
+        const Scene scene = roomOfFour(x);
+        again.run(scene);
+        const Json report = reportOf(again);
+        const bool isAsKept = !std::isfinite(x) || x == 1;
+        EXPECT_EQ(skips(report, SkippedWork::KEPT_LIGHTS), !isAsKept) << x;
+        EXPECT_EQ(skips(report, SkippedWork::SCALED_LIGHTS), isAsKept) << x;
+        Bake fresh;
+        setQuick(fresh);
+        fresh.run(scene);
+        EXPECT_LT(int(report["shadow_rays"]), int(reportOf(fresh)["shadow_rays"]) / 2) << x;
+        const double stated = reportOf(fresh)["estimated_error"];
+        // Both bakes have the noise that they state. They share the noise of the lines.
+        EXPECT_LT(noise(everything(again), everything(fresh)), stated) << x;
+        EXPECT_NEAR(report["estimated_error"], stated, 0.2 * stated) << x;
+        const Json energy = reportOf(fresh)["energy"];
+        EXPECT_NEAR(report["energy"]["emitted"], energy["emitted"],
+                    1e-3 * double(energy["emitted"]));
+    }
+}
+
 TEST(Relighting, TheSameSceneNeedsNoMoreBundles) {
     // The number of bundles is independent of how many looks at the noise the first bake took.
     for (float target : {0.03f, 0.02f, 0.014f, 0.01f}) {

@@ -34,8 +34,11 @@ FirstShot shootOrKeep(const StageInput& in, const FirstShotInput& input, uint64_
     }
     FirstShot shot = firstShot(in.settings.firstShot, input);
     report.shadowRays += shot.rays;
-    if (shot.bySource && shot.bySource == last.shot.bySource)
-        report.skip(SkippedWork::SCALED_LIGHTS, 1);
+    if (shot.bySource && shot.bySource == last.shot.bySource) {
+        const size_t kept = input.light.lightSources().size() - shot.freshSources;
+        report.skip(shot.freshSources ? SkippedWork::KEPT_LIGHTS : SkippedWork::SCALED_LIGHTS,
+                    kept);
+    }
     if (isGather) last = {hash, aims, shot};
     return shot;
 }
@@ -51,8 +54,7 @@ std::vector<CoarseShot> shootCoarsely(const StageInput& in, Report& report) {
     for (int32_t set = kNoLightSet; set < int32_t(in.scene.lightSets.size()); ++set) {
         const DirectLight direct(in.scene, patches, in.trace.visibilityOfLights(),
                                  uint32_t(in.settings.seed), set, in.settings);
-        CoarseShot shot;
-        shot.gathered.resize(all.size());
+        CoarseShot shot{std::vector<Gathered>(all.size()), {}};
         direct.shootCoarsely(
             shot, all,
             [&](size_t side) {

@@ -70,9 +70,8 @@ DirectLight::DirectLight(const Scene& scene, const Patches& patches, const Visib
       split(std::move(split)) {}
 
 void DirectLight::gatherThese(std::vector<Gathered>& results, const Aims& these,
-                              const std::function<Receiver(size_t)>& receiverAt, Seen& seen,
-                              const std::function<void(double)>& progress, LightBySource* bySource,
-                              std::vector<Sightings>* sightings) const {
+                              const GatherAt& gatherAt,
+                              const std::function<void(double)>& progress) const {
     // Receivers between two calls of `progress`, which may cancel.
     constexpr size_t kSlice = 1 << 14;
     const size_t count = these.receivers.size();
@@ -82,9 +81,7 @@ void DirectLight::gatherThese(std::vector<Gathered>& results, const Aims& these,
             const uint32_t receiver = these.receivers[k];
             Gathered& result = results[receiver];
             const uint64_t before = result.rays;
-            result = gather(receiverAt(receiver), these.aims[k], seen,
-                            bySource ? bySource->of(receiver) : nullptr,
-                            sightings ? &(*sightings)[receiver] : nullptr);
+            result = gatherAt(receiver, these.aims[k]);
             result.rays += before;
         });
     }
@@ -107,8 +104,14 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
     for (uint32_t k : these)
         first.aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples, 1, 0,
                               nullptr, !hasNeighbour[k]});
-    gatherThese(coarse.gathered, first, receiverAt, seen, progress, bySource,
-                coarse.sightings.empty() ? nullptr : &coarse.sightings);
+    gatherThese(
+        coarse.gathered, first,
+        [&](uint32_t receiver, const Aim& aim) {
+            return gather(receiverAt(receiver), aim, seen,
+                          bySource ? bySource->of(receiver) : nullptr,
+                          coarse.sightings.empty() ? nullptr : &coarse.sightings[receiver]);
+        },
+        progress);
     for (size_t k = 0; k < seen.size(); ++k) coarse.seen[k] = coarse.seen[k] || seen[k];
 }
 
@@ -139,11 +142,21 @@ std::vector<Gathered> DirectLight::gather(
 
     Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
     const auto outlooks = lookAround(further, results, receiverAt, std::move(first.sightings));
-    std::vector<Aim> last(neighbours.empty() ? 0 : count);  // per receiver
+    refine(results, std::move(further), {receiverAt, targetError, progress, neighbours},
+           [&](uint32_t receiver, const Aim& aim) {
+               return gather(receiverAt(receiver), aim, seen,
+                             bySource ? bySource->of(receiver) : nullptr, nullptr);
+           });
+    return results;
+}
+
+void DirectLight::refine(std::vector<Gathered>& results, Aims further, const Passes& passes,
+                         const GatherAt& gatherAt) const {
+    const auto& [receiverAt, targetError, progress, neighbours] = passes;
+    std::vector<Aim> last(neighbours.empty() ? 0 : results.size());  // per receiver
     for (int pass = 0; pass < kMostPasses && !further.receivers.empty(); ++pass) {
-        gatherThese(
-            results, further, receiverAt, seen,
-            [&](double done) { progress(pass == 0 ? 0.5 + done : 1.0); }, bySource, nullptr);
+        gatherThese(results, further, gatherAt,
+                    [&, &report = progress](double done) { report(pass == 0 ? 0.5 + done : 1.0); });
         if (neighbours.empty()) break;  // only neighbours can reveal a missed edge of a shadow
         for (size_t k = 0; k < further.receivers.size(); ++k)
             last[further.receivers[k]] = further.aims[k];
@@ -156,7 +169,6 @@ std::vector<Gathered> DirectLight::gather(
         for (size_t k = 0; k < further.receivers.size(); ++k)
             further.aims[k].outlook = last[further.receivers[k]].outlook;
     }
-    return results;
 }
 
 std::array<Outlooks, 2> DirectLight::lookAround(Aims& further, std::vector<Gathered>& results,
@@ -193,14 +205,20 @@ std::array<Outlooks, 2> DirectLight::lookAround(Aims& further, std::vector<Gathe
     return outlooks;
 }
 
-std::vector<Gathered> DirectLight::scale(const LightBySource& before,
-                                         const std::vector<LightBySource::Match>& matches,
-                                         const std::function<Receiver(size_t)>& receiverAt,
-                                         float targetError,
-                                         const std::function<void(double)>& progress) const {
-    std::vector<Gathered> results = before.scaled(matches, [&](size_t source, size_t receiver) {
-        return isUnpowered(source, receiverAt(receiver).side);
-    });
+std::vector<Gathered> DirectLight::gatherFresh(const LightBySource& before,
+                                               const LightBySource::Matches& matches,
+                                               const std::function<Receiver(size_t)>& receiverAt,
+                                               float targetError,
+                                               const std::function<void(double)>& progress,
+                                               const std::vector<ReceiverPair>& neighbours) const {
+    std::vector<Gathered> results =
+        before.scaled(matches.ofKept, [&](size_t source, size_t receiver) {
+            return isUnpowered(source, receiverAt(receiver).side);
+        });
+    Seen seen(sources.size());
+    for (std::atomic<bool>& source : seen) source = true;
+    if (!matches.fresh.empty())
+        addFresh(results, matches.fresh, {receiverAt, targetError, progress, neighbours}, seen);
     // Receivers that already took as many samples as allowed also have a large error. A further
     // pass would not reduce it, so the error is compared with the one before.
     const std::vector<Gathered> then = before.asItWas();
@@ -210,10 +228,50 @@ std::vector<Gathered> DirectLight::scale(const LightBySource& before,
         const float light = brightest(now.irradiance), lightThen = brightest(was.irradiance);
         return now.variance * lightThen * lightThen > kSameError * was.variance * light * light;
     });
-    Seen seen(sources.size());
-    for (std::atomic<bool>& source : seen) source = true;
-    gatherThese(results, further, receiverAt, seen, progress, nullptr, nullptr);
+    gatherThese(
+        results, further,
+        [&](uint32_t receiver, const Aim& aim) {
+            return gather(receiverAt(receiver), aim, seen, nullptr, nullptr);
+        },
+        progress);
     return results;
+}
+
+// The kept light does not say what it was without occluders. The shadows whose edges further passes
+// look for are therefore those of fresh sources alone.
+void DirectLight::addFresh(std::vector<Gathered>& results, const std::vector<size_t>& fresh,
+                           const Passes& passes, Seen& seen) const {
+    const std::vector<Gathered> kept = results;
+    // The errors of several sources add up.
+    const float share = sources.size() > kFewSources
+                            ? std::sqrt(float(fresh.size()) / float(sources.size()))
+                            : 1.0f;
+    auto gatherAt = [&](uint32_t k, const Aim& aim) {
+        const Receiver receiver = passes.receiverAt(k);
+        const ReceiverPlace place(patches, receiver);
+        Aim own = aim;
+        own.tolerance *= share;
+        Gathered result = kept[k];
+        for (size_t source : fresh)
+            result.add(uint32_t(source),
+                       gatherFrom(source, receiver, place, own, seen, nullptr, result),
+                       isUnpowered(source, receiver.side), hash(receiver.seed, uint32_t(source)));
+        return result;
+    };
+    Aims first;
+    const std::vector<bool> hasNeighbour = haveNeighbours(results.size(), passes.neighbours);
+    for (uint32_t k = 0; k < results.size(); ++k) {
+        first.receivers.push_back(k);
+        first.aims.push_back({INFINITY, hasNeighbour[k] ? kNeighbourSamples : kFirstSamples, 1, 0,
+                              nullptr, !hasNeighbour[k]});
+    }
+    gatherThese(results, first, gatherAt, passes.progress);
+    Aims further =
+        aimsAfter(results, patches, passes.receiverAt, passes.neighbours, passes.targetError);
+    further.keep([&](uint32_t k, const Aim& aim) {
+        return aim.besideShadow > 0 || results[k].variance > kSameError * kept[k].variance;
+    });
+    refine(results, std::move(further), passes, gatherAt);
 }
 
 const LightSource* DirectLight::surrounding() const {
@@ -280,10 +338,16 @@ bool DirectLight::isOutOfSight(const LightSource& source, const ReceiverPlace& p
 }
 
 std::vector<PowerShares> DirectLight::powerShares() const {
+    std::vector<size_t> all(sources.size());
+    std::iota(all.begin(), all.end(), size_t(0));
+    return powerShares(all);
+}
+
+std::vector<PowerShares> DirectLight::powerShares(const std::vector<size_t>& these) const {
     std::vector<PowerShares> shares(sources.size());
     if (sources.empty()) return shares;
     const uint32_t rays = std::max(kLeastPowerRays, kPowerRays / uint32_t(sources.size()));
-    for (size_t k = 0; k < sources.size(); ++k) {
+    for (size_t k : these) {
         if (brightest(sources[k]->power()) <= 0 || !sources[k]->castsShadows) continue;
         const uint32_t own = hash(seed, uint32_t(k));
         const SobolPoints points(own);

@@ -42,8 +42,12 @@ struct CoarseShot {
     std::vector<bool> seen;          // per source: whether it lights any receiver
     double bundled = 0;              // estimated irradiance by emission left to the bundles, W/m^2
     // Per receiver: where the samples of a source that surrounds it went. Empty: not kept.
-    std::vector<Sightings> sightings;
+    std::vector<Sightings> sightings = {};
 };
+
+// Number of sources up to which each may have the whole error that a receiver may have, and no
+// weights of the sources are estimated.
+constexpr size_t kFewSources = 4;
 
 struct ReceiverPlace;
 
@@ -87,14 +91,15 @@ class DirectLight {
                                  const std::vector<ReceiverPair>& neighbours = {},
                                  LightBySource* bySource = nullptr) const;
 
-    // Computes the light of sources whose strengths alone have changed, from the light that each
-    // source gave before. Only receivers whose error is too large compared with the present light
-    // are sampled again. `matches` assigns the sources of `before` to the present ones.
-    std::vector<Gathered> scale(const LightBySource& before,
-                                const std::vector<LightBySource::Match>& matches,
-                                const std::function<Receiver(size_t)>& receiverAt,
-                                float targetError,
-                                const std::function<void(double)>& progress) const;
+    // Computes the light from the light that sources gave before, and gathers only that of the
+    // sources that are fresh. Only receivers whose error is too large compared with the present
+    // light are sampled again from all sources. The other arguments are those of gather().
+    std::vector<Gathered> gatherFresh(const LightBySource& before,
+                                      const LightBySource::Matches& matches,
+                                      const std::function<Receiver(size_t)>& receiverAt,
+                                      float targetError,
+                                      const std::function<void(double)>& progress,
+                                      const std::vector<ReceiverPair>& neighbours) const;
 
     // Runs the coarse pass of gather() at the receivers `these`. See gather() for `neighbours` and
     // `bySource`.
@@ -124,8 +129,10 @@ class DirectLight {
     // miss, because a source casts no shadow or the side's own instance does not stop direct light.
     bool hasPassingLight(uint32_t side) const;
 
-    // Estimates by rays from each source which share of its power escapes and which is covered. The
-    // shares of a source without power of its own are 0.
+    // Estimates by rays from each of the given sources which share of its power escapes and which
+    // is covered. The shares of other sources, and of those without power of their own, are 0.
+    std::vector<PowerShares> powerShares(const std::vector<size_t>& these) const;
+    // Returns the shares of all sources.
     std::vector<PowerShares> powerShares() const;
 
   private:
@@ -136,10 +143,26 @@ class DirectLight {
 
     using Seen = std::vector<std::atomic<bool>>;  // per source: whether it lights any receiver
 
-    void gatherThese(std::vector<Gathered>& results, const Aims& these,
-                     const std::function<Receiver(size_t)>& receiverAt, Seen& seen,
-                     const std::function<void(double)>& progress, LightBySource* bySource,
-                     std::vector<Sightings>* sightings) const;
+    // Returns the light at a receiver, given by its index, for an aim.
+    using GatherAt = std::function<Gathered(uint32_t receiver, const Aim& aim)>;
+    // Replaces the results of the receivers `these`. `progress` receives the share of this, 0 to
+    // 0.5.
+    void gatherThese(std::vector<Gathered>& results, const Aims& these, const GatherAt& gatherAt,
+                     const std::function<void(double)>& progress) const;
+    // What further passes need besides the results of the first.
+    struct Passes {
+        const std::function<Receiver(size_t)>& receiverAt;
+        float targetError;
+        const std::function<void(double)>& progress;
+        const std::vector<ReceiverPair>& neighbours;
+    };
+    // Samples the receivers of `further` again, and in further passes their neighbours, as long as
+    // these find edges of shadows.
+    void refine(std::vector<Gathered>& results, Aims further, const Passes& passes,
+                const GatherAt& gatherAt) const;
+    // Adds the light of the sources `fresh` to `results`, which hold the light of all others.
+    void addFresh(std::vector<Gathered>& results, const std::vector<size_t>& fresh,
+                  const Passes& passes, Seen& seen) const;
     // Gathers at one receiver. `parts`, per source, receives the light of each; may be null.
     // `sightings` receives where the samples of the source with parts went; may be null.
     Gathered gather(const Receiver& receiver, const Aim& aim, Seen& seen, LightPart* parts,

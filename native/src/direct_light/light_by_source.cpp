@@ -22,23 +22,35 @@ LightBySource::LightBySource(const std::vector<std::unique_ptr<LightSource>>& so
     parts.resize(receivers * sources.size());
 }
 
-std::optional<std::vector<LightBySource::Match>> LightBySource::match(
+std::optional<LightBySource::Matches> LightBySource::match(
     const std::vector<std::unique_ptr<LightSource>>& now) const {
     if (!isWhole) return std::nullopt;
-    // Each present source is matched with the first free source of equal shape.
-    std::vector<Match> matches(shapes.size());
+    Matches result{std::vector<Match>(shapes.size()), {}};
+    std::vector<Match>& matches = result.ofKept;
     for (size_t source = 0; source < now.size(); ++source) {
+        // Each present source is matched with the first free source of equal shape that gave light
+        // in all its channels.
+        const glm::vec3& strength = now[source]->magnitude;
         size_t k = 0;
-        while (k < shapes.size() && (matches[k].source || shapes[k] != now[source]->shape)) ++k;
-        if (k == shapes.size()) return std::nullopt;
-        matches[k].source = source;
-        for (int c = 0; c < 3; ++c) {
-            if (magnitudes[k][c] > 0)
-                matches[k].factor[c] = now[source]->magnitude[c] / magnitudes[k][c];
-            else if (now[source]->magnitude[c] != 0)
-                return std::nullopt;
+        auto isMatch = [&] {
+            if (matches[k].source || shapes[k] != now[source]->shape) return false;
+            for (int c = 0; c < 3; ++c)
+                if (!(magnitudes[k][c] > 0) && strength[c] != 0) return false;
+            return true;
+        };
+        while (k < shapes.size() && !isMatch()) ++k;
+        if (k == shapes.size()) {
+            // Samples of a source with parts follow what receivers see of it, which is found out
+            // for all receivers together.
+            if (!now[source]->parts().empty()) return std::nullopt;
+            result.fresh.push_back(source);
+            continue;
         }
+        matches[k].source = source;
+        for (int c = 0; c < 3; ++c)
+            if (magnitudes[k][c] > 0) matches[k].factor[c] = strength[c] / magnitudes[k][c];
     }
+    if (2 * result.fresh.size() > now.size()) return std::nullopt;
 
     // Sum over the receivers of the light in the brightest channel, per source.
     std::vector<double> before(matches.size(), 0.0), after(before);
@@ -48,10 +60,13 @@ std::optional<std::vector<LightBySource::Match>> LightBySource::match(
         after[k] += double(brightest(matches[k].factor * parts[i].irradiance));
     }
     const double allBefore = std::accumulate(before.begin(), before.end(), 0.0);
-    const double allAfter = std::accumulate(after.begin(), after.end(), 0.0);
+    double allAfter = std::accumulate(after.begin(), after.end(), 0.0);
+    // Fresh sources are taken for those that are gone: most often a lamp was moved a little.
+    for (size_t k = 0; k < matches.size(); ++k)
+        if (!matches[k].source && !result.fresh.empty()) allAfter += before[k];
     for (size_t k = 0; k < matches.size(); ++k)
         if (after[k] * allBefore > kMostGrowth * before[k] * allAfter) return std::nullopt;
-    return matches;
+    return result;
 }
 
 std::vector<Gathered> LightBySource::asItWas() const {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // The light that each receiver got from each source. Light is proportional to the strength of its
-// source. If only strengths changed since the last bake, the light of each source is scaled instead
-// of gathered again.
+// source. If only the strengths of some sources changed since the last bake, or some were moved,
+// added or removed, the light of the others is kept or scaled instead of gathered again.
 //
 // The number of samples of a source was chosen for the old strengths. Receivers that need more
 // samples with the new strengths are recognised by their error and gathered again, for this bake
@@ -42,10 +42,15 @@ class LightBySource {
         std::optional<size_t> source;
         glm::vec3 factor{0.0f};
     };
-    // Returns the match of each source. Returns nothing if the sources differ by more than their
-    // strengths, or if a source has become a much larger part of the light.
-    std::optional<std::vector<Match>> match(
-        const std::vector<std::unique_ptr<LightSource>>& now) const;
+    struct Matches {
+        std::vector<Match> ofKept;  // per source whose light is kept
+        // Indices of present sources whose light is not: they are new, were moved or were dark.
+        std::vector<size_t> fresh;
+    };
+    // Returns what has become of the sources. Returns nothing if more than half of the present
+    // sources are fresh, if a source with parts is, or if a source has become a much larger part of
+    // the light.
+    std::optional<Matches> match(const std::vector<std::unique_ptr<LightSource>>& now) const;
 
     // Returns the light at all receivers with the present strengths. isUnpowered(source, receiver)
     // takes the index of a present source; see Gathered::unpowered.

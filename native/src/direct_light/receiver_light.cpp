@@ -16,10 +16,8 @@
 namespace raybundle {
 namespace {
 
-// Samples for sources of little weight, and the number of sources up to which no weights are
-// estimated.
+// Samples for sources of little weight.
 constexpr int kFewSamples = 4;
-constexpr size_t kFewSources = 4;
 // A source that gives less than kSmallShare of the light that a receiver could get takes
 // kFewSamples. A source below kMiddleShare takes half as many samples as others.
 constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;

@@ -37,6 +37,8 @@ struct FirstShot {
     std::vector<uint32_t> noisiest;
     std::vector<glm::vec3> emission;                // per side: emission left to the bundles, W/m^2
     std::shared_ptr<const LightBySource> bySource;  // GATHER only: the light of each source
+    // GATHER only: number of sources that were gathered while the light of others was kept.
+    size_t freshSources = 0;
     // Power of the gathered sources, W. Sources without power of their own count with the light
     // that arrives.
     glm::dvec3 emitted{0.0};

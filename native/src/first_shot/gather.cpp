@@ -109,6 +109,27 @@ std::vector<glm::vec3> irradianceOfSides(const std::vector<Gathered>& gathered,
     return irradiance;
 }
 
+// Adds what the gatherers have gathered to the shot, whose vectors have an entry per side.
+void addResults(const std::vector<Gathered>& results, const Patches& patches,
+                const StandIns& standIns, FirstShot& shot) {
+    for (const Gathered& result : results) {
+        shot.rays += result.rays;
+        shot.unblockedSides += result.unblocked;
+        shot.hiddenSides += result.hidden;
+        shot.weakSides += result.weak;
+        shot.insideSides += result.inside;
+    }
+    for (uint32_t side = 0; side < patches.sideCount(); ++side) {
+        const Gathered& result = results[standIns.numberOf(side)];
+        shot.irradiance[side] = result.irradiance;
+        shot.emitted += double(patches.area[patchOf(side)]) * glm::dvec3(result.unpowered);
+        shot.angles[side] = result.meanAngles();
+        if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
+        shot.error[side] = std::sqrt(result.variance);
+        shot.noisiest[side] = result.noisiest;
+    }
+}
+
 }  // namespace
 
 FirstShot gather(const FirstShotInput& input) {
@@ -145,10 +166,15 @@ FirstShot gather(const FirstShotInput& input) {
     std::vector<PowerShares> shares(sources.size());
     std::vector<Gathered> results;
     if (const auto matches = input.before ? input.before->match(sources) : std::nullopt) {
-        results = light.scale(*input.before, *matches, receiverAt, target, report);
+        results =
+            light.gatherFresh(*input.before, *matches, receiverAt, target, report,
+                              matches->fresh.empty() ? std::vector<ReceiverPair>()
+                                                     : neighbouringGatherers(patches, standIns));
         shot.bySource = input.before;
-        for (size_t k = 0; k < matches->size(); ++k)
-            if (const auto source = (*matches)[k].source)
+        shot.freshSources = matches->fresh.size();
+        shares = light.powerShares(matches->fresh);
+        for (size_t k = 0; k < matches->ofKept.size(); ++k)
+            if (const auto source = matches->ofKept[k].source)
                 shares[*source] = input.before->powerShares[k];
     } else {
         auto bySource = std::make_shared<LightBySource>(sources, gatherers.size());
@@ -164,22 +190,7 @@ FirstShot gather(const FirstShotInput& input) {
         shares = bySource->powerShares = light.powerShares();
         shot.bySource = std::move(bySource);
     }
-    for (const Gathered& result : results) {
-        shot.rays += result.rays;
-        shot.unblockedSides += result.unblocked;
-        shot.hiddenSides += result.hidden;
-        shot.weakSides += result.weak;
-        shot.insideSides += result.inside;
-    }
-    for (uint32_t side = 0; side < n; ++side) {
-        const Gathered& result = results[standIns.numberOf(side)];
-        shot.irradiance[side] = result.irradiance;
-        shot.emitted += double(patches.area[patchOf(side)]) * glm::dvec3(result.unpowered);
-        shot.angles[side] = result.meanAngles();
-        if (!shot.incoming.empty()) shot.incoming[side] = result.incoming;
-        shot.error[side] = std::sqrt(result.variance);
-        shot.noisiest[side] = result.noisiest;
-    }
+    addResults(results, patches, standIns, shot);
     shot.sidesByOthers = n - gatherers.size();
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::dvec3 power(sources[k]->power());

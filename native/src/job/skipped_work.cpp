@@ -16,6 +16,9 @@ constexpr SkippedText kTexts[] = {
     {"UNCHANGED_LIGHTS", "first shot", "the lights are unchanged since the last bake"},
     {"SCALED_LIGHTS", "first shot",
      "only the strengths of lights have changed since the last bake; their light was scaled"},
+    {"KEPT_LIGHTS", "first shot",
+     "these lights are as before, or have only changed their strengths; only the others were "
+     "gathered"},
     {"DEGENERATE_FACES", "faces", "their area is zero or no larger than rounding errors"},
     {"SHEETS", "projection of faces",
      "neighbouring faces of equal shape in one plane were projected together"},
