@@ -7,7 +7,7 @@ The user's data is changed only after the native library has computed all of the
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 
@@ -103,9 +103,11 @@ def prepare(context: bpy.types.Context, overrides: dict[str, object]) -> Prepare
                         started, export_seconds)
 
 
-def write_results(context: bpy.types.Context, prepared: PreparedBake) -> BakeReport:
+def write_results(context: bpy.types.Context, prepared: PreparedBake,
+                  warnings: Sequence[str] = ()) -> BakeReport:
     """Writes the light of an executed bake to the meshes, in Object Mode, and returns the report.
-    Raises BakeError, before anything is written, if a target has changed since prepare()."""
+    warnings: further warnings for the report. Raises BakeError, before anything is written, if a
+    target has changed since prepare()."""
     write_started = time.perf_counter()
     native_bake, export = prepared.native_bake, prepared.export
     _check_unchanged(prepared.scene, export, native_bake)
@@ -119,7 +121,7 @@ def write_results(context: bpy.types.Context, prepared: PreparedBake) -> BakeRep
                                 for name, status in export.statuses.items()]
     # The library's warnings come first, because one of lost or created light is the first of them
     # and has to be read before all others.
-    report.add_warnings(export.warnings)
+    report.add_warnings([*warnings, *export.warnings])
     finished = time.perf_counter()
     report.seconds.update(export=prepared.export_seconds, write_back=finished - write_started,
                           total=finished - prepared.started)

@@ -31,13 +31,33 @@ def active() -> BakeRun | None:
     return _active
 
 
+def changes_light(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Returns whether an update changes a lamp, a material, the world or the place of an object.
+    Changes of meshes do not count, because writing light to a mesh is one."""
+    return any(
+        isinstance(update.id, (bpy.types.Light, bpy.types.World, bpy.types.Material,
+                               bpy.types.ShaderNodeTree))
+        or isinstance(update.id, bpy.types.Object) and update.is_updated_transform
+        for update in depsgraph.updates)
+
+
+def make_way() -> None:
+    """Ends the run of live mode, if there is one, before another bake begins."""
+    if _active is not None and _active.is_live:
+        _active.stop("Another bake has begun")
+        _active.leave()
+
+
 class BakeRun:
     """A bake from the export of the scene to the end of the native run."""
 
-    def __init__(self, context: bpy.types.Context) -> None:
+    def __init__(self, context: bpy.types.Context, overrides: dict[str, object] | None = None,
+                 is_live: bool = False) -> None:
         """Exports the context's scene, starts the native run, and makes this the active run.
-        Errors: as in bake()."""
+        is_live: whether live mode has started it; such a run shows no interim light. overrides, and
+        errors: as in bake()."""
         global _active
+        self.is_live = is_live
         last = json.loads(context.scene.raybundle.report or "{}")
         self.progress = BakeProgress(last.get('seconds', {}))
         self.stopped_because = ""  # why the run was stopped, for the user; "": it was not
@@ -45,7 +65,7 @@ class BakeRun:
         self.was_scene_changed = False  # whether lights, materials or places changed meanwhile
         native.load()
         with object_mode(context):
-            self._prepared = prepare(context, {})
+            self._prepared = prepare(context, overrides or {})
         # The run keeps the native scene until it ends.
         with self._prepared.native_scene:
             self._run = native.Run(self._prepared.native_bake, self._prepared.native_scene)
@@ -73,7 +93,8 @@ class BakeRun:
             # By now the light is written and drawn.
             self._next_show = now + (now - self._shown) * (1.0 / _SHOWING_SHARE - 1.0)
             self._shown = None
-        if self.state.interim > 0 and self.state.is_running and now >= self._next_show:
+        if (self.state.interim > 0 and self.state.is_running and now >= self._next_show
+                and not self.is_live):
             self._interim.show(self._run)
             self._shown = now
         return self.state.is_running
@@ -101,18 +122,15 @@ class BakeRun:
         """Writes the result of a run that has ended by itself, and returns the report. Errors: as
         in bake(); the attributes then get back what they held before."""
         self.progress.note('write_back', 0.0)
+        warnings = ["The scene was changed while the bake ran, and the light is that of the scene "
+                    "before: bake again, or relight"] if self.was_scene_changed else []
         try:
             self._run.finish()
             with object_mode(context):
-                report = write_results(context, self._prepared)
+                return write_results(context, self._prepared, warnings)
         except (BakeError, native.RaybundleError):
             self._interim.put_back()
             raise
-        if self.was_scene_changed:
-            report.warnings.insert(0, "The scene was changed while the bake ran, and the light is "
-                                      "that of the scene before: bake again, or relight")
-            self._prepared.scene.raybundle.report = report.to_json()
-        return report
 
     def leave(self) -> None:
         """Ends the run if it goes on, and makes room for the next one."""
@@ -150,13 +168,8 @@ def _before_save(*_arguments: object) -> None:
 
 @persistent
 def _after_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if _active is None:
-        return
-    for update in depsgraph.updates:
-        item = update.id
-        if isinstance(item, (bpy.types.Light, bpy.types.World, bpy.types.Material)) or (
-                isinstance(item, bpy.types.Object) and update.is_updated_transform):
-            _active.was_scene_changed = True
+    if _active is not None and not _active.is_live and changes_light(depsgraph):
+        _active.was_scene_changed = True
 
 
 def _before_exit() -> None:

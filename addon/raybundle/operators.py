@@ -51,6 +51,7 @@ class _Bakes:
     button does, while Blender stays usable."""
 
     def execute(self, context):
+        bake_run.make_way()
         progress = BakeProgress({})
         window_manager = context.window_manager
 
@@ -69,6 +70,7 @@ class _Bakes:
     def invoke(self, context, _event):
         if bpy.app.background or context.window is None:
             return self.execute(context)
+        bake_run.make_way()
         context.window.cursor_modal_set('WAIT')
         try:
             self._run = bake_run.BakeRun(context)
@@ -140,7 +142,8 @@ class _NeedsScene:
 
 def _can_begin(operator: type[bpy.types.Operator]) -> bool:
     """Returns whether no bake is running. Otherwise sets the reason that the button shows."""
-    if bake_run.active() is not None:
+    run = bake_run.active()
+    if run is not None and not run.is_live:
         operator.poll_message_set(tip_("A bake is running"))
         return False
     return True
@@ -211,6 +214,7 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
         return True
 
     def execute(self, context):
+        bake_run.make_way()
         scene = context.scene
         copies = remove_copies(scene)
         meshes = {item.data for item in scene.objects

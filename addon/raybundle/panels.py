@@ -7,7 +7,7 @@ The panel of the last report is in report_panel.py, that of collections in objec
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import native, preferences
+from . import live_light, native, preferences
 from .light_sets import attribute_of
 from .presets import RAYBUNDLE_PT_presets
 from .progress_panel import draw_progress
@@ -59,6 +59,13 @@ def draw_bake(layout: bpy.types.UILayout) -> None:
     row.operator("raybundle.clear", text="", icon='TRASH')
 
 
+def draw_live(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draws the switch of live mode, and why the light does not follow."""
+    layout.prop(context.scene.raybundle, "live", toggle=True, icon='OUTLINER_OB_LIGHT')
+    if context.scene.raybundle.live and live_light.live.message:
+        draw_wrapped(layout.column(), context, live_light.live.message, 'ERROR', 0.0)
+
+
 def changed_methods(settings: bpy.types.PropertyGroup) -> list[str]:
     """Returns the names, as shown, of the settings of the panel Method that differ from their
     defaults."""
@@ -104,6 +111,7 @@ class RAYBUNDLE_PT_render(RaybundleRenderPanel, bpy.types.Panel):
         draw_quality(layout, context.scene)
         if not draw_progress(layout):
             draw_bake(layout)
+            draw_live(layout, context)
         layout.prop(settings, "scope")
         methods = changed_methods(settings)
         if methods and not preferences.studies_methods():
@@ -291,6 +299,7 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
             column.operator("raybundle.bake", text="Bake", icon='LIGHT')
             column.operator("raybundle.relight")
             column.operator("raybundle.clear", text="Clear")
+            draw_live(layout, context)
         layout.operator("raybundle.preview")
 
 

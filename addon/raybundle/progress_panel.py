@@ -9,9 +9,10 @@ from . import bake_run
 
 
 def draw_progress(layout: bpy.types.UILayout) -> bool:
-    """Draws the progress of the running bake. Returns False, and draws nothing, if none runs."""
+    """Draws the progress of the running bake. Returns False, and draws nothing, if none runs, or
+    only one of live mode."""
     run = bake_run.active()
-    if run is None:
+    if run is None or run.is_live:
         return False
     text = run.progress.text(run.state)
     column = layout.column(align=True)

@@ -225,6 +225,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     clamp: BoolProperty(
         name="Clamp", description="Cut written values off at 1, after the exposure is applied",
         default=False)
+    live: BoolProperty(
+        name="Live", default=False,
+        description="While lamps, materials, the world or places of objects change, the light "
+                    "follows: at first a draft, and the light of a bake when changes stop. Changes "
+                    "of the shape of meshes are not followed")
     show_result: BoolProperty(
         name="Show Result", default=True,
         description="While a bake runs and after it, show the baked colours in all 3D views. "

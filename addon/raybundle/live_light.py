@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live mode: the light in the attributes follows lamps, materials, the world and places of objects
+while the user changes them.
+
+While changes come, each update is a draft: few rays and bundles on the lines of the last bake. When
+changes stop, a bake with the settings of the scene replaces the draft. Both run in the background
+(bake_run.py), one at a time. Changes of the shape of meshes are not followed, because writing light
+to a mesh changes the mesh too.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import bake_run, viewport_preview
+from .bake_report import BakeError
+from .native import RaybundleError
+
+# The settings of a draft that differ from those of the scene. With these, a bake takes no more
+# bundles than it has, and sends no rays from noisy surfaces.
+DRAFT = {'target_error': 0.3, 'max_bundles': 64}
+# Seconds without a change after which the draft is replaced, and between two looks of this module
+# while it has something to do and while not.
+_REST_SECONDS, _LOOK_SECONDS, _IDLE_SECONDS = 0.4, 0.01, 0.25
+
+
+class LiveLight:
+    """Starts the bakes of live mode, and writes their light."""
+
+    def __init__(self) -> None:
+        self.drafts = 0  # number of drafts that were written
+        self.message = ""  # why the light does not follow, for the user; "": it does
+        self._run: bake_run.BakeRun | None = None
+        self._is_draft = False  # whether self._run is a draft
+        self._was_on = False
+        self._changes_scene = False  # whether live mode itself is changing the scene
+        self._is_stale = False  # whether something has changed since the last draft began
+        self._is_rough = False  # whether the attributes hold a draft
+        self._last_change = 0.0  # time.perf_counter()
+
+    def note_change(self) -> None:
+        """Notes that the light has changed, unless live mode itself has changed the scene."""
+        if self._changes_scene:
+            return
+        self._is_stale = True
+        self._last_change = time.perf_counter()
+
+    def step(self, context: bpy.types.Context) -> float:
+        """Does what is to be done now. Returns the seconds until the next step."""
+        scene = context.scene
+        is_on = scene is not None and scene.raybundle.live
+        if is_on and not self._was_on:
+            self.note_change()
+        self._was_on = is_on
+        if self._run is not None:
+            self._go_on(context, is_on)
+        # Meshes in Edit Mode can be neither read nor written.
+        if is_on and self._run is None and bake_run.active() is None and context.mode == 'OBJECT':
+            self._begin(context)
+        return _LOOK_SECONDS if is_on and (self._run or self._is_stale or self._is_rough) \
+            else _IDLE_SECONDS
+
+    def _begin(self, context: bpy.types.Context) -> None:
+        rested = time.perf_counter() - self._last_change
+        if not self._is_stale and not (self._is_rough and rested > _REST_SECONDS):
+            return
+        self._is_draft = self._is_stale
+        self._is_stale = False
+        self.message = ""
+        try:
+            with self._own_changes(context):
+                self._run = bake_run.BakeRun(context, DRAFT if self._is_draft else {},
+                                             is_live=True)
+        except (BakeError, RaybundleError) as error:
+            self._fail(error)
+
+    def _go_on(self, context: bpy.types.Context, is_on: bool) -> None:
+        run = self._run
+        if not is_on or self._is_stale and not self._is_draft:
+            run.stop("The light has changed")
+        if run.advance():
+            return
+        self._run = None
+        try:
+            if not run.stopped_because:
+                with self._own_changes(context):
+                    run.finish(context)
+                self._is_rough = self._is_draft
+                self.drafts += self._is_draft
+                if context.scene.raybundle.show_result and context.window_manager.windows:
+                    viewport_preview.show(context.window_manager)
+        except (BakeError, RaybundleError) as error:
+            self._fail(error)
+        finally:
+            run.leave()
+
+    @contextmanager
+    def _own_changes(self, context: bpy.types.Context) -> Iterator[None]:
+        """Changes of the scene in the with block do not count as changes of the light."""
+        self._changes_scene = True
+        try:
+            yield
+            # Blender evaluates and reports the changes now.
+            context.view_layer.update()
+        finally:
+            self._changes_scene = False
+
+    def _fail(self, error: BakeError | RaybundleError) -> None:
+        """Waits for the next change, which may end the cause of the error."""
+        self.message = str(error)
+        self._is_rough = False
+
+
+live = LiveLight()
+
+
+@persistent
+def _after_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if bake_run.changes_light(depsgraph):
+        live.note_change()
+
+
+@persistent
+def _after_load(*_arguments: object) -> None:
+    # A file that is opened does not begin to bake by itself.
+    for scene in bpy.data.scenes:
+        scene.raybundle.live = False
+    live.__init__()
+
+
+def _step() -> float:
+    return live.step(bpy.context)
+
+
+def register() -> None:
+    bpy.app.handlers.depsgraph_update_post.append(_after_update)
+    bpy.app.handlers.load_post.append(_after_load)
+    # Background processes run no timers.
+    if not bpy.app.background:
+        bpy.app.timers.register(_step, first_interval=_IDLE_SECONDS, persistent=True)
+
+
+def unregister() -> None:
+    if bpy.app.timers.is_registered(_step):
+        bpy.app.timers.unregister(_step)
+    bpy.app.handlers.load_post.remove(_after_load)
+    bpy.app.handlers.depsgraph_update_post.remove(_after_update)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live mode. Its timer needs a window; here, tests take its steps themselves."""
+
+import time
+
+import bpy
+import numpy as np
+import pytest
+import raybundle
+from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
+from raybundle import bake_run, live_light
+from surface_error import read_colors
+
+pytestmark = pytest.mark.needs_library
+
+
+@pytest.fixture
+def live():
+    """Live mode, off and without memory of earlier tests."""
+    live_light.live.__init__()
+    yield live_light.live
+    if bake_run.active() is not None:
+        bake_run.active().leave()
+    live_light.live.__init__()
+
+
+@pytest.fixture
+def room(new_object, new_material, new_light):
+    """A room with a block and two lamps."""
+    white = new_material("White", (0.7, 0.7, 0.7))
+    item = new_object("Room", CUBE_VERTICES, [face[::-1] for face in CUBE_FACES], white)
+    new_object("Block", [tuple(0.2 * x for x in v) for v in CUBE_VERTICES], CUBE_FACES, white,
+               (0.3, 0.2, -0.5))
+    new_light("Left", 'POINT', 30.0, (-0.6, 0.0, 0.6))
+    new_light("Right", 'POINT', 10.0, (0.6, 0.1, 0.5))
+    # Few patches, to save time.
+    bpy.context.scene.raybundle.max_patches = 2000
+    bpy.context.scene.raybundle.seed = 1
+    return item
+
+
+def until_at_rest(live, seconds=30.0):
+    """Takes steps until nothing is left to do. Returns the number of drafts meanwhile."""
+    drafts = live.drafts
+    deadline = time.monotonic() + seconds
+    while live.step(bpy.context) != live_light._IDLE_SECONDS:
+        assert time.monotonic() < deadline, "live mode never rests"
+        time.sleep(0.001)
+    return live.drafts - drafts
+
+
+def switch_on(live):
+    bpy.context.scene.raybundle.live = True
+    return until_at_rest(live)
+
+
+def test_the_light_at_rest_is_that_of_a_bake(room, live):
+    assert switch_on(live) == 1
+    light = read_colors(room).copy()
+    report = bpy.context.scene.raybundle.report
+    assert report and live.message == ""
+    raybundle.bake(bpy.context)
+    assert np.allclose(read_colors(room), light, rtol=1e-5, atol=1e-6)
+
+
+def change_power(scene):
+    bpy.data.lights["Left"].energy *= 2.0
+
+
+def change_color(scene):
+    bpy.data.lights["Left"].color = (1.0, 0.2, 0.1)
+
+
+def move_lamp(scene):
+    bpy.data.objects["Right"].location.x = 0.2
+
+
+def move_block(scene):
+    bpy.data.objects["Block"].location.x = -0.3
+
+
+def change_material(scene):
+    node = bpy.data.materials["White"].node_tree.nodes["Diffuse BSDF"]
+    node.inputs['Color'].default_value = (0.3, 0.5, 0.7, 1.0)
+
+
+@pytest.mark.parametrize("change", [change_power, change_color, move_lamp, move_block,
+                                    change_material])
+def test_the_light_follows(room, live, change):
+    switch_on(live)
+    before = read_colors(room)[:, :3].copy()
+    change(bpy.context.scene)
+    bpy.context.view_layer.update()
+    # The draft comes first. Its noise may be 0.3 of the light at the 95th percentile.
+    while not live.drafts - 1:
+        live.step(bpy.context)
+    draft = read_colors(room)[:, :3].copy()
+    assert until_at_rest(live) == 0
+    light = read_colors(room)[:, :3].copy()
+    bpy.ops.raybundle.clear()
+    raybundle.bake(bpy.context)
+    fresh = read_colors(room)[:, :3]
+    scale = fresh.mean()
+    # Both bakes have noise of at most 2 % of the light at the 95th percentile.
+    assert np.percentile(np.abs(light - fresh), 95) < 0.03 * scale
+    assert np.percentile(np.abs(draft - fresh), 95) < 0.3 * scale
+    assert np.abs(light - before).max() > 0.05 * scale
+
+
+@pytest.mark.parametrize("topology", ['KEEP', 'SUBDIVIDE'])
+def test_the_light_that_is_written_is_no_change(room, live, topology):
+    bpy.context.scene.raybundle.topology = topology
+    bpy.context.scene.raybundle.patch_size = 0.3
+    assert switch_on(live) == 1
+    bpy.context.view_layer.update()
+    assert until_at_rest(live) == 0
+    assert bake_run.active() is None
+
+
+def test_it_waits_while_meshes_are_edited(room, live):
+    switch_on(live)
+    bpy.context.view_layer.objects.active = room
+    bpy.ops.object.mode_set(mode='EDIT')
+    change_power(bpy.context.scene)
+    bpy.context.view_layer.update()
+    for _ in range(5):
+        live.step(bpy.context)
+    assert bake_run.active() is None
+    bpy.ops.object.mode_set(mode='OBJECT')
+    assert until_at_rest(live) >= 1
+
+
+def test_a_scene_that_cannot_be_baked_is_said_once(new_light, live):
+    new_light("Lamp", 'POINT', 10.0)
+    switch_on(live)
+    assert "Nothing to bake" in live.message
+
+
+def test_switched_off_it_leaves_the_light_alone(room, live):
+    switch_on(live)
+    bpy.context.scene.raybundle.live = False
+    light = read_colors(room).copy()
+    change_power(bpy.context.scene)
+    bpy.context.view_layer.update()
+    assert until_at_rest(live) == 0
+    assert np.array_equal(read_colors(room), light)
+
+
+def test_a_bake_ends_the_run_of_live_mode(closed_box, live):
+    settings = bpy.context.scene.raybundle
+    settings.skips_off, settings.max_bundles, settings.live = {'bundles'}, 2 ** 24, True
+    while bake_run.active() is None or live._is_draft:
+        live.step(bpy.context)
+    settings.skips_off, settings.max_bundles = set(), 128
+    assert bpy.ops.raybundle.bake.poll()
+    assert bpy.ops.raybundle.bake() == {'FINISHED'}
+    assert np.allclose(read_colors(closed_box)[:, :3], FURNACE_LIGHT, rtol=1e-3)
+    until_at_rest(live)
+
+
+def test_a_file_that_is_opened_begins_no_bake(room, live, tmp_path):
+    bpy.context.scene.raybundle.live = True
+    path = str(tmp_path / "live.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert not bpy.context.scene.raybundle.live
+    assert until_at_rest(live) == 0
