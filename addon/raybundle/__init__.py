@@ -9,8 +9,9 @@ import atexit
 
 import bpy
 
-from . import (bake_cache, bake_run, error_view, live_light, menus, object_roles, operators, panels,
-               preferences, presets, properties, report_panel, report_remedies, translations)
+from . import (bake_cache, bake_run, error_view, export_operators, export_panels, live_light, menus,
+               object_roles, operators, panels, preferences, presets, properties, report_panel,
+               report_remedies, translations)
 from .bake import bake
 from .bake_report import BakeError, BakeReport
 from .native import RaybundleError
@@ -29,7 +30,8 @@ bl_info = {
 
 # In the order of registration: panels refer to operators and properties.
 _MODULES = (translations, preferences, properties, bake_cache, bake_run, live_light, operators,
-            report_remedies, error_view, object_roles, presets, panels, report_panel, menus)
+            export_operators, report_remedies, error_view, object_roles, presets, panels,
+            report_panel, export_panels, menus)
 
 
 def register() -> None:

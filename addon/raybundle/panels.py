@@ -307,7 +307,7 @@ register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_PT_render,
     RAYBUNDLE_OT_reset_methods,
     RAYBUNDLE_OT_use_preferences,
-    # In the order of bl_order. 20 is left to a panel about the use of the result.
+    # In the order of bl_order. 20 is that of export_panels.py.
     RAYBUNDLE_PT_output,
     RAYBUNDLE_PT_quality,
     RAYBUNDLE_PT_limits,

@@ -16,6 +16,7 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
                        PointerProperty, StringProperty)
 
 from . import preferences, quality
+from .engine_presets import ENUM_ENGINE, apply_preset
 
 enum_scope = (
     ('VISIBLE', "Visible", "Bake all objects that are visible in the viewport and in renders"),
@@ -167,9 +168,56 @@ enum_side = (
      "point outward"),
 )
 
+enum_shown_as = (
+    ('AUTO', "Automatic", "Combined as Light Alone, other outputs as Light Times Colour"),
+    ('EMISSION', "Light Alone",
+     "Unlit: the camera sees the attribute itself. For the output Combined"),
+    ('COLORED', "Light Times Colour",
+     "Unlit: the camera sees the attribute times the colour of the surface. For Lighting, Direct "
+     "and Indirect"),
+    ('FACTOR', "Factor on Colour",
+     "The attribute multiplies the colour of the surface, which lamps go on to light. Hide the "
+     "lamps that were baked, or their light counts twice"),
+)
+
+enum_export_format = (
+    ('SHORT', "16 Bits", "65,536 levels from 0 to 1: no visible steps"),
+    ('BYTE', "8 Bits", "256 linear levels from 0 to 1: the smallest file, steps in the dark"),
+    ('FLOAT', "Floats", "The values themselves, in the largest file; not all engines read them"),
+)
+
+enum_channel = (
+    ('NONE', "Empty", "0, and 1 in alpha"),
+    ('LIGHTING', "Lighting", "Light on a white surface"),
+    ('DIRECT', "Direct",
+     "The part of Lighting that comes straight from lights, emission and world"),
+    ('INDIRECT', "Indirect", "The part of Lighting that other surfaces have reflected"),
+    ('COMBINED', "Combined", "Emission and reflected light with the material's colour"),
+    ('AO', "Ambient Occlusion",
+     "The share of a white sky that a surface sees: 1 in the open, 0 in closed rooms"),
+    ('SET_1', "Light Set 1", "Lighting of the first light set"),
+    ('SET_2', "Light Set 2", "Lighting of the second light set"),
+    ('SET_3', "Light Set 3", "Lighting of the third light set"),
+    ('SET_4', "Light Set 4", "Lighting of the fourth light set"),
+)
+
+enum_export_range = (
+    ('AUTO', "Automatic",
+     "If light is brighter than 1, all light is divided by the largest value. The scale is in the "
+     "file's extras, by which the engine multiplies it again"),
+    ('FULL', "Full",
+     "All light is divided by the largest value, which becomes 1: the finest steps. The scale is "
+     "in the file's extras, by which the engine multiplies it again"),
+    ('KEEP', "Unchanged", "Light is not scaled; 8 and 16 bits cut it off at 1"),
+)
+
 
 def _is_mesh_object(_self: bpy.types.PropertyGroup, item: bpy.types.Object) -> bool:
     return item.type == 'MESH'
+
+
+def _apply_engine(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    apply_preset(settings, settings.engine)
 
 
 class RaybundleLightSet(bpy.types.PropertyGroup):
@@ -339,6 +387,38 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         name="Report", description="The report of the last bake, as JSON")
     last_surfaces: StringProperty(
         name="Last Surfaces", description="The surfaces of the materials in the last bake, as JSON",
+        options={'HIDDEN'})
+    # How baked light is shown in materials and exported.
+    engine: EnumProperty(
+        name="For", description="Where the light is shown: sets what is baked and exported so that "
+                                "it arrives there unchanged",
+        items=ENUM_ENGINE, default='BLENDER',
+        update=_apply_engine)
+    shown_as: EnumProperty(
+        name="Show As", description="How Use in Material shows the light", items=enum_shown_as,
+        default='AUTO')
+    export_format: EnumProperty(
+        name="Format", description="How the export stores light", items=enum_export_format,
+        default='SHORT')
+    export_range: EnumProperty(
+        name="Range", description="How the export fits light into the range 0 to 1 of glTF",
+        items=enum_export_range, default='AUTO')
+    channel_r: EnumProperty(
+        name="Red", description="Part of the light that Bake Channels writes to the red channel",
+        items=enum_channel, default='DIRECT')
+    channel_g: EnumProperty(
+        name="Green",
+        description="Part of the light that Bake Channels writes to the green channel",
+        items=enum_channel, default='INDIRECT')
+    channel_b: EnumProperty(
+        name="Blue", description="Part of the light that Bake Channels writes to the blue channel",
+        items=enum_channel, default='AO')
+    channel_a: EnumProperty(
+        name="Alpha",
+        description="Part of the light that Bake Channels writes to the alpha channel",
+        items=enum_channel, default='NONE')
+    export_check: StringProperty(
+        name="Export Check", description="What the last check of the export has found, as JSON",
         options={'HIDDEN'})
 
 

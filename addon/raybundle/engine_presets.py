@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a bake and an export write for Blender itself and for each engine.
+
+Engines show vertex colours best as LIGHTING, the light on a white surface: the glTF material
+multiplies it by the surface's colour and image. Blender 3.4's exporter mixes up the values of face
+corners (fixed in 3.5), so that light is baked to vertices there. Floats keep light above 1; the
+range is found by the export (gltf_export.py).
+"""
+
+from __future__ import annotations
+
+import bpy
+
+# Whether Blender's own exporter writes the values of face corners in their places.
+EXPORTS_CORNERS = bpy.app.version >= (3, 5, 0)
+
+_EXPORTED = {'output': 'LIGHTING', 'domain': 'CORNER' if EXPORTS_CORNERS else 'POINT',
+             'data_type': 'FLOAT_COLOR', 'exposure': 0.0, 'clamp': False,
+             'export_format': 'SHORT', 'export_range': 'AUTO'}
+
+PRESETS: dict[str, dict[str, object]] = {
+    'BLENDER': {**_EXPORTED, 'domain': 'CORNER'},
+    'GLTF': _EXPORTED,
+    # Godot stores 8 bits per channel in its meshes, of which the full range keeps most.
+    'GODOT': {**_EXPORTED, 'export_format': 'BYTE', 'export_range': 'FULL'},
+    'UNITY': _EXPORTED,
+    'THREE': _EXPORTED,
+}
+
+_CORNERS = "a value per face corner" if EXPORTS_CORNERS else \
+    "a value per vertex, because Blender's exporter before 3.5 mixes up face corners"
+_SETS = f"Lighting, {_CORNERS}, as floats without exposure or cut"
+
+# Items of the property `engine`. Files store positions: add at the end.
+ENUM_ENGINE = (
+    ('BLENDER', "Blender",
+     "For renders in Blender. Sets Lighting, a value per face corner, as floats without exposure "
+     "or cut, because nothing is lost in Blender"),
+    ('GLTF', "glTF",
+     f"For any program that reads glTF. Sets {_SETS}; the export writes 16 bits and scales light "
+     f"above 1 down, because glTF allows 0 to 1"),
+    ('GODOT', "Godot",
+     f"For Godot. Sets {_SETS}; the export writes 8 bits and scales the largest value to 1, "
+     f"because Godot keeps 8 bits per channel"),
+    ('UNITY', "Unity",
+     f"For Unity. Sets {_SETS}; the export writes 16 bits and scales light above 1 down, because "
+     f"glTF allows 0 to 1"),
+    ('THREE', "three.js",
+     f"For web pages with three.js. Sets {_SETS}; the export writes 16 bits and scales light above "
+     f"1 down, because glTF allows 0 to 1"),
+)
+
+
+def apply_preset(settings: bpy.types.PropertyGroup, engine: str) -> None:
+    """Sets the settings of scene.raybundle that an engine (a key of PRESETS) needs."""
+    for name, value in PRESETS[engine].items():
+        setattr(settings, name, value)

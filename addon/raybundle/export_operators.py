@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators that show baked light in materials, export it, and check exports."""
+
+import json
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from . import gltf_export, light_in_material
+from .bake_report import BakeError
+from .channel_bake import bake_channels, why_not
+from .export_check import check
+from .gltf_export import ExportError, ExportSettings
+from .native import RaybundleError
+from .properties import enum_export_format, enum_export_range, enum_shown_as
+
+enum_surface_color = (
+    ('AUTO', "Automatic", "Without colour for the output Combined, with colour for others"),
+    ('WITH', "With Colour", "The light is multiplied by the colour of the surface"),
+    ('WITHOUT', "Without", "The light alone is shown"),
+)
+
+
+class _NeedsObjectMode:
+    """Mixin of operators that need a scene in Object Mode."""
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None and context.mode == 'OBJECT'
+
+
+class _NeedsLight(_NeedsObjectMode):
+    """Mixin of operators that need an object with baked light."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        attribute = context.scene.raybundle.attribute
+        if not any(item.type == 'MESH' and attribute in item.data.color_attributes
+                   for item in context.scene.objects):
+            cls.poll_message_set(f'No object has the attribute "{attribute}": bake first')
+            return False
+        return True
+
+
+class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
+    """Show the baked light in the materials of the baked objects, in Eevee and Cycles. Nodes are
+    added beside the material's own; Take Out of Material removes them"""
+    bl_idname = "raybundle.use_in_material"
+    bl_label = "Use in Material"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    way: EnumProperty(name="Show As", description="How the light is shown", items=enum_shown_as)
+
+    def invoke(self, context, event):
+        self.way = context.scene.raybundle.shown_as
+        return self.execute(context)
+
+    def execute(self, context):
+        settings = context.scene.raybundle
+        way = self.way if self.properties.is_property_set('way') else settings.shown_as
+        if way == 'AUTO':
+            way = light_in_material.way_for(settings.output)
+        report = light_in_material.use(context.scene, settings.attribute, way)
+        for warning in report.warnings:
+            self.report({'WARNING'}, warning)
+        self.report({'INFO'}, f'Materials that show "{settings.attribute}": '
+                              f'{len(report.materials)}')
+        return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_take_out_of_material(_NeedsObjectMode, bpy.types.Operator):
+    """Remove the nodes of Use in Material from all materials of the file, which are then as they
+    were before"""
+    bl_idname = "raybundle.take_out_of_material"
+    bl_label = "Take Out of Material"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def execute(self, context):
+        self.report({'INFO'}, f"Materials restored: {light_in_material.take_out()}")
+        return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
+    """Export the visible objects with their baked light in one binary glTF file, as vertex colours
+    of unlit materials. The scene stays as it is"""
+    bl_idname = "raybundle.export_gltf"
+    bl_label = "Export glTF"
+
+    filepath: StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
+    filter_glob: StringProperty(default="*.glb", options={'HIDDEN'})
+    check_existing: BoolProperty(default=True, options={'HIDDEN'})
+    format: EnumProperty(name="Format", description="How the light is stored",
+                         items=enum_export_format)
+    range: EnumProperty(name="Range", description="How light is fitted into the range 0 to 1",
+                        items=enum_export_range)
+    surface_color: EnumProperty(
+        name="Surface", description="Whether the colour of the surface multiplies the light",
+        items=enum_surface_color)
+    apply_modifiers: BoolProperty(
+        name="Apply Modifiers", description="Export the shapes that modifiers make. Shape keys are "
+                                            "then left out", default=True)
+    selected: BoolProperty(
+        name="Selected Only", description="Export the selected objects only", default=False)
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not gltf_export.exporter_options():
+            cls.poll_message_set('Enable the add-on "glTF 2.0 format" in the preferences')
+            return False
+        return True
+
+    def invoke(self, context, event):
+        settings = context.scene.raybundle
+        self.format, self.range = settings.export_format, settings.export_range
+        if not self.filepath:
+            name = bpy.data.filepath or str(Path.home() / "untitled")
+            self.filepath = str(Path(name).with_suffix(".glb"))
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        for name in ("format", "range", "surface_color", "apply_modifiers", "selected"):
+            self.layout.prop(self, name)
+
+    def execute(self, context):
+        settings = context.scene.raybundle
+        is_set = self.properties.is_property_set
+        with_color = settings.output != 'COMBINED' if self.surface_color == 'AUTO' \
+            else self.surface_color == 'WITH'
+        path = Path(bpy.path.abspath(self.filepath)).with_suffix(".glb")
+        try:
+            report = gltf_export.export(context, path, ExportSettings(
+                settings.attribute, with_color,
+                self.format if is_set('format') else settings.export_format,
+                self.range if is_set('range') else settings.export_range,
+                self.apply_modifiers, self.selected))
+        except ExportError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        for warning in report.warnings:
+            self.report({'WARNING'}, warning)
+        self.report({'INFO'}, report.summary())
+        return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_bake_channels(_NeedsObjectMode, bpy.types.Operator):
+    """Bake several parts of the light, such as direct light and ambient occlusion, as luminance
+    into the red, green, blue and alpha channel of one attribute"""
+    bl_idname = "raybundle.bake_channels"
+    bl_label = "Bake Channels"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if reason := why_not(context.scene):
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context):
+        try:
+            report = bake_channels(context)
+        except (BakeError, RaybundleError) as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        for warning in report.warnings:
+            self.report({'WARNING'}, warning)
+        self.report({'INFO'}, f'Channels of "{context.scene.raybundle.attribute}" written')
+        return {'FINISHED'}
+
+
+class RAYBUNDLE_OT_check_export(_NeedsObjectMode, bpy.types.Operator):
+    """Say what Blender's own glTF exporter, with its default options, would lose or change of the
+    baked light, and what to do"""
+    bl_idname = "raybundle.check_export"
+    bl_label = "Check Export"
+
+    def execute(self, context):
+        lines = [finding.text() for finding in check(context.scene)]
+        context.scene.raybundle.export_check = json.dumps(lines)
+        for line in lines:
+            self.report({'WARNING'}, line)
+        if not lines:
+            self.report({'INFO'}, "Blender's glTF exporter keeps the light as it is")
+        return {'FINISHED'}
+
+
+register, unregister = bpy.utils.register_classes_factory((
+    RAYBUNDLE_OT_use_in_material,
+    RAYBUNDLE_OT_take_out_of_material,
+    RAYBUNDLE_OT_export_gltf,
+    RAYBUNDLE_OT_bake_channels,
+    RAYBUNDLE_OT_check_export,
+))
