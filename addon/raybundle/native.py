@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import library_file
 from .surface_data import SurfaceData
 
 ABI_VERSION = 3
@@ -236,8 +237,8 @@ def library_path() -> Path:
 
 def load() -> ctypes.CDLL:
     """Returns the library, which is loaded at the first call. Raises RaybundleError with code
-    INVALID_OPERATION if the library is missing, cannot be loaded or has another version of the
-    interface."""
+    INVALID_OPERATION if the library is missing, is damaged, cannot be loaded or has another version
+    of the interface."""
     global _library
     if _library is not None:
         return _library
@@ -249,6 +250,12 @@ def load() -> ctypes.CDLL:
             f"'cmake --preset release && cmake --build --preset release', or install the add-on "
             f"from a release for this platform")
     try:
+        damage = library_file.damage(path)
+        if damage:
+            raise RaybundleError(
+                ErrorCode.INVALID_OPERATION,
+                f"The native library is damaged: {path} ({damage}). Install the add-on again from "
+                f"its zip, or build the library again")
         library = ctypes.CDLL(str(path))
         library.rb_get_abi_version.restype = _int
         version = library.rb_get_abi_version()
