@@ -5,6 +5,10 @@
 #include <atomic>
 #include <cstring>
 
+#if defined(__x86_64__) && defined(__SSE4_2__)
+#include <cpuid.h>
+#endif
+
 namespace {
 
 // A plain array instead of a string, because memory may have run out when a message is stored:
@@ -34,8 +38,13 @@ void makeRoomForMessage() noexcept {
 
 void needProcessor() {
 #if defined(__x86_64__) && defined(__SSE4_2__)
-    static const bool isEnough =
-        __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
+    // Asks the processor and not __builtin_cpu_supports, which needs a function of the compiler's
+    // library that fills in its answers before. Zig's compiler has none: it always answers no.
+    static const bool isEnough = [] {
+        unsigned a, b, features, d;
+        return __get_cpuid(1, &a, &b, &features, &d) && (features & bit_SSE4_2) &&
+               (features & bit_POPCNT);
+    }();
     if (!isEnough)
         throw Error(RB_ERROR_UNSUPPORTED_HARDWARE,
                     "this processor does not support SSE 4.2 and POPCNT, which Raybundle requires");

@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "visibility/embree3.h"
 
+#ifndef EMBREE_STATIC_LIB
 #include <dlfcn.h>
+#endif
 
 namespace raybundle {
 namespace {
 
 // Looks up a function in the shared library of Embree 3, which is loaded together with this
-// library. Returns `linked` if Embree is linked statically.
+// library. If Embree is linked statically, its functions are hidden, so that `linked` is the right
+// one whatever else the process has loaded, another Embree 3 included.
 template <class Function>
-Function find(const char* name, Function linked) {
+Function find([[maybe_unused]] const char* name, Function linked) {
+#ifndef EMBREE_STATIC_LIB
     static void* const library = dlopen("libembree3.so.3", RTLD_LAZY | RTLD_NOLOAD);
-    void* found = library ? dlsym(library, name) : nullptr;
-    return found ? reinterpret_cast<Function>(found) : linked;
+    if (void* found = library ? dlsym(library, name) : nullptr)
+        return reinterpret_cast<Function>(found);
+#endif
+    return linked;
 }
 
 }  // namespace
