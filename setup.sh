@@ -9,6 +9,8 @@ test_packages=(libgtest-dev librapidcheck-dev python3-pytest python3-matplotlib 
     libegl-mesa0)
 # Clang with its sanitizers, and LLVM, which adds line numbers to their reports.
 sanitizer_packages=(clang libclang-rt-14-dev llvm)
+# The zip of the add-on is built by a compiler from Python's package index, from sources of libraries.
+zip_packages=(cmake ninja-build binutils python3-venv dpkg-dev patch xz-utils bzip2)
 
 # require_packages PACKAGE ...: installs Debian packages that are missing, as root or with sudo. Without these rights
 # prints the command that installs them and exits.
@@ -31,6 +33,27 @@ require_packages() {
     "${as_root[@]}" apt-get update -q >/dev/null
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
         apt-get install -q -y --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+# fetch_source PACKAGE FOLDER: unpacks the source of a library into FOLDER. Downloads it as the source of a Debian
+# package, from the servers that this machine gets its packages from. It must have the name and the SHA-256 that
+# native/packaging/SOURCES lists. Returns 1 if it cannot be had.
+fetch_source() {
+    local pinned=$PWD/native/packaging/SOURCES folder=$PWD/build/sources list archive
+    local apt=(apt-get -q -o Dir::Etc::sourcelist=/dev/null -o "Dir::Etc::sourceparts=$folder/servers"
+        -o "Dir::State::lists=$folder/lists")
+    archive=$(grep -o " $1_.*" "$pinned")
+    archive=${archive# }
+    mkdir -p "$folder/servers" "$folder/lists" "$2"
+    if [ ! -e "$folder/$archive" ]; then
+        sed -n 's/^deb /deb-src /p' /etc/apt/sources.list >"$folder/servers/list.list" 2>/dev/null || true
+        for list in /etc/apt/sources.list.d/*.sources; do
+            [ ! -e "$list" ] || sed 's/^Types:.*/Types: deb-src/' "$list" >"$folder/servers/$(basename "$list")"
+        done
+        "${apt[@]}" update && (cd "$folder" && "${apt[@]}" source --download-only --tar-only "$1") || return 1
+    fi
+    (cd "$folder" && grep " $archive\$" "$pinned" | sha256sum --check --quiet) || return 1
+    tar -xf "$folder/$archive" -C "$2" --strip-components=1
 }
 
 # Sets the variable blender to the program that BLENDER names, or else to the first Blender on the caller's PATH. Then
