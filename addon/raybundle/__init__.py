@@ -6,15 +6,22 @@ RaybundleError.
 """
 
 import atexit
+import sys
 
 import bpy
 
-from . import (bake_cache, bake_run, error_view, export_operators, export_panels, live_light, menus,
-               object_roles, operators, panels, preferences, presets, properties, report_panel,
-               report_remedies, translations)
-from .bake import bake
-from .bake_report import BakeError, BakeReport
-from .native import RaybundleError
+# After an update in the same session, Blender before 4.2 runs only this file again. Forget the
+# other modules, which are those of the old version, and their names here.
+for _name in [name for name in sys.modules if name.startswith(f"{__name__}.")]:
+    del sys.modules[_name]
+    globals().pop(_name[len(__name__) + 1:], None)
+
+from . import (bake_cache, bake_run, error_view, export_operators, export_panels,  # noqa: E402
+               live_light, menus, object_roles, operators, panels, preferences, presets,
+               properties, report_panel, report_remedies, translations)
+from .bake import bake  # noqa: E402
+from .bake_report import BakeError, BakeReport  # noqa: E402
+from .native import RaybundleError  # noqa: E402
 
 __all__ = ('BakeError', 'BakeReport', 'RaybundleError', 'bake', 'register', 'unregister')
 
@@ -45,5 +52,8 @@ def register() -> None:
 
 def unregister() -> None:
     atexit.unregister(unregister)
+    # Blender as a Python module also disables its add-ons when Python ends, after the above.
+    if not hasattr(bpy.types.Scene, "raybundle"):
+        return
     for module in reversed(_MODULES):
         module.unregister()
