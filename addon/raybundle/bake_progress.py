@@ -12,11 +12,6 @@ from .native import RunState
 # The usual share of each stage in the time of a bake, for scenes that were not baked before.
 _USUAL_SHARES = {'export': 0.05, 'patches': 0.05, 'first_shot': 0.2, 'bundles': 0.25, 'solve': 0.4,
                  'reconstruction': 0.03, 'write_back': 0.02}
-# What the user reads of each stage.
-STAGE_NAMES = {'export': "Reading the scene", 'patches': "Dividing faces into patches",
-               'first_shot': "Direct light", 'bundles': "Reflected light",
-               'solve': "Reflected light", 'reconstruction': "Light at the corners",
-               'write_back': "Writing the attributes"}
 # No time is foretold before this share of the bake, and none for bakes of less than a second.
 _LEAST_FRACTION = 0.05
 
@@ -54,7 +49,12 @@ class BakeProgress:
 
     def stage_name(self) -> str:
         """Returns the name of the stage for the user."""
-        return iface_(STAGE_NAMES[self.stage])
+        return {'export': iface_("Reading the scene"),
+                'patches': iface_("Dividing faces into patches"),
+                'first_shot': iface_("Direct light"), 'bundles': iface_("Reflected light"),
+                'solve': iface_("Reflected light"),
+                'reconstruction': iface_("Light at the corners"),
+                'write_back': iface_("Writing the attributes")}[self.stage]
 
     def text(self, state: RunState) -> str:
         """Returns the finished share, the noise so far and the time left for the user."""
