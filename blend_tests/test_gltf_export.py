@@ -463,6 +463,11 @@ def test_the_operator_takes_the_settings_of_the_scene(cube, tmp_path):
     assert document['materials'][0]['pbrMetallicRoughness'].get('baseColorFactor') != [1, 1, 1, 1]
 
 
+def test_a_name_with_a_dot_keeps_it(cube, tmp_path):
+    bpy.ops.raybundle.export_gltf(filepath=str(tmp_path / "room.v2"))
+    assert [path.name for path in tmp_path.iterdir()] == ["room.v2.glb"]
+
+
 def test_the_operator_reports_errors(tmp_path):
     with pytest.raises(RuntimeError, match="bake first"):
         bpy.ops.raybundle.export_gltf(filepath=str(tmp_path / "empty.glb"))

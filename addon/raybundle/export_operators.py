@@ -123,6 +123,13 @@ class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {'RUNNING_MODAL'}
 
+    def check(self, context):
+        # The file browser asks before it overwrites the file that this name stands for.
+        filepath = bpy.path.ensure_ext(self.filepath, ".glb")
+        is_changed = filepath != self.filepath
+        self.filepath = filepath
+        return is_changed
+
     def draw(self, context):
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
@@ -134,7 +141,7 @@ class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
         is_set = self.properties.is_property_set
         with_color = settings.output != 'COMBINED' if self.surface_color == 'AUTO' \
             else self.surface_color == 'WITH'
-        path = Path(bpy.path.abspath(self.filepath)).with_suffix(".glb")
+        path = Path(bpy.path.abspath(bpy.path.ensure_ext(self.filepath, ".glb")))
         try:
             report = gltf_export.export(context, path, ExportSettings(
                 settings.attribute, with_color,
