@@ -202,6 +202,28 @@ def test_extras_undo_the_scale(cube, tmp_path):
         assert np.abs(light - value).min() <= HALF_QUANTUM['SHORT'] * 6.0 + 1e-6
 
 
+@pytest.mark.skipif(bpy.app.version < (4, 0, 0),
+                    reason="the importer of 3.4 does not run with NumPy 1.24")
+@pytest.mark.parametrize("kind", ['SHORT', 'BYTE', 'FLOAT'])
+def test_blender_reads_the_file(cube, tmp_path, kind):
+    """Blender's importer is another reader of the file: it finds the light and unlit materials."""
+    export(tmp_path / "cube.glb", format=kind)
+    expected = [corner_light(cube)[0], corner_light(cube)[2]]
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.import_scene.gltf(filepath=str(tmp_path / "cube.glb"))
+    mesh = bpy.data.objects["Cube"].data
+    [attribute] = mesh.color_attributes
+    positions, _, colors = corner_light(bpy.data.objects["Cube"], attribute.name)
+    # The importer stores 8 bits as sRGB, of which half a step is 0.0046 at most.
+    assert attribute.data_type == 'BYTE_COLOR'
+    tolerance = 1.001 * HALF_QUANTUM[kind] + 0.0046
+    for position, color in zip(*expected):
+        same = np.abs(positions - position).max(axis=1) < 1e-5
+        assert np.abs(colors[same] - color).max(axis=1).min() <= tolerance
+    for material in mesh.materials:
+        assert any(node.type == 'LIGHT_PATH' for node in material.node_tree.nodes)
+
+
 def test_alpha_is_kept(cube, tmp_path):
     cube.data.color_attributes.remove(cube.data.color_attributes["Radiosity"])
     paint(cube, alpha=0.25)
