@@ -243,4 +243,11 @@ def test_nothing_is_baked_and_no_exporter(cube, monkeypatch):
 
 def test_the_operator_keeps_what_it_found_for_the_panel(cube):
     assert bpy.ops.raybundle.check_export() == {'FINISHED'}
-    assert "bake first" in bpy.context.scene.raybundle.export_check
+    settings = bpy.context.scene.raybundle
+    assert "bake first" in settings.export_check
+    # What the panel shows follows the buttons beside it.
+    paint(cube, domain='POINT')
+    bpy.ops.raybundle.use_in_material()
+    assert settings.export_check == "[]"
+    bpy.ops.raybundle.take_out_of_material()
+    assert "not unlit" in settings.export_check

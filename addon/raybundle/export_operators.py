@@ -45,6 +45,19 @@ class _NeedsLight(_NeedsObjectMode):
         return True
 
 
+def _check(scene: bpy.types.Scene) -> list[str]:
+    """Returns what the check of exports finds, one line each, and keeps it for the panel."""
+    lines = [finding.text() for finding in check(scene)]
+    scene.raybundle.export_check = json.dumps(lines)
+    return lines
+
+
+def _check_again(scene: bpy.types.Scene) -> None:
+    """Updates what the panel shows of an earlier check."""
+    if scene.raybundle.export_check:
+        _check(scene)
+
+
 class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
     """Show the baked light in the materials of the baked objects, in Eevee and Cycles. Nodes are
     added beside the material's own; Take Out of Material removes them"""
@@ -64,6 +77,7 @@ class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
         if way == 'AUTO':
             way = light_in_material.way_for(settings.output)
         report = light_in_material.use(context.scene, settings.attribute, way)
+        _check_again(context.scene)
         for warning in report.warnings:
             self.report({'WARNING'}, warning)
         self.report({'INFO'}, f'Materials that show "{settings.attribute}": '
@@ -80,6 +94,7 @@ class RAYBUNDLE_OT_take_out_of_material(_NeedsObjectMode, bpy.types.Operator):
 
     def execute(self, context):
         self.report({'INFO'}, f"Materials restored: {light_in_material.take_out()}")
+        _check_again(context.scene)
         return {'FINISHED'}
 
 
@@ -191,8 +206,7 @@ class RAYBUNDLE_OT_check_export(_NeedsObjectMode, bpy.types.Operator):
     bl_label = "Check Export"
 
     def execute(self, context):
-        lines = [finding.text() for finding in check(context.scene)]
-        context.scene.raybundle.export_check = json.dumps(lines)
+        lines = _check(context.scene)
         for line in lines:
             self.report({'WARNING'}, line)
         if not lines:
