@@ -207,6 +207,20 @@ def test_a_change_of_the_scene_is_said(two_boxes, start):
     assert not any("was changed" in warning for warning in to_the_end(start(seed=1)).warnings)
 
 
+@pytest.mark.parametrize("topology", ['KEEP', 'SUBDIVIDE'])
+def test_another_scene_may_be_shown_at_the_end(two_boxes, start, topology):
+    run = start(topology=topology, patch_size=0.3)
+    baked = bpy.context.scene
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    if topology == 'KEEP':
+        to_the_end(run)
+        assert attribute(two_boxes[0]) is not None and baked.raybundle.report
+    else:
+        with pytest.raises(raybundle.BakeError, match="another scene"):
+            to_the_end(run)
+        assert all(attribute(item) is None for item in two_boxes)
+
+
 def test_a_bake_beside_a_run_is_refused(two_boxes, start):
     start(**ENDLESS)
     with pytest.raises(raybundle.RaybundleError, match="still using"):

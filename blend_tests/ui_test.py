@@ -179,6 +179,8 @@ def steps(out: Path) -> Iterator[float]:
 def escape(x: int, y: int, out: Path) -> Iterator[float]:
     """Starts a bake that would never end, looks at its light, and cancels it with Esc. x, y: the
     Bake button. Yields pauses, s."""
+    view = next(area for area in window().screen.areas if area.type == 'VIEW_3D').spaces.active
+    view.shading.color_type = 'OBJECT'
     settings = bpy.context.scene.raybundle
     settings.seed, settings.skips_off, settings.max_bundles = 1, {'bundles'}, 2 ** 24
     before = colors()
@@ -190,6 +192,8 @@ def escape(x: int, y: int, out: Path) -> Iterator[float]:
     yield from until(lambda: bake_run.active() is None, "Esc has not ended the bake")
     if not same(colors(), before):
         raise UiError("Esc has not restored the attributes")
+    if view.shading.color_type != 'OBJECT':
+        raise UiError("Esc has not restored the shading of the 3D view")
 
 
 def until(is_done: Callable[[], object], otherwise: str) -> Iterator[float]:

@@ -8,7 +8,6 @@ Nothing of Blender is used in another thread. At most one bake runs at a time.
 from __future__ import annotations
 
 import atexit
-import json
 import time
 
 import bpy
@@ -19,6 +18,7 @@ from .bake import object_mode, prepare, write_results
 from .bake_progress import BakeProgress
 from .bake_report import BakeError, BakeReport
 from .interim_light import InterimLight
+from .report_data import read_report
 
 # Interim light is shown so rarely that writing and drawing it take at most this share of the time.
 _SHOWING_SHARE = 0.2
@@ -58,8 +58,8 @@ class BakeRun:
         errors: as in bake()."""
         global _active
         self.is_live = is_live
-        last = json.loads(context.scene.raybundle.report or "{}")
-        self.progress = BakeProgress(last.get('seconds', {}))
+        report = read_report(context.scene) or {}
+        self.progress = BakeProgress(report.get('seconds', {}))
         self.stopped_because = ""  # why the run was stopped, for the user; "": it was not
         self.is_kept = False  # whether the light so far was kept when the run was stopped
         self.was_scene_changed = False  # whether lights, materials or places changed meanwhile
@@ -124,10 +124,15 @@ class BakeRun:
         self.progress.note('write_back', 0.0)
         warnings = ["The scene was changed while the bake ran, and the light is that of the scene "
                     "before: bake again, or relight"] if self.was_scene_changed else []
+        prepared = self._prepared
         try:
             self._run.finish()
+            if prepared.subdivided and context.scene != prepared.scene:
+                # Copies are evaluated and placed in the scene that the window shows.
+                raise BakeError("The window shows another scene than the one that was baked: "
+                                "nothing was written, show that scene and bake again")
             with object_mode(context):
-                return write_results(context, self._prepared, warnings)
+                return write_results(context, prepared, warnings)
         except (BakeError, native.RaybundleError):
             self._interim.put_back()
             raise

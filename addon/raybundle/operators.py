@@ -79,6 +79,7 @@ class _Bakes:
         finally:
             context.window.cursor_modal_restore()
         self._next_draw = 0.0
+        self._switched_preview = False
         self._timer = context.window_manager.event_timer_add(_LOOK_SECONDS, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {'RUNNING_MODAL'}
@@ -108,10 +109,12 @@ class _Bakes:
         run = self._run
         if run.stopped_because:
             self.report({'WARNING'}, run.stopped_because)
+            if self._switched_preview and not run.is_kept:
+                viewport_preview.hide(context.window_manager)
             return {'FINISHED'} if run.is_kept else {'CANCELLED'}
         goes_on = run.advance()
         if run.shows_light and context.scene.raybundle.show_result:
-            viewport_preview.show(context.window_manager)
+            self._switched_preview |= viewport_preview.show(context.window_manager)
         return None if goes_on else _say(self, run.finish(context))
 
     def _show_progress(self, context) -> None:

@@ -26,21 +26,28 @@ _earlier: dict[int, _Shading] = {}
 def toggle(window_manager: bpy.types.WindowManager) -> bool:
     """Switches the preview on in all 3D views, or off if it is on in all of them. Returns whether
     it is on now."""
-    views = list(_views(window_manager))
-    if all(_read(view) == _PREVIEW for view in views):
-        for view in views:
-            _apply(view, _earlier.pop(view.as_pointer(), _DEFAULT))
+    if not show(window_manager):
+        hide(window_manager)
         return False
-    show(window_manager)
     return True
 
 
-def show(window_manager: bpy.types.WindowManager) -> None:
-    """Switches the preview on in all 3D views."""
+def show(window_manager: bpy.types.WindowManager) -> bool:
+    """Switches the preview on in all 3D views. Returns whether it was off in any."""
+    was_off = False
     for view in _views(window_manager):
         if _read(view) != _PREVIEW:
             _earlier[view.as_pointer()] = _read(view)
             _apply(view, _PREVIEW)
+            was_off = True
+    return was_off
+
+
+def hide(window_manager: bpy.types.WindowManager) -> None:
+    """Gives all 3D views that show the preview their earlier shading."""
+    for view in _views(window_manager):
+        if _read(view) == _PREVIEW:
+            _apply(view, _earlier.pop(view.as_pointer(), _DEFAULT))
 
 
 def _views(window_manager: bpy.types.WindowManager) -> Iterator[bpy.types.SpaceView3D]:
