@@ -3,10 +3,12 @@ r"""Prints the table of docs/performance.md about bakes in the background: how l
 
     blender -b --factory-startup -P blend_tests/interaction.py -- [--runs 5] [--file FILE.blend ...]
 
-Without --file measures office, big_room and a room of 467,000 faces. The columns are, in ms, the
-largest of --runs runs: how long Blender's window stands still for the export of the scene, for one
-showing of interim light, and for the writing of the result; the time from the call to the first
-light in the attributes; and from a stop to its end, in each stage. Drawing is not part of it.
+Without --file measures office, big_room and a room of 467,000 faces. The columns of the first table
+are, in ms, the largest of --runs runs: how long Blender's window stands still for the export of the
+scene, for one showing of interim light, and for the writing of the result; the time from the call
+to the first light in the attributes; and from a stop to its end, in each stage. The second table
+has the drafts per second of live mode while a lamp, a mesh lamp or its power changes. Drawing is
+not part of it.
 """
 
 from __future__ import annotations
@@ -25,10 +27,12 @@ sys.dont_write_bytecode = True
 
 import command_line  # noqa: E402
 import raybundle  # noqa: E402
-from raybundle import bake_run, native  # noqa: E402
+from raybundle import bake_run, live_light, native  # noqa: E402
 
 SCENES = HERE.parent / "scenes"
 COLUMNS = ("export", "first light", "showing", "writing", *(f"stop: {s}" for s in native.STAGES))
+LIVE_COLUMNS = ("power of a lamp", "place of a lamp", "emission", "place of a mesh")
+LIVE_SECONDS = 3.0  # of changes, per column of the second table
 # Seconds between two looks at a run, as in the add-on's operator.
 LOOK_SECONDS = 0.03
 # A stop comes at a random time of this length after a stage has begun, s.
@@ -108,23 +112,64 @@ def measure(runs: int) -> dict[str, float]:
     return largest
 
 
+def live_rates() -> list[float]:
+    """Returns the drafts per second by column of the second table, with a lamp added to the scene.
+    The first draft after a pause, which gathers all lamps, does not count."""
+    scene = bpy.context.scene
+    bpy.ops.object.light_add(type='POINT', location=(0.3, 0.2, 1.0))
+    lamp = bpy.context.object
+    lamp.data.energy = 50.0
+    emission = [node.inputs['Strength'] for material in bpy.data.materials if material.node_tree
+                for node in material.node_tree.nodes if node.type == 'EMISSION']
+    mesh = next(item for item in scene.objects if item.type == 'MESH')
+
+    def brighten() -> None:
+        for socket in emission:
+            socket.default_value *= 1.01
+
+    def change_power() -> None:
+        lamp.data.energy *= 1.01
+
+    def move(item: bpy.types.Object) -> None:
+        item.location.x += 0.001
+
+    scene.raybundle.live = True
+    rates = []
+    for change in (change_power, lambda: move(lamp), brighten, lambda: move(mesh)):
+        first = None
+        while first is None or time.perf_counter() < first + LIVE_SECONDS:
+            change()
+            bpy.context.view_layer.update()
+            time.sleep(live_light.live.step(bpy.context))
+            if first is None and live_light.live.drafts:
+                first, live_light.live.drafts = time.perf_counter(), 0
+        rates.append(live_light.live.drafts / (time.perf_counter() - first))
+        while live_light.live.step(bpy.context) < live_light.IDLE_SECONDS:
+            time.sleep(LOOK_SECONDS)
+        live_light.live.drafts = 0
+    return rates
+
+
 def main() -> None:
     parser = command_line.parser(__file__, __doc__)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--file", type=Path, nargs="+", default=[])
     options = parser.parse_args(command_line.arguments())
     raybundle.register()
-    print(f"| scene | {' | '.join(COLUMNS)} |\n|---|{'---|' * len(COLUMNS)}")
+    rows = []
     for path in options.file or (SCENES / "office.blend", SCENES / "big_room.blend", None):
         if path is None:
             make_big_room()
         else:
             bpy.ops.wm.open_mainfile(filepath=str(path))
         largest = measure(options.runs)
-        cells = [f"{1000.0 * largest[column]:.0f}" if column in largest else "-"
-                 for column in COLUMNS]
         name = path.stem if path is not None else "467,000 faces"
-        print(f"| {name} | {' | '.join(cells)} |", flush=True)
+        rows.append((name, [f"{1000.0 * largest[column]:.0f}" if column in largest else "-"
+                            for column in COLUMNS], [f"{rate:.1f}" for rate in live_rates()]))
+    for number, columns in ((1, COLUMNS), (2, LIVE_COLUMNS)):
+        print(f"| scene | {' | '.join(columns)} |\n|---|{'---|' * len(columns)}")
+        for row in rows:
+            print(f"| {row[0]} | {' | '.join(row[number])} |", flush=True)
 
 
 if __name__ == "__main__":

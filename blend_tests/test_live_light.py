@@ -43,7 +43,7 @@ def until_at_rest(live, seconds=30.0):
     """Takes steps until nothing is left to do. Returns the number of drafts meanwhile."""
     drafts = live.drafts
     deadline = time.monotonic() + seconds
-    while live.step(bpy.context) != live_light._IDLE_SECONDS:
+    while live.step(bpy.context) != live_light.IDLE_SECONDS:
         assert time.monotonic() < deadline, "live mode never rests"
         time.sleep(0.001)
     return live.drafts - drafts

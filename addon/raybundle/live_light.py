@@ -26,7 +26,7 @@ from .native import RaybundleError
 DRAFT = {'target_error': 0.3, 'max_bundles': 64}
 # Seconds without a change after which the draft is replaced, and between two looks of this module
 # while it has something to do and while not.
-_REST_SECONDS, _LOOK_SECONDS, _IDLE_SECONDS = 0.4, 0.01, 0.25
+_REST_SECONDS, _LOOK_SECONDS, IDLE_SECONDS = 0.4, 0.01, 0.25
 
 
 class LiveLight:
@@ -63,7 +63,7 @@ class LiveLight:
         if is_on and self._run is None and bake_run.active() is None and context.mode == 'OBJECT':
             self._begin(context)
         return _LOOK_SECONDS if is_on and (self._run or self._is_stale or self._is_rough) \
-            else _IDLE_SECONDS
+            else IDLE_SECONDS
 
     def _begin(self, context: bpy.types.Context) -> None:
         rested = time.perf_counter() - self._last_change
@@ -142,7 +142,7 @@ def register() -> None:
     bpy.app.handlers.load_post.append(_after_load)
     # Background processes run no timers.
     if not bpy.app.background:
-        bpy.app.timers.register(_step, first_interval=_IDLE_SECONDS, persistent=True)
+        bpy.app.timers.register(_step, first_interval=IDLE_SECONDS, persistent=True)
 
 
 def unregister() -> None:
