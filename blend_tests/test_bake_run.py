@@ -10,7 +10,7 @@ import pytest
 
 import raybundle
 from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
-from raybundle import bake_run, color_attribute, native
+from raybundle import bake_progress, bake_run, color_attribute, native
 from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
@@ -247,3 +247,19 @@ def test_the_progress_never_goes_back(two_boxes, start):
         assert run.progress.text(run.state)
     assert fractions == sorted(fractions)
     assert 0.0 <= fractions[0] <= fractions[-1] <= 1.0
+
+
+@pytest.mark.parametrize("noise, text", [
+    (None, "0 %"), (0.0042, "0 %, noise 0.42 %"), (0.0999, "0 %, noise 10 %"),
+    (0.5, "0 %, noise 50 %"), (1.0, "0 %, noise 100 %"), (12.3456, "0 %, noise 1235 %")])
+def test_the_noise_so_far_is_in_plain_digits(noise, text):
+    state = native.RunState(True, 'bundles', 0.0, noise, 0)
+    assert bake_progress.BakeProgress({}).text(state) == text
+
+
+def test_no_channels_are_baked_while_a_bake_runs(two_boxes, start):
+    assert bpy.ops.raybundle.bake_channels.poll()
+    run = start()
+    assert not bpy.ops.raybundle.bake_channels.poll()
+    run.leave()
+    assert bpy.ops.raybundle.bake_channels.poll()

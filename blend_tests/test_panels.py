@@ -77,6 +77,7 @@ def test_every_setting_of_a_bake_is_in_a_panel():
     missing = set(properties.BakeSettings.names()) - shown - set(panels.METHODS)
     # target_error is shown in %. Skips are switched off by scripts, to test that light is equal.
     assert missing == {'target_error', 'skips_off'}
+    assert {'live', 'show_result'} <= shown
 
 
 def test_methods_are_hidden_until_they_are_studied(user):

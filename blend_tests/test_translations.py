@@ -8,7 +8,7 @@ import pytest
 import translation_strings
 from raybundle import translations
 
-PLACEHOLDER = re.compile(r"\{\w*\}")
+PLACEHOLDER = re.compile(r"\{[^{}]*\}")
 GERMAN = translations.FOLDER / "de.po"
 LANGUAGES = sorted(translations.FOLDER.glob("*.po"))
 REWRITE = "run blend_tests/translation_strings.py"

@@ -62,12 +62,14 @@ def rna_of(item: type) -> bpy.types.Struct:
 
 
 def own_properties(item: type) -> Iterator[bpy.types.Property]:
-    """Yields the properties that a class defines, without those of Blender's own classes."""
+    """Yields the properties that a class defines and that are shown, without those of Blender's own
+    classes."""
     names = {name for base in item.__mro__ if base.__module__.partition(".")[0] == "raybundle"
              for name in base.__dict__.get('__annotations__', ())}
     # A property that replaces one of Blender, such as `name`, is listed after it.
     found = {definition.identifier: definition for definition in rna_of(item).properties}
-    yield from (definition for name, definition in found.items() if name in names)
+    yield from (definition for name, definition in found.items()
+                if name in names and not definition.is_hidden)
 
 
 def texts_of_property(definition: bpy.types.Property) -> Iterator[Key]:

@@ -60,8 +60,10 @@ class BakeProgress:
         """Returns the finished share, the noise so far and the time left for the user."""
         parts = [f"{100.0 * self.fraction:.0f} %"]
         if state.noise is not None:
-            parts.append(iface_("noise {:.2g} %").format(100.0 * state.noise))
+            percent = 100.0 * state.noise
+            digits = f"{percent:.2g}" if percent < 10.0 else f"{percent:.0f}"
+            parts.append(iface_("noise {percent} %").format(percent=digits))
         left = self.seconds_left()
         if left is not None and left >= 1.0:
-            parts.append(iface_("{:.0f} s left").format(left))
+            parts.append(iface_("{seconds} s left").format(seconds=f"{left:.0f}"))
         return ", ".join(parts)

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_tip as tip_
 
 from . import color_attribute
 from .bake import bake
@@ -76,14 +77,15 @@ def why_not(scene: bpy.types.Scene) -> str | None:
     """Returns why the channels that are chosen cannot be baked, and what to do. None: they can."""
     sources = _sources(scene)
     if all(source == NONE for source in sources):
-        return "All channels are empty: choose what to bake into them"
+        return tip_("All channels are empty: choose what to bake into them")
     sets = scene.raybundle.light_sets
     for source in sources:
         if source.startswith(_SET):
             number = int(source[len(_SET):])
             if number > len(sets) or not sets[number - 1].enabled:
-                return (f"There is no enabled light set number {number}: add it in the panel Light "
-                        f"Sets, or choose another part for the channel")
+                return tip_("There is no enabled light set number {number}: add it in the panel "
+                            "Light Sets, or choose another part for the channel").format(
+                                number=number)
     return None
 
 

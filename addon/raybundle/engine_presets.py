@@ -27,27 +27,23 @@ PRESETS: dict[str, dict[str, object]] = {
     'THREE': _EXPORTED,
 }
 
-_CORNERS = "a value per face corner" if EXPORTS_CORNERS else \
-    "a value per vertex, because Blender's exporter before 3.5 mixes up face corners"
-_SETS = f"Lighting, {_CORNERS}, as floats without exposure or cut"
+_SETS = ("Sets the output Lighting as floats without exposure and clamp, one value per face corner "
+         "(per vertex before Blender 3.5, whose exporter mixes up face corners)")
+_SCALES = "divides light above 1 by the largest value, because glTF allows 0 to 1"
 
 # Items of the property `engine`. Files store positions: add at the end.
 ENUM_ENGINE = (
     ('BLENDER', "Blender",
-     "For renders in Blender. Sets Lighting, a value per face corner, as floats without exposure "
-     "or cut, because nothing is lost in Blender"),
+     "For renders in Blender. Sets the output Lighting as floats without exposure and clamp, one "
+     "value per face corner, because nothing is lost in Blender"),
     ('GLTF', "glTF",
-     f"For any program that reads glTF. Sets {_SETS}; the export writes 16 bits and scales light "
-     f"above 1 down, because glTF allows 0 to 1"),
+     f"For any program that reads glTF. {_SETS}. The export writes 16 bits and {_SCALES}"),
     ('GODOT', "Godot",
-     f"For Godot. Sets {_SETS}; the export writes 8 bits and scales the largest value to 1, "
-     f"because Godot keeps 8 bits per channel"),
-    ('UNITY', "Unity",
-     f"For Unity. Sets {_SETS}; the export writes 16 bits and scales light above 1 down, because "
-     f"glTF allows 0 to 1"),
+     f"For Godot. {_SETS}. The export writes 8 bits, because Godot keeps 8 bits per channel, and "
+     f"divides light by the largest value"),
+    ('UNITY', "Unity", f"For Unity. {_SETS}. The export writes 16 bits and {_SCALES}"),
     ('THREE', "three.js",
-     f"For web pages with three.js. Sets {_SETS}; the export writes 16 bits and scales light above "
-     f"1 down, because glTF allows 0 to 1"),
+     f"For web pages with three.js. {_SETS}. The export writes 16 bits and {_SCALES}"),
 )
 
 

@@ -166,8 +166,8 @@ def _is_lit(material: bpy.types.Material) -> bool:
 
 
 def _keeps_emission(material: bpy.types.Material, scene: bpy.types.Scene) -> bool:
-    """Returns whether the material emits light that the baked light does not contain. Use in
-    Material leaves it as it is."""
+    """Returns whether the material emits light that the baked light does not contain, so that Use
+    in Material leaves it as it is."""
     return scene.raybundle.output != 'COMBINED' and emits(material)
 
 

@@ -5,9 +5,10 @@ import json
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from . import gltf_export, light_in_material
+from . import bake_run, gltf_export, light_in_material
 from .bake_report import BakeError
 from .channel_bake import bake_channels, why_not
 from .export_check import check
@@ -16,9 +17,10 @@ from .native import RaybundleError
 from .properties import enum_export_format, enum_export_range, enum_shown_as
 
 enum_surface_color = (
-    ('AUTO', "Automatic", "Without colour for the output Combined, with colour for others"),
+    ('AUTO', "Automatic",
+     "Without the colour of the surface for the output Combined, and with it for other outputs"),
     ('WITH', "With Colour", "The light is multiplied by the colour of the surface"),
-    ('WITHOUT', "Without", "The light alone is shown"),
+    ('WITHOUT', "Without Colour", "The light alone is shown"),
 )
 
 
@@ -27,7 +29,13 @@ class _NeedsObjectMode:
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and context.mode == 'OBJECT'
+        if context.scene is None:
+            return False
+        if context.mode != 'OBJECT':
+            cls.poll_message_set(tip_("Leave the present mode: light is used and exported in "
+                                      "Object Mode"))
+            return False
+        return True
 
 
 class _NeedsLight(_NeedsObjectMode):
@@ -40,7 +48,8 @@ class _NeedsLight(_NeedsObjectMode):
         attribute = context.scene.raybundle.attribute
         if not any(item.type == 'MESH' and attribute in item.data.color_attributes
                    for item in context.scene.objects):
-            cls.poll_message_set(f'No object has the attribute "{attribute}": bake first')
+            cls.poll_message_set(tip_("No object has the attribute \"{name}\": bake first").format(
+                name=attribute))
             return False
         return True
 
@@ -59,8 +68,7 @@ def _check_again(scene: bpy.types.Scene) -> None:
 
 
 class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
-    """Show the baked light in the materials of the baked objects, in Eevee and Cycles. Nodes are
-    added beside the material's own; Take Out of Material removes them"""
+    """Show the baked light in Eevee and Cycles, by nodes in the materials of the baked objects"""
     bl_idname = "raybundle.use_in_material"
     bl_label = "Use in Material"
     bl_options = {'REGISTER', 'UNDO'}
@@ -86,8 +94,7 @@ class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_take_out_of_material(_NeedsObjectMode, bpy.types.Operator):
-    """Remove the nodes of Use in Material from all materials of the file, which are then as they
-    were before"""
+    """Remove the nodes of Use in Material from all materials of the file"""
     bl_idname = "raybundle.take_out_of_material"
     bl_label = "Take Out of Material"
     bl_options = {'REGISTER', 'UNDO'}
@@ -99,33 +106,36 @@ class RAYBUNDLE_OT_take_out_of_material(_NeedsObjectMode, bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
-    """Export the visible objects with their baked light in one binary glTF file, as vertex colours
-    of unlit materials. The scene stays as it is"""
+    """Export the visible objects to a .glb file, with the light as colours of unlit materials"""
     bl_idname = "raybundle.export_gltf"
     bl_label = "Export glTF"
 
-    filepath: StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
+    filepath: StringProperty(
+        name="File Path", description="The .glb file that is written", subtype='FILE_PATH',
+        options={'SKIP_SAVE'})
     filter_glob: StringProperty(default="*.glb", options={'HIDDEN'})
     check_existing: BoolProperty(default=True, options={'HIDDEN'})
     format: EnumProperty(name="Format", description="How the light is stored",
                          items=enum_export_format)
-    range: EnumProperty(name="Range", description="How light is fitted into the range 0 to 1",
-                        items=enum_export_range)
+    range: EnumProperty(
+        name="Range", description="How light is fitted into the range 0 to 1 of glTF",
+        items=enum_export_range)
     surface_color: EnumProperty(
         name="Surface", description="Whether the colour of the surface multiplies the light",
         items=enum_surface_color)
     apply_modifiers: BoolProperty(
-        name="Apply Modifiers", description="Export the shapes that modifiers make. Shape keys are "
-                                            "then left out", default=True)
+        name="Apply Modifiers", description="Export the shapes that modifiers make, without shape "
+                                            "keys", default=True)
     selected: BoolProperty(
-        name="Selected Only", description="Export the selected objects only", default=False)
+        name="Selected Only", description="Export only the selected objects", default=False)
 
     @classmethod
     def poll(cls, context):
         if not super().poll(context):
             return False
         if not gltf_export.exporter_options():
-            cls.poll_message_set('Enable the add-on "glTF 2.0 format" in the preferences')
+            cls.poll_message_set(tip_("Blender's glTF exporter is switched off: enable the add-on "
+                                      "\"glTF 2.0 format\" in the preferences"))
             return False
         return True
 
@@ -173,8 +183,7 @@ class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_bake_channels(_NeedsObjectMode, bpy.types.Operator):
-    """Bake several parts of the light, such as direct light and ambient occlusion, as luminance
-    into the red, green, blue and alpha channel of one attribute"""
+    """Bake the luminance of several parts of the light to the channels of the attribute"""
     bl_idname = "raybundle.bake_channels"
     bl_label = "Bake Channels"
     bl_options = {'REGISTER', 'UNDO'}
@@ -183,11 +192,16 @@ class RAYBUNDLE_OT_bake_channels(_NeedsObjectMode, bpy.types.Operator):
     def poll(cls, context):
         if not super().poll(context):
             return False
+        run = bake_run.active()
+        if run is not None and not run.is_live:
+            cls.poll_message_set(tip_("A bake is running: wait until it ends, or press Esc"))
+            return False
         if reason := why_not(context.scene):
             cls.poll_message_set(reason)
         return not reason
 
     def execute(self, context):
+        bake_run.make_way()
         try:
             report = bake_channels(context)
         except (BakeError, RaybundleError) as error:
@@ -200,8 +214,7 @@ class RAYBUNDLE_OT_bake_channels(_NeedsObjectMode, bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_check_export(_NeedsObjectMode, bpy.types.Operator):
-    """Say what Blender's own glTF exporter, with its default options, would lose or change of the
-    baked light, and what to do"""
+    """Say what Blender's own glTF exporter would lose or change of the light, and what to do"""
     bl_idname = "raybundle.check_export"
     bl_label = "Check Export"
 

@@ -170,10 +170,10 @@ def _reason_to_leave(material: bpy.types.Material, way: str) -> str | None:
         return None
     if way == COLORED and emits(material):
         return ("emits light and was left as it is, because this light is not part of what the "
-                "attribute shows: bake the output Combined and use it as Emission")
+                "attribute shows: bake the output Combined and show it as Light Alone")
     if not any(node.type in _COLORS for node in _shaders(tree)):
         return ("has no shader with a surface colour outside of node groups and was left as it "
-                "is: bake the output Combined and use it as Emission")
+                "is: bake the output Combined and show it as Light Alone")
     return None
 
 

@@ -147,7 +147,7 @@ def _can_begin(operator: type[bpy.types.Operator]) -> bool:
     """Returns whether no bake is running. Otherwise sets the reason that the button shows."""
     run = bake_run.active()
     if run is not None and not run.is_live:
-        operator.poll_message_set(tip_("A bake is running"))
+        operator.poll_message_set(tip_("A bake is running: wait until it ends, or press Esc"))
         return False
     return True
 

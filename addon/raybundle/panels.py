@@ -224,7 +224,7 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
         layout = property_layout(self)
         settings = context.scene.raybundle
         for name in ("output", "attribute", "domain", "data_type", "exposure", "clamp",
-                     "write_error"):
+                     "write_error", "show_result"):
             layout.prop(settings, name)
         column = layout.column()
         # Subdivided copies never share a mesh.

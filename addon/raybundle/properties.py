@@ -169,7 +169,8 @@ enum_side = (
 )
 
 enum_shown_as = (
-    ('AUTO', "Automatic", "Combined as Light Alone, other outputs as Light Times Colour"),
+    ('AUTO', "Automatic",
+     "The output Combined as Light Alone, and other outputs as Light Times Colour"),
     ('EMISSION', "Light Alone",
      "Unlit: the camera sees the attribute itself. For the output Combined"),
     ('COLORED', "Light Times Colour",
@@ -182,12 +183,12 @@ enum_shown_as = (
 
 enum_export_format = (
     ('SHORT', "16 Bits", "65,536 levels from 0 to 1: no visible steps"),
-    ('BYTE', "8 Bits", "256 linear levels from 0 to 1: the smallest file, steps in the dark"),
+    ('BYTE', "8 Bits", "256 linear levels from 0 to 1: the smallest file, with steps in the dark"),
     ('FLOAT', "Floats", "The values themselves, in the largest file; not all engines read them"),
 )
 
 enum_channel = (
-    ('NONE', "Empty", "0, and 1 in alpha"),
+    ('NONE', "Empty", "Nothing: the channel is 0, or 1 if it is alpha"),
     ('LIGHTING', "Lighting", "Light on a white surface"),
     ('DIRECT', "Direct",
      "The part of Lighting that comes straight from lights, emission and world"),
@@ -203,12 +204,12 @@ enum_channel = (
 
 enum_export_range = (
     ('AUTO', "Automatic",
-     "If light is brighter than 1, all light is divided by the largest value. The scale is in the "
-     "file's extras, by which the engine multiplies it again"),
+     "If light is brighter than 1, all light is divided by the largest value. The engine can "
+     "multiply it by this scale again, which is in the file's extras"),
     ('FULL', "Full",
-     "All light is divided by the largest value, which becomes 1: the finest steps. The scale is "
-     "in the file's extras, by which the engine multiplies it again"),
-    ('KEEP', "Unchanged", "Light is not scaled; 8 and 16 bits cut it off at 1"),
+     "All light is divided by the largest value, which becomes 1: the finest steps. The engine can "
+     "multiply it by this scale again, which is in the file's extras"),
+    ('KEEP', "Unchanged", "Light is written as it is; 8 and 16 bits cut it off at 1"),
 )
 
 
@@ -275,9 +276,9 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         default=False)
     live: BoolProperty(
         name="Live", default=False,
-        description="While lamps, materials, the world or places of objects change, the light "
-                    "follows: at first a draft, and the light of a bake when changes stop. Changes "
-                    "of the shape of meshes are not followed")
+        description="The light follows changes of lamps, materials, the world and the places of "
+                    "objects: as a draft at first, and as a bake when the changes stop. Changes of "
+                    "the shape of meshes are not followed")
     show_result: BoolProperty(
         name="Show Result", default=True,
         description="While a bake runs and after it, show the baked colours in all 3D views. "
@@ -390,18 +391,18 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         options={'HIDDEN'})
     # How baked light is shown in materials and exported.
     engine: EnumProperty(
-        name="For", description="Where the light is shown: sets what is baked and exported so that "
-                                "it arrives there unchanged",
+        name="For", description="The program that shows the light: sets what is baked and exported "
+                                "so that it arrives there unchanged",
         items=ENUM_ENGINE, default='BLENDER',
         update=_apply_engine)
     shown_as: EnumProperty(
         name="Show As", description="How Use in Material shows the light", items=enum_shown_as,
         default='AUTO')
     export_format: EnumProperty(
-        name="Format", description="How the export stores light", items=enum_export_format,
+        name="Format", description="How the export stores the light", items=enum_export_format,
         default='SHORT')
     export_range: EnumProperty(
-        name="Range", description="How the export fits light into the range 0 to 1 of glTF",
+        name="Range", description="How light is fitted into the range 0 to 1 of glTF",
         items=enum_export_range, default='AUTO')
     channel_r: EnumProperty(
         name="Red", description="Part of the light that Bake Channels writes to the red channel",
