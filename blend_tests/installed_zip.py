@@ -95,7 +95,7 @@ def live(path: str, older: str) -> None:
     assert bake().max() > 0.0
     print("updated to", version())
 
-    # Scripts find the module as docs/install.md says.
+    # Scripts find the module as docs/scripting.md says.
     name = next(name for name in bpy.context.preferences.addons.keys()
                 if name.split(".")[-1] == "raybundle")
     assert name == MODULE and callable(importlib.import_module(name).bake)

@@ -219,8 +219,9 @@ def test_without_surfaces_there_is_nothing_to_set():
 
 @pytest.mark.parametrize("menu", [menus.RAYBUNDLE_MT_render, menus.RAYBUNDLE_MT_object])
 def test_menus_have_the_operators(menu):
-    assert {"raybundle.bake", "raybundle.relight", "raybundle.clear", "raybundle.preview"} <= set(
-        drawn(menu).operators())
+    names = ("bake", "relight", "clear", "preview", "use_in_material", "take_out_of_material",
+             "export_gltf", "check_export", "bake_channels")
+    assert {f"raybundle.{name}" for name in names} <= set(drawn(menu).operators())
 
 
 def test_the_menus_of_blender_have_an_entry():

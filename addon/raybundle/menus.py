@@ -28,6 +28,12 @@ def draw_operators(layout: bpy.types.UILayout) -> None:
     layout.operator("raybundle.relight")
     layout.operator("raybundle.preview")
     layout.operator("raybundle.clear", icon='TRASH')
+    layout.separator()
+    layout.operator("raybundle.use_in_material", icon='MATERIAL')
+    layout.operator("raybundle.take_out_of_material")
+    layout.operator("raybundle.export_gltf", icon='EXPORT')
+    layout.operator("raybundle.check_export")
+    layout.operator("raybundle.bake_channels")
 
 
 def _draw_in_render(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

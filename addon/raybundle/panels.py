@@ -61,7 +61,9 @@ def draw_bake(layout: bpy.types.UILayout) -> None:
 
 def draw_live(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draws the switch of live mode, and why the light does not follow."""
-    layout.prop(context.scene.raybundle, "live", toggle=True, icon='OUTLINER_OB_LIGHT')
+    row = layout.row()
+    row.use_property_split = False  # The name is on the button.
+    row.prop(context.scene.raybundle, "live", toggle=True, icon='OUTLINER_OB_LIGHT')
     if context.scene.raybundle.live and live_light.live.message:
         draw_wrapped(layout.column(), context, live_light.live.message, 'ERROR', 0.0)
 
