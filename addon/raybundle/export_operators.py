@@ -29,13 +29,10 @@ class _NeedsObjectMode:
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None:
-            return False
         if context.mode != 'OBJECT':
             cls.poll_message_set(tip_("Leave the present mode: light is used and exported in "
                                       "Object Mode"))
-            return False
-        return True
+        return context.scene is not None and context.mode == 'OBJECT'
 
 
 class _NeedsLight(_NeedsObjectMode):
