@@ -39,7 +39,10 @@ Stop StopRule::after(uint32_t bundles, double excess) {
         settings.skipBundles ? 1.05 * std::pow(excess, 1 / kNoiseSlope) : INFINITY;
     wantedBundles =
         std::min(mostBundles, (uint32_t(bundles * (factor < kFarAway ? factor : 2.0)) + 2) & ~1u);
-    foreseenBundles = uint32_t(std::min(bundles * factor, double(mostBundles)));
+    // The factor is not finite if no bundle has been traced, or if all bundles are wanted.
+    const bool isForeseen = factor < double(mostBundles);
+    foreseenBundles =
+        isForeseen ? uint32_t(std::min(bundles * factor, double(mostBundles))) : mostBundles;
     return Stop::NOT_YET;
 }
 
