@@ -80,8 +80,10 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
         return write_results(context, prepared)
 
 
-def prepare(context: bpy.types.Context, overrides: dict[str, object]) -> PreparedBake:
-    """Exports the context's scene, in Object Mode. overrides, and errors: as in bake()."""
+def prepare(context: bpy.types.Context, overrides: dict[str, object], is_draft: bool = False
+            ) -> PreparedBake:
+    """Exports the context's scene, in Object Mode. is_draft: the library's setting `draft`.
+    overrides, and errors: as in bake()."""
     started = time.perf_counter()
     scene = context.scene
     try:
@@ -96,6 +98,7 @@ def prepare(context: bpy.types.Context, overrides: dict[str, object]) -> Prepare
     export_seconds = time.perf_counter() - started
     try:
         _apply_settings(native_bake, settings)
+        native_bake.set('draft', is_draft)
     except BaseException:
         native_scene.close()
         raise

@@ -52,10 +52,10 @@ class BakeRun:
     """A bake from the export of the scene to the end of the native run."""
 
     def __init__(self, context: bpy.types.Context, overrides: dict[str, object] | None = None,
-                 is_live: bool = False) -> None:
+                 is_live: bool = False, is_draft: bool = False) -> None:
         """Exports the context's scene, starts the native run, and makes this the active run.
-        is_live: whether live mode has started it; such a run shows no interim light. overrides, and
-        errors: as in bake()."""
+        is_live: whether live mode has started it; such a run shows no interim light. is_draft: as
+        in prepare(). overrides, and errors: as in bake()."""
         global _active
         self.is_live = is_live
         report = read_report(context.scene) or {}
@@ -65,7 +65,7 @@ class BakeRun:
         self.was_scene_changed = False  # whether lights, materials or places changed meanwhile
         native.load()
         with object_mode(context):
-            self._prepared = prepare(context, overrides or {})
+            self._prepared = prepare(context, overrides or {}, is_draft)
         # The run keeps the native scene until it ends.
         with self._prepared.native_scene:
             self._run = native.Run(self._prepared.native_bake, self._prepared.native_scene)

@@ -22,11 +22,11 @@ from .bake_report import BakeError
 from .native import RaybundleError
 
 # The settings of a draft that differ from those of the scene. With these, a bake takes no more
-# bundles than it has, and sends no rays from noisy surfaces.
+# bundles than it has.
 DRAFT = {'target_error': 0.3, 'max_bundles': 64}
 # Seconds without a change after which the draft is replaced, and between two looks of this module
 # while it has something to do and while not.
-_REST_SECONDS, _LOOK_SECONDS, IDLE_SECONDS = 0.4, 0.01, 0.25
+_REST_SECONDS, _LOOK_SECONDS, IDLE_SECONDS = 0.4, 0.005, 0.25
 
 
 class LiveLight:
@@ -75,7 +75,7 @@ class LiveLight:
         try:
             with self._own_changes(context):
                 self._run = bake_run.BakeRun(context, DRAFT if self._is_draft else {},
-                                             is_live=True)
+                                             is_live=True, is_draft=self._is_draft)
         except (BakeError, RaybundleError) as error:
             self._fail(error)
 

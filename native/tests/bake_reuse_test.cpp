@@ -110,6 +110,27 @@ TEST(Relighting, ScalesWhatEachLightBrought) {
     }
 }
 
+TEST(Relighting, ADraftHasTheLightOfItsBundles) {
+    // The residual of the solves of a draft is at most 0.002, relative to its light. Solutions are
+    // not linear in the lines, so that their mean differs from the solution with all lines by a
+    // part of their noise, which is small against the noise of the result.
+    Bake whole, draft;
+    for (Bake* bake : {&whole, &draft}) {
+        setQuick(*bake);
+        bake->settings.minBundles = bake->settings.maxBundles = 64;
+        bake->settings.targetError = 0.3f;
+    }
+    draft.settings.draft = 1;
+    whole.run(litRoom());
+    draft.run(litRoom());
+    EXPECT_EQ(reportOf(draft)["bundles"], 64);
+    EXPECT_GT(difference(everything(draft), everything(whole)), 1e-5);
+    EXPECT_LT(std::abs(double(reportOf(draft)["energy"]["balance_error"])), 0.01);
+    const double stated = reportOf(whole)["estimated_error"];
+    EXPECT_LT(noise(everything(draft), everything(whole)), 0.3 * stated);
+    EXPECT_NEAR(reportOf(draft)["estimated_error"], stated, 0.05 * stated);
+}
+
 TEST(Relighting, OneLightIsExactlyScaled) {
     auto room = [](const glm::dvec3& colour) {
         Scene scene = roomWithBoxes(0.5f);

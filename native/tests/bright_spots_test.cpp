@@ -71,6 +71,22 @@ TEST_P(BrightSpots, GiveTheLightOfVeryManyBundles) {
     EXPECT_NEAR(lightOfOthers(gathered) / lightOfOthers(bundled), 1, 0.01);
 }
 
+TEST_P(BrightSpots, LightDraftsTheSame) {
+    Bake whole, draft;
+    for (Bake* bake : {&whole, &draft}) {
+        bake->settings.patchSize = 0.1f;
+        bake->settings.targetError = 0.3f;
+        bake->settings.minBundles = bake->settings.maxBundles = 64;
+    }
+    draft.settings.draft = 1;
+    const Scene scene = roomWithLampAtWall(0.01, GetParam());
+    whole.run(scene);
+    draft.run(scene);
+    // Both have the same lines and rays. The residual of a draft is 0.002 of all light, which the
+    // patch beside the lamp has most of.
+    EXPECT_NEAR(lightOfOthers(draft) / lightOfOthers(whole), 1, 0.05);
+}
+
 TEST_P(BrightSpots, LeaveNoNoiseToTheRoom) {
     // Compares the opposite half of the room, whose corners are lit only by the bright spot.
     std::vector<glm::vec3> light[2];

@@ -21,6 +21,8 @@ namespace {
 constexpr double kFinalShare = 0.01, kLeastTolerance = 1e-6, kMostTolerance = 1e-5;
 // Relative residual of the solves of the halves, in multiples of the target error.
 constexpr float kHalfTolerance = 0.05f;
+// Largest relative residual of the halves in a draft, of which they are the result.
+constexpr float kDraftTolerance = 2e-3f;
 // Largest number of rays of a side in the first pass, which doubles with each further pass, and the
 // largest number of passes.
 constexpr uint32_t kRaysOfFirstPass = 512, kMostPasses = 5;
@@ -61,7 +63,8 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       // No extra rays if the caller fixes or limits the number of bundles, because the result of
       // these bundles is then wanted.
       castsRays(input.settings.countsLines() && input.settings.skipBundles &&
-                input.settings.minBundles < input.settings.maxBundles),
+                input.settings.minBundles < input.settings.maxBundles && !input.settings.draft),
+      isDraft(input.settings.draft && input.settings.countsLines()),
       halves(lights.size()) {
     if (input.settings.countsLines())
         noisyParts.emplace(NoisyPartsInput{in.tiles, in.trace.looks, in.tiles.sum(area), in.shown,
@@ -97,10 +100,10 @@ void BundleSolve::look() {
     const std::vector<float> exposed = in.trace.exposedShare();
     for (size_t side = 0; side < weight.size(); ++side) weight[side] = area[side] * exposed[side];
     tileWeight = in.tiles.sum(weight);
+    float tolerance = kHalfTolerance * float(in.settings.targetError);
+    if (isDraft) tolerance = std::min(tolerance, kDraftTolerance);
     for (size_t k = 0; k < lights.size(); ++k)
-        for (size_t h = 0; h < 2; ++h)
-            halves[k][h] =
-                transports[k]->irradiance(Half(h), kHalfTolerance * float(in.settings.targetError));
+        for (size_t h = 0; h < 2; ++h) halves[k][h] = transports[k]->irradiance(Half(h), tolerance);
     const Halves now = seen();
     noise.look(now, bundles, tracer.bias());
     measureCorners(noise, now);
@@ -130,9 +133,13 @@ Stop BundleSolve::stopAfterLook() {
     return castsRays && stop == Stop::NOISE_AT_TARGET ? rule.afterRays(bundles, castRays()) : stop;
 }
 
-// Makes the last solve, with all bundles traced so far.
+// Makes the last solve, with all bundles traced so far. A draft makes do with those of the halves.
 void BundleSolve::finish() {
     ofFinish = Report();
+    if (isDraft) {
+        for (size_t k = 0; k < lights.size(); ++k) lights[k].irradiance = meanOf(halves[k]);
+        return;
+    }
     const float tolerance =
         float(std::clamp(kFinalShare * errors.front(), kLeastTolerance, kMostTolerance));
     for (size_t k = 0; k < lights.size(); ++k) {

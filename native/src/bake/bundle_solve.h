@@ -76,6 +76,7 @@ class BundleSolve {
     std::optional<NoisyParts> noisyParts;  // empty unless the solver counts lines
     StopRule rule;
     const bool castsRays;
+    const bool isDraft;  // whether the mean of the halves will do as the result
 
     Halves halves;               // light that arrives at sides, not the shown light
     std::vector<double> errors;  // relative noise: of the sum of all lights, then of each light set

@@ -78,6 +78,10 @@ inline constexpr Setting kSettings[] = {
      "Use smaller patches beside gaps much narrower than a patch, such as on a table below the "
      "rim of a plate",
      &Settings::contacts},
+    {"draft",
+     "Light at once instead of little noise: no rays from noisy surfaces, and no last solve after "
+     "those that measure the noise",
+     &Settings::draft},
     {"min_bundles", "Minimum number of bundles, even if the noise is already below the target",
      &Settings::minBundles, 2, 1 << 24},
     {"max_bundles", "Maximum number of bundles, even if the noise is still above the target",

@@ -26,6 +26,7 @@ struct Settings : Skips {
     int maxPatches = 100000;
     int refine = 0;
     int contacts = 1;
+    int draft = 0;
     int minBundles = 64;
     int maxBundles = kMostWindowBundles;
     int linesPerBundle = 0;
