@@ -12,6 +12,7 @@ import time
 
 import bpy
 from bpy.app.handlers import persistent
+from bpy.app.translations import pgettext_tip as tip_
 
 from . import native
 from .bake import object_mode, prepare, write_results
@@ -41,6 +42,15 @@ def changes_light(depsgraph: bpy.types.Depsgraph) -> bool:
         for update in depsgraph.updates)
 
 
+def can_begin(operator: type[bpy.types.Operator]) -> bool:
+    """Returns whether no bake is running that another bake would have to wait for. Otherwise sets
+    the reason that the operator's button shows."""
+    if _active is not None and not _active.is_live:
+        operator.poll_message_set(tip_("A bake is running: wait until it ends, or press Esc"))
+        return False
+    return True
+
+
 def make_way() -> None:
     """Ends the run of live mode, if there is one, before another bake begins."""
     if _active is not None and _active.is_live:
@@ -58,8 +68,7 @@ class BakeRun:
         in prepare(). overrides, and errors: as in bake()."""
         global _active
         self.is_live = is_live
-        report = read_report(context.scene) or {}
-        self.progress = BakeProgress(report.get('seconds', {}))
+        self.progress = BakeProgress(read_report(context.scene).get('seconds', {}))
         self.stopped_because = ""  # why the run was stopped, for the user; "": it was not
         self.is_kept = False  # whether the light so far was kept when the run was stopped
         self.was_scene_changed = False  # whether lights, materials or places changed meanwhile

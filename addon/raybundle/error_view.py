@@ -82,10 +82,7 @@ class RAYBUNDLE_OT_show_error(bpy.types.Operator):
             return {'CANCELLED'}
         most = write_error_colors(meshes, settings.attribute)
         if not bpy.app.background:
-            # The first call switches the preview off if all views already show it.
-            for _ in range(2):
-                if viewport_preview.toggle(context.window_manager):
-                    break
+            viewport_preview.show(context.window_manager)
         self.report({'INFO'}, tip_("White is a stated error of {error} W/(m² sr) and more").format(
             error=f"{most:.2g}"))
         return {'FINISHED'}

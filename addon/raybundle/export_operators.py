@@ -187,11 +187,7 @@ class RAYBUNDLE_OT_bake_channels(_NeedsObjectMode, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not super().poll(context):
-            return False
-        run = bake_run.active()
-        if run is not None and not run.is_live:
-            cls.poll_message_set(tip_("A bake is running: wait until it ends, or press Esc"))
+        if not super().poll(context) or not bake_run.can_begin(cls):
             return False
         if reason := why_not(context.scene):
             cls.poll_message_set(reason)

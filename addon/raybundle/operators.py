@@ -143,15 +143,6 @@ class _NeedsScene:
         return context.scene is not None
 
 
-def _can_begin(operator: type[bpy.types.Operator]) -> bool:
-    """Returns whether no bake is running. Otherwise sets the reason that the button shows."""
-    run = bake_run.active()
-    if run is not None and not run.is_live:
-        operator.poll_message_set(tip_("A bake is running: wait until it ends, or press Esc"))
-        return False
-    return True
-
-
 class RAYBUNDLE_OT_bake(_Bakes, bpy.types.Operator):
     """Write direct and indirect light into the colour attributes of the scene's meshes"""
     bl_idname = "raybundle.bake"
@@ -160,7 +151,7 @@ class RAYBUNDLE_OT_bake(_Bakes, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and _can_begin(cls)
+        return context.scene is not None and bake_run.can_begin(cls)
 
 
 class RAYBUNDLE_OT_relight(_Bakes, bpy.types.Operator):
@@ -171,7 +162,7 @@ class RAYBUNDLE_OT_relight(_Bakes, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not _can_begin(cls):
+        if context.scene is None or not bake_run.can_begin(cls):
             return False
         if not bake_cache.has_result(context.scene):
             cls.poll_message_set(tip_("There is nothing to relight: bake first. The lines of a "
@@ -208,7 +199,7 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not _can_begin(cls):
+        if context.scene is None or not bake_run.can_begin(cls):
             return False
         if context.mode != 'OBJECT':
             cls.poll_message_set(tip_("Leave the present mode: attributes are removed in Object "

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-import json
 import platform
 from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import BoolProperty, FloatProperty, IntProperty
+
+from .report_data import read_report
 
 # The add-on's zip contains the guide; in a clone of the repository it is beside the add-on.
 _GUIDES = (Path(__file__).parent / "docs" / "user_guide.md",
@@ -108,7 +109,7 @@ def bug_report(scene: bpy.types.Scene | None) -> str:
         changed = [f"{name} = {getattr(settings, name)!r}" for name in BakeSettings.names()
                    if name != 'attribute' and settings.is_property_set(name)]
         lines.append("Settings: " + (", ".join(changed) or "default"))
-        report = json.loads(scene.raybundle.report or "{}")
+        report = read_report(scene)
         # Names of objects may be private, and are not needed to find most bugs.
         lines.append(f"Warnings: {', '.join(report.get('warning_ids', [])) or 'none'}")
         lines.append(f"Seconds: {report.get('seconds', {})}")
