@@ -33,7 +33,7 @@ def user(monkeypatch):
 def test_the_quality_comes_first():
     layout = drawn(panels.RAYBUNDLE_PT_render)
     first = [arguments for method, arguments, *_ in layout.record if method == 'prop_enum']
-    assert [arguments[1:] for arguments in first] == [
+    assert [arguments[1:] for arguments in first[:3]] == [
         ("quality", 'DRAFT'), ("quality", 'GOOD'), ("quality", 'FINAL')]
     calls = [method for method, *_ in layout.record]
     assert calls.index('prop_enum') < calls.index('operator')
@@ -44,6 +44,12 @@ def test_costs_are_shown_after_the_first_bake():
     settings().report = json.dumps(FULL)
     texts = drawn(panels.RAYBUNDLE_PT_render).texts()
     assert [text for text in texts if text.startswith("≈")] == ["≈ 4.2 s", "≈ 10 s", "≈ 54 s"]
+
+
+def test_the_choice_how_light_is_shown_is_in_both_places():
+    for panel in (panels.RAYBUNDLE_PT_render, panels.RAYBUNDLE_PT_sidebar):
+        assert [arguments[2] for method, arguments, *_ in drawn(panel).record
+                if method == 'prop_enum' and arguments[1] == "show_in"] == ['SOLID', 'MATERIALS']
 
 
 def test_the_sidebar_and_the_preferences_are_drawn():

@@ -82,7 +82,7 @@ class RAYBUNDLE_OT_show_error(bpy.types.Operator):
             return {'CANCELLED'}
         most = write_error_colors(meshes, settings.attribute)
         if not bpy.app.background:
-            viewport_preview.show(context.window_manager)
+            viewport_preview.show(context)
         self.report({'INFO'}, tip_("White is a stated error of {error} W/(m² sr) and more").format(
             error=f"{most:.2g}"))
         return {'FINISHED'}

@@ -8,7 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from . import bake_run, gltf_export, light_in_material
+from . import bake_run, gltf_export, light_in_material, viewport_preview
 from .bake_report import BakeError
 from .channel_bake import bake_channels, why_not
 from .export_check import check
@@ -74,13 +74,15 @@ class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
 
     def invoke(self, context, event):
         self.way = context.scene.raybundle.shown_as
-        return self.execute(context)
+        result = self.execute(context)
+        viewport_preview.show(context, viewport_preview.MATERIALS)
+        return result
 
     def execute(self, context):
         settings = context.scene.raybundle
-        way = self.way if self.properties.is_property_set('way') else settings.shown_as
-        if way == 'AUTO':
-            way = light_in_material.way_for(settings.output)
+        way = light_in_material.chosen_way(
+            settings, self.way if self.properties.is_property_set('way') else "")
+        settings.is_light_lent = False
         report = light_in_material.use(context.scene, settings.attribute, way)
         _check_again(context.scene)
         for warning in report.warnings:
@@ -96,7 +98,12 @@ class RAYBUNDLE_OT_take_out_of_material(_NeedsObjectMode, bpy.types.Operator):
     bl_label = "Take Out of Material"
     bl_options = {'REGISTER', 'UNDO'}
 
+    def invoke(self, context, event):
+        viewport_preview.hide(context)
+        return self.execute(context)
+
     def execute(self, context):
+        context.scene.raybundle.is_light_lent = False
         self.report({'INFO'}, f"Materials restored: {light_in_material.take_out()}")
         _check_again(context.scene)
         return {'FINISHED'}

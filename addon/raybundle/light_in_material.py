@@ -46,10 +46,14 @@ class UseReport:
     warnings: list[str] = field(default_factory=list)
 
 
-def way_for(output: str) -> str:
-    """Returns the way that shows an output (LIGHTING, ...) as a render would: light on a white
-    surface is multiplied by the colour of the surface."""
-    return EMISSION if output == 'COMBINED' else COLORED
+def chosen_way(settings: bpy.types.PropertyGroup, shown_as: str = "") -> str:
+    """Returns the way that a choice of how to show light stands for; "": the choice of the scene's
+    settings. AUTO shows an output (LIGHTING, ...) as a render would: light on a white surface is
+    multiplied by the colour of the surface."""
+    shown_as = shown_as or settings.shown_as
+    if shown_as != 'AUTO':
+        return shown_as
+    return EMISSION if settings.output == 'COMBINED' else COLORED
 
 
 def use(scene: bpy.types.Scene, attribute: str, way: str) -> UseReport:

@@ -90,10 +90,9 @@ class LiveLight:
             if not run.stopped_because:
                 with self._own_changes(context):
                     run.finish(context)
+                    viewport_preview.show_result(context, is_new=False)
                 self._is_rough = self._is_draft
                 self.drafts += self._is_draft
-                if context.scene.raybundle.show_result and context.window_manager.windows:
-                    viewport_preview.show(context.window_manager)
         except (BakeError, RaybundleError) as error:
             self._fail(error)
         finally:

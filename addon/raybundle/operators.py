@@ -110,12 +110,17 @@ class _Bakes:
         if run.stopped_because:
             self.report({'WARNING'}, run.stopped_because)
             if self._switched_preview and not run.is_kept:
-                viewport_preview.hide(context.window_manager)
+                viewport_preview.hide(context)
             return {'FINISHED'} if run.is_kept else {'CANCELLED'}
         goes_on = run.advance()
-        if run.shows_light and context.scene.raybundle.show_result:
-            self._switched_preview |= viewport_preview.show(context.window_manager)
-        return None if goes_on else _say(self, run.finish(context))
+        if run.shows_light:
+            self._switched_preview |= viewport_preview.show_interim(context)
+        if goes_on:
+            return None
+        report = run.finish(context)
+        for warning in viewport_preview.show_result(context):
+            self.report({'WARNING'}, warning)
+        return _say(self, report)
 
     def _show_progress(self, context) -> None:
         if time.perf_counter() < self._next_draw:
@@ -265,6 +270,7 @@ class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
     """Show the baked attribute in all 3D views, or restore their earlier shading"""
     bl_idname = "raybundle.preview"
     bl_label = "Preview"
+    bl_options = {'REGISTER', 'UNDO'}
 
     def execute(self, context):
         for item in context.scene.objects:
@@ -272,7 +278,8 @@ class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
                 color_attribute.activate(item.data, context.scene.raybundle.attribute)
         # A background process has no windows.
         if not bpy.app.background:
-            viewport_preview.toggle(context.window_manager)
+            for warning in viewport_preview.toggle(context):
+                self.report({'WARNING'}, warning)
         return {'FINISHED'}
 
 

@@ -7,7 +7,7 @@ The panel of the last report is in report_panel.py, that of collections in objec
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import live_light, native, preferences
+from . import live_light, native, preferences, viewport_preview
 from .light_sets import attribute_of
 from .presets import RAYBUNDLE_PT_presets
 from .progress_panel import draw_progress
@@ -57,6 +57,15 @@ def draw_bake(layout: bpy.types.UILayout) -> None:
     row.operator("raybundle.bake", text="Bake", icon='LIGHT')
     row.operator("raybundle.relight")
     row.operator("raybundle.clear", text="", icon='TRASH')
+
+
+def draw_preview(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """Draws the button that shows baked light in the 3D views, and the choice how."""
+    row = layout.row(align=True)
+    row.use_property_split = False  # The names are on the buttons.
+    row.operator("raybundle.preview")
+    for way in (viewport_preview.SOLID, viewport_preview.MATERIALS):
+        row.prop_enum(settings, "show_in", way)
 
 
 def draw_live(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -114,6 +123,7 @@ class RAYBUNDLE_PT_render(RaybundleRenderPanel, bpy.types.Panel):
         if not draw_progress(layout):
             draw_bake(layout)
             draw_live(layout, context)
+        draw_preview(layout, settings)
         layout.prop(settings, "scope")
         methods = changed_methods(settings)
         if methods and not preferences.studies_methods():
@@ -302,7 +312,7 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
             column.operator("raybundle.relight")
             column.operator("raybundle.clear", text="Clear")
             draw_live(layout, context)
-        layout.operator("raybundle.preview")
+        draw_preview(layout, context.scene.raybundle)
 
 
 register, unregister = bpy.utils.register_classes_factory((

@@ -15,7 +15,7 @@ import bpy
 from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty,
                        PointerProperty, StringProperty)
 
-from . import preferences, quality
+from . import preferences, quality, viewport_preview
 from .engine_presets import ENUM_ENGINE, apply_preset
 
 enum_scope = (
@@ -168,6 +168,14 @@ enum_side = (
      "point outward"),
 )
 
+enum_show_in = (
+    ('SOLID', "Solid",
+     "At once: the values themselves, without surface colours and the scene's view transform"),
+    ('MATERIALS', "Materials",
+     "Light times surface colour, through the scene's view transform: a bake and Preview add the "
+     "light to the materials, as Use in Material does, and switch to Material Preview"),
+)
+
 enum_shown_as = (
     ('AUTO', "Automatic",
      "The output Combined as Light Alone, and other outputs as Light Times Colour"),
@@ -283,6 +291,12 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         name="Show Result", default=True,
         description="While a bake runs and after it, show the baked colours in all 3D views. "
                     "Preview switches back to the earlier shading")
+    show_in: EnumProperty(
+        name="Show In", description="How the 3D views show baked light", items=enum_show_in,
+        default='SOLID', update=viewport_preview.follow_choice)
+    is_light_lent: BoolProperty(
+        name="Lent to Materials", options={'HIDDEN'},
+        description="Whether the light is in the materials only as long as the preview shows it")
     write_error: BoolProperty(
         name="Write Error",
         description="Also write the stated error of the light, one number per corner or vertex, "
