@@ -197,8 +197,9 @@ def test_roles_of_the_selection(two_boxes):
 def test_roles_and_sides_of_a_collection(two_boxes):
     assert bpy.ops.raybundle.set_role(role='IGNORE', target='COLLECTION') == {'FINISHED'}
     assert bpy.ops.raybundle.set_side(side='BACK', target='COLLECTION') == {'FINISHED'}
-    assert {(item.raybundle.role, item.raybundle.side) for item in two_boxes} == {
-        ('IGNORE', 'BACK')}
+    assert bpy.ops.raybundle.set_quality(quality='FINE', target='COLLECTION') == {'FINISHED'}
+    assert {(item.raybundle.role, item.raybundle.side, item.raybundle.quality)
+            for item in two_boxes} == {('IGNORE', 'BACK', 'FINE')}
     assert bpy.data.objects["Empty"].raybundle.role == 'BAKE'
 
 
@@ -207,7 +208,7 @@ def test_the_panel_of_a_collection(two_boxes):
     assert layout.texts()[0] == "Objects with surfaces: 2"
     pressed = [options['text'] for method, _, options, *_ in layout.record
                if method == 'operator' and options['depress']]
-    assert pressed == ["Bake", "Front"]
+    assert pressed == ["Bake", "Front", "As Scene"]
     two_boxes[0].raybundle.role = 'OCCLUDE'
     layout = drawn(object_roles.RAYBUNDLE_PT_collection)
     assert not any(options['depress'] for method, _, options, *_ in layout.record

@@ -104,3 +104,28 @@ def test_a_bake_stores_its_time_and_relighting_keeps_it(closed_box):
     assert stored['full_bake'] == {'target_error': 0.05, 'seconds': stored['seconds']}
     bpy.ops.raybundle.relight()
     assert json.loads(settings().report)['full_bake'] == stored['full_bake']
+
+
+@pytest.mark.needs_library
+def test_patches_of_a_fine_object_are_half_as_long(closed_box):
+    """A cube has 6 faces of 4 n^2 patches, but for rounding."""
+    def patches(name: str) -> int:
+        closed_box.raybundle.quality = name
+        raybundle.bake(bpy.context, patch_size=0.1, max_bundles=16)
+        return json.loads(settings().report)['patches']
+
+    assert patches('FINE') == pytest.approx(4 * patches('SCENE'), rel=0.1)
+    assert patches('COARSE') == pytest.approx(patches('SCENE') / 4, rel=0.1)
+
+
+@pytest.mark.needs_library
+def test_the_copy_of_a_fine_object_has_finer_faces(closed_box):
+    def faces(name: str) -> int:
+        closed_box.raybundle.quality = name
+        raybundle.bake(bpy.context, patch_size=0.1, topology='SUBDIVIDE', max_bundles=16)
+        copy, = (item for item in bpy.context.scene.objects
+                 if item.raybundle.source == closed_box)
+        assert copy.raybundle.quality == name
+        return len(copy.data.polygons)
+
+    assert faces('FINE') == pytest.approx(4 * faces('SCENE'), rel=0.1)

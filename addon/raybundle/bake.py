@@ -22,7 +22,7 @@ from .mesh_arrays import corner_vertices
 from .native import ErrorCode, Progress, RaybundleError
 from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings
-from .quality import full_bake
+from .quality import OBJECT_FACTORS, full_bake
 from .scene_data import MeshData
 from .scene_export import BakeTarget, SceneExport, export_scene
 from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
@@ -242,7 +242,9 @@ def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, Subdivided
     result = {}
     for target in export.targets:
         instance = scene.instances[target.instance]
-        mesh = subdivide(scene.meshes[instance.mesh], instance.transform, 2.0 * patch_size)
+        factor = OBJECT_FACTORS[instance.quality].patch_size
+        mesh = subdivide(scene.meshes[instance.mesh], instance.transform,
+                         2.0 * factor * patch_size)
         scene.meshes.append(mesh.data)
         scene.instances[target.instance] = replace(instance, mesh=len(scene.meshes) - 1)
         result[target.instance] = mesh

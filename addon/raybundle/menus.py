@@ -19,7 +19,7 @@ class RAYBUNDLE_MT_object(bpy.types.Menu):
     def draw(self, context):
         draw_operators(self.layout)
         self.layout.separator()
-        for property_name in ("role", "side"):
+        for property_name in ("role", "side", "quality"):
             self.layout.operator_menu_enum(f"raybundle.set_{property_name}", property_name)
 
 

@@ -175,6 +175,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_set_light_spread': (_handle, _int, _float),
     'rb_set_light_shadows': (_handle, _int, ctypes.c_bool),
     'rb_set_instance_visibility': (_handle, _int, ctypes.c_bool, ctypes.c_bool),
+    'rb_set_instance_quality': (_handle, _int, ctypes.c_float, ctypes.c_float),
     'rb_set_result_corners': (_handle, _int, _ints, _size),
     'rb_set_world': (_handle, _floats),
     'rb_set_world_image': (_handle, _int, _int, _floats),
@@ -554,6 +555,11 @@ class Scene(_Handle):
         light. exchanges: whether the instance reflects light to other surfaces and blocks their
         light."""
         self._library.rb_set_instance_visibility(self._pointer, instance, stops_direct, exchanges)
+
+    def set_instance_quality(self, instance: int, noise: float, patch_size: float) -> None:
+        """Sets how exactly the light of an instance is computed. noise: factor on target_error.
+        patch_size: factor on the edge length of the instance's patches. Both 0.01 to 100."""
+        self._library.rb_set_instance_quality(self._pointer, instance, noise, patch_size)
 
     def set_result_corners(self, instance: int, corners: np.ndarray) -> None:
         """Limits the results of an instance to some corners. corners: (k,), the corners of the

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from . import native
+from .quality import OBJECT_FACTORS
 from .scene_data import (AreaLightData, LightData, LightSetData, MeshData, PointLightData,
                          SceneData)
 
@@ -24,6 +25,8 @@ def build_native_scene(data: SceneData) -> native.Scene:
         identifier = scene.add_instance(instance.mesh, instance.name, instance.transform,
                                         instance.role, instance.side)
         scene.set_instance_visibility(identifier, instance.stops_direct, instance.exchanges)
+        factors = OBJECT_FACTORS[instance.quality]
+        scene.set_instance_quality(identifier, factors.noise, factors.patch_size)
         if instance.result_corners is not None:
             scene.set_result_corners(identifier, instance.result_corners)
     for light in data.lights:

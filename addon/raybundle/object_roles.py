@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sets the role and the side of many objects at once: of a collection or of the selection."""
+"""Sets the role, the side and the quality of many objects at once: of a collection or of the
+selection."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import EnumProperty
 
 from .properties import enum_role, enum_side
+from .quality import enum_object_quality
 
 # Types of objects that have surfaces.
 SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT'}
@@ -83,6 +85,20 @@ class RAYBUNDLE_OT_set_side(_SetsObjects, bpy.types.Operator):
         return self.set_all(context, 'side', self.side)
 
 
+class RAYBUNDLE_OT_set_quality(_SetsObjects, bpy.types.Operator):
+    """Set how exactly the light of the objects is computed, compared with the scene"""
+    bl_idname = "raybundle.set_quality"
+    bl_label = "Set Quality"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    quality: EnumProperty(
+        name="Quality", description="How exactly the light of the objects is computed",
+        items=enum_object_quality)
+
+    def execute(self, context):
+        return self.set_all(context, 'quality', self.quality)
+
+
 class RAYBUNDLE_PT_collection(bpy.types.Panel):
     bl_label = "Raybundle"
     bl_space_type = 'PROPERTIES'
@@ -97,7 +113,8 @@ class RAYBUNDLE_PT_collection(bpy.types.Panel):
                      translate=False)
         column = layout.column()
         column.enabled = bool(items)
-        for name, choices in (("role", enum_role), ("side", enum_side)):
+        for name, choices in (("role", enum_role), ("side", enum_side),
+                              ("quality", enum_object_quality)):
             counts = Counter(getattr(item.raybundle, name) for item in items)
             split = column.split(factor=0.3, align=True)
             split.label(text=bpy.types.Object.bl_rna.properties['raybundle'].fixed_type
@@ -114,5 +131,6 @@ class RAYBUNDLE_PT_collection(bpy.types.Panel):
 register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_OT_set_role,
     RAYBUNDLE_OT_set_side,
+    RAYBUNDLE_OT_set_quality,
     RAYBUNDLE_PT_collection,
 ))

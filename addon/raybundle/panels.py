@@ -295,6 +295,7 @@ class RAYBUNDLE_PT_object(bpy.types.Panel):
         column = layout.column()
         column.active = settings.role == 'BAKE'
         column.prop(settings, "side")
+        column.prop(settings, "quality")
 
 
 class RAYBUNDLE_PT_sidebar(bpy.types.Panel):

@@ -444,6 +444,10 @@ class RaybundleObjectSettings(bpy.types.PropertyGroup):
     side: EnumProperty(
         name="Side", description="The side of the faces whose light is baked", items=enum_side,
         default='FRONT')
+    quality: EnumProperty(
+        name="Quality", description="How exactly the light of the object is computed, compared "
+                                    "with the scene", items=quality.enum_object_quality,
+        default='SCENE')
     source: PointerProperty(
         name="Source", description="The original of this subdivided copy",
         type=bpy.types.Object, poll=_is_mesh_object)

@@ -9,6 +9,7 @@ bake, scaled by a law that docs/performance.md measures ("What a quality costs")
 from __future__ import annotations
 
 import json
+from typing import NamedTuple
 
 import bpy
 
@@ -32,6 +33,25 @@ _POWERS = {'first_shot': (0.4, 0.95), 'bundles': (0.9, 1.4), 'solve': (0.9, 1.4)
 _FIXED = ('export', 'patches', 'reconstruction', 'write_back')
 # The identifier of a skip: a bake that reused patches and lines tells nothing of a full one's time.
 _REUSED = "UNCHANGED_GEOMETRY"
+
+
+class Factors(NamedTuple):
+    """How exactly the light of an object is computed, compared with the scene."""
+
+    noise: float  # factor on target_error
+    patch_size: float  # factor on the edge length of patches
+
+
+# The qualities of an object, by name.
+enum_object_quality = (
+    ('SCENE', "As Scene", "The noise and the patches of the scene"),
+    ('COARSE', "Coarse", "Three times the noise of the scene and patches twice as long: for objects "
+                         "far away or rarely seen"),
+    ('FINE', "Fine", "Half the noise of the scene and patches half as long: for objects seen close "
+                     "up. The bake takes longer"),
+)
+OBJECT_FACTORS = {'SCENE': Factors(1.0, 1.0), 'COARSE': Factors(3.0, 2.0),
+                  'FINE': Factors(0.5, 0.5)}
 
 
 def quality_of(target_error: float) -> str:

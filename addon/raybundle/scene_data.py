@@ -87,6 +87,7 @@ class InstanceData:
     transform: np.ndarray  # (3, 4) float64, object to world
     role: str  # 'BAKE' or 'OCCLUDE'
     side: str  # 'FRONT' or 'BACK'
+    quality: str = 'SCENE'  # a key of quality.OBJECT_FACTORS
     stops_direct: bool = True  # whether the instance blocks the direct light of lamps
     # Whether the instance reflects light to other objects and blocks their light.
     exchanges: bool = True

@@ -379,6 +379,7 @@ class _Exporter:
         shown = (item, instance.parent) if instance.is_instance and instance.parent else (item,)
         self.result.scene.instances.append(
             InstanceData(mesh, item.name, transform, role, original.raybundle.side,
+                         original.raybundle.quality,
                          stops_direct=all(source.visible_shadow for source in shown),
                          exchanges=all(source.visible_diffuse for source in shown)))
         self.members.add_instance(instance)

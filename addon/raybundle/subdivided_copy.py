@@ -147,6 +147,7 @@ def _place_copy(context: bpy.types.Context, original: bpy.types.Object, mesh: bp
     copy.matrix_world = original.matrix_world
     copy.raybundle.role = original.raybundle.role
     copy.raybundle.side = original.raybundle.side
+    copy.raybundle.quality = original.raybundle.quality
     copy.raybundle.source = original
     return copy
 

@@ -271,6 +271,7 @@ void addInstance(Bytes& in, rb_scene scene) {
     expectMessage(rb_add_instance(scene, in.small(), in.text().c_str(), transform.data(),
                                   rb_role(in.below(3)), rb_side(in.below(3)), &id));
     if (in.flag()) expectMessage(rb_set_instance_visibility(scene, id, in.flag(), in.flag()));
+    if (in.flag()) expectMessage(rb_set_instance_quality(scene, id, in.number(), in.number()));
     const int32_t corners[] = {in.small(), in.small(), 0};
     if (in.flag()) expectMessage(rb_set_result_corners(scene, id, corners, in.below(4)));
     if (in.flag()) expectMessage(rb_set_instance_light_set(scene, in.small(), in.small()));

@@ -45,6 +45,7 @@ TEST(ApiNull, HandlesAreRefusedEverywhere) {
     expectInvalid(rb_set_light_spread(nullptr, 0, 1), "scene");
     expectInvalid(rb_set_light_shadows(nullptr, 0, false), "scene");
     expectInvalid(rb_set_instance_visibility(nullptr, 0, true, true), "scene");
+    expectInvalid(rb_set_instance_quality(nullptr, 0, 1, 1), "scene");
     expectInvalid(rb_set_result_corners(nullptr, 0, nullptr, 0), "scene");
     expectInvalid(rb_add_sun_light(nullptr, "", kOne, kOne, 0, &id), "scene");
     expectInvalid(rb_add_area_light(nullptr, "", kOne, kOne, kOne, kOne, RB_AREA_ELLIPSE, &id),
@@ -271,15 +272,18 @@ TEST_F(Api, NumbersThatMakeNoSenseAreRefusedByName) {
     expectInvalid(rb_set_light_spread(scene, sun, 1), "sol");
     expectInvalid(rb_set_light_shadows(scene, 99, false), "99");
     expectInvalid(rb_set_instance_visibility(scene, 99, true, true), "99");
+    expectInvalid(rb_set_instance_quality(scene, 99, 1, 1), "99");
     const int32_t noCorners[] = {0, 77777};
     expectInvalid(rb_set_result_corners(scene, 99, noCorners, 1), "99");
     const int32_t box = addInstance(mesh);
+    expectInvalid(rb_set_instance_quality(scene, box, 0.001f, 1), "0.01 to 100");
+    expectInvalid(rb_set_instance_quality(scene, box, 1, NAN), "0.01 to 100");
     expectInvalid(rb_set_result_corners(scene, box, nullptr, 1), "corners");
     expectInvalid(rb_set_result_corners(scene, box, noCorners, 2), "77777");
     int32_t screen = -1;
-    ASSERT_EQ(rb_add_instance(scene, mesh, "screen", kIdentity, RB_ROLE_OCCLUDE, RB_SIDE_FRONT,
-                              &screen),
-              RB_ERROR_NONE);
+    ASSERT_EQ(
+        rb_add_instance(scene, mesh, "screen", kIdentity, RB_ROLE_OCCLUDE, RB_SIDE_FRONT, &screen),
+        RB_ERROR_NONE);
     expectInvalid(rb_set_result_corners(scene, screen, noCorners, 1), "screen");
 }
 

@@ -325,6 +325,14 @@ RB_API rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name,
 RB_API rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops_direct,
                                            bool exchanges);
 
+/* Sets how exactly the light of an instance is computed compared with the rest of the scene. Both
+ * factors are 1 by default, and must be from 0.01 to 100. Otherwise returns RB_INVALID_ARGUMENT.
+ *   noise        factor on target_error for this instance. Solvers other than LINE_REUSE follow it
+ *                for the light that the first shot gathers only.
+ *   patch_size   factor on the edge length of the patches of this instance */
+RB_API rb_error rb_set_instance_quality(rb_scene scene, int32_t instance, float noise,
+                                        float patch_size);
+
 /* Optional, for an instance with role RB_ROLE_BAKE. Selects the corners of its mesh that need a
  * result: corner_count corner indices. It serves meshes that are finer than the mesh to which the
  * light is written. By default all corners need one.

@@ -119,6 +119,19 @@ rb_error rb_add_instance(rb_scene scene, int32_t mesh, const char* name, const f
     });
 }
 
+rb_error rb_set_instance_quality(rb_scene scene, int32_t instance, float noise, float patch_size) {
+    return guarded([&] {
+        const HeldScene held(scene, "scene");
+        Instance& target = held->instance(instance);
+        for (const float factor : {noise, patch_size})
+            if (!(factor >= 0.01f && factor <= 100))
+                throw invalidArgument("instance \"" + target.name +
+                                      "\": the factors of its quality must be from 0.01 to 100");
+        target.noiseFactor = noise;
+        target.patchFactor = patch_size;
+    });
+}
+
 rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, bool stops_direct,
                                     bool exchanges) {
     return guarded([&] {

@@ -67,8 +67,8 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       isDraft(input.settings.draft && input.settings.countsLines()),
       halves(lights.size()) {
     if (input.settings.countsLines())
-        noisyParts.emplace(NoisyPartsInput{in.tiles, in.trace.looks, in.tiles.sum(area), in.shown,
-                                           growth, shown, projectionsOfFaces(in.trace),
+        noisyParts.emplace(NoisyPartsInput{in.scene, in.tiles, in.trace.looks, in.tiles.sum(area),
+                                           in.shown, growth, shown, projectionsOfFaces(in.trace),
                                            in.settings.targetError});
 }
 

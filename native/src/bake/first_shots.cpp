@@ -94,6 +94,7 @@ SetLights shootSources(const StageInput& in, const ShownLight& shown,
                              coarse.empty() ? nullptr : &coarse[lights.size()],
                              mayScale ? last.shot.bySource : nullptr,
                              &shown.sides(),
+                             &in.scene.instances,
                              &standIns};
         // The light of further sets is not waited for.
         if (in.interim && lights.empty())

@@ -40,7 +40,8 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
     }
     addOpacity(scene, hasher);
     for (const Instance& instance : scene.instances) {
-        hasher.add(instance.mesh, instance.transform, instance.stopsDirect, instance.exchanges);
+        hasher.add(instance.mesh, instance.transform, instance.stopsDirect, instance.exchanges,
+                   instance.patchFactor);
     }
     hasher.add(settings.patchSize, settings.maxPatches, settings.refine, settings.contacts,
                settings.linesPerBundle, settings.seed, settings.planeCount, settings.planeCoherence,

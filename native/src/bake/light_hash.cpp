@@ -16,6 +16,7 @@ uint64_t shotHash(const Scene& scene, const Settings& settings, const std::vecto
     for (const Mesh& mesh : scene.meshes)
         if (hasDirections) hasher.add(mesh.faceMaterials);
     hasher.add(std::vector<uint8_t>(isShown.begin(), isShown.end()));
+    for (const Instance& instance : scene.instances) hasher.add(instance.noiseFactor);
     hasher.add(settings.targetError, settings.seed, settings.skipFacing, settings.skipLit,
                settings.skipWeak, settings.skipInside);
     return hasher.value();

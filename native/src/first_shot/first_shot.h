@@ -69,6 +69,8 @@ struct FirstShotInput {
     // Per side: whether the light on it is shown in the result. Light that is not shown only lights
     // other surfaces. Null: the light of all sides is shown.
     const std::vector<bool>* isShown = nullptr;
+    // GATHER only: the instances, which have factors on the target error. Null: the factors are 1.
+    const std::vector<Instance>* instances = nullptr;
     // GATHER only: which sides gather for other sides. Null: each side gathers for itself.
     const StandIns* standIns = nullptr;
     // GATHER only: receives the irradiance per side, W/m^2, after the coarse pass. May be empty.

@@ -158,6 +158,8 @@ FirstShot gather(const FirstShotInput& input) {
             receiver.isShown = false;
             receiver.errorFactor =
                 std::min(receiver.errorFactor * othersError(patches, standIns, side), kMostError);
+        } else if (input.instances) {
+            receiver.targetFactor = (*input.instances)[patches.parentAt(side).instance].noiseFactor;
         }
         return receiver;
     };

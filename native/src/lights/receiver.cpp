@@ -103,25 +103,24 @@ Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
     // receivers beside a lamp.
     const double meanLight = litArea[anyShown] > 0 ? lit[anyShown] / litArea[anyShown] : 0;
     const float floor = kDarkShare * float(meanLight);
-    std::vector<float> tolerance(results.size());
+    std::vector<float> targets(results.size()), tolerance(results.size());
     std::vector<bool> counts(results.size());
     for (size_t k = 0; k < results.size(); ++k) {
         const Receiver receiver = receiverAt(k);
         counts[k] = receiver.isShown || !anyShown;
-        tolerance[k] =
-            receiver.errorFactor * kDirectShare * targetError * std::max(floor, light[k]);
+        targets[k] = receiver.targetFactor * targetError;
+        tolerance[k] = receiver.errorFactor * kDirectShare * targets[k] * std::max(floor, light[k]);
     }
     const float factor = laxity(results, counts, tolerance, kLaxShare * targetError * meanLight);
     for (float& error : tolerance) error *= factor;
     const std::vector<float> besideShadow = besideShadows(results, neighbours, tolerance);
     const std::vector<bool> hasNeighbour = haveNeighbours(results.size(), neighbours);
     Aims further;
-    const int growth = mostGrowth(targetError);
     for (uint32_t k = 0; k < results.size(); ++k)
         if (besideShadow[k] > 0 || std::sqrt(results[k].variance) > tolerance[k]) {
             further.receivers.push_back(k);
-            further.aims.push_back(
-                {tolerance[k], kFirstSamples, growth, besideShadow[k], nullptr, !hasNeighbour[k]});
+            further.aims.push_back({tolerance[k], kFirstSamples, mostGrowth(targets[k]),
+                                    besideShadow[k], nullptr, !hasNeighbour[k]});
         }
     return further;
 }

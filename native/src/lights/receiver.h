@@ -31,8 +31,9 @@ struct Receiver {
     // on surfaces that do not stop direct light, that of all sources. Lines that end at the first
     // surface cannot bring this light.
     bool passingOnly = false;
-    float errorFactor = 1;  // factor on the error that the receiver may have
-    bool isShown = true;    // false: the result shows only light that this receiver reflects
+    float errorFactor = 1;   // factor on the error that the receiver may have
+    float targetFactor = 1;  // factor on the target error: that of the object
+    bool isShown = true;     // false: the result shows only light that this receiver reflects
     // Irradiance that the receiver gets besides the light of the sources, brightest channel, W/m^2.
     float otherLight = 0;
 };

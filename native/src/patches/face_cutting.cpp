@@ -30,7 +30,8 @@ class FaceCutting {
           patches(patches),
           cutting(patches) {}
 
-    // `patchSize` is the edge length of a patch, m; 0 takes the automatic sizes.
+    // `patchSize` is the edge length of a patch, m; 0 takes the automatic sizes. Each instance has
+    // a factor on it.
     void run(float patchSize) {
         const std::vector<Shell> shells = findShells();
         DoubledFaces doubled =
@@ -78,6 +79,7 @@ class FaceCutting {
             }
             double size = patchSize > 0 ? double(patchSize) : sizes.size[faces.piece[face]];
             if (!(size > 0)) size = 1;
+            size *= double(scene.instances[i].patchFactor);
             Island& island = patches.islands[sizes.island[faces.piece[face]]];
             island.size = std::max(island.size, float(size));
             island.finest = island.finest > 0 ? std::min(island.finest, float(size)) : float(size);

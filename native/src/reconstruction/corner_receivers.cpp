@@ -71,6 +71,7 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
             receiver.side =
                 2 * (parent.firstPatch + parent.patchAt(st.x, st.y)) + uint32_t(placed.side);
             receiver.point = point;
+            receiver.targetFactor = placed.noiseFactor;
             receiver.seed = hash(instance, uint32_t(corner));
             receiver.normal = patches.normal(receiver.side);
             if (mesh.cornerNormals.empty()) continue;

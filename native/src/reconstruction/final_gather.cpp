@@ -61,14 +61,17 @@ FinalGather::FinalGather(const LitSurfaces& surfaces, const Visibility& visibili
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
                                        float brightness) const {
+    const float factor = receivers[0].receiver->targetFactor;
     const double tolerance = std::pow(
-        double(kSpreadOverError * kNoiseShare * std::max(error, targetError * brightness)), 2);
+        double(kSpreadOverError * kNoiseShare * factor * std::max(error, targetError * brightness)),
+        2);
     const uint32_t parts = std::max(kFewestParts, kParts / uint32_t(receivers.size()));
     std::vector<Light> sums(receivers.size() * parts);
     const uint32_t count = uint32_t(sums.size());
     uint32_t wanted = kFirstRays;
     // The loop below compares two rounds, so that it casts at least twice this number of rays.
-    while (wanted < kMostRays / 2 && 2 * float(wanted * count) * targetError < kFewestTimesTarget)
+    while (wanted < kMostRays / 2 &&
+           2 * float(wanted * count) * factor * targetError < kFewestTimesTarget)
         wanted *= 2;
     const SobolPoints points(hash(receivers[0].receiver->seed, 0));
     Light mean;

@@ -72,6 +72,8 @@ struct Instance {
     int32_t lightSet = kNoLightSet;
     bool stopsDirect = true;  // blocks the light of the sources
     bool exchanges = true;  // emits and reflects light to other surfaces, and blocks that of others
+    // Factors on the target error of the light of the object, and on the edges of its patches.
+    float noiseFactor = 1, patchFactor = 1;
     // If only some corners have a result: whether a vertex of the mesh has a corner with a result
     // (per vertex), and whether a face has such a vertex (per face). Empty if all corners have a
     // result.

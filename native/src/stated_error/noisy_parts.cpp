@@ -100,6 +100,7 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
         partOf[side] = cells[cell].part;
         Part& part = parts[cells[cell].part];
         part.instance = parent.instance;
+        part.strictness = std::pow(input.scene.instances[parent.instance].noiseFactor, -2.0);
         ++part.sides;
         if (input.shown.isGathered(tiles.firstSide(side))) part.isGathered = true;
     }
@@ -217,7 +218,7 @@ std::vector<double> NoisyParts::squaresOf(const SetNoise& noise) const {
         for (size_t p = 0; p < parts.size(); ++p) result[p] = std::max(result[p], ofSet[p]);
     }
     for (size_t p = 0; p < parts.size(); ++p)
-        if (!parts[p].isGathered) result[p] *= kByChance;
+        result[p] *= (parts[p].isGathered ? 1 : kByChance) * parts[p].strictness;
     return result;
 }
 

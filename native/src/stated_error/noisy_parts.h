@@ -28,6 +28,7 @@ namespace raybundle {
 
 // The input of NoisyParts. References must outlive this struct.
 struct NoisyPartsInput {
+    const Scene& scene;
     const Tiles& tiles;
     const Looks& before;  // of earlier bakes with these lines
     // Per side of the tiles: exposed area of sides with a result, otherwise 0, m^2.
@@ -78,6 +79,7 @@ class NoisyParts {
     struct Part {
         uint32_t instance = 0;
         bool isGathered = false;
+        double strictness = 1;  // factor on its squared noise: that of the object's target
         // Sides, and lines that have met them.
         double sides = 0, lines = 0;
         // Squared noise at the corners divided by the squared light there: at the last look, and
@@ -115,7 +117,8 @@ class NoisyParts {
     // of their whole object. `light` is the result of lightOf() for `noise`.
     std::vector<double> foretold(const Noise& noise, const std::vector<double>& light,
                                  const Measured& measured) const;
-    // Returns per part the squared relative noise at the corners, the largest of all lights.
+    // Returns per part the squared relative noise at the corners, the largest of all lights, as if
+    // the objects had the target of the scene.
     std::vector<double> squaresOf(const SetNoise& noise) const;
     // Returns per instance the quantile over nine tenths of its parts, or of those parts that want
     // rays. `squares` is per part.

@@ -374,8 +374,8 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         const double noise = report.objects[i].error.noise;
         const double brightness = own.signal / own.area * all.area / all.signal;
-        if (!errsAlike && noise > kNoisyTargets * targetError &&
-            brightness > kNearlyBlack * kNearlyBlack)
+        const double allowed = kNoisyTargets * targetError * double(scene.instances[i].noiseFactor);
+        if (!errsAlike && noise > allowed && brightness > kNearlyBlack * kNearlyBlack)
             noisy.push_back({noise, light[i].name});
         if (!(brightness > kDark)) continue;
         if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
