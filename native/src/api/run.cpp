@@ -40,7 +40,8 @@ class Run {
         Bake& baked = **bake;
         const Progress callers = baked.progress;
         baked.progress = Progress(&Run::note, this);
-        baked.interim = &interim;
+        // A draft ends before anyone could look at less than it.
+        baked.interim = baked.settings.draft ? nullptr : &interim;
         try {
             baked.run(**scene);
         } catch (...) {
