@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live mode. Its timer needs a window; here, tests take its steps themselves."""
 
+import sys
 import time
 
 import bpy
@@ -9,9 +10,12 @@ import pytest
 import raybundle
 from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
 from raybundle import bake_run, live_light
+from raybundle.scene_export import export_scene
 from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
+
+bake_module = sys.modules["raybundle.bake"]  # raybundle.bake is the function
 
 
 @pytest.fixture
@@ -165,3 +169,87 @@ def test_a_file_that_is_opened_begins_no_bake(room, live, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=path)
     assert not bpy.context.scene.raybundle.live
     assert until_at_rest(live) == 0
+
+
+# --------------------------------------------------------------------------------------------------
+# Drafts after a change of lamps alone
+# --------------------------------------------------------------------------------------------------
+
+
+def add_lamp(scene):
+    light = bpy.data.lights.new("Third", 'POINT')
+    light.energy = 20.0
+    scene.collection.objects.link(bpy.data.objects.new("Third", light))
+
+
+def switch_lamp_off(scene):
+    bpy.data.lights["Left"].energy = 0.0
+
+
+def hide_block(scene):
+    bpy.data.objects["Block"].hide_viewport = True
+
+
+@pytest.fixture
+def exports(monkeypatch):
+    """Counts the exports of whole scenes."""
+    found = []
+
+    def export(*arguments):
+        found.append(None)
+        return export_scene(*arguments)
+
+    monkeypatch.setattr(bake_module, 'export_scene', export)
+    return found
+
+
+def next_draft(live):
+    """Takes steps until the next draft is written."""
+    drafts, deadline = live.drafts, time.monotonic() + 30.0
+    while live.drafts == drafts:
+        assert time.monotonic() < deadline, "there is no draft"
+        live.step(bpy.context)
+        time.sleep(0.001)
+
+
+@pytest.mark.parametrize("change", [change_power, change_color, move_lamp])
+def test_only_lamps_are_exported_again(room, live, exports, change):
+    switch_on(live)
+    exports.clear()
+    change(bpy.context.scene)
+    bpy.context.view_layer.update()
+    next_draft(live)
+    assert exports == []
+    draft = read_colors(room).copy()
+    # The same draft from a whole export.
+    prepared = bake_module.prepare(bpy.context, live_light.DRAFT, True)
+    with prepared.native_scene:
+        prepared.native_bake.execute(prepared.native_scene, lambda *_: True)
+    bake_module.write_results(bpy.context, prepared)
+    assert np.allclose(read_colors(room), draft, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("change", [move_block, change_material, add_lamp, switch_lamp_off,
+                                    hide_block])
+def test_other_changes_need_a_whole_export(room, live, exports, change):
+    switch_on(live)
+    change_power(bpy.context.scene)
+    bpy.context.view_layer.update()
+    next_draft(live)
+    exports.clear()
+    change(bpy.context.scene)
+    bpy.context.view_layer.update()
+    next_draft(live)
+    assert len(exports) == 1
+
+
+def test_a_lamp_that_changes_after_something_else_needs_a_whole_export(room, live, exports):
+    """The two changes come between two steps of live mode."""
+    switch_on(live)
+    exports.clear()
+    change_material(bpy.context.scene)
+    bpy.context.view_layer.update()
+    move_lamp(bpy.context.scene)
+    bpy.context.view_layer.update()
+    next_draft(live)
+    assert len(exports) == 1

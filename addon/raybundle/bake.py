@@ -24,7 +24,8 @@ from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings
 from .quality import OBJECT_FACTORS, full_bake
 from .scene_data import MeshData
-from .scene_export import BakeTarget, SceneExport, export_scene
+from .scene_export import (BakeTarget, SceneExport, export_lamps_again,
+                           export_scene)
 from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
                               subdivide)
 
@@ -53,10 +54,10 @@ class PreparedBake:
     export: SceneExport
     # The finer mesh of each target, by the target's position in SceneData.instances.
     subdivided: dict[int, SubdividedMesh]
-    native_bake: native.Bake
-    native_scene: native.Scene  # the owner of this object closes it
     started: float  # time.perf_counter() at the beginning
-    export_seconds: float
+    native_bake: native.Bake | None = None
+    native_scene: native.Scene | None = None  # the owner of this object closes it
+    export_seconds: float = 0.0
 
 
 def bake(context: bpy.types.Context, progress: Progress | None = None,
@@ -93,17 +94,39 @@ def prepare(context: bpy.types.Context, overrides: dict[str, object], is_draft: 
     light_sets = read_light_sets(scene, settings.attribute)
     _check(scene, settings, light_sets)
     export, subdivided = _export(context, settings, light_sets)
-    native_bake = bake_cache.get_or_create(scene)
-    native_scene = build_native_scene(export.scene)
-    export_seconds = time.perf_counter() - started
+    return _ready(PreparedBake(scene, settings, light_sets, export, subdivided, started), is_draft)
+
+
+def prepare_lamps(context: bpy.types.Context, overrides: dict[str, object], is_draft: bool,
+                  last: PreparedBake) -> PreparedBake | None:
+    """Does what prepare() does, for a scene in which nothing but lamps has changed since `last` was
+    prepared, in a fraction of the time. Returns None if that is not possible."""
+    started = time.perf_counter()
+    settings = read_settings(context.scene, overrides)
+    # No export depends on these settings.
+    same = replace(last.settings, target_error=settings.target_error,
+                   max_bundles=settings.max_bundles)
+    if (last.scene != context.scene or same != settings
+            or read_light_sets(context.scene, settings.attribute) != last.light_sets):
+        return None
+    export = export_lamps_again(context, last.export)
+    if export is None:
+        return None
+    return _ready(replace(last, settings=settings, export=export, started=started), is_draft)
+
+
+def _ready(prepared: PreparedBake, is_draft: bool) -> PreparedBake:
+    """Adds to a bake whose scene is exported what the native library needs."""
+    prepared.native_bake = bake_cache.get_or_create(prepared.scene)
+    prepared.native_scene = build_native_scene(prepared.export.scene)
+    prepared.export_seconds = time.perf_counter() - prepared.started
     try:
-        _apply_settings(native_bake, settings)
-        native_bake.set('draft', is_draft)
+        _apply_settings(prepared.native_bake, prepared.settings)
+        prepared.native_bake.set('draft', is_draft)
     except BaseException:
-        native_scene.close()
+        prepared.native_scene.close()
         raise
-    return PreparedBake(scene, settings, light_sets, export, subdivided, native_bake, native_scene,
-                        started, export_seconds)
+    return prepared
 
 
 def write_results(context: bpy.types.Context, prepared: PreparedBake,

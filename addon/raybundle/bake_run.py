@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_tip as tip_
 
 from . import native
-from .bake import object_mode, prepare, write_results
+from .bake import PreparedBake, object_mode, prepare, prepare_lamps, write_results
 from .bake_progress import BakeProgress
 from .bake_report import BakeError, BakeReport
 from .interim_light import InterimLight
@@ -33,13 +33,21 @@ def active() -> BakeRun | None:
 
 
 def changes_light(depsgraph: bpy.types.Depsgraph) -> bool:
-    """Returns whether an update changes a lamp, a material, the world or the place of an object.
-    Changes of meshes do not count, because writing light to a mesh is one."""
+    """Returns whether an update changes a lamp, a material, the world, the place of an object, or
+    which objects there are. Changes of meshes do not count, because writing light to a mesh is
+    one."""
     return any(
         isinstance(update.id, (bpy.types.Light, bpy.types.World, bpy.types.Material,
-                               bpy.types.ShaderNodeTree))
+                               bpy.types.ShaderNodeTree, bpy.types.Collection))
         or isinstance(update.id, bpy.types.Object) and update.is_updated_transform
         for update in depsgraph.updates)
+
+
+def changes_only_lamps(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Returns whether an update changes nothing but lamps."""
+    return all(isinstance(update.id, bpy.types.Light)
+               or isinstance(update.id, bpy.types.Object) and update.id.type == 'LIGHT'
+               for update in depsgraph.updates)
 
 
 def can_begin(operator: type[bpy.types.Operator]) -> bool:
@@ -62,10 +70,12 @@ class BakeRun:
     """A bake from the export of the scene to the end of the native run."""
 
     def __init__(self, context: bpy.types.Context, overrides: dict[str, object] | None = None,
-                 is_live: bool = False, is_draft: bool = False) -> None:
+                 is_live: bool = False, is_draft: bool = False,
+                 last: PreparedBake | None = None) -> None:
         """Exports the context's scene, starts the native run, and makes this the active run.
         is_live: whether live mode has started it; such a run shows no interim light. is_draft: as
-        in prepare(). overrides, and errors: as in bake()."""
+        in prepare(). last: an earlier bake, if nothing but lamps has changed since it was prepared.
+        overrides, and errors: as in bake()."""
         global _active
         self.is_live = is_live
         self.progress = BakeProgress(read_report(context.scene).get('seconds', {}))
@@ -74,11 +84,13 @@ class BakeRun:
         self.was_scene_changed = False  # whether lights, materials or places changed meanwhile
         native.load()
         with object_mode(context):
-            self._prepared = prepare(context, overrides or {}, is_draft)
+            self.prepared = last and prepare_lamps(context, overrides or {}, is_draft, last)
+            if self.prepared is None:
+                self.prepared = prepare(context, overrides or {}, is_draft)
         # The run keeps the native scene until it ends.
-        with self._prepared.native_scene:
-            self._run = native.Run(self._prepared.native_bake, self._prepared.native_scene)
-        self._interim = InterimLight(self._prepared)
+        with self.prepared.native_scene:
+            self._run = native.Run(self.prepared.native_bake, self.prepared.native_scene)
+        self._interim = InterimLight(self.prepared)
         self.state = self._run.state()
         # time.perf_counter() when light was last shown, or None if that has been drawn; and before
         # which none is shown again
@@ -122,7 +134,7 @@ class BakeRun:
         self.is_kept = keep and self.shows_light
         if self.is_kept:
             # The last report describes other light.
-            self._prepared.scene.raybundle.report = ""
+            self.prepared.scene.raybundle.report = ""
         else:
             self._interim.put_back()
         self._run.close()
@@ -133,7 +145,7 @@ class BakeRun:
         self.progress.note('write_back', 0.0)
         warnings = ["The scene was changed while the bake ran, and the light is that of the scene "
                     "before: bake again, or relight"] if self.was_scene_changed else []
-        prepared = self._prepared
+        prepared = self.prepared
         try:
             self._run.finish()
             if prepared.subdivided and context.scene != prepared.scene:

@@ -21,6 +21,16 @@ from .scene_data import AreaLightData, LightData, PointLightData, SunLightData, 
 _ALL_BOUNCES = 1024
 
 
+def export_instance(instance: bpy.types.DepsgraphObjectInstance, images: ImagePixels,
+                    warnings: Warnings) -> LightData | None:
+    """Returns a lamp as export_light() does, by its evaluated instance. Returns None for portals
+    and lamps without Diffuse visibility too, which do not light diffuse surfaces."""
+    item = instance.object
+    if is_portal(item.data) or not item.visible_diffuse:
+        return None
+    return export_light(item, instance.matrix_world, images, warnings)
+
+
 def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: ImagePixels,
                  warnings: Warnings) -> LightData | None:
     """Returns a lamp in world space and physical units. Returns None if the lamp emits nothing.

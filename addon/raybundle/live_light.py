@@ -18,6 +18,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import bake_run, viewport_preview
+from .bake import PreparedBake
 from .bake_report import BakeError
 from .native import RaybundleError
 
@@ -37,16 +38,24 @@ class LiveLight:
         self.message = ""  # why the light does not follow, for the user; "": it does
         self._run: bake_run.BakeRun | None = None
         self._is_draft = False  # whether self._run is a draft
+        # The last bake that was prepared, as long as nothing but lamps has changed since.
+        self._exported: PreparedBake | None = None
         self._was_on = False
         self._changes_scene = False  # whether live mode itself is changing the scene
         self._is_stale = False  # whether something has changed since the last draft began
         self._is_rough = False  # whether the attributes hold a draft
         self._last_change = 0.0  # time.perf_counter()
 
-    def note_change(self) -> None:
-        """Notes that the light has changed, unless live mode itself has changed the scene."""
+    def note_update(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Notes what an update of the scene has changed, unless live mode itself has changed it."""
         if self._changes_scene:
             return
+        if not bake_run.changes_only_lamps(depsgraph):
+            self._exported = None
+        if bake_run.changes_light(depsgraph):
+            self._note_change()
+
+    def _note_change(self) -> None:
         self._is_stale = True
         self._last_change = time.perf_counter()
 
@@ -55,7 +64,8 @@ class LiveLight:
         scene = context.scene
         is_on = scene is not None and scene.raybundle.live
         if is_on and not self._was_on:
-            self.note_change()
+            self._exported = None
+            self._note_change()
         self._was_on = is_on
         if self._run is not None:
             self._go_on(context, is_on)
@@ -74,8 +84,10 @@ class LiveLight:
         self.message = ""
         try:
             with self._own_changes(context):
-                self._run = bake_run.BakeRun(context, DRAFT if self._is_draft else {},
-                                             is_live=True, is_draft=self._is_draft)
+                self._run = bake_run.BakeRun(
+                    context, DRAFT if self._is_draft else {}, is_live=True,
+                    is_draft=self._is_draft, last=self._exported if self._is_draft else None)
+            self._exported = self._run.prepared
         except (BakeError, RaybundleError) as error:
             self._fail(error)
 
@@ -112,6 +124,7 @@ class LiveLight:
     def _fail(self, error: BakeError | RaybundleError) -> None:
         """Waits for the next change, which may end the cause of the error."""
         self.message = str(error)
+        self._exported = None
         self._is_rough = False
 
 
@@ -120,8 +133,7 @@ live = LiveLight()
 
 @persistent
 def _after_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if bake_run.changes_light(depsgraph):
-        live.note_change()
+    live.note_update(depsgraph)
 
 
 @persistent

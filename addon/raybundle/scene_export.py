@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -19,7 +19,8 @@ from mathutils import Vector
 from . import left_out
 from .corner_map import CornerMap, ElementCodes, build_corner_map, same_topology
 from .hidden_lights import hidden_light_instances
-from .light_export import export_light, is_portal
+from .image_export import ImagePixels
+from .light_export import export_instance
 from .light_sets import LightSet, LightSetMembers
 from .materials.cycles_bake import BakedSurface, Wanted, bake_surfaces
 from .materials.export import MaterialExporter, SlotMaterial
@@ -27,7 +28,7 @@ from .materials.gloss import filter_glossy_of
 from .materials.last_surfaces import LastSurfaces
 from .materials.shown_results import RENDERED, renders_result, result_names
 from .mesh_export import MeshError, export_mesh, has_turned_normals
-from .scene_data import InstanceData, MeshData, SceneData, Warnings
+from .scene_data import InstanceData, LightData, MeshData, SceneData, Warnings
 from .world_export import export_world
 
 # Object types whose evaluated geometry is a mesh.
@@ -65,6 +66,7 @@ class SceneExport:
     statuses: dict[str, str] = field(default_factory=dict)  # by object name: why it gets no light
     warnings: Warnings = field(default_factory=Warnings)
     last: LastSurfaces | None = None  # the surfaces of this bake, for the next bake
+    shown_lamps: int = 0  # of the scene's lights, those that the viewport shows come first
 
 
 def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None,
@@ -90,6 +92,28 @@ def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Obje
         if changed:
             # Evaluate again, so that evaluated meshes have no codes either.
             context.view_layer.update()
+
+
+def export_lamps_again(context: bpy.types.Context, last: SceneExport) -> SceneExport | None:
+    """Returns the export of a scene in which nothing but lamps has changed since its last export.
+    Returns None if that needs a whole export: if lamps were added or removed, or have begun or
+    ceased to shine, or if an object cannot be written any more."""
+    shown: list[LightData] = []
+    warnings = Warnings()
+    images = ImagePixels()
+    for instance in renderable_instances(context):
+        if instance.object.type == 'LIGHT':
+            light = export_instance(instance, images, warnings)
+            if light is not None:
+                shown.append(light)
+    before = last.scene.lights[:last.shown_lamps]
+    if [light.name for light in shown] != [light.name for light in before] \
+            or any(target.unchanged_mesh() is None for target in last.targets):
+        return None
+    scene = replace(last.scene, lights=shown + last.scene.lights[last.shown_lamps:])
+    for text in last.warnings:
+        warnings.add(text)
+    return replace(last, scene=scene, warnings=warnings)
 
 
 def renderable_instances(context: bpy.types.Context) -> Iterator[bpy.types.DepsgraphObjectInstance]:
@@ -260,7 +284,7 @@ class _Exporter:
                 self._refuse(item.name, left_out.UNREAD_TYPES[item.type])
         hidden = self._hidden()
         lights = self.result.scene.lights
-        shown = len(lights)
+        shown = self.result.shown_lamps = len(lights)
         for instance in hidden_light_instances(self.context, hidden):
             self._add_light(instance)
         self._name_what_is_left_out(hidden, [light.name for light in lights[shown:]])
@@ -325,12 +349,7 @@ class _Exporter:
             f'the properties that the last bake used')
 
     def _add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        item = instance.object
-        # Portals and lamps without Diffuse visibility do not light diffuse surfaces.
-        if is_portal(item.data) or not item.visible_diffuse:
-            return
-        light = export_light(item, instance.matrix_world, self.materials.images,
-                             self.result.warnings)
+        light = export_instance(instance, self.materials.images, self.result.warnings)
         if light is not None:
             self.result.scene.lights.append(light)
             self.members.add_light(instance)
