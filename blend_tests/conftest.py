@@ -49,6 +49,15 @@ def empty_file():
     yield
 
 
+@pytest.fixture
+def user():
+    """The add-on's preferences of a user who enabled it."""
+    addon = bpy.context.preferences.addons.new()
+    addon.module = raybundle.__name__
+    yield addon.preferences
+    bpy.context.preferences.addons.remove(addon)
+
+
 def create_material(name: str, reflectance=(0.8, 0.8, 0.8), emission=(0.0, 0.0, 0.0)):
     """Returns a new material of a Diffuse shader and, if it emits, an Emission shader.
 

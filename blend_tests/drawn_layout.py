@@ -45,11 +45,13 @@ class DrawnLayout:
         return [arguments[0] for method, arguments, *_ in self.record if method == 'operator']
 
 
-def drawn(panel: type, context: object = None, method: str = 'draw') -> DrawnLayout:
-    """Returns what a panel draws, for bpy.context unless another context is given."""
+def drawn(panel: type, context: object = None, method: str = 'draw', **properties: object
+          ) -> DrawnLayout:
+    """Returns what a panel draws, for bpy.context unless another context is given. properties:
+    values of properties of the panel itself that it reads."""
     layout = DrawnLayout()
     own = {name: value for name, value in vars(panel).items() if name.startswith("_draw")}
-    stand_in = SimpleNamespace(layout=layout)
+    stand_in = SimpleNamespace(layout=layout, **properties)
     for name, value in own.items():
         function = value.__func__ if isinstance(value, staticmethod) else value.__get__(stand_in)
         setattr(stand_in, name, function)

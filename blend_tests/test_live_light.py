@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import raybundle
 from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
-from raybundle import bake_run, live_light
+from drawn_layout import drawn
+from raybundle import bake_run, live_light, panels, preferences
 from raybundle.scene_export import export_scene
 from surface_error import read_colors
 
@@ -160,6 +161,49 @@ def test_a_bake_ends_the_run_of_live_mode(closed_box, live):
     assert bpy.ops.raybundle.bake() == {'FINISHED'}
     assert np.allclose(read_colors(closed_box)[:, :3], FURNACE_LIGHT, rtol=1e-3)
     until_at_rest(live)
+
+
+SAYS_DRAFT = "The light is a draft: press Bake"
+
+
+def test_a_draft_stays_if_the_user_bakes(room, live, user):
+    user.live_bakes = False
+    assert switch_on(live) == 1
+    assert bake_run.active() is None and live.shows_draft(bpy.context.scene)
+    assert SAYS_DRAFT in drawn(panels.RAYBUNDLE_PT_sidebar).texts()
+    draft = read_colors(room).copy()
+    raybundle.bake(bpy.context)
+    assert until_at_rest(live) == 0
+    assert not np.array_equal(read_colors(room), draft)
+    assert SAYS_DRAFT not in drawn(panels.RAYBUNDLE_PT_sidebar).texts()
+
+
+def test_the_bake_begins_after_the_delay(room, live, user):
+    assert user.live_delay == pytest.approx(preferences.LIVE_DELAY) == live_light.rest_seconds()
+    user.live_delay = 3600.0
+    bpy.context.scene.raybundle.live = True
+    while live.drafts == 0:
+        live.step(bpy.context)
+    for _ in range(5):
+        assert live.step(bpy.context) < live_light.IDLE_SECONDS
+        assert bake_run.active() is None
+    # Light that will get better by itself is not called a draft.
+    assert SAYS_DRAFT not in drawn(panels.RAYBUNDLE_PT_sidebar).texts()
+    user.live_delay = 0.0
+    assert until_at_rest(live) == 0
+    assert not live.shows_draft(bpy.context.scene)
+
+
+def test_a_draft_of_live_mode_that_was_switched_off_is_named(room, live, user):
+    user.live_delay = 3600.0
+    bpy.context.scene.raybundle.live = True
+    while live.drafts == 0:
+        live.step(bpy.context)
+    bpy.context.scene.raybundle.live = False
+    assert until_at_rest(live) == 0
+    assert SAYS_DRAFT in drawn(panels.RAYBUNDLE_PT_sidebar).texts()
+    bpy.ops.raybundle.clear()
+    assert SAYS_DRAFT not in drawn(panels.RAYBUNDLE_PT_sidebar).texts()
 
 
 def test_a_file_that_is_opened_begins_no_bake(room, live, tmp_path):

@@ -16,15 +16,6 @@ def settings() -> bpy.types.PropertyGroup:
     return bpy.context.scene.raybundle
 
 
-@pytest.fixture
-def user(monkeypatch):
-    """The add-on's preferences of a user who enabled it."""
-    addon = bpy.context.preferences.addons.new()
-    addon.module = preferences.__package__
-    yield addon.preferences
-    bpy.context.preferences.addons.remove(addon)
-
-
 # --------------------------------------------------------------------------------------------------
 # Render properties
 # --------------------------------------------------------------------------------------------------
@@ -56,7 +47,7 @@ def test_the_sidebar_and_the_preferences_are_drawn():
     assert {"raybundle.bake", "raybundle.preview"} <= set(
         drawn(panels.RAYBUNDLE_PT_sidebar).operators())
     assert {"raybundle.open_guide", "raybundle.copy_bug_report"} == set(
-        drawn(preferences.RaybundlePreferences).operators())
+        drawn(preferences.RaybundlePreferences, live_bakes=True).operators())
 
 
 def test_all_panels_are_drawn_with_what_this_blender_has(closed_box):

@@ -20,6 +20,8 @@ COPY_MIRRORS = MIRRORS.replace('"Glossy BSDF"', '"Glossy BSDF.001"')
      [f'material "A"{MIRRORS}', f'light "A"{MIRRORS}']),
     (['object "A": 3 faces lie on others', 'object "B": 4 faces lie on others'],
      ['object "A", "B": 7 faces lie on others']),
+    (['"A": 3 % of its values are cut off', '"B": 4 % of its values are cut off'],
+     ['"A": 3 % of its values are cut off', '"B": 4 % of its values are cut off']),
     (['"A" is left out: it has no faces', '"B" is left out: it has no faces'],
      ['"A", "B" is left out: it has no faces']),
     # If a name contains quotes, its end in the line is not known. Such lines are not merged.

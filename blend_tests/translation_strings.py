@@ -7,7 +7,8 @@ Writes addon/raybundle/translations/raybundle.pot, and rewrites the .po files be
 are added without a translation, and texts that no longer exist are removed.
 
 Texts of classes (labels, descriptions, properties and their choices) are read from Blender, all
-others from the code: texts of labels and buttons, and texts in iface_() and tip_().
+others from the code: texts of labels and buttons, texts in iface_() and tip_(), templates of
+Message(), and those of the native library's texts.
 """
 
 from __future__ import annotations
@@ -24,13 +25,14 @@ sys.path.insert(0, str(ADDON.parent))
 sys.dont_write_bytecode = True
 
 import raybundle  # noqa: E402
-from raybundle import translations  # noqa: E402
+from raybundle import library_messages, translations  # noqa: E402
 
 TEMPLATE = translations.FOLDER / "raybundle.pot"
 # Contexts in which Blender looks a text up.
 GENERAL, OPERATOR = "*", "Operator"
-# Functions that translate their argument.
-_TRANSLATING = {'iface_', 'tip_'}
+# Functions that translate their first argument, and the class of messages, which are translated
+# when they are shown.
+_TRANSLATING = {'iface_', 'tip_', 'Message'}
 # Methods of layouts that translate their argument `text`, and the context of the text.
 _LAYOUT = {'label': GENERAL, 'prop': GENERAL, 'menu': GENERAL, 'prop_enum': GENERAL,
            'operator': OPERATOR, 'operator_menu_enum': OPERATOR}
@@ -119,6 +121,8 @@ def all_texts() -> list[Key]:
     found = {key for item in registered_classes() for key in texts_of_class(item)}
     for owner in (bpy.types.Scene, bpy.types.Object):
         found.update(texts_of_property(owner.bl_rna.properties['raybundle']))
+    found.update((GENERAL, text)
+                 for text in (*library_messages.WARNINGS, *library_messages.SKIPS))
     for path in ADDON.rglob("*.py"):
         found.update(texts_of_code(path.read_text(encoding="utf-8")))
     return sorted(((context, text) for context, text in found if text.strip()),

@@ -19,6 +19,7 @@ from .bake_report import BakeError, BakeReport, ObjectReport
 from .corner_map import CornerMap, grouped_mean
 from .light_sets import LightSet, read_light_sets
 from .mesh_arrays import corner_vertices
+from .messages import Message, quoted
 from .native import ErrorCode, Progress, RaybundleError
 from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings
@@ -28,6 +29,7 @@ from .scene_export import (BakeTarget, SceneExport, export_lamps_again,
                            export_scene)
 from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
                               subdivide)
+from .warning_lines import listed
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ def write_results(context: bpy.types.Context, prepared: PreparedBake,
 def _checked_progress(progress: Progress | None) -> Progress:
     def report(stage: str, fraction: float) -> None:
         if progress is not None and progress(stage, fraction) is False:
-            raise RaybundleError(ErrorCode.CANCELLED, "The bake was cancelled")
+            raise RaybundleError(ErrorCode.CANCELLED, Message("The bake was cancelled"))
     return report
 
 
@@ -187,22 +189,26 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[Ligh
     """Raises BakeError if the attributes of the settings and of the light sets cannot be
     written."""
     if not settings.attribute:
-        raise BakeError("The colour attribute has no name: enter one in the panel Output")
+        raise BakeError(Message("The colour attribute has no name: enter one in the panel Output"))
     longest = settings.attribute
     if settings.write_error:
         longest = color_attribute.error_name(longest)
     if len(longest.encode()) > color_attribute.MOST_BYTES:
-        raise BakeError(f'The attribute name "{longest}" is longer than '
-                        f'{color_attribute.MOST_BYTES} bytes: choose a shorter one')
+        raise BakeError(Message("The attribute name {name} is longer than {count} bytes: choose a "
+                                "shorter one", name=quoted(longest),
+                                count=color_attribute.MOST_BYTES))
     for item in scene.objects:
         if item.type != 'MESH' or item.raybundle.role != 'BAKE':
             continue
         if item.data.is_editmode:
-            raise BakeError(f'"{item.name}" is in Edit Mode: leave Edit Mode before you bake')
+            raise BakeError(Message("{name} is in Edit Mode: leave Edit Mode before you bake",
+                                    name=quoted(item.name)))
         for name in (settings.attribute, *(light_set.attribute for light_set in light_sets)):
             if not color_attribute.name_is_free(item.data, name):
-                raise BakeError(f'"{item.name}" already has an attribute or UV map "{name}" that '
-                                f'is not a colour attribute: choose another attribute name')
+                raise BakeError(Message(
+                    "{object} already has an attribute or UV map {name} that is not a colour "
+                    "attribute: choose another attribute name", object=quoted(item.name),
+                    name=quoted(name)))
 
 
 # --------------------------------------------------------------------------------------------------
@@ -227,14 +233,23 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
                               settings.attribute)
     _leave_out_unwritable(export, settings)
     if not export.targets:
-        reasons = "; ".join(f'"{name}": {status}' for name, status in export.statuses.items())
-        what = "selected mesh object" if settings.scope == 'SELECTED' else "visible mesh object"
-        raise BakeError(f"Nothing to bake: there is no {what} with faces and the role Bake"
-                        + (f" ({reasons})" if reasons else ""))
+        raise BakeError(_nothing_to_bake(settings, export))
     if refine:
         return export, _refine(export, settings)
     _want_written_corners(export)
     return export, {}
+
+
+def _nothing_to_bake(settings: BakeSettings, export: SceneExport) -> Message:
+    what = Message("Nothing to bake: there is no selected mesh object with faces and the role Bake"
+                   if settings.scope == 'SELECTED' else
+                   "Nothing to bake: there is no visible mesh object with faces and the role Bake")
+    if not export.statuses:
+        return what
+    reasons = [Message("{name}: {reason}", name=quoted(name), reason=status)
+               for name, status in export.statuses.items()]
+    return Message("{what} ({reasons})", what=what,
+                   reasons=listed(reasons, len(reasons), separator="; "))
 
 
 def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
@@ -248,10 +263,12 @@ def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
         if owner.library is None and owner.override_library is None:
             writable.append(target)
             continue
-        status = (f"linked from {owner.library.filepath} and gets no colours: make it local"
-                  if owner.library else "a library override and gets no colours: make it local")
+        status = (Message("linked from {file} and gets no colours: make it local",
+                          file=owner.library.filepath) if owner.library else
+                  Message("a library override and gets no colours: make it local"))
         export.statuses[target.object.name] = status
-        export.warnings.add(f'"{target.object.name}" is {status}')
+        export.warnings.add(Message("{name} is {what}", name=quoted(target.object.name),
+                                    what=status))
         instances = export.scene.instances
         instances[target.instance] = replace(instances[target.instance], role='OCCLUDE')
     export.targets[:] = writable
@@ -302,10 +319,10 @@ def _check_unchanged(scene: bpy.types.Scene, export: SceneExport, native_bake: n
         is_scene = False
     for target in export.targets:
         if not is_scene or target.unchanged_mesh() is None:
-            raise BakeError(f'"{target.name}" was removed or changed during the bake: nothing was '
-                            f'written, bake again')
+            raise BakeError(Message("{name} was removed or changed during the bake: nothing was "
+                                    "written, bake again", name=quoted(target.name)))
     if native_bake.is_closed:
-        raise BakeError("The bake was cleared while it was running: nothing was written")
+        raise BakeError(Message("The bake was cleared while it was running: nothing was written"))
 
 
 # --------------------------------------------------------------------------------------------------
@@ -427,14 +444,15 @@ def _resolve_shared_meshes(lights: list[TargetLight], settings: BakeSettings,
             error = None if group[0].error is None else np.max([item.error for item in group], 0)
             group = [replace(item, light=mean, error=error, set_lights=set_means)
                      for item in group]
-            export.warnings.add(f'mesh "{mesh.name}" shows the mean light of the '
-                                f'{len(group)} objects that share it')
+            export.warnings.add(Message("mesh {name} shows the mean light of the {count} objects "
+                                        "that share it", name=quoted(mesh.name),
+                                        count=len(group)))
         elif len(group) > 1:
             for item in group[1:]:
                 item.target.object.data = mesh.copy()
-            export.warnings.add(
-                f'mesh "{mesh.name}" was shared by {len(group)} baked objects: each object now has '
-                f'its own mesh, with its own light')
+            export.warnings.add(Message(
+                "mesh {name} was shared by {count} baked objects: each object now has its own "
+                "mesh, with its own light", name=quoted(mesh.name), count=len(group)))
         resolved += group
     return resolved
 
@@ -446,7 +464,7 @@ def _warn_of_clipping(lights: list[TargetLight], settings: BakeSettings, export:
     for item in lights:
         clipped = np.count_nonzero((item.light > 1.0).any(axis=1)) / max(len(item.light), 1)
         if clipped:
-            export.warnings.add(
-                f'"{item.target.object.name}": {100.0 * clipped:.3g} % of its values are brighter '
-                f'than 1 and were cut off: choose the data type Color to keep them, or lower the '
-                f'exposure')
+            export.warnings.add(Message(
+                "{name}: {percent} % of its values are brighter than 1 and were cut off: choose "
+                "the data type Color to keep them, or lower the exposure",
+                name=quoted(item.target.object.name), percent=f"{100.0 * clipped:.3g}"))

@@ -7,6 +7,8 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 
+from .library_messages import recognised
+from .messages import Message, encoded
 from .warning_lines import grouped
 
 
@@ -67,6 +69,7 @@ class BakeReport:
                      'light_sets', 'warnings', 'warning_ids', 'skipped'):
             if name in values:
                 setattr(report, name, values[name])
+        report.warnings = [recognised(line) for line in report.warnings]
         report.warning_owners = [{'id': identifier} for identifier in report.warning_ids]
         report.warning_ids = list(dict.fromkeys(report.warning_ids))
         return report
@@ -83,15 +86,24 @@ class BakeReport:
                                 'names': list(group.names)} for group in groups]
 
     def to_json(self, indent: int | None = None) -> str:
-        """Returns the report as JSON. indent: as in json.dumps."""
-        return json.dumps(asdict(self), indent=indent)
+        """Returns the report as JSON, with the templates of the add-on's texts, so that panels can
+        translate them. indent: as in json.dumps."""
+        texts = [*self.warnings, *(item.status for item in self.objects)]
+        values = {**asdict(self), 'templates': {
+            text: encoded(text) for text in texts if isinstance(text, Message)}}
+        return json.dumps(values, indent=indent)
 
     def summary(self) -> str:
         """Returns one line for the status bar."""
         baked = sum(item.status.startswith('baked') for item in self.objects)
-        objects = "object" if baked == 1 else "objects"
-        count = len(self.warnings)
-        warnings = f", {count} warning{'s' if count > 1 else ''}" if count else ""
-        return (f"{baked} {objects} baked in {self.seconds['total']:.2f} s: {self.patches} "
-                f"patches, {self.bundles} bundles, noise {100.0 * self.error['noise']:.2g} %, "
-                f"stated error {100.0 * self.error['total']:.2g} %{warnings}")
+        text = Message("{objects} baked in {seconds} s: {patches} patches, {bundles} bundles, "
+                       "noise {noise} %, stated error {error} %",
+                       objects=Message("{count} object" if baked == 1 else "{count} objects",
+                                       count=baked),
+                       seconds=f"{self.seconds['total']:.2f}", patches=self.patches,
+                       bundles=self.bundles, noise=f"{100.0 * self.error['noise']:.2g}",
+                       error=f"{100.0 * self.error['total']:.2g}")
+        if not self.warnings:
+            return text
+        return Message("{baked}, {count} warnings" if len(self.warnings) > 1 else
+                       "{baked}, {count} warning", baked=text, count=len(self.warnings))

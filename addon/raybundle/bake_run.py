@@ -19,6 +19,7 @@ from .bake import PreparedBake, object_mode, prepare, prepare_lamps, write_resul
 from .bake_progress import BakeProgress
 from .bake_report import BakeError, BakeReport
 from .interim_light import InterimLight
+from .messages import Message
 from .report_data import read_report
 
 # Interim light is shown so rarely that writing and drawing it take at most this share of the time.
@@ -62,7 +63,7 @@ def can_begin(operator: type[bpy.types.Operator]) -> bool:
 def make_way() -> None:
     """Ends the run of live mode, if there is one, before another bake begins."""
     if _active is not None and _active.is_live:
-        _active.stop("Another bake has begun")
+        _active.stop(Message("Another bake has begun"))
         _active.leave()
 
 
@@ -124,8 +125,8 @@ class BakeRun:
         """Gives the attributes what they held before, until the next light is shown."""
         self._interim.put_back()
 
-    def stop(self, because: str, keep: bool = False) -> None:
-        """Ends the run within about 100 ms. because: a sentence for the user. keep: whether the
+    def stop(self, because: Message, keep: bool = False) -> None:
+        """Ends the run within about 100 ms. because: for the user. keep: whether the
         attributes keep the light so far, or get back what they held before."""
         if self.stopped_because:
             return
@@ -143,15 +144,17 @@ class BakeRun:
         """Writes the result of a run that has ended by itself, and returns the report. Errors: as
         in bake(); the attributes then get back what they held before."""
         self.progress.note('write_back', 0.0)
-        warnings = ["The scene was changed while the bake ran, and the light is that of the scene "
-                    "before: bake again, or relight"] if self.was_scene_changed else []
+        warnings = [Message("The scene was changed while the bake ran, and the light is that of "
+                            "the scene before: bake again, or relight")
+                    ] if self.was_scene_changed else []
         prepared = self.prepared
         try:
             self._run.finish()
             if prepared.subdivided and context.scene != prepared.scene:
                 # Copies are evaluated and placed in the scene that the window shows.
-                raise BakeError("The window shows another scene than the one that was baked: "
-                                "nothing was written, show that scene and bake again")
+                raise BakeError(Message("The window shows another scene than the one that was "
+                                        "baked: nothing was written, show that scene and bake "
+                                        "again"))
             with object_mode(context):
                 return write_results(context, prepared, warnings)
         except (BakeError, native.RaybundleError):
@@ -175,13 +178,14 @@ class BakeRun:
 def _before_undo(*_arguments: object) -> None:
     if _active is not None:
         # Undo compares meshes with its own copies, which do not have the interim light.
-        _active.stop("The bake was stopped by Undo or Redo: nothing was written")
+        _active.stop(Message("The bake was stopped by Undo or Redo: nothing was written"))
 
 
 @persistent
 def _before_load(*_arguments: object) -> None:
     if _active is not None:
-        _active.stop("The bake was stopped because a file was opened: nothing was written")
+        _active.stop(Message("The bake was stopped because a file was opened: nothing was "
+                             "written"))
         _active.leave()
 
 

@@ -14,13 +14,13 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_tip as tip_
 
 from . import color_attribute
 from .bake import bake
 from .bake_report import BakeError, BakeReport
 from .materials.last_surfaces import LastSurfaces
 from .mesh_arrays import read
+from .messages import Message
 from .native import Progress
 from .subdivided_copy import find_copies
 
@@ -73,19 +73,19 @@ def bake_channels(context: bpy.types.Context, progress: Progress | None = None) 
     return report
 
 
-def why_not(scene: bpy.types.Scene) -> str | None:
+def why_not(scene: bpy.types.Scene) -> Message | None:
     """Returns why the channels that are chosen cannot be baked, and what to do. None: they can."""
     sources = _sources(scene)
     if all(source == NONE for source in sources):
-        return tip_("All channels are empty: choose what to bake into them")
+        return Message("All channels are empty: choose what to bake into them")
     sets = scene.raybundle.light_sets
     for source in sources:
         if source.startswith(_SET):
             number = int(source[len(_SET):])
             if number > len(sets) or not sets[number - 1].enabled:
-                return tip_("There is no enabled light set number {number}: add it in the panel "
-                            "Light Sets, or choose another part for the channel").format(
-                                number=number)
+                return Message("There is no enabled light set number {number}: add it in the "
+                               "panel Light Sets, or choose another part for the channel",
+                               number=number)
     return None
 
 

@@ -13,6 +13,7 @@ from bpy.app.translations import pgettext_tip as tip_
 
 from . import viewport_preview
 from .color_attribute import MOST_BYTES, error_colors_name, error_name, show
+from .messages import Message, translated
 
 # The error of this share of all corners is within the range of the colours.
 _RANGE = 98.0
@@ -73,18 +74,19 @@ class RAYBUNDLE_OT_show_error(bpy.types.Operator):
         meshes = error_meshes(context.scene)
         if not meshes:
             settings.write_error = True
-            self.report({'INFO'}, tip_("Write Error is switched on: bake again, then press Show "
-                                       "Error once more"))
+            self.report({'INFO'}, translated(Message("Write Error is switched on: bake again, then "
+                                                     "press Show Error once more")))
             return {'FINISHED'}
         if len(error_colors_name(settings.attribute).encode()) > MOST_BYTES:
-            self.report({'WARNING'}, tip_("The name of the attribute is too long to add an "
-                                          "attribute for these colours: choose a shorter name"))
+            self.report({'WARNING'}, translated(Message(
+                "The name of the attribute is too long to add an attribute for these colours: "
+                "choose a shorter name")))
             return {'CANCELLED'}
         most = write_error_colors(meshes, settings.attribute)
         if not bpy.app.background:
             viewport_preview.show(context)
-        self.report({'INFO'}, tip_("White is a stated error of {error} W/(m² sr) and more").format(
-            error=f"{most:.2g}"))
+        self.report({'INFO'}, translated(Message(
+            "White is a stated error of {error} W/(m² sr) and more", error=f"{most:.2g}")))
         return {'FINISHED'}
 
 

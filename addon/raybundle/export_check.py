@@ -17,10 +17,12 @@ import numpy as np
 from .color_attribute import rendered_attribute
 from .engine_presets import EXPORTS_CORNERS
 from .filled_slots import has_nodes
-from .gltf_export import exporter_options
+from .gltf_export import EXPORTER_OFF, exporter_options
 from .light_in_material import COLORED, EMISSION, NODE_TAG, emits
 from .light_sets import written_attributes
 from .mesh_arrays import read
+from .messages import Message, quoted
+from .warning_lines import listed
 
 # Whether 16-bit colours above 1 may start again at 0 instead of being cut off: 4.2 has this fault,
 # 4.5 has not.
@@ -31,19 +33,15 @@ _WRAPS = bpy.app.version < (4, 5, 0)
 class Finding:
     """One thing that an export loses or changes, and what to do."""
 
-    what: str
-    remedy: str
+    what: Message  # with the remedy after a colon
     names: tuple[str, ...] = ()  # of the objects or materials concerned
 
-    def text(self) -> str:
+    def text(self) -> Message:
         """Returns the finding as one line."""
-        where = ""
-        if self.names:
-            where = f'"{self.names[0]}"'
-            if len(self.names) > 1:
-                where += f" and {len(self.names) - 1} more"
-            where += ": "
-        return f"{where}{self.what}: {self.remedy}"
+        if not self.names:
+            return self.what
+        return Message("{name}: {reason}", reason=self.what,
+                       name=listed([quoted(name) for name in self.names], 1))
 
 
 def check(scene: bpy.types.Scene) -> list[Finding]:
@@ -51,14 +49,14 @@ def check(scene: bpy.types.Scene) -> list[Finding]:
     change of the light in the scene's objects. Empty: nothing."""
     options = exporter_options()
     if not options:
-        return [Finding("Blender's glTF exporter is switched off",
-                        'enable the add-on "glTF 2.0 format" in the preferences')]
+        return [Finding(EXPORTER_OFF)]
     attribute = scene.raybundle.attribute
     items = [item for item in scene.objects
              if item.type == 'MESH' and attribute in item.data.color_attributes
              and not item.data.is_editmode]
     if not items:
-        return [Finding(f'no object has the attribute "{attribute}"', "bake first")]
+        return [Finding(Message("no object has the attribute {name}: bake first",
+                                name=quoted(attribute)))]
     by_material = 'export_vertex_color' in options
     found = [*_of_values(items, attribute, by_material), *_of_objects(scene, items)]
     found += _of_materials(scene, items, attribute) if by_material \
@@ -72,23 +70,26 @@ def _of_values(items: list[bpy.types.Object], attribute: str, by_material: bool
     attributes = [(item.name, item.data.color_attributes[attribute]) for item in items]
     corners = tuple(name for name, entry in attributes if entry.domain == 'CORNER')
     if corners and not EXPORTS_CORNERS:
-        yield Finding("the exporter of this Blender mixes up the values of face corners",
-                      'choose the domain Vertex and bake again, or press Export glTF', corners)
+        yield Finding(Message("the exporter of this Blender mixes up the values of face corners: "
+                              "choose the domain Vertex and bake again, or press Export glTF"),
+                      corners)
     colors = [(name, read(entry.data, 'color', np.float32, 4)) for name, entry in attributes]
     bright = {name for name, values in colors if (values[:, :3] > 1.0).any()}
     if bright:
-        yield Finding("light above 1 is outside of glTF's range, and engines may cut it off",
-                      "press Export glTF, which scales it, or lower the exposure and bake again",
-                      tuple(sorted(bright)))
+        yield Finding(Message("light above 1 is outside of glTF's range, and engines may cut it "
+                              "off: press Export glTF, which scales it, or lower the exposure and "
+                              "bake again"), tuple(sorted(bright)))
     bare = tuple(item.name for item in items if item.name in bright and not _materials(item))
     if bare and by_material:
-        fate = "starts again at 0" if _WRAPS else "is cut off at 1"
-        yield Finding(f"without a material, light above 1 {fate}",
-                      "press Export glTF or Use in Material", bare)
+        yield Finding(Message(
+            "without a material, light above 1 starts again at 0: press Export glTF or Use in "
+            "Material" if _WRAPS else
+            "without a material, light above 1 is cut off at 1: press Export glTF or Use in "
+            "Material"), bare)
     clear = tuple(name for name, values in colors if (values[:, 3] != 1.0).any())
     if clear and by_material:
-        yield Finding("the alpha of the attribute is left out unless a material uses it",
-                      "press Export glTF to export it", clear)
+        yield Finding(Message("the alpha of the attribute is left out unless a material uses it: "
+                              "press Export glTF to export it"), clear)
 
 
 def _materials(item: bpy.types.Object) -> list[bpy.types.Material]:
@@ -99,9 +100,9 @@ def _of_render(items: list[bpy.types.Object], attribute: str) -> Iterator[Findin
     others = tuple(item.name for item in items
                    if rendered_attribute(item.data).name != attribute)
     if others:
-        yield Finding("another colour attribute is the render attribute, which is exported",
-                      f'set "{attribute}" for rendering (the camera in the list of colour '
-                      f'attributes)', others)
+        yield Finding(Message("another colour attribute is the render attribute, which is "
+                              "exported: set {name} for rendering (the camera in the list of "
+                              "colour attributes)", name=quoted(attribute)), others)
 
 
 def _of_materials(scene: bpy.types.Scene, items: list[bpy.types.Object], attribute: str
@@ -117,12 +118,13 @@ def _of_materials(scene: bpy.types.Scene, items: list[bpy.types.Object], attribu
                    if not _uses(material, item.data, attribute)
                    and not _keeps_emission(material, scene)]
     if unused:
-        yield Finding("the material does not use the light, so that COLOR_0 is white and the light "
-                      "is in COLOR_1, which engines ignore",
-                      "press Use in Material or Export glTF", tuple(dict.fromkeys(unused)))
+        yield Finding(Message("the material does not use the light, so that COLOR_0 is white and "
+                              "the light is in COLOR_1, which engines ignore: press Use in "
+                              "Material or Export glTF"), tuple(dict.fromkeys(unused)))
     if others:
-        yield Finding("another colour attribute is the render attribute, which is exported",
-                      f'set "{attribute}" for rendering', tuple(others))
+        yield Finding(Message("another colour attribute is the render attribute, which is "
+                              "exported: set {name} for rendering", name=quoted(attribute)),
+                      tuple(others))
 
 
 def _uses(material: bpy.types.Material, mesh: bpy.types.Mesh, attribute: str) -> bool:
@@ -142,17 +144,17 @@ def _of_shading(items: list[bpy.types.Object], scene: bpy.types.Scene) -> Iterat
     lamps = tuple(material.name for material in materials if _is_lit(material)
                   and _keeps_emission(material, scene))
     if lamps:
-        yield Finding("the material emits light and is exported without the baked light",
-                      "bake the output Combined to export both", lamps)
+        yield Finding(Message("the material emits light and is exported without the baked light: "
+                              "bake the output Combined to export both"), lamps)
     bare = tuple(item.name for item in items if not _materials(item))
     if lit or bare:
-        yield Finding("the material is not unlit, so that engines light it again",
-                      "press Use in Material with Light Alone or Light Times Colour, or press "
-                      "Export glTF", lit + bare)
+        yield Finding(Message("the material is not unlit, so that engines light it again: press "
+                              "Use in Material with Light Alone or Light Times Colour, or press "
+                              "Export glTF"), lit + bare)
     if scene.raybundle.output == 'COMBINED' and lit:
-        yield Finding("the engine multiplies the light by the surface's colour, which Combined "
-                      "has already", "press Use in Material with Light Alone, or press Export "
-                                     "glTF", lit)
+        yield Finding(Message("the engine multiplies the light by the surface's colour, which "
+                              "Combined has already: press Use in Material with Light Alone, or "
+                              "press Export glTF"), lit)
 
 
 def _is_lit(material: bpy.types.Material) -> bool:
@@ -176,13 +178,13 @@ def _of_objects(scene: bpy.types.Scene, items: list[bpy.types.Object]) -> Iterat
                      if any(modifier.show_viewport and modifier.type != 'ARMATURE'
                             for modifier in item.modifiers))
     if modified:
-        yield Finding("modifiers are not applied", "switch on Apply Modifiers in the export",
-                      modified)
+        yield Finding(Message("modifiers are not applied: switch on Apply Modifiers in the "
+                              "export"), modified)
     originals = tuple(item.raybundle.source.name for item in scene.objects
                       if item.raybundle.source)
     if originals:
-        yield Finding("the hidden original is exported too, in the same place as its finer copy",
-                      "switch on Visible Objects in the export", originals)
+        yield Finding(Message("the hidden original is exported too, in the same place as its "
+                              "finer copy: switch on Visible Objects in the export"), originals)
 
 
 def _of_light_sets(scene: bpy.types.Scene, items: list[bpy.types.Object], by_material: bool
@@ -190,8 +192,9 @@ def _of_light_sets(scene: bpy.types.Scene, items: list[bpy.types.Object], by_mat
     attributes = [name for name in sorted(written_attributes(scene))
                   if any(name in item.data.color_attributes for item in items)]
     if attributes:
-        fate = "are in COLOR_1 and further ones, which engines ignore" if by_material else \
-            "are not exported"
-        yield Finding(f"light sets in attributes of their own {fate}",
-                      "export each set in a file of its own: name its attribute in Attribute and "
-                      "press Export glTF", tuple(attributes))
+        yield Finding(Message(
+            "light sets in attributes of their own are in COLOR_1 and further ones, which engines "
+            "ignore: export each set in a file of its own: name its attribute in Attribute and "
+            "press Export glTF" if by_material else
+            "light sets in attributes of their own are not exported: export each set in a file of "
+            "its own: name its attribute in Attribute and press Export glTF"), tuple(attributes))

@@ -12,7 +12,8 @@ from . import bake_run, gltf_export, light_in_material, viewport_preview
 from .bake_report import BakeError
 from .channel_bake import bake_channels, why_not
 from .export_check import check
-from .gltf_export import ExportError, ExportSettings
+from .gltf_export import EXPORTER_OFF, ExportError, ExportSettings
+from .messages import Message, encoded, quoted, translated
 from .native import RaybundleError
 from .properties import enum_export_format, enum_export_range, enum_shown_as
 
@@ -51,10 +52,10 @@ class _NeedsLight(_NeedsObjectMode):
         return True
 
 
-def _check(scene: bpy.types.Scene) -> list[str]:
+def _check(scene: bpy.types.Scene) -> list[Message]:
     """Returns what the check of exports finds, one line each, and keeps it for the panel."""
     lines = [finding.text() for finding in check(scene)]
-    scene.raybundle.export_check = json.dumps(lines)
+    scene.raybundle.export_check = json.dumps([encoded(line) for line in lines])
     return lines
 
 
@@ -86,9 +87,10 @@ class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
         report = light_in_material.use(context.scene, settings.attribute, way)
         _check_again(context.scene)
         for warning in report.warnings:
-            self.report({'WARNING'}, warning)
-        self.report({'INFO'}, f'Materials that show "{settings.attribute}": '
-                              f'{len(report.materials)}')
+            self.report({'WARNING'}, translated(warning))
+        self.report({'INFO'}, translated(Message(
+            "Materials that show {name}: {count}", name=quoted(settings.attribute),
+            count=len(report.materials))))
         return {'FINISHED'}
 
 
@@ -104,7 +106,8 @@ class RAYBUNDLE_OT_take_out_of_material(_NeedsObjectMode, bpy.types.Operator):
 
     def execute(self, context):
         context.scene.raybundle.is_light_lent = False
-        self.report({'INFO'}, f"Materials restored: {light_in_material.take_out()}")
+        self.report({'INFO'}, translated(Message("Materials restored: {count}",
+                                                 count=light_in_material.take_out())))
         _check_again(context.scene)
         return {'FINISHED'}
 
@@ -138,8 +141,7 @@ class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
         if not super().poll(context):
             return False
         if not gltf_export.exporter_options():
-            cls.poll_message_set(tip_("Blender's glTF exporter is switched off: enable the add-on "
-                                      "\"glTF 2.0 format\" in the preferences"))
+            cls.poll_message_set(tip_(EXPORTER_OFF))
             return False
         return True
 
@@ -178,11 +180,11 @@ class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
                 self.range if is_set('range') else settings.export_range,
                 self.apply_modifiers, self.selected))
         except ExportError as error:
-            self.report({'ERROR'}, str(error))
+            self.report({'ERROR'}, translated(error))
             return {'CANCELLED'}
         for warning in report.warnings:
-            self.report({'WARNING'}, warning)
-        self.report({'INFO'}, report.summary())
+            self.report({'WARNING'}, translated(warning))
+        self.report({'INFO'}, translated(report.summary()))
         return {'FINISHED'}
 
 
@@ -197,7 +199,7 @@ class RAYBUNDLE_OT_bake_channels(_NeedsObjectMode, bpy.types.Operator):
         if not super().poll(context) or not bake_run.can_begin(cls):
             return False
         if reason := why_not(context.scene):
-            cls.poll_message_set(reason)
+            cls.poll_message_set(translated(reason))
         return not reason
 
     def execute(self, context):
@@ -205,11 +207,12 @@ class RAYBUNDLE_OT_bake_channels(_NeedsObjectMode, bpy.types.Operator):
         try:
             report = bake_channels(context)
         except (BakeError, RaybundleError) as error:
-            self.report({'ERROR'}, str(error))
+            self.report({'ERROR'}, translated(error))
             return {'CANCELLED'}
         for warning in report.warnings:
-            self.report({'WARNING'}, warning)
-        self.report({'INFO'}, f'Channels of "{context.scene.raybundle.attribute}" written')
+            self.report({'WARNING'}, translated(warning))
+        self.report({'INFO'}, translated(Message(
+            "Channels of {name} written", name=quoted(context.scene.raybundle.attribute))))
         return {'FINISHED'}
 
 
@@ -221,9 +224,10 @@ class RAYBUNDLE_OT_check_export(_NeedsObjectMode, bpy.types.Operator):
     def execute(self, context):
         lines = _check(context.scene)
         for line in lines:
-            self.report({'WARNING'}, line)
+            self.report({'WARNING'}, translated(line))
         if not lines:
-            self.report({'INFO'}, "Blender's glTF exporter keeps the light as it is")
+            self.report({'INFO'}, translated(Message(
+                "Blender's glTF exporter keeps the light as it is")))
         return {'FINISHED'}
 
 

@@ -6,6 +6,7 @@ import json
 import bpy
 
 from .channel_bake import CHANNELS
+from .messages import decoded, translated
 from .panels import RaybundleRenderPanel, property_layout
 from .text_wrap import draw_wrapped
 
@@ -27,7 +28,8 @@ class RAYBUNDLE_PT_use_and_export(RaybundleRenderPanel, bpy.types.Panel):
         column.operator("raybundle.export_gltf", icon='EXPORT')
         column.operator("raybundle.check_export")
         if settings.export_check:
-            _draw_check(layout, context, json.loads(settings.export_check))
+            _draw_check(layout, context, [
+                decoded(line) for line in json.loads(settings.export_check)])
 
 
 def _draw_use(layout: bpy.types.UILayout) -> None:
@@ -44,7 +46,7 @@ def _draw_check(layout: bpy.types.UILayout, context: bpy.types.Context, lines: l
         return
     column.label(text="With Blender's own exporter:")
     for line in lines:
-        draw_wrapped(column, context, line, 'ERROR')
+        draw_wrapped(column, context, translated(line), 'ERROR')
 
 
 class RAYBUNDLE_PT_channels(RaybundleRenderPanel, bpy.types.Panel):

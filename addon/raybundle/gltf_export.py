@@ -23,6 +23,7 @@ import numpy as np
 from . import light_in_material
 from .glb_file import GlbError, GlbFile
 from .mesh_arrays import corner_vertices, read
+from .messages import Message, quoted
 
 FORMATS = {'SHORT': np.uint16, 'BYTE': np.uint8, 'FLOAT': np.float32}
 # Ways to fit light into the range 0 to 1.
@@ -32,6 +33,9 @@ AUTO, FULL, KEEP = 'AUTO', 'FULL', 'KEEP'
 # start with an underscore; 3.4 adds another one.
 _LIGHT, _ALPHA = "_RAYBUNDLE_LIGHT", "_RAYBUNDLE_ALPHA"
 _UNLIT = 'KHR_materials_unlit'
+
+EXPORTER_OFF = Message("Blender's glTF exporter is switched off: enable the add-on \"glTF 2.0 "
+                       "format\" in the preferences")
 
 
 class ExportError(RuntimeError):
@@ -63,11 +67,13 @@ class ExportReport:
 
     def summary(self) -> str:
         """Returns one line for the status bar."""
-        text = f"Light of {self.meshes} mesh{'es' if self.meshes != 1 else ''} exported"
-        if self.scale != 1.0:
-            text += (f", divided by {self.scale:.4g} so that the largest value is 1: multiply it "
-                     f"in the engine by the scale in the file's extras")
-        return text
+        text = Message("Light of {count} meshes exported" if self.meshes != 1 else
+                       "Light of {count} mesh exported", count=self.meshes)
+        if self.scale == 1.0:
+            return text
+        return Message("{exported}, divided by {scale} so that the largest value is 1: multiply it "
+                       "in the engine by the scale in the file's extras", exported=text,
+                       scale=f"{self.scale:.4g}")
 
 
 def exporter_options() -> set[str]:
@@ -83,10 +89,10 @@ def export(context: bpy.types.Context, path: Path, settings: ExportSettings) -> 
     Raises ExportError, after which an earlier file of this name is still there.
     """
     if not exporter_options():
-        raise ExportError("Blender's glTF exporter is switched off: enable the add-on \"glTF 2.0 "
-                          "format\" in the preferences")
+        raise ExportError(EXPORTER_OFF)
     if not any(settings.attribute in mesh.color_attributes for mesh in bpy.data.meshes):
-        raise ExportError(f'No mesh has the attribute "{settings.attribute}": bake first')
+        raise ExportError(Message("No mesh has the attribute {name}: bake first",
+                                  name=quoted(settings.attribute)))
     report = ExportReport()
     with tempfile.TemporaryDirectory() as folder:
         written = Path(folder) / "light.glb"
@@ -100,7 +106,8 @@ def export(context: bpy.types.Context, path: Path, settings: ExportSettings) -> 
             _show_unlit(file, settings, changed, report)
             file.write(path)
         except (GlbError, OSError) as error:
-            raise ExportError(f'"{path}" could not be written: {error}') from error
+            raise ExportError(Message("{path} could not be written: {error}",
+                                      path=quoted(str(path)), error=error)) from error
     return report
 
 
@@ -119,9 +126,10 @@ def _run_exporter(path: Path, settings: ExportSettings) -> None:
     try:
         bpy.ops.export_scene.gltf(filepath=str(path), **options)
     except RuntimeError as error:
-        raise ExportError(f"Blender's glTF exporter failed: {error}") from error
+        raise ExportError(Message("Blender's glTF exporter failed: {error}", error=error)
+                          ) from error
     if not path.is_file():
-        raise ExportError("Blender's glTF exporter wrote no file: see the console")
+        raise ExportError(Message("Blender's glTF exporter wrote no file: see the console"))
 
 
 @contextmanager
@@ -134,7 +142,8 @@ def _passed_on(attribute: str, report: ExportReport) -> Iterator[None]:
             try:
                 _pass_on(mesh, attribute)
             except (RuntimeError, AttributeError) as error:
-                report.warnings.append(f'"{mesh.name}" is exported without its light: {error}')
+                report.warnings.append(Message("{name} is exported without its light: {error}",
+                                               name=quoted(mesh.name), error=error))
         yield
     finally:
         for mesh in meshes:
@@ -195,13 +204,14 @@ def _write_colors(file: GlbFile, settings: ExportSettings, report: ExportReport)
     if passed:
         file.document['asset'].setdefault('extras', {})['raybundle'] = extras
     if report.cut:
-        report.warnings.append(
-            f"the light of {report.cut} vertices is brighter than 1 and was cut off (the largest "
-            f"value is {report.largest:.4g}): export with the range Automatic")
+        report.warnings.append(Message(
+            "the light of {count} vertices is brighter than 1 and was cut off (the largest value "
+            "is {largest}): export with the range Automatic", count=report.cut,
+            largest=f"{report.largest:.4g}"))
     if cut_alpha:
-        report.warnings.append(
-            f"the alpha of {cut_alpha} vertices is above 1, is not scaled, and was cut off: export "
-            f"floats, or write a part of the light to alpha that stays below 1")
+        report.warnings.append(Message(
+            "the alpha of {count} vertices is above 1, is not scaled, and was cut off: export "
+            "floats, or write a part of the light to alpha that stays below 1", count=cut_alpha))
 
 
 def _take(attributes: dict[str, int], name: str) -> int | None:
@@ -264,9 +274,10 @@ def _make_unlit(material: dict, settings: ExportSettings, report: ExportReport) 
     name = material.get('name', "Grey")
     surface = material.setdefault('pbrMetallicRoughness', {})
     if settings.with_color and (any(material.get('emissiveFactor', ()))):
-        report.warnings.append(
-            f'material "{name}" emits light and is not exported as unlit, because unlit materials '
-            f'do not emit: bake the output Combined to export emission with the light')
+        report.warnings.append(Message(
+            "material {name} emits light and is not exported as unlit, because unlit materials do "
+            "not emit: bake the output Combined to export emission with the light",
+            name=quoted(name)))
         return
     if not settings.with_color:
         alpha = surface.get('baseColorFactor', (1.0,) * 4)[3]
@@ -274,9 +285,9 @@ def _make_unlit(material: dict, settings: ExportSettings, report: ExportReport) 
         if material.get('alphaMode', 'OPAQUE') == 'OPAQUE':
             surface.pop('baseColorTexture', None)
         elif 'baseColorTexture' in surface:
-            report.warnings.append(
-                f'material "{name}" keeps its image, which has the transparency, so that the '
-                f'light is multiplied by the image: bake the output Lighting')
+            report.warnings.append(Message(
+                "material {name} keeps its image, which has the transparency, so that the light is "
+                "multiplied by the image: bake the output Lighting", name=quoted(name)))
     elif 'baseColorFactor' not in surface and not material.get('name'):
         # Faces without a material are grey in Blender and white in glTF.
         surface['baseColorFactor'] = [0.8, 0.8, 0.8, 1.0]
@@ -302,5 +313,6 @@ def _name_meshes_without_light(scene: bpy.types.Scene, file: GlbFile, attribute:
             continue
         if not any('COLOR_0' in primitive['attributes']
                    for primitive in meshes[node['mesh']]['primitives']):
-            report.warnings.append(f'"{item.name}" is exported without light, because a modifier '
-                                   f'removes the attribute: apply the modifier and bake again')
+            report.warnings.append(Message(
+                "{name} is exported without light, because a modifier removes the attribute: apply "
+                "the modifier and bake again", name=quoted(item.name)))

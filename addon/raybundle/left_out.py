@@ -13,16 +13,17 @@ from collections.abc import Iterable, Iterator
 import bpy
 
 from .materials.node_links import output_node
+from .messages import Message, quoted
 from .warning_lines import listed
 
 # Types of objects that a bake leaves out, and the warning for each.
 UNREAD_TYPES = {
-    'CURVES': "hair curves neither block nor reflect light in a bake: convert them to a mesh with "
-              "thickness",
-    'POINTCLOUD': "point clouds neither block nor reflect light in a bake: instance spheres on the "
-                  "points, or convert the points to a mesh",
-    'VOLUME': "volumes neither absorb nor scatter light in a bake: convert the volume to a mesh, "
-              "or disable it in renders to compare with Cycles",
+    'CURVES': Message("hair curves neither block nor reflect light in a bake: convert them to a "
+                      "mesh with thickness"),
+    'POINTCLOUD': Message("point clouds neither block nor reflect light in a bake: instance "
+                          "spheres on the points, or convert the points to a mesh"),
+    'VOLUME': Message("volumes neither absorb nor scatter light in a bake: convert the volume to a "
+                      "mesh, or disable it in renders to compare with Cycles"),
 }
 # Blender's defaults. Lower values were chosen by the user.
 _BOUNCES, _DIFFUSE_BOUNCES, _CLAMP_INDIRECT = 12, 4, 10.0
@@ -34,40 +35,44 @@ _DATA_DETAIL = {'CURVE': ('resolution_u', 'render_resolution_u'),
                 'SURFACE': ('resolution_u', 'render_resolution_u'),
                 'FONT': ('resolution_u', 'render_resolution_u'),
                 'META': ('resolution', 'render_resolution')}
-NO_LINKING = ("Raybundle ignores light linking: the light reaches all objects, and all objects "
-              "block it; use light sets instead")
-NO_CAUSTICS = "Raybundle ignores Shadow Caustics: light passes straight through glass"
+NO_LINKING = Message("Raybundle ignores light linking: the light reaches all objects, and all "
+                     "objects block it; use light sets instead")
+NO_CAUSTICS = Message("Raybundle ignores Shadow Caustics: light passes straight through glass")
 
 
 def of_render_settings(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
     """Yields warnings of settings of the scene, of its view layer and of Cycles that a bake
     ignores."""
     if scene.background_set is not None:
-        yield (f'Raybundle leaves out the background set "{scene.background_set.name}": to bake '
-               f'with its objects, link them to the scene')
+        yield Message("Raybundle leaves out the background set {scene}: to bake with its objects, "
+                      "link them to the scene", scene=quoted(scene.background_set.name))
     if view_layer.material_override is not None:
-        yield (f'Raybundle ignores the material override "{view_layer.material_override.name}" of '
-               f'the view layer: remove the override to compare with Cycles')
+        yield Message("Raybundle ignores the material override {material} of the view layer: "
+                      "remove the override to compare with Cycles",
+                      material=quoted(view_layer.material_override.name))
     cycles = getattr(scene, 'cycles', None)
     if cycles is None:
         return
     if cycles.film_exposure > 0.0 and abs(cycles.film_exposure - 1.0) > 1e-6:
-        yield (f"Cycles multiplies its baked values by the film Exposure of "
-               f"{cycles.film_exposure:.3g}, Raybundle does not: for the same values, set "
-               f"Raybundle's exposure to {math.log2(cycles.film_exposure):.3g}")
+        yield Message("Cycles multiplies its baked values by the film Exposure of {exposure}, "
+                      "Raybundle does not: for the same values, set Raybundle's exposure to "
+                      "{stops}",
+                      exposure=f"{cycles.film_exposure:.3g}",
+                      stops=f"{math.log2(cycles.film_exposure):.3g}")
     if cycles.use_fast_gi:
-        yield ("Raybundle ignores Fast GI Approximation and computes all reflected light: switch "
-               "Fast GI Approximation off to compare with Cycles")
+        yield Message("Raybundle ignores Fast GI Approximation and computes all reflected light: "
+                      "switch Fast GI Approximation off to compare with Cycles")
     bounces = min(cycles.max_bounces, cycles.diffuse_bounces)
     if cycles.max_bounces < _BOUNCES or cycles.diffuse_bounces < _DIFFUSE_BOUNCES:
-        yield (f"Cycles reflects diffuse light at most {bounces} times, Raybundle without "
-               f"limit: raise Total and Diffuse under Light Paths, Max Bounces to compare")
+        yield Message("Cycles reflects diffuse light at most {count} times, Raybundle without "
+                      "limit: raise Total and Diffuse under Light Paths, Max Bounces to compare",
+                      count=bounces)
     if cycles.sample_clamp_direct > 0.0 or 0.0 < cycles.sample_clamp_indirect < _CLAMP_INDIRECT:
-        yield ("Cycles clamps its samples, which removes light: set Direct Light and Indirect "
-               "Light under Light Paths, Clamping to 0 to compare")
+        yield Message("Cycles clamps its samples, which removes light: set Direct Light and "
+                      "Indirect Light under Light Paths, Clamping to 0 to compare")
     if scene.render.use_simplify and (cycles.use_camera_cull or cycles.use_distance_cull):
-        yield ("Simplify culls objects by camera or distance in Cycles, but not in Raybundle: "
-               "disable these objects in renders instead")
+        yield Message("Simplify culls objects by camera or distance in Cycles, but not in "
+                      "Raybundle: disable these objects in renders instead")
 
 
 def of_world(world: bpy.types.World | None) -> Iterator[str]:
@@ -78,10 +83,10 @@ def of_world(world: bpy.types.World | None) -> Iterator[str]:
         return
     output = output_node(tree)
     if getattr(getattr(world, 'cycles', None), 'is_caustics_light', False):
-        yield f'world "{world.name}": {NO_CAUSTICS}'
+        yield Message("world {name}: {what}", name=quoted(world.name), what=NO_CAUSTICS)
     if output is not None and output.inputs['Volume'].is_linked:
-        yield (f'world "{world.name}": its volume neither absorbs nor scatters light in a bake: '
-               f'unlink the volume to compare with Cycles')
+        yield Message("world {name}: its volume neither absorbs nor scatters light in a bake: "
+                      "unlink the volume to compare with Cycles", name=quoted(world.name))
 
 
 def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Material, bool]]
@@ -93,38 +98,26 @@ def of_materials(scene: bpy.types.Scene, materials: Iterable[tuple[bpy.types.Mat
         output = output_node(material.node_tree) if material.node_tree is not None else None
         if output is None or bpy.app.version < (5, 0, 0) and not material.use_nodes:
             continue
+        name = quoted(material.name)
         if output.inputs['Displacement'].is_linked and _displacement(material) != 'BUMP':
-            yield (f'material "{material.name}": its displacement does not move the surface in a '
-                   f'bake: use a Displace modifier, or apply the displacement to the mesh')
+            yield Message("material {name}: its displacement does not move the surface in a bake: "
+                          "use a Displace modifier, or apply the displacement to the mesh",
+                          name=name)
         if any(_turns_normals(node) for node in _nodes(material.node_tree)):
-            turned.append(f'"{material.name}"')
+            turned.append(name)
         if output.inputs['Volume'].is_linked:
-            yield (f'material "{material.name}": its volume neither absorbs nor scatters light in '
-                   f'a bake, and a material without a surface lets all light pass: unlink the '
-                   f'volume to compare with Cycles')
+            yield Message("material {name}: its volume neither absorbs nor scatters light in a "
+                          "bake, and a material without a surface lets all light pass: unlink the "
+                          "volume to compare with Cycles", name=name)
         if is_transparent and any(_is_glass(node) for node in _nodes(material.node_tree)):
-            glassy.append(f'"{material.name}"')
-    yield from _line_about(
-        turned, "Raybundle ignores normal maps and linked normals. Materials:",
-        "Unlink the normals to compare with Cycles")
-    if not getattr(getattr(scene, 'cycles', None), 'caustics_refractive', True):
-        yield from _line_about(
-            glassy, "Refractive Caustics are off, so that glass blocks reflected light in "
-                    "Cycles, but not in Raybundle. Materials:",
-            "Switch Refractive Caustics on to compare")
-
-
-def _line_about(owners: Iterable[str], what: str, remedy: str) -> Iterator[str]:
-    """Yields one line that names the owners (quoted names), or no line if there are no owners.
-    what: a sentence, and the kind of the owners with a colon. remedy: a sentence without its full
-    stop."""
-    owners = list(owners)
-    if owners:
-        yield f"{what} {listed(owners)}. {remedy}"
-
-
-def _quoted(names: Iterable[str]) -> list[str]:
-    return [f'"{name}"' for name in names]
+            glassy.append(name)
+    if turned:
+        yield Message("Raybundle ignores normal maps and linked normals. Materials: {names}. "
+                      "Unlink the normals to compare with Cycles", names=listed(turned))
+    if glassy and not getattr(getattr(scene, 'cycles', None), 'caustics_refractive', True):
+        yield Message("Refractive Caustics are off, so that glass blocks reflected light in "
+                      "Cycles, but not in Raybundle. Materials: {names}. Switch Refractive "
+                      "Caustics on to compare", names=listed(glassy))
 
 
 def _nodes(tree: bpy.types.NodeTree, seen: frozenset[str] = frozenset()
@@ -178,13 +171,14 @@ def of_objects(items: Iterable[bpy.types.Object]) -> Iterator[str]:
     for item in items:
         yield from _of_hair(item)
         if getattr(getattr(item, 'cycles', None), 'shadow_terminator_offset', 0.0) > 0.0:
-            yield (f'"{item.name}": Raybundle ignores the Shading Offset of the shadow '
-                   f'terminator: set it to 0 to compare with Cycles')
-        differing += [f'"{item.name}" ({how})' for how in _differences(item)]
-    yield from _line_about(
-        differing, "The viewport and renders show different geometry, and Raybundle bakes that of "
-                   "the viewport. Objects:",
-        "Use the same settings for both")
+            yield Message("{name}: Raybundle ignores the Shading Offset of the shadow terminator: "
+                          "set it to 0 to compare with Cycles", name=quoted(item.name))
+        differing += [Message("{name} ({how})", name=quoted(item.name), how=how)
+                      for how in _differences(item)]
+    if differing:
+        yield Message("The viewport and renders show different geometry, and Raybundle bakes that "
+                      "of the viewport. Objects: {names}. Use the same settings for both",
+                      names=listed(differing))
 
 
 def _of_hair(item: bpy.types.Object) -> Iterator[str]:
@@ -196,9 +190,9 @@ def _of_hair(item: bpy.types.Object) -> Iterator[str]:
         settings = system.settings
         has_strands = settings.count > 0 or system.is_edited
         if settings.type == 'HAIR' and settings.render_type == 'PATH' and has_strands:
-            yield (f'"{item.name}": the strands of its particle system "{system.name}" neither '
-                   f'block nor reflect light in a bake: convert the strands to a mesh with '
-                   f'thickness')
+            yield Message("{name}: the strands of its particle system {system} neither block nor "
+                          "reflect light in a bake: convert the strands to a mesh with thickness",
+                          name=quoted(item.name), system=quoted(system.name))
 
 
 def _differences(item: bpy.types.Object) -> Iterator[str]:
@@ -206,28 +200,31 @@ def _differences(item: bpy.types.Object) -> Iterator[str]:
     words."""
     for modifier in item.modifiers:
         if modifier.show_viewport != modifier.show_render:
-            yield f'{modifier.name}: only in {"viewport" if modifier.show_viewport else "renders"}'
+            yield Message("{name}: only in viewport" if modifier.show_viewport else
+                          "{name}: only in renders", name=modifier.name)
         elif modifier.show_render:
             for shown, rendered in _DETAIL:
                 values = [getattr(modifier, name, None) for name in (shown, rendered)]
                 if None not in values and values[0] != values[1]:
-                    yield (f'{modifier.name}: {shown.removeprefix("viewport_")} {values[0]} in '
-                           f'viewport, {values[1]} in renders')
+                    yield Message("{name}: {setting} {shown} in viewport, {rendered} in renders",
+                                  name=modifier.name, setting=shown.removeprefix("viewport_"),
+                                  shown=values[0], rendered=values[1])
         if modifier.type == 'PARTICLE_SYSTEM' and modifier.show_render:
             settings = modifier.particle_system.settings
             if (settings.render_type in ('OBJECT', 'COLLECTION')
                     and settings.display_percentage < 100):
-                yield (f'{modifier.name}: {settings.display_percentage} % of the particles in '
-                       f'viewport')
+                yield Message("{name}: {percent} % of the particles in viewport",
+                              name=modifier.name, percent=settings.display_percentage)
     if item.modifiers and (_setting(item, 'use_adaptive_subdivision', False) or any(
             getattr(modifier, 'use_adaptive_subdivision', False) for modifier in item.modifiers)):
-        yield "adaptive subdivision"
+        yield Message("adaptive subdivision")
     if item.type in _DATA_DETAIL:
         shown, rendered = (getattr(item.data, name) for name in _DATA_DETAIL[item.type])
         # A resolution of 0 in renders means that of the viewport.
         if rendered and shown != rendered:
-            yield (f'{_DATA_DETAIL[item.type][0]} {shown:.3g} in viewport, {rendered:.3g} in '
-                   f'renders')
+            yield Message("{setting} {shown} in viewport, {rendered} in renders",
+                          setting=_DATA_DETAIL[item.type][0], shown=f"{shown:.3g}",
+                          rendered=f"{rendered:.3g}")
 
 
 def has_light_linking(item: bpy.types.Object) -> bool:
@@ -241,48 +238,45 @@ def of_hidden(hidden: Iterable[bpy.types.Object], lights: Iterable[str]) -> Iter
     """Yields warnings of objects that are hidden in the viewport but not in renders. hidden:
     original objects with surfaces, which are left out. lights: names of lamps, which are part of
     the bake."""
-    yield from _line_about(
-        _quoted(dict.fromkeys(lights)),
-        "Lights that are hidden only in the viewport give light, as in Cycles. Lights:",
-        "Disable them in renders to switch them off")
-    yield from _line_about(
-        _quoted(item.name for item in hidden),
-        "Raybundle leaves out objects that are hidden in the viewport, but Cycles renders them. "
-        "Objects:",
-        "Show them in the viewport, or disable them in renders too")
+    if names := [quoted(name) for name in dict.fromkeys(lights)]:
+        yield Message("Lights that are hidden only in the viewport give light, as in Cycles. "
+                      "Lights: {names}. Disable them in renders to switch them off",
+                      names=listed(names))
+    if names := [quoted(item.name) for item in hidden]:
+        yield Message("Raybundle leaves out objects that are hidden in the viewport, but Cycles "
+                      "renders them. Objects: {names}. Show them in the viewport, or disable them "
+                      "in renders too", names=listed(names))
 
 
 def of_unrendered(unrendered: Iterable[bpy.types.Object]) -> Iterator[str]:
     """Yields warnings of objects that are shown in the viewport but not in renders. They are left
     out. unrendered: original objects. Objects that are drawn as wires or bounds, such as cutters of
     Boolean modifiers, are not named."""
-    yield from _line_about(
-        _quoted(item.name for item in unrendered if item.display_type in ('SOLID', 'TEXTURED')),
-        "Raybundle leaves out objects that are hidden in renders, as Cycles does. Objects:",
-        "Enable them in renders to bake them")
+    names = [quoted(item.name) for item in unrendered
+             if item.display_type in ('SOLID', 'TEXTURED')]
+    if names:
+        yield Message("Raybundle leaves out objects that are hidden in renders, as Cycles does. "
+                      "Objects: {names}. Enable them in renders to bake them", names=listed(names))
 
 
 def of_modifiers(copied: Iterable[str], untraced: Iterable[str]) -> Iterator[str]:
     """Yields warnings of modifiers that prevent an exact assignment of results to the original mesh
     (corner_map.py). copied: names of objects whose modifiers create several corners from one.
     untraced: names of objects whose modifiers do not keep the codes of some corners."""
-    yield from _line_about(
-        _quoted(copied),
-        "Modifiers copy faces, and all copies show the light of the one nearest to the original "
-        "face. Objects:",
-        "Apply the modifiers to give each copy its own light")
-    yield from _line_about(
-        _quoted(untraced),
-        "Modifiers keep no trace of some corners, which get the light of the nearest surface. "
-        "Objects:",
-        "Apply the modifiers to give each corner its own light")
+    if names := [quoted(name) for name in copied]:
+        yield Message("Modifiers copy faces, and all copies show the light of the one nearest to "
+                      "the original face. Objects: {names}. Apply the modifiers to give each copy "
+                      "its own light", names=listed(names))
+    if names := [quoted(name) for name in untraced]:
+        yield Message("Modifiers keep no trace of some corners, which get the light of the nearest "
+                      "surface. Objects: {names}. Apply the modifiers to give each corner its own "
+                      "light", names=listed(names))
 
 
 def of_normals(turned: Iterable[str]) -> Iterator[str]:
     """Yields warnings of custom normals. turned: names of objects whose custom normals differ from
     the orientation of the faces."""
-    yield from _line_about(
-        _quoted(turned),
-        "Raybundle computes light with the normals of the faces and ignores custom normals that "
-        "differ from them. Objects:",
-        "Clear the custom split normals to compare with Cycles")
+    if names := [quoted(name) for name in turned]:
+        yield Message("Raybundle computes light with the normals of the faces and ignores custom "
+                      "normals that differ from them. Objects: {names}. Clear the custom split "
+                      "normals to compare with Cycles", names=listed(names))

@@ -13,6 +13,8 @@ import hashlib
 import struct
 from pathlib import Path
 
+from .messages import Message
+
 # Header of a 64-bit ELF file in little-endian order: magic number and class, offsets of the tables
 # of segments and of sections, size and number of the entries of each.
 _ELF_HEADER = struct.Struct('<5s 27x QQ 6x HHHH 2x')
@@ -21,7 +23,7 @@ _ELF_MAGIC = b'\x7fELF\x02'
 _ELF_SEGMENT = struct.Struct('<8x Q 16x Q 16x')
 
 
-def damage(path: Path) -> str | None:
+def damage(path: Path) -> Message | None:
     """Returns what is wrong with the file of a library, as a part of a sentence, or None if nothing
     was found. path: an existing file. Raises OSError if it cannot be read."""
     content = path.read_bytes()
@@ -29,9 +31,10 @@ def damage(path: Path) -> str | None:
     if hash_file.exists():
         stated = hash_file.read_bytes()[:64].decode(errors='replace')
         if hashlib.sha256(content).hexdigest() != stated:
-            return f"its SHA-256 is not the one in {hash_file.name}"
+            return Message("its SHA-256 is not the one in {file}", file=hash_file.name)
     elif len(content) < (needed := _elf_length(content)):
-        return f"it has {len(content)} bytes instead of {needed}"
+        return Message("it has {count} bytes instead of {needed}", count=len(content),
+                       needed=needed)
     return None
 
 

@@ -15,6 +15,7 @@ from .image_export import ImagePixels
 from .left_out import NO_CAUSTICS, NO_LINKING, has_light_linking
 from .materials.node_links import output_node
 from .materials.node_reader import NodeReader
+from .messages import Message, quoted
 from .scene_data import AreaLightData, LightData, PointLightData, SunLightData, Warnings
 
 # Blender's default of a lamp's Max Bounces, which no path reaches.
@@ -43,7 +44,8 @@ def export_light(light_object: bpy.types.Object, matrix_world: Matrix, images: I
     given = _strength(light, name, images, warnings)
     strength = np.where(np.isfinite(given), np.maximum(given, 0.0), 0.0)
     if not np.array_equal(strength, given):
-        warnings.add(f'light "{name}": light that is negative or not a finite number counts as 0')
+        warnings.add(Message("light {name}: light that is negative or not a finite number counts "
+                             "as 0", name=quoted(name)))
     if not np.any(strength > 0.0):
         return None
     _warn_of_unread_options(light_object, warnings)
@@ -103,7 +105,7 @@ def _strength(light: bpy.types.Light, name: str, images: ImagePixels, warnings: 
         output = output_node(light.node_tree)
         if output is None:
             return np.zeros(3)
-        reader = NodeReader(f'light "{name}"', images, warnings)
+        reader = NodeReader(Message("light {name}", name=quoted(name)), images, warnings)
         strength = strength * reader.surface(output.inputs['Surface']).emission
     return strength
 
@@ -129,15 +131,16 @@ def _casts_shadows(light: bpy.types.Light) -> bool:
 
 
 def _warn_of_unread_options(light_object: bpy.types.Object, warnings: Warnings) -> None:
-    name = light_object.name
+    name = quoted(light_object.name)
     bounces = getattr(_cycles_settings(light_object.data), 'max_bounces', _ALL_BOUNCES)
     if bounces < _ALL_BOUNCES:
-        warnings.add(f'light "{name}": Raybundle ignores its Max Bounces of {bounces} and reflects '
-                     f'its light without limit: set Max Bounces to {_ALL_BOUNCES} to compare')
+        warnings.add(Message("light {name}: Raybundle ignores its Max Bounces of {bounces} and "
+                             "reflects its light without limit: set Max Bounces to {all} to "
+                             "compare", name=name, bounces=bounces, all=_ALL_BOUNCES))
     if getattr(_cycles_settings(light_object.data), 'is_caustics_light', False):
-        warnings.add(f'light "{name}": {NO_CAUSTICS}')
+        warnings.add(Message("light {name}: {what}", name=name, what=NO_CAUSTICS))
     if has_light_linking(light_object):
-        warnings.add(f'light "{name}": {NO_LINKING}')
+        warnings.add(Message("light {name}: {what}", name=name, what=NO_LINKING))
 
 
 def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strength: np.ndarray

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from .filled_slots import empty_slots, fill_slots, has_nodes
+from .messages import Message, quoted
 
 # Custom property of the inserted nodes; its value is the way.
 NODE_TAG = "raybundle_light"
@@ -79,7 +80,8 @@ def use(scene: bpy.types.Scene, attribute: str, way: str) -> UseReport:
             _insert(material.node_tree, attribute, way)
             report.materials.append(material.name)
         else:
-            report.warnings.append(f'"{material.name}" {reason}')
+            report.warnings.append(Message("{name} {reason}", name=quoted(material.name),
+                                           reason=reason))
     report.warnings += _sharing_warnings(scene, attribute, used, report.materials)
     return report
 
@@ -160,24 +162,24 @@ def _needs_export_nodes(material: bpy.types.Material) -> bool:
 # --------------------------------------------------------------------------------------------------
 
 
-def _reason_to_leave(material: bpy.types.Material, way: str) -> str | None:
+def _reason_to_leave(material: bpy.types.Material, way: str) -> Message | None:
     """Returns why the light cannot be shown in the material, and what to do. None: it can."""
     if material.library is not None or material.override_library is not None:
-        return ("is linked from another file and was left as it is: make it local, or use the "
-                "light in that file")
+        return Message("is linked from another file and was left as it is: make it local, or use "
+                       "the light in that file")
     tree = material.node_tree
     if not has_nodes(material):
-        return "has no nodes and was left as it is: switch on Use Nodes"
+        return Message("has no nodes and was left as it is: switch on Use Nodes")
     if not _outputs(tree):
-        return "has no Material Output node and was left as it is: add one"
+        return Message("has no Material Output node and was left as it is: add one")
     if way == EMISSION:
         return None
     if way == COLORED and emits(material):
-        return ("emits light and was left as it is, because this light is not part of what the "
-                "attribute shows: bake the output Combined and show it as Light Alone")
+        return Message("emits light and was left as it is, because this light is not part of what "
+                       "the attribute shows: bake the output Combined and show it as Light Alone")
     if not any(node.type in _COLORS for node in _shaders(tree)):
-        return ("has no shader with a surface colour outside of node groups and was left as it "
-                "is: bake the output Combined and show it as Light Alone")
+        return Message("has no shader with a surface colour outside of node groups and was left as "
+                       "it is: bake the output Combined and show it as Light Alone")
     return None
 
 
@@ -191,10 +193,11 @@ def _sharing_warnings(scene: bpy.types.Scene, attribute: str,
         for slot in item.material_slots:
             if slot.material in used and slot.material.name in shown:
                 sharing.setdefault(slot.material.name, []).append(item.name)
-    return [f'"{name}" is also the material of "{items[0]}"'
-            + (f" and {len(items) - 1} more objects" if len(items) > 1 else "")
-            + f' without the attribute "{attribute}", black now: bake them too, or give them '
-              f'another material' for name, items in sharing.items()]
+    return [Message("{name} is also the material of {objects} without the attribute {attribute}, "
+                    "black now: bake them too, or give them another material", name=quoted(name),
+                    objects=Message("{name} and {count} more objects", name=quoted(items[0]),
+                                    count=len(items) - 1) if len(items) > 1 else quoted(items[0]),
+                    attribute=quoted(attribute)) for name, items in sharing.items()]
 
 
 def _outputs(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:

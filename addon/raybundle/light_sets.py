@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import reduce
 
 import bpy
 
 from .bake_report import BakeError
 from .color_attribute import MOST_BYTES
+from .messages import Message, quoted
 from .scene_data import LightSetData, SceneData
 
 
@@ -38,22 +40,25 @@ def read_light_sets(scene: bpy.types.Scene, main_attribute: str) -> list[LightSe
     """Returns the enabled sets of the scene. Raises BakeError if a set has no name, or if names or
     attributes are too long or occur twice."""
     sets: list[LightSet] = []
-    owners = {main_attribute: "the light of all lights"}
+    owners = {main_attribute: Message("the light of all lights")}
     for item in scene.raybundle.light_sets:
         if not item.enabled:
             continue
         if not item.name:
-            raise BakeError("A light set has no name: enter one")
+            raise BakeError(Message("A light set has no name: enter one"))
         if any(item.name == other.name for other in sets):
-            raise BakeError(f'Two light sets have the name "{item.name}": rename one of them')
+            raise BakeError(Message("Two light sets have the name {name}: rename one of them",
+                                    name=quoted(item.name)))
         attribute = attribute_of(item, main_attribute)
         if len(attribute.encode()) > MOST_BYTES:
-            raise BakeError(f'Light set "{item.name}": the attribute name "{attribute}" is longer '
-                            f'than {MOST_BYTES} bytes, choose a shorter one')
+            raise BakeError(Message("Light set {set}: the attribute name {name} is longer than "
+                                    "{count} bytes, choose a shorter one", set=quoted(item.name),
+                                    name=quoted(attribute), count=MOST_BYTES))
         if attribute in owners:
-            raise BakeError(f'Light set "{item.name}" has the same attribute "{attribute}" as '
-                            f'{owners[attribute]}: choose another attribute name')
-        owners[attribute] = f'the light set "{item.name}"'
+            raise BakeError(Message("Light set {set} has the same attribute {name} as {other}: "
+                                    "choose another attribute name", set=quoted(item.name),
+                                    name=quoted(attribute), other=owners[attribute]))
+        owners[attribute] = Message("the light set {name}", name=quoted(item.name))
         objects = frozenset(item.collection.all_objects) if item.collection else frozenset()
         sets.append(LightSet(item.name, attribute, objects, item.world))
     return sets
@@ -79,7 +84,7 @@ class LightSetMembers:
         self._sets = sets
         self._scene = scene
         scene.light_sets = [LightSetData(light_set.name, light_set.world) for light_set in sets]
-        _check_single("The world", [light_set for light_set in sets if light_set.world])
+        _check_single(Message("The world"), [light_set for light_set in sets if light_set.world])
 
     def add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Records the lamp that was exported last. instance: the lamp's evaluated instance."""
@@ -111,7 +116,7 @@ class LightSetMembers:
             items.add(instance.parent.original)
         found = [index for index, light_set in enumerate(self._sets)
                  if not items.isdisjoint(light_set.objects)]
-        _check_single(f'"{instance.object.name}"', [self._sets[index] for index in found])
+        _check_single(quoted(instance.object.name), [self._sets[index] for index in found])
         return found
 
 
@@ -119,6 +124,7 @@ def _check_single(what: str, sets: list[LightSet]) -> None:
     """Raises BakeError if there is more than one set. what: subject of the message, which is a
     member of the sets."""
     if len(sets) > 1:
-        names = " and ".join(f'"{light_set.name}"' for light_set in sets)
-        raise BakeError(f"{what} belongs to the light sets {names}: a light can be in only one "
-                        f"set, remove it from the others")
+        names = reduce(lambda names, name: Message("{names} and {name}", names=names, name=name),
+                       [quoted(light_set.name) for light_set in sets])
+        raise BakeError(Message("{what} belongs to the light sets {names}: a light can be in only "
+                                "one set, remove it from the others", what=what, names=names))

@@ -3,13 +3,14 @@
 while the user changes them.
 
 While changes come, each update is a draft: few rays and bundles on the lines of the last bake. When
-changes stop, a bake with the settings of the scene replaces the draft. Both run in the background
-(bake_run.py), one at a time. Changes of the shape of meshes are not followed, because writing light
-to a mesh changes the mesh too.
+changes stop, a bake with the settings of the scene replaces the draft, unless the preferences leave
+that to the user. Both run in the background (bake_run.py), one at a time. Changes of the shape of
+meshes are not followed, because writing light to a mesh changes the mesh too.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,17 +18,26 @@ from contextlib import contextmanager
 import bpy
 from bpy.app.handlers import persistent
 
-from . import bake_run, viewport_preview
+from . import bake_run, preferences, viewport_preview
 from .bake import PreparedBake
 from .bake_report import BakeError
+from .messages import Message, translated
 from .native import RaybundleError
 
 # The settings of a draft that differ from those of the scene. With these, a bake takes no more
 # bundles than it has.
 DRAFT = {'target_error': 0.3, 'max_bundles': 64}
-# Seconds without a change after which the draft is replaced, and between two looks of this module
-# while it has something to do and while not.
-_REST_SECONDS, _LOOK_SECONDS, IDLE_SECONDS = 0.4, 0.005, 0.25
+# Seconds between two looks of this module while it has something to do and while not.
+_LOOK_SECONDS, IDLE_SECONDS = 0.005, 0.25
+
+
+def rest_seconds() -> float:
+    """Returns the time without a change after which a bake replaces the draft, s; infinity: none
+    does."""
+    user = preferences.get()
+    if user is None:
+        return preferences.LIVE_DELAY
+    return user.live_delay if user.live_bakes else math.inf
 
 
 class LiveLight:
@@ -43,7 +53,7 @@ class LiveLight:
         self._was_on = False
         self._changes_scene = False  # whether live mode itself is changing the scene
         self._is_stale = False  # whether something has changed since the last draft began
-        self._is_rough = False  # whether the attributes hold a draft
+        self._draft_report = ""  # the scene's report after the last draft; "": a bake replaced it
         self._last_change = 0.0  # time.perf_counter()
 
     def note_update(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -59,6 +69,10 @@ class LiveLight:
         self._is_stale = True
         self._last_change = time.perf_counter()
 
+    def shows_draft(self, scene: bpy.types.Scene) -> bool:
+        """Returns whether the attributes hold a draft that no bake has replaced."""
+        return bool(self._draft_report) and scene.raybundle.report == self._draft_report
+
     def step(self, context: bpy.types.Context) -> float:
         """Does what is to be done now. Returns the seconds until the next step."""
         scene = context.scene
@@ -72,12 +86,17 @@ class LiveLight:
         # Meshes in Edit Mode can be neither read nor written.
         if is_on and self._run is None and bake_run.active() is None and context.mode == 'OBJECT':
             self._begin(context)
-        return _LOOK_SECONDS if is_on and (self._run or self._is_stale or self._is_rough) \
-            else IDLE_SECONDS
+        has_work = is_on and (self._run or self._is_stale or self.waits(scene))
+        return _LOOK_SECONDS if has_work else IDLE_SECONDS
+
+    def waits(self, scene: bpy.types.Scene) -> bool:
+        """Returns whether a bake will replace the draft."""
+        return self.shows_draft(scene) and math.isfinite(rest_seconds())
 
     def _begin(self, context: bpy.types.Context) -> None:
         rested = time.perf_counter() - self._last_change
-        if not self._is_stale and not (self._is_rough and rested > _REST_SECONDS):
+        if not self._is_stale and not (
+                self.shows_draft(context.scene) and rested > rest_seconds()):
             return
         self._is_draft = self._is_stale
         self._is_stale = False
@@ -94,7 +113,7 @@ class LiveLight:
     def _go_on(self, context: bpy.types.Context, is_on: bool) -> None:
         run = self._run
         if not is_on or self._is_stale and not self._is_draft:
-            run.stop("The light has changed")
+            run.stop(Message("The light has changed"))
         if run.advance():
             return
         self._run = None
@@ -103,7 +122,7 @@ class LiveLight:
                 with self._own_changes(context):
                     run.finish(context)
                     viewport_preview.show_result(context, is_new=False)
-                self._is_rough = self._is_draft
+                self._draft_report = context.scene.raybundle.report if self._is_draft else ""
                 self.drafts += self._is_draft
         except (BakeError, RaybundleError) as error:
             self._fail(error)
@@ -123,12 +142,17 @@ class LiveLight:
 
     def _fail(self, error: BakeError | RaybundleError) -> None:
         """Waits for the next change, which may end the cause of the error."""
-        self.message = str(error)
+        self.message = translated(error)
         self._exported = None
-        self._is_rough = False
+        self._draft_report = ""
 
 
 live = LiveLight()
+
+
+def keeps_draft(scene: bpy.types.Scene) -> bool:
+    """Returns whether the attributes hold a draft that live mode will not replace by a bake."""
+    return live.shows_draft(scene) and not (scene.raybundle.live and live.waits(scene))
 
 
 @persistent

@@ -17,6 +17,7 @@ from .color_attribute import rendered_attribute
 from .materials.color_expression import Texture
 from .materials.export import MaterialExport
 from .mesh_arrays import HAS_ATTRIBUTES, corner_vertices, read, read_attribute, vertex_positions
+from .messages import Message
 from .scene_data import MeshData
 
 # Limit of coordinates, m. The squares of larger coordinates are meaningless or overflow in single
@@ -43,20 +44,20 @@ def export_mesh(mesh: bpy.types.Mesh, name: str, materials: Sequence[MaterialExp
     faces.
     """
     if not len(mesh.polygons):
-        raise MeshError("it has no faces")
+        raise MeshError(Message("it has no faces"))
     vertices = vertex_positions(mesh)
     # The comparison is also False for NaN.
     if not (np.abs(vertices) < COORDINATE_LIMIT).all():
-        raise MeshError(f"it has coordinates that are not finite or not below "
-                        f"{COORDINATE_LIMIT:.0e}: delete these vertices")
+        raise MeshError(Message("it has coordinates that are not finite or not below {limit}: "
+                                "delete these vertices", limit=f"{COORDINATE_LIMIT:.0e}"))
     starts = read(mesh.polygons, 'loop_start', np.int32)
     face_offsets = np.append(starts, np.int32(len(mesh.loops)))
     sizes = np.diff(face_offsets)
     # Later versions of Blender store no sizes that could contradict the starts.
     if not HAS_ATTRIBUTES and not np.array_equal(sizes, read(mesh.polygons, 'loop_total',
                                                              np.int32)):
-        raise MeshError("its faces are stored out of order: remove the modifier or script that "
-                        "made the mesh invalid")
+        raise MeshError(Message("its faces are stored out of order: remove the modifier or script "
+                                "that made the mesh invalid"))
     materials = materials or (default_material,)
     slots = _face_slots(mesh, len(materials))
     face_materials = np.array([item.index for item in materials], np.int32)[slots]

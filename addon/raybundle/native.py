@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from . import library_file
+from .messages import Message
 from .surface_data import SurfaceData
 
 ABI_VERSION = 3
@@ -247,36 +248,40 @@ def load() -> ctypes.CDLL:
     if not path.is_file():
         raise RaybundleError(
             ErrorCode.INVALID_OPERATION,
-            f"The native library is missing: {path}. Build it with "
-            f"'cmake --preset release && cmake --build --preset release', or install the add-on "
-            f"from a release for this platform")
+            Message("The native library is missing: {path}. Build it with 'cmake --preset release "
+                    "&& cmake --build --preset release', or install the add-on from a release for "
+                    "this platform", path=path))
     try:
         damage = library_file.damage(path)
         if damage:
             raise RaybundleError(
                 ErrorCode.INVALID_OPERATION,
-                f"The native library is damaged: {path} ({damage}). Install the add-on again from "
-                f"its zip, or build the library again")
+                Message("The native library is damaged: {path} ({damage}). Install the add-on "
+                        "again from its zip, or build the library again", path=path,
+                        damage=damage))
         library = ctypes.CDLL(str(path))
         library.rb_get_abi_version.restype = _int
         version = library.rb_get_abi_version()
     except (OSError, AttributeError) as error:
         raise RaybundleError(
             ErrorCode.INVALID_OPERATION,
-            f"The native library cannot be loaded: {path} ({error}). Build it again, or install "
-            f"the add-on from a release for this platform") from error
+            Message("The native library cannot be loaded: {path} ({error}). Build it again, or "
+                    "install the add-on from a release for this platform", path=path,
+                    error=error)) from error
     if version != ABI_VERSION:
         raise RaybundleError(
             ErrorCode.INVALID_OPERATION,
-            f"The native library {path} has interface version {version}, but this add-on needs "
-            f"{ABI_VERSION}: build or install both from the same release")
+            Message("The native library {path} has interface version {version}, but this add-on "
+                    "needs {needed}: build or install both from the same release", path=path,
+                    version=version, needed=ABI_VERSION))
     try:
         _declare(library)
     except AttributeError as error:
         raise RaybundleError(
             ErrorCode.INVALID_OPERATION,
-            f"The native library {path} lacks a function of interface version {ABI_VERSION} "
-            f"({error}): build or install both from the same release") from error
+            Message("The native library {path} lacks a function of interface version {version} "
+                    "({error}): build or install both from the same release", path=path,
+                    version=ABI_VERSION, error=error)) from error
     _library = library
     return library
 

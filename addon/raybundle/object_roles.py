@@ -11,6 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import EnumProperty
 
+from .messages import Message, translated
 from .properties import enum_role, enum_side
 from .quality import enum_object_quality
 
@@ -51,11 +52,11 @@ class _SetsObjects:
         for item in changed:
             setattr(item.raybundle, name, value)
         if len(changed) < len(items):
-            self.report({'WARNING'}, tip_("Objects set: {count}. Objects linked from other files, "
-                                          "which cannot be changed: {linked}").format(
-                count=len(changed), linked=len(items) - len(changed)))
+            self.report({'WARNING'}, translated(Message(
+                "Objects set: {count}. Objects linked from other files, which cannot be changed: "
+                "{linked}", count=len(changed), linked=len(items) - len(changed))))
         else:
-            self.report({'INFO'}, tip_("Objects set: {count}").format(count=len(changed)))
+            self.report({'INFO'}, translated(Message("Objects set: {count}", count=len(changed))))
         return {'FINISHED'}
 
 

@@ -14,6 +14,7 @@ from .bake_progress import BakeProgress
 from .bake_report import BakeError, BakeReport
 from .light_sets import written_attributes
 from .materials.last_surfaces import LastSurfaces
+from .messages import Message, quoted, translated
 from .native import ErrorCode, RaybundleError
 from .subdivided_copy import remove_copies
 
@@ -25,15 +26,15 @@ _LOOK_SECONDS, _DRAW_SECONDS = 0.03, 0.25
 def _say(operator: bpy.types.Operator, report: BakeReport) -> set[str]:
     """Reports the warnings and the summary of a bake to the user."""
     for warning in report.warnings:
-        operator.report({'WARNING'}, warning)
-    operator.report({'INFO'}, report.summary())
+        operator.report({'WARNING'}, translated(warning))
+    operator.report({'INFO'}, translated(report.summary()))
     return {'FINISHED'}
 
 
 def _refuse(operator: bpy.types.Operator, error: BakeError | RaybundleError) -> set[str]:
     """Reports why there is no bake."""
     cancelled = isinstance(error, RaybundleError) and error.code == ErrorCode.CANCELLED
-    operator.report({'WARNING' if cancelled else 'ERROR'}, str(error))
+    operator.report({'WARNING' if cancelled else 'ERROR'}, translated(error))
     return {'CANCELLED'}
 
 
@@ -87,7 +88,7 @@ class _Bakes:
     def modal(self, context, event):
         run = self._run
         if event.type == 'ESC' and event.value == 'PRESS':
-            run.stop("The bake was cancelled: the attributes are as before")
+            run.stop(Message("The bake was cancelled: the attributes are as before"))
         elif event.type != 'TIMER':
             return {'PASS_THROUGH'}
         try:
@@ -108,7 +109,7 @@ class _Bakes:
         """Takes the next step of the bake. Returns the operator's result if it was the last."""
         run = self._run
         if run.stopped_because:
-            self.report({'WARNING'}, run.stopped_because)
+            self.report({'WARNING'}, translated(run.stopped_because))
             if self._switched_preview and not run.is_kept:
                 viewport_preview.hide(context)
             return {'FINISHED'} if run.is_kept else {'CANCELLED'}
@@ -119,7 +120,7 @@ class _Bakes:
             return None
         report = run.finish(context)
         for warning in viewport_preview.show_result(context):
-            self.report({'WARNING'}, warning)
+            self.report({'WARNING'}, translated(warning))
         return _say(self, report)
 
     def _show_progress(self, context) -> None:
@@ -190,9 +191,9 @@ class RAYBUNDLE_OT_stop(bpy.types.Operator):
         return bake_run.active() is not None
 
     def execute(self, context):
-        bake_run.active().stop("The bake was stopped: the attributes keep the light so far"
-                               if self.keep else
-                               "The bake was cancelled: the attributes are as before", self.keep)
+        bake_run.active().stop(
+            Message("The bake was stopped: the attributes keep the light so far" if self.keep else
+                    "The bake was cancelled: the attributes are as before"), self.keep)
         return {'FINISHED'}
 
 
@@ -225,8 +226,9 @@ class RAYBUNDLE_OT_clear(bpy.types.Operator):
         LastSurfaces(scene).forget_attributes()
         scene.raybundle.report = ""
         bake_cache.discard(scene)
-        self.report({'INFO'}, f'Attribute "{scene.raybundle.attribute}" removed from meshes: '
-                              f'{cleared}. Subdivided copies removed: {copies}')
+        self.report({'INFO'}, translated(Message(
+            "Attribute {name} removed from meshes: {cleared}. Subdivided copies removed: {copies}",
+            name=quoted(scene.raybundle.attribute), cleared=cleared, copies=copies)))
         return {'FINISHED'}
 
 
@@ -279,7 +281,7 @@ class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
         # A background process has no windows.
         if not bpy.app.background:
             for warning in viewport_preview.toggle(context):
-                self.report({'WARNING'}, warning)
+                self.report({'WARNING'}, translated(warning))
         return {'FINISHED'}
 
 

@@ -69,12 +69,15 @@ def draw_preview(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) 
 
 
 def draw_live(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draws the switch of live mode, and why the light does not follow."""
+    """Draws the switch of live mode, why the light does not follow, and whether a draft stays."""
     row = layout.row()
     row.use_property_split = False  # The name is on the button.
     row.prop(context.scene.raybundle, "live", toggle=True, icon='OUTLINER_OB_LIGHT')
     if context.scene.raybundle.live and live_light.live.message:
         draw_wrapped(layout.column(), context, live_light.live.message, 'ERROR', 0.0)
+    elif live_light.keeps_draft(context.scene):
+        draw_wrapped(layout.column(), context, iface_("The light is a draft: press Bake"), 'INFO',
+                     0.0)
 
 
 def changed_methods(settings: bpy.types.PropertyGroup) -> list[str]:

@@ -10,11 +10,16 @@ import bpy
 from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
+from .messages import Message, translated
 from .report_data import read_report
 
 # The add-on's zip contains the guide; in a clone of the repository it is beside the add-on.
 _GUIDES = (Path(__file__).parent / "docs" / "user_guide.md",
            Path(__file__).parent.parent.parent / "docs" / "user_guide.md")
+
+
+# Usual seconds without a change of the light after which live mode bakes.
+LIVE_DELAY = 0.4
 
 
 def get() -> RaybundlePreferences | None:
@@ -54,6 +59,16 @@ class RaybundlePreferences(bpy.types.AddonPreferences):
                     "not set their own limit",
         default=4096.0, min=1.0, max=1e9, soft_min=64.0, soft_max=262_144.0, precision=0,
         step=6400)
+    live_bakes: BoolProperty(
+        name="Bake when Changes Stop",
+        description="In live mode, replace the draft by a bake with the settings of the scene as "
+                    "soon as changes stop. Off: the draft stays until you press Bake",
+        default=True)
+    live_delay: FloatProperty(
+        name="Delay",
+        description="Time without changes after which live mode bakes",
+        default=LIVE_DELAY, min=0.0, soft_max=10.0, max=3600.0, precision=1, step=10,
+        subtype='TIME_ABSOLUTE', unit='TIME_ABSOLUTE')
 
     def draw(self, context):
         layout = self.layout
@@ -61,6 +76,13 @@ class RaybundlePreferences(bpy.types.AddonPreferences):
         layout.prop(self, "threads")
         layout.prop(self, "memory_limit")
         layout.prop(self, "study_methods")
+        layout.separator()
+        column = layout.column(heading="Live")
+        column.prop(self, "live_bakes")
+        row = column.row()
+        row.active = self.live_bakes
+        row.prop(self, "live_delay")
+        layout.separator()
         row = layout.row()
         row.operator("raybundle.open_guide", icon='HELP')
         row.operator("raybundle.copy_bug_report", icon='URL')
@@ -74,7 +96,7 @@ class RAYBUNDLE_OT_open_guide(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if _guide() is None:
-            cls.poll_message_set("This copy of the add-on contains no user guide")
+            cls.poll_message_set(tip_("This copy of the add-on contains no user guide"))
             return False
         return True
 
@@ -90,8 +112,8 @@ class RAYBUNDLE_OT_copy_bug_report(bpy.types.Operator):
 
     def execute(self, context):
         context.window_manager.clipboard = bug_report(context.scene)
-        self.report({'INFO'}, tip_("The bug report is in the clipboard: paste it where you report "
-                                   "the bug"))
+        self.report({'INFO'}, translated(Message("The bug report is in the clipboard: paste it "
+                                                 "where you report the bug")))
         return {'FINISHED'}
 
 

@@ -10,6 +10,8 @@ from functools import lru_cache
 
 import bpy
 
+from .library_messages import recognised
+from .messages import decoded
 from .warning_lines import owners
 
 
@@ -17,7 +19,7 @@ from .warning_lines import owners
 class Line:
     """A warning of the report."""
 
-    text: str
+    text: str  # in English; a message that can be translated, if it is known
     id: str  # identifier of the library's warning, "" for warnings of the add-on or unknown
     kind: str  # of the owners: 'object', 'material', 'light', 'mesh', or "" if it names none
     names: tuple[str, ...]  # of the owners
@@ -43,13 +45,19 @@ def warning_lines(report: dict) -> list[Line]:
     texts = report.get('warnings', [])
     known = report.get('warning_owners', [])
     if len(known) == len(texts):
-        return [Line(text, item.get('id', ""), item['kind'], tuple(item['names']))
-                for text, item in zip(texts, known)]
-    return [Line(text, "", *owners(text)) for text in texts]
+        return [Line(as_message(report, text), item.get('id', ""), item['kind'],
+                     tuple(item['names'])) for text, item in zip(texts, known)]
+    return [Line(as_message(report, text), "", *owners(text)) for text in texts]
+
+
+def as_message(report: dict, text: str) -> str:
+    """Returns a text of a report as a message, or as it is if its template is unknown."""
+    stored = report.get('templates', {}).get(text)
+    return recognised(text) if stored is None else decoded(stored)
 
 
 def left_out_objects(report: dict) -> list[tuple[str, str]]:
-    """Returns the name of each object that was not baked, and the reason."""
+    """Returns the name of each object that was not baked, and the reason in English."""
     return [(item['name'], item['status']) for item in report.get('objects', [])
             if not item['status'].startswith('baked')]
 

@@ -7,8 +7,10 @@ from __future__ import annotations
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .report_data import (Line, left_out_objects, noisiest_object, read_report, time_text,
-                          warning_lines)
+from .library_messages import recognised
+from .messages import translated
+from .report_data import (Line, as_message, left_out_objects, noisiest_object, read_report,
+                          time_text, warning_lines)
 from .report_remedies import (advice_text, advised_settings, exist, is_about_error, is_about_side,
                               is_applied)
 from .text_wrap import draw_wrapped
@@ -79,7 +81,7 @@ class RAYBUNDLE_PT_warnings(_LastBakePanel, bpy.types.Panel):
     def draw(self, context):
         for index, line in enumerate(warning_lines(read_report(context.scene))):
             box = self.layout.box()
-            draw_wrapped(box, context, line.text, 'ERROR', _BOX)
+            draw_wrapped(box, context, translated(line.text), 'ERROR', _BOX)
             _draw_remedies(box, context, line, index)
 
 
@@ -118,10 +120,12 @@ class RAYBUNDLE_PT_left_out(_LastBakePanel, bpy.types.Panel):
         return super().poll(context) and bool(left_out_objects(read_report(context.scene)))
 
     def draw(self, context):
-        objects = left_out_objects(read_report(context.scene))
+        report = read_report(context.scene)
+        objects = left_out_objects(report)
         for name, reason in objects[:_MOST_ROWS]:
             row = self.layout.row(align=True)
-            draw_wrapped(row.column(), context, f"{name}: {reason}", indent=32.0)
+            draw_wrapped(row.column(), context,
+                         f"{name}: {translated(as_message(report, reason))}", indent=32.0)
             button = row.row(align=True)
             button.enabled = exist('object', [name])
             button.operator("raybundle.select_named", text="",
@@ -142,8 +146,8 @@ class RAYBUNDLE_PT_skipped(_LastBakePanel, bpy.types.Panel):
 
     def draw(self, context):
         for item in read_report(context.scene)['skipped']:
-            draw_wrapped(self.layout, context,
-                         f"{item['count']:,} × {item['what']}: {item['why']}", 'DOT')
+            what, why = (translated(recognised(item[key])) for key in ('what', 'why'))
+            draw_wrapped(self.layout, context, f"{item['count']:,} × {what}: {why}", 'DOT')
 
 
 register, unregister = bpy.utils.register_classes_factory((

@@ -12,6 +12,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import IntProperty, StringProperty
 
+from .messages import Message, translated
 from .properties import assign
 from .report_data import Line, read_report, warning_lines
 from .subdivided_copy import find_copies
@@ -142,15 +143,15 @@ def _select(operator: bpy.types.Operator, context: bpy.types.Context,
     shown = [item for item in items
              if item.name in view_layer.objects and item.visible_get(view_layer=view_layer)]
     if not shown:
-        operator.report({'WARNING'}, tip_("Nothing is selected: the objects are hidden, in another "
-                                          "view layer or removed"))
+        operator.report({'WARNING'}, translated(Message(
+            "Nothing is selected: the objects are hidden, in another view layer or removed")))
         return False
     for item in context.selected_objects:
         item.select_set(False)
     for item in shown:
         item.select_set(True)
     view_layer.objects.active = shown[0]
-    operator.report({'INFO'}, tip_("Selected objects: {count}").format(count=len(shown)))
+    operator.report({'INFO'}, translated(Message("Selected objects: {count}", count=len(shown))))
     return True
 
 
@@ -205,7 +206,7 @@ class RAYBUNDLE_OT_apply_advice(_OfWarning, bpy.types.Operator):
             assign(settings, name, value)
         if not advised:
             return {'CANCELLED'}
-        self.report({'INFO'}, tip_("The settings are changed: bake again"))
+        self.report({'INFO'}, translated(Message("The settings are changed: bake again")))
         return {'FINISHED'}
 
 
@@ -220,8 +221,8 @@ class RAYBUNDLE_OT_bake_other_side(_OfWarning, bpy.types.Operator):
         found = objects_of(context.scene, line.kind, line.names) if line is not None else []
         for item in found:
             item.raybundle.side = 'FRONT' if item.raybundle.side == 'BACK' else 'BACK'
-        self.report({'INFO'}, tip_("Objects with another side: {count}. Bake again").format(
-            count=len(found)))
+        self.report({'INFO'}, translated(Message("Objects with another side: {count}. Bake again",
+                                                 count=len(found))))
         return {'FINISHED'}
 
 

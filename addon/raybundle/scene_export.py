@@ -28,6 +28,7 @@ from .materials.gloss import filter_glossy_of
 from .materials.last_surfaces import LastSurfaces
 from .materials.shown_results import RENDERED, renders_result, result_names
 from .mesh_export import MeshError, export_mesh, has_turned_normals
+from .messages import Message, quoted
 from .scene_data import InstanceData, LightData, MeshData, SceneData, Warnings
 from .world_export import export_world
 
@@ -296,10 +297,11 @@ class _Exporter:
         self._name_showing_materials()
         for (parent, name), count in self._instance_counts.items():
             label = name if parent == name else f"{parent} / {name}"
-            plural = "s" if count > 1 else ""
-            self.result.statuses[label] = (
-                f"{count} instance{plural}, not baked: instances reflect and block light, but get "
-                f"no colours; make them real to bake them")
+            self.result.statuses[label] = Message(
+                "{count} instances, not baked: instances reflect and block light, but get no "
+                "colours; make them real to bake them" if count > 1 else
+                "{count} instance, not baked: instances reflect and block light, but get no "
+                "colours; make them real to bake them", count=count)
         return self.result
 
     def _hidden(self) -> list[bpy.types.Object]:
@@ -326,9 +328,10 @@ class _Exporter:
             [item for item in items
              if item.type in GEOMETRY_TYPES and _role(item, None) != 'IGNORE']
             for items in (hidden, self._unrendered()))
-        for items, where in ((hidden, "the viewport"), (unrendered, "renders")):
+        for items, status in ((hidden, Message("hidden in the viewport")),
+                              (unrendered, Message("hidden in renders"))):
             for item in items:
-                self.result.statuses.setdefault(item.name, f"hidden in {where}")
+                self.result.statuses.setdefault(item.name, status)
         for text in (
                 *left_out.of_render_settings(scene, self.context.view_layer),
                 *left_out.of_world(scene.world), *left_out.of_objects(self._drawn),
@@ -342,11 +345,11 @@ class _Exporter:
     def _name_showing_materials(self) -> None:
         if not self.materials.showing:
             return
-        names = ", ".join(f'"{name}"' for name in self.materials.showing)
-        self.result.warnings.add(
-            f'the materials {names} show the result of a bake: the result counts as 0 where it is '
-            f'emission and as 1 where it is a factor; a surface that shows only the result keeps '
-            f'the properties that the last bake used')
+        names = ", ".join(quoted(name) for name in self.materials.showing)
+        self.result.warnings.add(Message(
+            "the materials {names} show the result of a bake: the result counts as 0 where it is "
+            "emission and as 1 where it is a factor; a surface that shows only the result keeps "
+            "the properties that the last bake used", names=names))
 
     def _add_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         light = export_instance(instance, self.materials.images, self.result.warnings)
@@ -362,14 +365,14 @@ class _Exporter:
             return
         transform = np.array(instance.matrix_world)[:3]
         if not np.isfinite(transform).all():
-            self._refuse(item.name, "its transform is not finite: reset the transform")
+            self._refuse(item.name, Message("its transform is not finite: reset the transform"))
             return
         mesh = self._mesh(item, wants_map=role == 'BAKE' and not instance.is_instance)
         if isinstance(mesh, MeshError):
             # Curves without a surface and empty texts are common, so only meshes are worth a
             # warning.
             if original.type == 'MESH':
-                self._refuse(item.name, str(mesh))
+                self._refuse(item.name, *mesh.args)
             return
         if original.type != 'MESH':
             # Blender lists a curve twice: as itself and as the mesh that it evaluates to.
@@ -378,9 +381,9 @@ class _Exporter:
                 return
             self._placed.add(place)
             if role == 'BAKE':
-                self.result.statuses[item.name] = (
-                    f"takes part in the light, but gets no colours: convert the {original.type} "
-                    f"object to a mesh")
+                self.result.statuses[item.name] = Message(
+                    "takes part in the light, but gets no colours: convert the {type} object to a "
+                    "mesh", type=original.type)
             role = 'OCCLUDE'
         elif instance.is_instance:
             parent = instance.parent.name if instance.parent else item.name
@@ -390,10 +393,12 @@ class _Exporter:
         is_holdout = original.is_holdout or original.holdout_get(
             view_layer=self.context.view_layer)
         if is_holdout or original.is_shadow_catcher and bpy.app.version >= (4, 0, 0):
-            what = "holdout" if is_holdout else "shadow catcher"
-            self.result.warnings.add(f'"{item.name}" is a {what}: Cycles bakes it black, but '
-                                     f'Raybundle bakes it like other objects; switch the {what} '
-                                     f'off to compare')
+            self.result.warnings.add(Message(
+                "{name} is a holdout: Cycles bakes it black, but Raybundle bakes it like other "
+                "objects; switch the holdout off to compare" if is_holdout else
+                "{name} is a shadow catcher: Cycles bakes it black, but Raybundle bakes it like "
+                "other objects; switch the shadow catcher off to compare",
+                name=quoted(item.name)))
         # In Cycles, the ray visibility of the instancing object also applies.
         shown = (item, instance.parent) if instance.is_instance and instance.parent else (item,)
         self.result.scene.instances.append(
@@ -404,17 +409,19 @@ class _Exporter:
         self.members.add_instance(instance)
         if (left_out.has_light_linking(original)
                 and self.result.scene.emits(len(self.result.scene.instances) - 1)):
-            self.result.warnings.add(f'"{item.name}": {left_out.NO_LINKING}')
+            self.result.warnings.add(Message("{name}: {reason}", name=quoted(item.name),
+                                             reason=left_out.NO_LINKING))
         if role == 'BAKE':
             index = len(self.result.scene.instances) - 1
             self.result.targets.append(
                 BakeTarget(original, index, self._corner_maps[original], original.name,
                            len(original.data.vertices)))
 
-    def _refuse(self, name: str, reason: str) -> None:
+    def _refuse(self, name: str, reason: Message) -> None:
         """Leaves out an object, with a warning."""
         self.result.statuses[name] = reason
-        self.result.warnings.add(f'"{name}" is left out: {reason}')
+        self.result.warnings.add(Message("{name} is left out: {reason}", name=quoted(name),
+                                         reason=reason))
 
     def _mesh(self, item: bpy.types.Object, wants_map: bool) -> int | MeshError:
         """Returns the index in SceneData.meshes of an evaluated object's mesh, which is exported

@@ -7,11 +7,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from string import Formatter
+
+from .messages import Message, quoted
 
 _MOST_NAMES = 12
 # A line consists of the kind of the owner, its name, and the message, which may begin with a count.
 _LINE = re.compile(r'(?P<kind>(?:[a-z]+ )?)"(?P<name>.+?)"(?P<said>[: ].*)', re.DOTALL)
-_COUNT = re.compile(r': (?P<count>\d+) (?P<counted>.*)', re.DOTALL)
+# A percentage is no count: those of several owners have no sum.
+_COUNT = re.compile(r': (?P<count>\d+) (?!% )(?P<counted>.*)', re.DOTALL)
 # The suffix that Blender adds to names of copies, here of nodes.
 _SUFFIX = re.compile(r'\.\d{3,}"')
 
@@ -57,14 +61,35 @@ def _joined(said: str, matches: list[re.Match | None]) -> Group:
     if len(matches) == 1:
         return Group(first, *owners(first), first)
     counts = [_COUNT.fullmatch(match['said']) for match in matches]
+    total = None
     if counts[0] is not None:
         total = sum(int(count['count']) for count in counts)
         said = f": {total} {counts[0]['counted']}"
     names = tuple(match['name'] for match in matches)
-    listed_names = listed([f'"{name}"' for name in names], _MOST_NAMES)
+    listed_names = listed([quoted(name) for name in names], _MOST_NAMES)
     kind = matches[0]['kind'].strip() or 'object'
-    return Group(f"{matches[0]['kind']}{listed_names}{said}", kind if kind in _KINDS else "",
-                 names if kind in _KINDS else (), first)
+    text = f"{matches[0]['kind']}{listed_names}{said}"
+    if isinstance(first, Message) and (message := _about(first, listed_names, total)) == text:
+        text = message
+    return Group(text, kind if kind in _KINDS else "", names if kind in _KINDS else (), first)
+
+
+def _about(message: Message, owner: str | None, count: int | None = None) -> Message:
+    """Returns the same message about another owner, which the first value of the template is or
+    contains, and with another count. Suffixes of copies are removed from other names. None: the
+    owner or the count stays."""
+    fields = [field for _, field, *_ in Formatter().parse(message.template) if field]
+    values = {}
+    for field in fields:
+        value = message.values[field]
+        wanted = owner if field == fields[0] else None
+        if isinstance(value, Message):
+            values[field] = _about(value, wanted) if value.values else value
+        elif field == 'count' and count is not None:
+            values[field] = count
+        else:
+            values[field] = _SUFFIX.sub('"', value) if wanted is None else wanted
+    return Message(message.template, **values)
 
 
 def owners(text: str) -> tuple[str, tuple[str, ...]]:
@@ -89,7 +114,13 @@ def owners(text: str) -> tuple[str, tuple[str, ...]]:
     return kind, tuple(found)
 
 
-def listed(items: list[str], most: int = 3) -> str:
-    """Returns the first `most` items, separated by commas, and the number of further items."""
-    text = ", ".join(items[:most])
-    return text if len(items) <= most else f"{text} and {len(items) - most} more"
+def listed(items: list[str], most: int = 3, separator: str = ", ") -> str:
+    """Returns the first `most` items and the number of further items."""
+    shown = items[:most]
+    text = separator.join(shown)
+    if any(isinstance(item, Message) for item in shown):
+        named = {f"item{position}": item for position, item in enumerate(shown)}
+        text = Message(separator.join(f"{{{name}}}" for name in named), **named)
+    if len(items) <= most:
+        return text
+    return Message("{names} and {count} more", names=text, count=len(items) - most)

@@ -15,6 +15,7 @@ from . import world_panorama
 from .image_export import ImagePixels
 from .materials.node_links import output_node
 from .materials.node_reader import NodeReader
+from .messages import Message, quoted
 from .scene_data import SunLightData, Warnings
 
 # An image that varies by less than this share of its mean counts as constant.
@@ -55,11 +56,11 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
     if output is None:
         return WorldData()
     unread = Warnings()
-    reader = NodeReader(f'world "{world.name}"', images, unread)
+    reader = NodeReader(Message("world {name}", name=quoted(world.name)), images, unread)
     given = reader.surface(output.inputs['Surface']).emission
     radiance = np.maximum(given, 0.0)
     if np.any(given < 0.0):
-        warnings.add(f'world "{world.name}": negative light counts as 0')
+        warnings.add(Message("world {name}: negative light counts as 0", name=quoted(world.name)))
     # A world that is read without warnings is constant.
     if not unread:
         return WorldData(radiance)
@@ -72,8 +73,9 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
         try:
             evaluated = _split(world_panorama.evaluate(world, scene.frame_current))
         except RuntimeError as error:
-            warnings.add(f'world "{world.name}": Cycles could not evaluate its nodes ({error}), so '
-                         f'that its mean is used, as far as Raybundle can read it')
+            warnings.add(Message("world {name}: Cycles could not evaluate its nodes ({error}), so "
+                                 "that its mean is used, as far as Raybundle can read it",
+                                 name=quoted(world.name), error=error))
             for message in unread:
                 warnings.add(message)
             return WorldData(radiance)

@@ -12,6 +12,7 @@ import numpy as np
 from mathutils import Euler, Matrix
 
 from ..image_export import ImagePixels, sphere_mean
+from ..messages import Message, quoted
 from ..scene_data import Warnings
 from .color_expression import IDENTITY_UV, WHITE, ColorExpression, Result, Texture
 from .node_links import LIGHT_PATH, Source, default_color, default_value, follow, input_of
@@ -65,7 +66,7 @@ class ColorReader:
     (cycles_bake.py). `inexact` is the same list as `warnings` if it is not given.
     """
 
-    def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
+    def __init__(self, owner: Message, images: ImagePixels, warnings: Warnings,
                  reading: Reading = Reading(), inexact: Warnings | None = None) -> None:
         self.owner = owner  # the subject of warnings, such as 'material "Wall"'
         self.images = images
@@ -117,7 +118,8 @@ class ColorReader:
         behind = self._result_behind(node, path)
         if behind == Result.ALONE:
             return _only_result(source)
-        self._inexact(node, "cannot be read: the colour of the socket that it is linked to is used")
+        self._inexact(node, Message("cannot be read: the colour of the socket that it is linked to "
+                                    "is used"))
         return ColorExpression(default_color(source.socket) if self.reading.unread_color is None
                                else self.reading.unread_color, result=behind)
 
@@ -149,24 +151,26 @@ class ColorReader:
                path: tuple[bpy.types.Node, ...]) -> ColorExpression:
         pixels = self.images.read(node.image) if node.image else None
         if pixels is None:
-            self._warn(node, "has no image data: black is used")
+            self._warn(node, Message("has no image data: black is used"))
             return ColorExpression()
         mean = pixels.mean(axis=(0, 1), dtype=np.float64)
         if output.name != 'Color':
-            self._inexact(node, f"has a linked output {output.name}, which counts as 1")
+            self._inexact(node, Message("has a linked output {output}, which counts as 1",
+                                        output=output.name))
             return ColorExpression(WHITE)
         if node.projection != 'FLAT':
-            self._inexact(node, f"has the projection {node.projection}: the mean of the image is "
-                                f"used")
+            self._inexact(node, Message("has the projection {projection}: the mean of the image is "
+                                        "used", projection=node.projection))
             return ColorExpression(mean)
         coordinates = self._coordinates(node.inputs['Vector'], path)
         if coordinates is None:
-            self._inexact(node, "has coordinates other than a UV map: the mean of the image is "
-                                "used")
+            self._inexact(node, Message("has coordinates other than a UV map: the mean of the "
+                                        "image is used"))
             return ColorExpression(mean)
         extension = node.extension
         if extension not in ('REPEAT', 'EXTEND', 'CLIP'):
-            self._inexact(node, f"has the extension {extension}: REPEAT is used")
+            self._inexact(node, Message("has the extension {extension}: REPEAT is used",
+                                        extension=extension))
             extension = 'REPEAT'
         layer, matrix = coordinates
         return ColorExpression(texture=Texture(node.image, extension, mean, layer, matrix),
@@ -205,16 +209,16 @@ class ColorReader:
     def _environment(self, node: bpy.types.Node) -> ColorExpression:
         pixels = self.images.read(node.image) if node.image else None
         if pixels is None:
-            self._warn(node, "has no image data: black is used")
+            self._warn(node, Message("has no image data: black is used"))
             return ColorExpression()
-        self._warn(node, "varies with the direction: its mean over the sphere is used")
+        self._warn(node, Message("varies with the direction: its mean over the sphere is used"))
         if node.projection == 'MIRROR_BALL':
             return ColorExpression(pixels.mean(axis=(0, 1), dtype=np.float64))
         return ColorExpression(sphere_mean(pixels))
 
     def _attribute(self, node: bpy.types.Node) -> ColorExpression:
         if node.type == 'ATTRIBUTE' and node.attribute_type != 'GEOMETRY':
-            self._inexact(node, "reads a property of the object: grey is used")
+            self._inexact(node, Message("reads a property of the object: grey is used"))
             return ColorExpression(WHITE * 0.5)
         name = node.layer_name if node.type == 'VERTEX_COLOR' else node.attribute_name
         return ColorExpression(attribute=name, attribute_weight=WHITE)
@@ -234,7 +238,8 @@ class ColorReader:
             a, b = (self.value(sockets[name], path) for name in ('A_Float', 'B_Float'))
             return ColorExpression(WHITE * (a + (b - a) * share))
         else:
-            self._inexact(node, f"mixes values of type {node.data_type}: grey is used")
+            self._inexact(node, Message("mixes values of type {type}: grey is used",
+                                        type=node.data_type))
             return ColorExpression(WHITE * 0.5)
         share = float(np.clip(self.value(factor, path), 0.0, 1.0))
         a, b = self.color(first, path), self.color(second, path)
@@ -251,7 +256,8 @@ class ColorReader:
             return self._plus(a, b.scaled(-share), node)
         if node.blend_type == 'MULTIPLY':
             return self._plus(a.scaled(1.0 - share), self._times(a, b, node).scaled(share), node)
-        self._inexact(node, f"has the blend mode {node.blend_type}: its first colour is used")
+        self._inexact(node, Message("has the blend mode {mode}: its first colour is used",
+                                    mode=node.blend_type))
         return replace(a, result=max(a.result, b.result))
 
     def _filter(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> ColorExpression:
@@ -263,19 +269,21 @@ class ColorReader:
             return ColorExpression(np.array(node.color_ramp.evaluate(color.constant.mean())[:3]),
                                    result=color.result)
         if node.type == 'VALTORGB':
-            self._inexact(node, "maps a colour that varies: the mean colour is mapped instead")
+            self._inexact(node, Message("maps a colour that varies: the mean colour is mapped "
+                                        "instead"))
             return ColorExpression(np.array(node.color_ramp.evaluate(color.mean().mean())[:3]),
                                    result=color.result)
         if node.type == 'RGBTOBW' and color.is_constant:
             return ColorExpression(WHITE * (color.constant @ [0.2126, 0.7152, 0.0722]),
                                    result=color.result)
-        self._inexact(node, "is ignored: its input colour is used")
+        self._inexact(node, Message("is ignored: its input colour is used"))
         return color
 
     def _plus(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
               ) -> ColorExpression:
         if not a.can_add(b):
-            self._inexact(node, "adds two images or attributes: the mean of the second is used")
+            self._inexact(node, Message("adds two images or attributes: the mean of the second is "
+                                        "used"))
         return a.plus(b).simplified()
 
     def _times(self, a: ColorExpression, b: ColorExpression, node: bpy.types.Node
@@ -285,8 +293,8 @@ class ColorReader:
         if a.is_constant:
             return replace(b.scaled(a.constant), result=max(a.result, b.result))
         if not b.is_constant:
-            self._inexact(node, "multiplies two images or attributes: the mean of the second is "
-                                "used")
+            self._inexact(node, Message("multiplies two images or attributes: the mean of the "
+                                        "second is used"))
         return replace(a.scaled(b.mean()), result=max(a.result, b.result))
 
     # ----------------------------------------------------------------------------------------------
@@ -315,8 +323,8 @@ class ColorReader:
             return LIGHT_PATH.get(source.output.name, 0.0)
         if node.type == 'LIGHT_FALLOFF':
             if source.output.name != 'Quadratic' or self.value(node.inputs['Smooth'], path):
-                self._warn(node, "is not a Quadratic falloff with Smooth 0: the light falls off "
-                                 "with the square of the distance")
+                self._warn(node, Message("is not a Quadratic falloff with Smooth 0: the light "
+                                         "falls off with the square of the distance"))
             return self.value(node.inputs['Strength'], path)
         if node.type == 'MATH' and node.operation in _MATH:
             a, b = (self.value(socket, path) for socket in node.inputs[:2])
@@ -333,16 +341,23 @@ class ColorReader:
         self._result_values += bool(behind)
         if behind == Result.ALONE:
             return 1.0
-        self._inexact(node, f"is not a constant: the value of the socket {source.socket.name} "
-                            f"that it is linked to is used")
+        self._inexact(node, Message("is not a constant: the value of the socket {socket} that it "
+                                    "is linked to is used", socket=source.socket.name))
         return default_value(source.socket)
 
-    def _warn(self, node: bpy.types.Node, what: str) -> None:
-        self.warnings.add(f'{self.owner}: node "{node.name}" ({node.bl_label}) {what}')
+    def _warn(self, node: bpy.types.Node, what: Message) -> None:
+        self.warnings.add(Message("{owner}: {node} {what}", owner=self.owner, node=_said(node),
+                                  what=what))
 
-    def _inexact(self, node: bpy.types.Node, what: str) -> None:
-        self.unread.append(f'node "{node.name}" ({node.bl_label})')
-        self.inexact.add(f'{self.owner}: {self.unread[-1]} {what}')
+    def _inexact(self, node: bpy.types.Node, what: Message) -> None:
+        self.unread.append(_said(node))
+        self.inexact.add(Message("{owner}: {node} {what}", owner=self.owner, node=self.unread[-1],
+                                 what=what))
+
+
+def _said(node: bpy.types.Node) -> Message:
+    """Returns a node as a part of a sentence. Blender itself translates the type of the node."""
+    return Message("node {name} ({type})", name=quoted(node.name), type=Message(node.bl_label))
 
 
 def _only_result(source: Source) -> ColorExpression:

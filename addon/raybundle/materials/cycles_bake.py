@@ -23,6 +23,7 @@ import bpy
 import numpy as np
 
 from ..mesh_arrays import read, vertex_positions
+from ..messages import Message, quoted
 from .face_atlas import BORDER, FaceAtlas, face_atlas
 from .fingerprint import material_fingerprint
 from .gloss import filter_glossy_of
@@ -107,9 +108,10 @@ def bake_surfaces(context: bpy.types.Context, wanted: dict[bpy.types.Object, Wan
                     surface = _bake(context, item, mesh, asked, pixel)
             kept[key] = result[item] = surface
         except (RuntimeError, TypeError, ValueError) as error:
-            failures.append(f'"{item.name}": Cycles could not bake its materials '
-                            f'({str(error).strip()}): values that Raybundle cannot read are '
-                            f'replaced by constants')
+            failures.append(Message(
+                "{name}: Cycles could not bake its materials ({error}): values that Raybundle "
+                "cannot read are replaced by constants", name=quoted(item.name),
+                error=error))
     _cache[name] = kept
     return result, failures
 
@@ -192,7 +194,7 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
         context.evaluated_depsgraph_get()).matrix_world), wanted, pixel)
     layer = mesh.uv_layers.new(name=_UV_MAP, do_init=False)
     if layer is None:
-        raise RuntimeError("the mesh has no room for another UV map, remove one")
+        raise RuntimeError(Message("the mesh has no room for another UV map, remove one"))
     layer.data.foreach_set('uv', atlas.uvs.ravel())
     images = {}
     with _stage(context, item, mesh, asked.results) as stage:
@@ -223,9 +225,10 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
             atlas, sizes, slots == slot, whole, diffuse,
             *(images.get(name, black) for name in (RADIANCE, TRANSMITTANCE, TRANSLUCENCE)))
         materials[slot] = BakedMaterial(
-            f'material "{item.material_slots[slot].material.name}": baked by Cycles on '
-            f'"{item.name}", because Raybundle cannot read {reason}', whole,
-            images.get(RADIANCE), opacity, images.get(TRANSLUCENCE),
+            Message("material {name}: baked by Cycles on {object}, because Raybundle cannot read "
+                    "{reason}", name=quoted(item.material_slots[slot].material.name),
+                    object=quoted(item.name), reason=reason),
+            whole, images.get(RADIANCE), opacity, images.get(TRANSLUCENCE),
             *_line_through(pixels, diffuse_pixels),
             *(image.mean(axis=0) if len(image) else np.zeros(3)
               for image in (diffuse_pixels, *others)))

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ..image_export import ImagePixels
+from ..messages import Message, quoted
 from ..scene_data import ImageData, MaterialData, SceneData, Warnings
 from ..surface_data import (CORRELATED, SEPARATE, ColorData, DiffuseData, GlossData, LobeData,
                             PartData, ShownData, SurfaceData)
@@ -189,10 +190,12 @@ class MaterialExporter:
         if key not in self._unread:
             surface = self._surface(material, self._reading(slot), Warnings(), unread := [])
             if not unread and not _share_coordinates(surface.reflectance, surface.radiance):
-                unread.append("an emission that varies in another way than the reflectance")
+                unread.append(Message("an emission that varies in another way than the "
+                                      "reflectance"))
             if not unread and not _is_laid_out(surface.translucence, surface.reflectance,
                                                surface.radiance):
-                unread.append("a translucence that varies in another way than the reflectance")
+                unread.append(Message("a translucence that varies in another way than the "
+                                      "reflectance"))
             if self._shows(material, slot).only:
                 unread.clear()
             self._unread[key] = unread[0] if unread else None
@@ -258,17 +261,17 @@ class MaterialExporter:
         """Adds a material that shows only a result and whose surface the last bake has not stored.
         Its colours are those of its sockets, or grey if these are black. Adds a warning."""
         if any(np.any(side.reflectance.mean() + side.translucence.mean() > 0.0) for side in sides):
-            self.warnings.add(
-                f'material "{name}" shows only the result of a bake, and no earlier bake stored '
-                f'its own colour: the colour of the socket that the result is linked to is used; '
-                f'set it there, or link the result through a Multiply node')
+            self.warnings.add(Message(
+                "material {name} shows only the result of a bake, and no earlier bake stored its "
+                "own colour: the colour of the socket that the result is linked to is used; set it "
+                "there, or link the result through a Multiply node", name=quoted(name)))
         else:
             grey = Surface.matt(ColorExpression(WHITE * DEFAULT_REFLECTANCE))
             sides = [replace(grey, transmittance=side.transmittance) for side in sides]
-            self.warnings.add(
-                f'material "{name}" shows only the result of a bake, and no earlier bake stored '
-                f'its own colour: grey of {DEFAULT_REFLECTANCE} is used; bake once with the '
-                f'original material first')
+            self.warnings.add(Message(
+                "material {name} shows only the result of a bake, and no earlier bake stored its "
+                "own colour: grey of {value} is used; bake once with the original material first",
+                name=quoted(name), value=DEFAULT_REFLECTANCE))
         return self._add(name, sides)
 
     def _results(self, slot: SlotMaterial) -> frozenset[str]:
@@ -304,8 +307,9 @@ class MaterialExporter:
         mean, with a warning."""
         if not sides[0].reflectance.same_variation(sides[1].reflectance):
             # The native library has one image and one weight for the reflectance of both sides.
-            self.warnings.add(f'material "{name}": front and back have different images or '
-                              f'attributes: the mean of each side is used')
+            self.warnings.add(Message("material {name}: front and back have different images or "
+                                      "attributes: the mean of each side is used",
+                                      name=quoted(name)))
             sides = [replace(side, reflectance=ColorExpression(side.reflectance.mean()),
                              diffuse=ColorExpression(side.diffuse.mean())) for side in sides]
         varying = sides[0].reflectance
@@ -319,8 +323,9 @@ class MaterialExporter:
                 or any(glow.attribute not in (None, glow_attribute) for glow in glows)
                 or not all(_share_coordinates(side.reflectance, side.radiance)
                            for side in sides)):
-            self.warnings.add(f'material "{name}": its emission and its reflectance vary in '
-                              f'different ways: the mean of the emission is used')
+            self.warnings.add(Message("material {name}: its emission and its reflectance vary in "
+                                      "different ways: the mean of the emission is used",
+                                      name=quoted(name)))
             glows = [ColorExpression(glow.mean()) for glow in glows]
             glow_texture = glow_attribute = None
         passed = [side.translucence for side in sides]
@@ -328,17 +333,19 @@ class MaterialExporter:
         if (not all(_is_laid_out(color, varying, *glows) for color in passed)
                 or any(color.texture and not color.texture.same_as(passed_texture)
                        for color in passed)):
-            self.warnings.add(f'material "{name}": its translucence and its reflectance vary in '
-                              f'different ways: the mean of the translucence is used')
+            self.warnings.add(Message("material {name}: its translucence and its reflectance vary "
+                                      "in different ways: the mean of the translucence is used",
+                                      name=quoted(name)))
             passed = [ColorExpression(color.mean()) for color in passed]
             passed_texture = None
         if any(np.any(color.mean() < -1e-6) for side in sides
                for color in (side.reflectance, side.radiance)):
-            self.warnings.add(f'material "{name}": negative reflectance or emission counts as 0')
+            self.warnings.add(Message("material {name}: negative reflectance or emission counts "
+                                      "as 0", name=quoted(name)))
         transmittance = np.clip([side.transmittance for side in sides], 0.0, 1.0)
         if np.ptp(transmittance) > 1e-3:
-            self.warnings.add(f'material "{name}": its transparency differs between colours or '
-                              f'sides: the mean is used')
+            self.warnings.add(Message("material {name}: its transparency differs between colours "
+                                      "or sides: the mean is used", name=quoted(name)))
         images = [self._image_index(one) if one else None
                   for one in (texture, glow_texture, passed_texture)]
         data = MaterialData(name, *(_surface_data(
@@ -377,13 +384,14 @@ class MaterialExporter:
             return None, Surface.matt(ColorExpression(np.array(material.diffuse_color[:3])))
         output = output_node(material.node_tree)
         if output is None:
-            warnings.add(f'material "{material.name}" is black because it has no output node: add '
-                         f'a Material Output')
+            warnings.add(Message("material {name} is black because it has no output node: add a "
+                                 "Material Output", name=quoted(material.name)))
             return None, Surface()
         if output.inputs['Volume'].is_linked and not output.inputs['Surface'].is_linked:
             # A material with a volume and no surface lets all light pass, as in Cycles.
             return None, Surface(transmittance=WHITE)
-        reader = NodeReader(f'material "{material.name}"', self.images, warnings, reading, inexact)
+        reader = NodeReader(Message("material {name}", name=quoted(material.name)), self.images,
+                            warnings, reading, inexact)
         return reader, reader.surface(output.inputs['Surface'])
 
     def _image_index(self, texture: Texture) -> int:

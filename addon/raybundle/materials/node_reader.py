@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ..image_export import ImagePixels
+from ..messages import Message
 from ..scene_data import Warnings
 from .color_expression import WHITE, ColorExpression, Result
 from .color_reader import ColorReader, Reading
@@ -34,7 +35,8 @@ CLOTH = ('BSDF_SHEEN', 'BSDF_VELVET')
 # missing.
 CLOTH_ROUGHNESS = ('Roughness', 'Sigma'), 0.5
 EDGE_TINT = ('Edge Tint',), 1.0  # of the Metallic shader
-MIRRORS = "mirrors light: it lights other surfaces as if its roughness were at least 0.45"
+MIRRORS = Message("mirrors light: it lights other surfaces as if its roughness were at least "
+                  "0.45")
 
 
 class NodeReader(ColorReader):
@@ -43,7 +45,7 @@ class NodeReader(ColorReader):
     ColorReader describes the parameters, and how nodes that cannot be read are handled.
     """
 
-    def __init__(self, owner: str, images: ImagePixels, warnings: Warnings,
+    def __init__(self, owner: Message, images: ImagePixels, warnings: Warnings,
                  reading: Reading = Reading(), inexact: Warnings | None = None) -> None:
         super().__init__(owner, images, warnings, reading, inexact)
         # The highest Result of the colours of reflecting and transmitting shaders.
@@ -88,8 +90,8 @@ class NodeReader(ColorReader):
         if node.type == 'BSDF_TRANSLUCENT':
             return Surface(translucence=self._own_color(node.inputs['Color'], path))
         if node.type in ('BSDF_GLASS', 'BSDF_REFRACTION'):
-            self._warn(node, "lets light through: the light passes straight through, and none is "
-                             "reflected")
+            self._warn(node, Message("lets light through: the light passes straight through, and "
+                                     "none is reflected"))
             return Surface(transmittance=self._transmitted(node, node.inputs['Color'], path))
         if node.type == 'MIX_SHADER':
             factor = float(np.clip(self.value(node.inputs[0], path), 0.0, 1.0))
@@ -102,9 +104,9 @@ class NodeReader(ColorReader):
         if node.type in CLOTH:
             return self._cloth(node, path)
         if node.type == 'SUBSURFACE_SCATTERING':
-            self._warn(node, "is read as a diffuse surface")
+            self._warn(node, Message("is read as a diffuse surface"))
             return Surface.matt(self._own_color(node.inputs['Color'], path))
-        self._warn(node, "is not supported: it reflects nothing and blocks light")
+        self._warn(node, Message("is not supported: it reflects nothing and blocks light"))
         return Surface()
 
     def _principled(self, node: bpy.types.Node, path: tuple[bpy.types.Node, ...]) -> Surface:
@@ -119,7 +121,7 @@ class NodeReader(ColorReader):
             self._warn(node, MIRRORS)
         through = float(np.clip(self.value(transmission, path), 0.0, 1.0)) * (1.0 - metallic)
         if through > 0.0:
-            self._warn(node, "lets light through: the light passes straight through")
+            self._warn(node, Message("lets light through: the light passes straight through"))
         mean = np.clip(base.mean(), 0.0, 1.0)
         sockets = PrincipledSockets(
             *self._values(node, GLOSS_SOCKETS, path), node.distribution == 'MULTI_GGX', mean,
@@ -220,7 +222,8 @@ class NodeReader(ColorReader):
                      path: tuple[bpy.types.Node, ...]) -> np.ndarray:
         color = self._own_color(socket, path)
         if not color.is_constant:
-            self._inexact(node, f"has a varying {socket.name}: its mean is used")
+            self._inexact(node, Message("has a varying {socket}: its mean is used",
+                                        socket=socket.name))
         return np.clip(color.mean(), 0.0, 1.0)
 
     def _sum(self, parts: list[Surface], node: bpy.types.Node) -> Surface:
@@ -272,7 +275,8 @@ class NodeReader(ColorReader):
         color = self.color(socket, path)
         if color.is_constant or self.reading.varying_emission:
             return color
-        self._warn(socket.node, f"has a varying {socket.name}: its mean is used")
+        self._warn(socket.node, Message("has a varying {socket}: its mean is used",
+                                        socket=socket.name))
         return ColorExpression(color.mean(), result=color.result)
 
 
