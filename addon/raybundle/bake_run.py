@@ -46,9 +46,14 @@ def changes_light(depsgraph: bpy.types.Depsgraph) -> bool:
 
 def changes_only_lamps(depsgraph: bpy.types.Depsgraph) -> bool:
     """Returns whether an update changes nothing but lamps."""
-    return all(isinstance(update.id, bpy.types.Light)
-               or isinstance(update.id, bpy.types.Object) and update.id.type == 'LIGHT'
-               for update in depsgraph.updates)
+    changed = [update.id for update in depsgraph.updates]
+    has_lamp = any(isinstance(item, bpy.types.Light) for item in changed)
+    # From Blender 5.1 on every lamp has a node tree, which is updated with it. The owners of
+    # embedded trees are listed too.
+    return all(isinstance(item, bpy.types.Light)
+               or isinstance(item, bpy.types.Object) and item.type == 'LIGHT'
+               or isinstance(item, bpy.types.ShaderNodeTree) and item.is_embedded_data and has_lamp
+               for item in changed)
 
 
 def can_begin(operator: type[bpy.types.Operator]) -> bool:

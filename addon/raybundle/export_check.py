@@ -27,6 +27,9 @@ from .warning_lines import listed
 # Whether 16-bit colours above 1 may start again at 0 instead of being cut off: 4.2 has this fault,
 # 4.5 has not.
 _WRAPS = bpy.app.version < (4, 5, 0)
+# Whether only the first material of a mesh with a single colour attribute gets the light: 5.2.0
+# takes the others for materials that do not use it, and makes them white.
+_WHITENS = bpy.app.version >= (5, 2, 0)
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,8 @@ def check(scene: bpy.types.Scene) -> list[Finding]:
     found = [*_of_values(items, attribute, by_material), *_of_objects(scene, items)]
     found += _of_materials(scene, items, attribute) if by_material \
         else _of_render(items, attribute)
+    if _WHITENS:
+        found += _of_whitened(items, attribute)
     found += [*_of_shading(items, scene), *_of_light_sets(scene, items, by_material)]
     return found
 
@@ -125,6 +130,20 @@ def _of_materials(scene: bpy.types.Scene, items: list[bpy.types.Object], attribu
         yield Finding(Message("another colour attribute is the render attribute, which is "
                               "exported: set {name} for rendering", name=quoted(attribute)),
                       tuple(others))
+
+
+def _of_whitened(items: list[bpy.types.Object], attribute: str) -> Iterator[Finding]:
+    white = []
+    for item in items:
+        using = {slot for slot, entry in enumerate(item.material_slots)
+                 if entry.material and _uses(entry.material, item.data, attribute)}
+        used = using & set(read(item.data.polygons, 'material_index', np.int32).tolist())
+        if used and (len(item.data.color_attributes) > 1 or len(used) > 1):
+            white.append(item.name)
+    if white:
+        yield Finding(Message("the exporter of this Blender writes white instead of light on "
+                              "meshes with several materials or colour attributes: press Export "
+                              "glTF"), tuple(white))
 
 
 def _uses(material: bpy.types.Material, mesh: bpy.types.Mesh, attribute: str) -> bool:
