@@ -122,6 +122,22 @@ def test_the_light_that_is_written_is_no_change(room, live, topology):
     assert bake_run.active() is None
 
 
+def test_use_and_export_are_no_changes(room, live, tmp_path):
+    switch_on(live)
+    light = read_colors(room).copy()
+    for operator, options in ((bpy.ops.raybundle.export_gltf, {'filepath': str(tmp_path / "x.glb")}),
+                              (bpy.ops.raybundle.use_in_material, {}),
+                              (bpy.ops.raybundle.export_gltf, {'filepath': str(tmp_path / "x.glb")}),
+                              (bpy.ops.raybundle.take_out_of_material, {})):
+        assert operator(**options) == {'FINISHED'}
+        bpy.context.view_layer.update()
+        assert until_at_rest(live) == 0, operator.idname()
+    assert np.array_equal(read_colors(room), light)
+    change_power(bpy.context.scene)  # and is reported only by the operator
+    bpy.ops.raybundle.use_in_material()
+    assert until_at_rest(live) == 1
+
+
 def test_it_waits_while_meshes_are_edited(room, live):
     switch_on(live)
     bpy.context.view_layer.objects.active = room

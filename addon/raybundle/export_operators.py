@@ -13,6 +13,7 @@ from .bake_report import BakeError
 from .channel_bake import bake_channels, why_not
 from .export_check import check
 from .gltf_export import EXPORTER_OFF, ExportError, ExportSettings
+from .live_light import live
 from .messages import Message, encoded, quoted, translated
 from .native import RaybundleError
 from .properties import enum_export_format, enum_export_range, enum_shown_as
@@ -84,7 +85,8 @@ class RAYBUNDLE_OT_use_in_material(_NeedsLight, bpy.types.Operator):
         way = light_in_material.chosen_way(
             settings, self.way if self.properties.is_property_set('way') else "")
         settings.is_light_lent = False
-        report = light_in_material.use(context.scene, settings.attribute, way)
+        with live.ignoring_changes(context):
+            report = light_in_material.use(context.scene, settings.attribute, way)
         _check_again(context.scene)
         for warning in report.warnings:
             self.report({'WARNING'}, translated(warning))
@@ -101,13 +103,15 @@ class RAYBUNDLE_OT_take_out_of_material(_NeedsObjectMode, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def invoke(self, context, event):
-        viewport_preview.hide(context)
+        with live.ignoring_changes(context):
+            viewport_preview.hide(context)
         return self.execute(context)
 
     def execute(self, context):
         context.scene.raybundle.is_light_lent = False
-        self.report({'INFO'}, translated(Message("Materials restored: {count}",
-                                                 count=light_in_material.take_out())))
+        with live.ignoring_changes(context):
+            count = light_in_material.take_out()
+        self.report({'INFO'}, translated(Message("Materials restored: {count}", count=count)))
         _check_again(context.scene)
         return {'FINISHED'}
 
@@ -174,11 +178,13 @@ class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
             else self.surface_color == 'WITH'
         path = Path(bpy.path.abspath(bpy.path.ensure_ext(self.filepath, ".glb")))
         try:
-            report = gltf_export.export(context, path, ExportSettings(
-                settings.attribute, with_color,
-                self.format if is_set('format') else settings.export_format,
-                self.range if is_set('range') else settings.export_range,
-                self.apply_modifiers, self.selected))
+            # The exporter changes materials and restores them.
+            with live.ignoring_changes(context):
+                report = gltf_export.export(context, path, ExportSettings(
+                    settings.attribute, with_color,
+                    self.format if is_set('format') else settings.export_format,
+                    self.range if is_set('range') else settings.export_range,
+                    self.apply_modifiers, self.selected))
         except ExportError as error:
             self.report({'ERROR'}, translated(error))
             return {'CANCELLED'}

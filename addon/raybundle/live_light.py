@@ -51,14 +51,14 @@ class LiveLight:
         # The last bake that was prepared, as long as nothing but lamps has changed since.
         self._exported: PreparedBake | None = None
         self._was_on = False
-        self._changes_scene = False  # whether live mode itself is changing the scene
+        self._ignores_changes = False  # see ignoring_changes()
         self._is_stale = False  # whether something has changed since the last draft began
         self._draft_report = ""  # the scene's report after the last draft; "": a bake replaced it
         self._last_change = 0.0  # time.perf_counter()
 
     def note_update(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Notes what an update of the scene has changed, unless live mode itself has changed it."""
-        if self._changes_scene:
+        """Notes what an update of the scene has changed, unless changes are ignored."""
+        if self._ignores_changes:
             return
         if not bake_run.changes_only_lamps(depsgraph):
             self._exported = None
@@ -102,7 +102,7 @@ class LiveLight:
         self._is_stale = False
         self.message = ""
         try:
-            with self._own_changes(context):
+            with self.ignoring_changes(context):
                 self._run = bake_run.BakeRun(
                     context, DRAFT if self._is_draft else {}, is_live=True,
                     is_draft=self._is_draft, last=self._exported if self._is_draft else None)
@@ -119,7 +119,7 @@ class LiveLight:
         self._run = None
         try:
             if not run.stopped_because:
-                with self._own_changes(context):
+                with self.ignoring_changes(context):
                     run.finish(context)
                     viewport_preview.show_result(context, is_new=False)
                 self._draft_report = context.scene.raybundle.report if self._is_draft else ""
@@ -130,15 +130,17 @@ class LiveLight:
             run.leave()
 
     @contextmanager
-    def _own_changes(self, context: bpy.types.Context) -> Iterator[None]:
-        """Changes of the scene in the with block do not count as changes of the light."""
-        self._changes_scene = True
+    def ignoring_changes(self, context: bpy.types.Context) -> Iterator[None]:
+        """Changes of the scene in the with block do not count as changes of the light. For
+        operators that change materials without changing the light."""
+        context.view_layer.update()  # reports earlier changes, which count
+        self._ignores_changes = True
         try:
             yield
             # Blender evaluates and reports the changes now.
             context.view_layer.update()
         finally:
-            self._changes_scene = False
+            self._ignores_changes = False
 
     def _fail(self, error: BakeError | RaybundleError) -> None:
         """Waits for the next change, which may end the cause of the error."""

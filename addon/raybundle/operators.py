@@ -13,6 +13,7 @@ from .bake import bake
 from .bake_progress import BakeProgress
 from .bake_report import BakeError, BakeReport
 from .light_sets import written_attributes
+from .live_light import live
 from .materials.last_surfaces import LastSurfaces
 from .messages import Message, quoted, translated
 from .native import ErrorCode, RaybundleError
@@ -118,8 +119,10 @@ class _Bakes:
             self._switched_preview |= viewport_preview.show_interim(context)
         if goes_on:
             return None
-        report = run.finish(context)
-        for warning in viewport_preview.show_result(context):
+        with live.ignoring_changes(context):
+            report = run.finish(context)
+            warnings = viewport_preview.show_result(context)
+        for warning in warnings:
             self.report({'WARNING'}, translated(warning))
         return _say(self, report)
 
@@ -280,7 +283,9 @@ class RAYBUNDLE_OT_preview(_NeedsScene, bpy.types.Operator):
                 color_attribute.activate(item.data, context.scene.raybundle.attribute)
         # A background process has no windows.
         if not bpy.app.background:
-            for warning in viewport_preview.toggle(context):
+            with live.ignoring_changes(context):
+                warnings = viewport_preview.toggle(context)
+            for warning in warnings:
                 self.report({'WARNING'}, translated(warning))
         return {'FINISHED'}
 
