@@ -138,6 +138,17 @@ def test_use_and_export_are_no_changes(room, live, tmp_path):
     assert until_at_rest(live) == 1
 
 
+def test_relight_is_not_greyed_out_meanwhile(room, live):
+    switch_on(live)
+    assert bpy.ops.raybundle.relight.poll()
+    change_power(bpy.context.scene)
+    bpy.context.view_layer.update()
+    while bake_run.active() is None:
+        live.step(bpy.context)
+    assert bpy.ops.raybundle.relight.poll()
+    assert bpy.ops.raybundle.relight() == {'FINISHED'}
+
+
 def test_it_waits_while_meshes_are_edited(room, live):
     switch_on(live)
     bpy.context.view_layer.objects.active = room

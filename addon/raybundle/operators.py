@@ -173,7 +173,8 @@ class RAYBUNDLE_OT_relight(_Bakes, bpy.types.Operator):
     def poll(cls, context):
         if context.scene is None or not bake_run.can_begin(cls):
             return False
-        if not bake_cache.has_result(context.scene):
+        # While live mode bakes, the cache cannot tell. Relighting ends that bake and works.
+        if bake_run.active() is None and not bake_cache.has_result(context.scene):
             cls.poll_message_set(tip_("There is nothing to relight: bake first. The lines of a "
                                       "bake are kept only until the file is closed"))
             return False
