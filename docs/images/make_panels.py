@@ -11,17 +11,19 @@ The picture in German needs a Blender with languages.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "blend_tests"))
+sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "blend_tests")]
 
+import raybundle  # noqa: E402
 import ui_test  # noqa: E402
-from ui_test import bake_run, leave, raybundle, window  # noqa: E402
+from raybundle import bake_run  # noqa: E402
+from ui_window import MAIN  # noqa: E402
 
 PAUSE = 0.5  # s, in which Blender draws
 # Widths of the editor of properties, as share of the window.
@@ -30,14 +32,23 @@ WIDE, NARROW = 0.36, 0.2
 SHARE, RUNNING_ROWS = 0.6, 216
 
 
+def show_panel() -> None:
+    """Leaves only Raybundle's panels in the Render properties."""
+    for panel in list(bpy.types.Panel.__subclasses__()):
+        if (getattr(panel, 'bl_space_type', '') == 'PROPERTIES'
+                and getattr(panel, 'bl_context', '') == 'render'
+                and not panel.__name__.startswith('RAYBUNDLE') and panel.is_registered):
+            bpy.utils.unregister_class(panel)
+
+
 def editor() -> bpy.types.Area:
     """Returns the editor of properties that the pictures show, the one that was added last."""
-    return min((area for area in window().screen.areas if area.type == 'PROPERTIES'),
+    return min((area for area in MAIN.window.screen.areas if area.type == 'PROPERTIES'),
                key=lambda area: area.x)
 
 
 def largest_view() -> bpy.types.Area:
-    return max((area for area in window().screen.areas if area.type == 'VIEW_3D'),
+    return max((area for area in MAIN.window.screen.areas if area.type == 'VIEW_3D'),
                key=lambda area: area.width)
 
 
@@ -49,11 +60,11 @@ def show_editor(width: float) -> Iterator[float]:
     """Divides the 3D view, so that its right part is an editor of properties of this width. Yields
     pauses, s."""
     view = largest_view()
-    with bpy.context.temp_override(window=window(), area=view):
+    with bpy.context.temp_override(window=MAIN.window, area=view):
         bpy.ops.screen.area_split(direction='VERTICAL',
-                                  factor=1.0 - width * window().width / view.width)
+                                  factor=1.0 - width * MAIN.window.width / view.width)
     yield PAUSE  # Its areas have their places only after it was drawn.
-    right = max((area for area in window().screen.areas if area.type == 'VIEW_3D'),
+    right = max((area for area in MAIN.window.screen.areas if area.type == 'VIEW_3D'),
                 key=lambda area: area.x)
     right.type = 'PROPERTIES'
     yield PAUSE  # Its tabs exist only after it was drawn.
@@ -62,7 +73,7 @@ def show_editor(width: float) -> Iterator[float]:
 
 def save(path: Path) -> None:
     """Saves a picture of the editor's panels, cut off below the last one."""
-    pixels = ui_test.screenshot(path)
+    pixels = MAIN.picture(path)
     region = region_of(editor())
     inside = pixels[region.y:region.y + region.height, region.x:region.x + region.width]
     # Rows from the bottom, without the border of the region and the scroll bar.
@@ -106,7 +117,7 @@ def picture_running_bake(out: Path) -> Iterator[float]:
     run = start_bake(view)
     while not run.shows_light:
         yield 0.01
-    write_picture(out / "view_first_light.png", camera_frame(ui_test.screenshot(
+    write_picture(out / "view_first_light.png", camera_frame(MAIN.picture(
         out / "view_first_light.png"), region_of(view)))
     bpy.ops.raybundle.stop()
     yield PAUSE
@@ -114,7 +125,7 @@ def picture_running_bake(out: Path) -> Iterator[float]:
     run = start_bake(view)
     while run.progress.fraction < SHARE:
         yield 0.05
-    pixels = ui_test.screenshot(out / "panel_running.png")
+    pixels = MAIN.picture(out / "panel_running.png")
     write_picture(out / "view_later_light.png", camera_frame(pixels, region_of(view)))
     region = region_of(editor())
     top = region.y + region.height
@@ -126,7 +137,7 @@ def picture_running_bake(out: Path) -> Iterator[float]:
 
 def start_bake(view: bpy.types.Area) -> bake_run.BakeRun:
     """Starts a bake as a button in a 3D view does."""
-    with bpy.context.temp_override(window=window(), area=view, region=region_of(view)):
+    with bpy.context.temp_override(window=MAIN.window, area=view, region=region_of(view)):
         bpy.ops.raybundle.bake('INVOKE_DEFAULT')
     return bake_run.active()
 
@@ -142,7 +153,7 @@ def camera_frame(pixels: np.ndarray, region: bpy.types.Region) -> np.ndarray:
 
 def steps(out: Path) -> Iterator[float]:
     """Makes all pictures. Yields the pauses between the steps, s."""
-    ui_test.show_panel()
+    show_panel()
     yield from show_editor(WIDE)
     yield from bake("house_on_plain", quality='DRAFT')
     save(out / "panel.png")
@@ -158,23 +169,11 @@ def steps(out: Path) -> Iterator[float]:
     save(out / "panel_narrow.png")
 
 
-def advance(script: Iterator[float]) -> Callable[[], float | None]:
-    def next_step() -> float | None:
-        try:
-            return next(script)
-        except StopIteration:
-            leave(0, "the pictures are made")
-        except Exception as error:
-            leave(1, repr(error))
-        return None
-    return next_step
-
-
 def main(out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     bpy.context.preferences.view.show_splash = False
     raybundle.register()
-    bpy.app.timers.register(advance(steps(out)), first_interval=1.0, persistent=True)
+    ui_test.run(steps(out), out)
 
 
 if __name__ == "__main__":
