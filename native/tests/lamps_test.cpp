@@ -100,6 +100,70 @@ TEST(SpotLight, TheConeCutsAndBlends) {
     EXPECT_EQ(shot.front(4), 0);
 }
 
+// Returns the mean irradiance on a rectangle, W/m^2. The lamp is at the origin, has an intensity of
+// 1 W/sr and shines down.
+double meanOnRectangle(const Light& lamp, const glm::dvec3& origin, const glm::dvec3& a,
+                       const glm::dvec3& b) {
+    constexpr int kSteps = 800;
+    const glm::dvec3 normal = glm::normalize(glm::cross(a, b));
+    const double edge = std::cos(0.5 * lamp.coneAngle), soft = (1 - edge) * lamp.coneBlend;
+    double sum = 0;
+    for (int i = 0; i < kSteps; ++i)
+        for (int j = 0; j < kSteps; ++j) {
+            const glm::dvec3 d = origin + (i + 0.5) / kSteps * a + (j + 0.5) / kSteps * b;
+            const double distance = glm::length(d), above = -d.z / distance - edge;
+            if (above <= 0) continue;
+            const double t = soft > 0 ? std::min(1.0, above / soft) : 1;
+            sum += t * t * (3 - 2 * t) * -glm::dot(d, normal) / (distance * distance * distance);
+        }
+    return sum / (double(kSteps) * kSteps);
+}
+
+// A patch gets the mean over its lit part, however much of the patch that is.
+TEST(SpotLight, ItsRimMayCrossAPatch) {
+    for (const double blend : {0.0, 0.01})
+        for (const double angle : {1.2, double(kPi)})
+            for (const double share : {0.11, 0.19, 0.33, 0.52, 0.7, 0.89}) {
+                Light lamp = pointLight({0, 0, 0}, glm::dvec3(1));
+                lamp.hasCone = true;
+                lamp.coneAngle = angle;
+                lamp.coneBlend = blend;
+                // The rim meets a floor in a circle. That of the widest cone meets a wall at the
+                // height of the lamp.
+                const bool isWall = angle > 3;
+                const float size = 0.4f, lit = size * float(share), rim = std::tan(0.6f);
+                const glm::vec3 origin =
+                    isWall ? glm::vec3(-0.1f, 1, -lit) : glm::vec3(rim - lit, -0.1f, -1);
+                const glm::vec3 a = isWall ? glm::vec3(0.2f, 0, 0) : glm::vec3(size, 0, 0);
+                const glm::vec3 b = isWall ? glm::vec3(0, 0, size) : glm::vec3(0, 0.2f, 0);
+                Scene scene;
+                place(scene, rectangle("", origin, a, b), grey("", 0.5f));
+                scene.addLight(lamp);
+                const double exact = meanOnRectangle(lamp, origin, a, b);
+                // The error is that of the place of the rim, and does not shrink with the lit part.
+                EXPECT_NEAR(gatherFinely(scene).front(), exact, 0.003 * exact / share)
+                    << "angle " << angle << ", blend " << blend << ", share " << share;
+            }
+}
+
+// All light of the lamp arrives within a patch: the intensity times the solid angle of the cone.
+TEST(SpotLight, ANarrowConeMayLightASmallPartOfAPatch) {
+    for (const double angle : {0.02, 0.1, 0.5})
+        for (const double blend : {0.0, 0.5}) {
+            Scene scene;
+            place(scene, rectangle("floor", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), grey("", 0.5f));
+            Light light = pointLight({0.3, 0.2, 1}, glm::dvec3(1));
+            light.hasCone = true;
+            light.coneAngle = angle;
+            light.coneBlend = blend;
+            scene.addLight(light);
+            // Half of the light of the soft part is missing.
+            const double exact = 2 * kPi * (1 - std::cos(0.5 * angle)) * (1 - 0.5 * blend) / 4;
+            EXPECT_NEAR(gatherFinely(scene).front(), exact, 0.003 * exact)
+                << "angle " << angle << ", blend " << blend;
+        }
+}
+
 TEST(SpotLight, DimsWithTheCosineWhereItIsAskedTo) {
     Scene scene;
     placeReceiver(scene, {2, 0, 0});

@@ -3,7 +3,9 @@
 // Mean of a closed form over a patch. If the source cannot compute this mean itself, Gauss
 // quadrature does (degree 3 on a parallelogram, 2 on a triangle). The patch is divided into more
 // parts if the closed form varies much over it: beside a source the irradiance falls from a finite
-// value at the common edge with an infinite slope.
+// value at the common edge with an infinite slope. Where the light ends within the patch, at the rim
+// of a spot lamp, points in rows would all be on the same side of the rim. There samples of the
+// source at the points of a Fibonacci lattice are used, no two of which are in one row or column.
 #include "direct_light/closed_mean.h"
 
 #include "patches/patches.h"
@@ -53,6 +55,23 @@ std::optional<Quadrature> quadrature(const LightSource& source, const ReceiverPl
     return result;
 }
 
+// Returns the mean over the points of a Fibonacci lattice, or nothing if the source has no closed
+// form. `count` and `step` are successive Fibonacci numbers.
+std::optional<ClosedMean> latticeMean(const LightSource& source, const ReceiverPlace& place,
+                                      uint32_t count, uint32_t step) {
+    glm::vec3 sums[2] = {glm::vec3(0.0f), glm::vec3(0.0f)};
+    for (uint32_t k = 0; k < count; ++k) {
+        const glm::vec2 uv = (glm::vec2(k, k * step % count) + 0.5f) / float(count);
+        const auto [point, weight] =
+            source.choosesPlaces() ? source.placeOn(place, uv) : PatchPoint{place.at(uv)};
+        const auto value = source.irradiance(point, place.normal);
+        if (!value) return std::nullopt;
+        sums[k % 2] += weight * *value;
+    }
+    const glm::vec3 even = sums[0] / float((count + 1) / 2), odd = sums[1] / float(count / 2);
+    return ClosedMean{0.5f * (even + odd), brightest(glm::abs(even - odd)) / 2};
+}
+
 }  // namespace
 
 std::optional<ClosedMean> closedMean(const LightSource& source, const ReceiverPlace& place,
@@ -60,6 +79,10 @@ std::optional<ClosedMean> closedMean(const LightSource& source, const ReceiverPl
     auto exact = [](const std::optional<glm::vec3>& mean) {
         return mean ? std::optional(ClosedMean{*mean, 0}) : std::nullopt;
     };
+    if (place.radius > 0 && source.isSteepOn(place)) {
+        const auto mean = latticeMean(source, place, 233, 144);
+        return !mean || mean->error <= tolerance ? mean : latticeMean(source, place, 987, 610);
+    }
     if (place.radius == 0 || place.radius < source.farPatch() * source.distance(place.centroid()))
         return exact(source.irradiance(place.centroid(), place.normal));
     if (const auto mean = source.meanIrradiance(place)) return exact(mean);

@@ -99,10 +99,10 @@ class DirectLight::SourceGather {
         int next = isInside ? std::min(kFewSamples, aim.samples) : aim.samples;
         for (;;) {
             take(next);
-            // No sample faced the receiver. A source of many faces may have few that do, so take
-            // more samples.
+            // No sample faced the receiver. A source of many faces may have few that do, and a cone
+            // may light a small part of the receiver, so take more samples.
             if (brightest(all.open) <= 0 && all.count < mostSamples &&
-                (source.isNarrow || (closed && brightest(*closed) > 0))) {
+                (source.isNarrow || (closed ? brightest(*closed) > 0 : source.isSteepOn(place)))) {
                 next = 4 * all.count;
                 continue;
             }

@@ -137,6 +137,10 @@ class LightSource {
         return std::nullopt;
     }
 
+    // Returns whether the light may end within a patch, or change so steeply there that the mean of
+    // irradiance() over a few points in rows is off.
+    virtual bool isSteepOn(const ReceiverPlace& /*patch*/) const { return false; }
+
     // Returns whether samples on a patch must start at the points that placeOn() returns instead of
     // points that are uniform by area.
     virtual bool choosesPlaces() const { return false; }

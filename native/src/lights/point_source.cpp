@@ -89,10 +89,15 @@ class PointSource : public LightSource {
         return intensity * float((halves[0].area() + halves[1].area()) / areaOf(patch));
     }
 
+    bool isSteepOn(const ReceiverPlace& patch) const override {
+        return cone && cone->isSteepBetween(cornersOf(patch));
+    }
+
     // Points on the patch are uniform in the solid angle under which the lamp sees the patch, since
-    // the light of the lamp is.
+    // the light of the lamp is, or follow the cone if it lights a small part of the patch.
     bool choosesPlaces() const override { return true; }
     PatchPoint placeOn(const ReceiverPlace& patch, glm::vec2 uv) const override {
+        if (isNarrowOn(patch)) return placeInCone(patch, uv);
         if (patch.radius == 0 || patch.radius < kNearPatch * distance(patch.middle) ||
             !isBefore(patch))
             return LightSource::placeOn(patch, uv);
@@ -173,6 +178,41 @@ class PointSource : public LightSource {
         const glm::dvec3 o = glm::dvec3(patch.origin - position), a(patch.a), b(patch.b);
         const glm::dvec3 end = o + (patch.isTriangle ? b : a + b);
         return {SphericalTriangle(o, o + a, o + b), SphericalTriangle(end, o + b, o + a)};
+    }
+
+    // Returns whether the cone of a point lamp fills a smaller solid angle than a patch, so that
+    // most points of the patch may get no light.
+    bool isNarrowOn(const ReceiverPlace& patch) const {
+        if (!cone || !isPoint() || patch.radius == 0 || !isBefore(patch) || !isSteepOn(patch))
+            return false;
+        const std::array<SphericalTriangle, 2> halves = seen(patch);
+        return halves[0].area() + halves[1].area() >
+               4 * glm::pi<double>() * double(cone->meanOverSphere());
+    }
+
+    // Returns the point of a patch that a ray of the cone meets. The weight is 0 if it misses the
+    // patch.
+    PatchPoint placeInCone(const ReceiverPlace& patch, glm::vec2 uv) const {
+        const SpotCone::Ray ray = cone->emit(uv);
+        const glm::dvec3 d(ray.direction), a(patch.a), b(patch.b), across = glm::cross(a, b);
+        const glm::dvec3 n(patch.normal), origin(patch.origin - position);
+        const double cosine = -glm::dot(d, n), along = -glm::dot(origin, n) / cosine;
+        const glm::dvec3 on = along * d - origin;
+        const double u = glm::dot(glm::cross(on, b), across) / glm::dot(across, across);
+        const double v = glm::dot(glm::cross(a, on), across) / glm::dot(across, across);
+        const double share = double(cone->share(ray.direction));
+        const bool isOn = u >= 0 && v >= 0 && (patch.isTriangle ? u + v : std::max(u, v)) <= 1;
+        if (!(cosine > 0 && share > 0 && isOn)) return {patch.middle, 0};
+        // The weight is the density of points uniform by area over the density of these points.
+        const double all = 4 * glm::pi<double>() * double(ray.weight * cone->meanOverSphere());
+        return {position + glm::vec3(along * d),
+                float(all * along * along / (share * cosine * areaOf(patch)))};
+    }
+
+    // Returns the corners of a patch, relative to the lamp. A triangle has its last corner twice.
+    std::array<glm::dvec3, 4> cornersOf(const ReceiverPlace& patch) const {
+        const glm::dvec3 o = patch.origin - position, a(patch.a), b(patch.b);
+        return {o, o + a, o + b, patch.isTriangle ? o + b : o + a + b};
     }
 
     static double areaOf(const ReceiverPlace& patch) {

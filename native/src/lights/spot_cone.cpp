@@ -12,6 +12,9 @@ namespace {
 
 constexpr int kGrid = 64;        // grid points per axis for the mean over a deformed cone
 constexpr int kBisections = 40;  // steps to invert the integral of the share
+// A rim is steep if its width is smaller than this share of the patch. A quadrature with 8 points
+// along the patch then has fewer than two in the rim.
+constexpr double kSteep = 0.25;
 
 }  // namespace
 
@@ -38,6 +41,27 @@ SpotCone::SpotCone(const Light& light)
 
 float SpotCone::share(const glm::vec3& direction) const {
     return float(shareAt(-glm::normalize(toLocal * glm::dvec3(direction)).z));
+}
+
+bool SpotCone::isSteepBetween(const std::array<glm::dvec3, 4>& corners) const {
+    // A cone that dims to nothing at its rim has no edge there.
+    if (dims && edge <= 0 && soft == 0) return false;
+    glm::dvec3 sum(0.0), directions[4];
+    for (size_t k = 0; k < 4; ++k) {
+        const glm::dvec3 place = toLocal * corners[k];
+        directions[k] = glm::normalize(place);
+        sum += place;
+    }
+    // In the cone's own space the patch is flat too, so that no direction to it is further from
+    // that to its middle than those to its corners.
+    const glm::dvec3 middle = glm::normalize(sum);
+    double reach = 0;
+    for (const glm::dvec3& d : directions)
+        reach = std::max(reach, std::acos(std::clamp(glm::dot(d, middle), -1.0, 1.0)));
+    const double angle = std::acos(std::clamp(-middle.z, -1.0, 1.0));
+    const double least = std::cos(std::min(angle + reach, glm::pi<double>()));
+    const double most = std::cos(std::max(angle - reach, 0.0));
+    return least < edge + soft && most > edge && soft < kSteep * (most - least);
 }
 
 double SpotCone::shareAt(double cosine) const {

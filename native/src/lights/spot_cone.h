@@ -7,6 +7,7 @@
 // axis.
 #pragma once
 
+#include <array>
 #include <glm/glm.hpp>
 
 #include "scene/scene.h"
@@ -25,6 +26,10 @@ class SpotCone {
 
     // Returns the mean of share() over all directions of the sphere.
     float meanOverSphere() const { return mean; }
+
+    // Returns whether the share may rise from 0 to its full value within a small part of a patch
+    // with these corners, relative to the lamp.
+    bool isSteepBetween(const std::array<glm::dvec3, 4>& corners) const;
 
     // A direction sampled about in proportion to share(). The weight is share() divided by the
     // density of the sample, relative to the mean of this ratio, so that the mean weight is 1. All
