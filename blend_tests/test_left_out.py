@@ -350,17 +350,35 @@ def test_glass_without_refractive_caustics(floor, new_material):
     assert any("Refractive Caustics" in text and '"Grey"' in text for text in warnings())
 
 
-def set_normals(item, normal):
+def set_normals(item, normals):
+    """Sets custom normals. normals: one vector per corner."""
     mesh = item.data
     for polygon in mesh.polygons:
         polygon.use_smooth = True
     if bpy.app.version < (4, 1, 0):
         mesh.use_auto_smooth = True
-    mesh.normals_split_custom_set([normal] * len(mesh.loops))
+    mesh.normals_split_custom_set(normals)
 
 
 def test_custom_normals_that_turn_faces(floor):
-    set_normals(floor, (0, 0, 1))
+    set_normals(floor, [(0, 0, 1)] * 4)
     assert warnings() == []
-    set_normals(floor, (0.5, 0, 0.8660254))
+    set_normals(floor, [(0.5, 0, 0.8660254)] * 4)
     assert ['"Floor"' in text and "custom normals" in text for text in warnings()] == [True]
+
+
+@pytest.mark.parametrize("are_usual", [True, False])
+def test_custom_normals_of_a_smooth_box(floor, new_object, new_material, are_usual):
+    """Custom normals that equal those of the vertices change nothing.
+
+    The box is long, so that these normals depend on how the normals of the faces are weighted: with
+    the angles, which are equal here, and not with the areas.
+    """
+    vertices = np.array(CUBE_VERTICES) * (5.0, 0.5, 0.5) + (0, 0, 3)
+    box = new_object("Box", vertices.tolist(), CUBE_FACES, new_material("Black", (0, 0, 0)))
+    outwards = np.array(CUBE_VERTICES) / np.sqrt(3.0)
+    normals = outwards if are_usual else outwards * (-1, 1, 1)
+    corners = [vertex for face in CUBE_FACES for vertex in face]
+    set_normals(box, normals[corners].tolist())
+    assert ['"Box"' in text and "custom normals" in text for text in warnings()] == (
+        [] if are_usual else [True])

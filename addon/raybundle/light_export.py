@@ -96,11 +96,13 @@ def _strength(light: bpy.types.Light, name: str, images: ImagePixels, warnings: 
               ) -> np.ndarray:
     """Returns the product of colour, power, exposure, temperature and nodes, (3,) W, or W/m^2 for a
     sun."""
-    strength = np.array(light.color) * light.energy
+    # Without `float`, arrays of Blender's colours and matrices are float32 from 5.0 on, in which
+    # large strengths overflow.
+    strength = np.array(light.color, float) * light.energy
     # Lamps have an exposure from 4.5 on.
     strength = strength * 2.0 ** getattr(light, 'exposure', 0.0)
     if getattr(light, 'use_temperature', False):
-        strength = strength * np.array(light.temperature_color)
+        strength = strength * np.array(light.temperature_color, float)
     if light.use_nodes and light.node_tree:
         output = output_node(light.node_tree)
         if output is None:
@@ -154,7 +156,7 @@ def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, streng
     else:
         soft = light.use_soft_falloff
     intensity = strength / (4.0 * math.pi)
-    position = np.array(matrix_world.translation)
+    position = np.array(matrix_world.translation, float)
     shape = 'DISK' if soft else 'SPHERE'
     if light.type == 'POINT':
         return PointLightData(name, position, intensity, light.shadow_soft_size, shape)
@@ -167,7 +169,7 @@ def _point_light(light: bpy.types.Light, name: str, matrix_world: Matrix, streng
         world_to_light = np.array([across, axis.cross(across), axis])
     else:
         # The object's scale deforms the cone and does not change the intensity in it.
-        world_to_light = np.array(matrix_world.to_3x3().inverted_safe())
+        world_to_light = np.array(matrix_world.to_3x3().inverted_safe(), float)
     return PointLightData(name, position, intensity, light.shadow_soft_size, shape,
                           world_to_light, light.spot_size, light.spot_blend,
                           cone_dims=bpy.app.version < (3, 5, 0))
@@ -177,7 +179,7 @@ def _area_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strengt
                 ) -> AreaLightData | None:
     size_u = light.size
     size_v = light.size_y if light.shape in ('RECTANGLE', 'ELLIPSE') else light.size
-    matrix = np.array(matrix_world)[:3, :3]
+    matrix = np.array(matrix_world, float)[:3, :3]
     axis_u, axis_v = matrix[:, 0] * size_u / 2.0, matrix[:, 1] * size_v / 2.0
     # The lamp shines along the object's -Z axis, even if the object is mirrored.
     if np.cross(axis_u, axis_v) @ matrix[:, 2] > 0.0:
@@ -189,5 +191,5 @@ def _area_light(light: bpy.types.Light, name: str, matrix_world: Matrix, strengt
     if area <= 0.0:
         return None
     radiance = area_light_radiance(strength, area, getattr(light, 'normalize', True))
-    return AreaLightData(name, np.array(matrix_world.translation), axis_u, axis_v, radiance,
+    return AreaLightData(name, np.array(matrix_world.translation, float), axis_u, axis_v, radiance,
                          'ELLIPSE' if ellipse else 'RECTANGLE', light.spread)

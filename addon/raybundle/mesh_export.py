@@ -75,12 +75,31 @@ def has_turned_normals(mesh: bpy.types.Mesh, data: MeshData) -> bool:
     normals and the normals of their vertices. mesh: evaluated. data: exported from the mesh."""
     if not mesh.has_custom_normals:
         return False
-    usual = (np.repeat(read(mesh.polygon_normals, 'vector', np.float32, 3),
-                       np.diff(data.face_offsets), axis=0),
-             read(mesh.vertex_normals, 'vector', np.float32, 3)[data.corner_vertices])
+    of_faces = np.repeat(read(mesh.polygons, 'normal', np.float32, 3), np.diff(data.face_offsets),
+                         axis=0)
+    usual = of_faces, _vertex_normals(data, of_faces)[data.corner_vertices]
     is_usual = np.any([np.einsum('ck,ck->c', data.corner_normals, normals) > _SAME_WAY
                        for normals in usual], axis=0)
     return bool(np.mean(~is_usual) > _TURNED_SHARE)
+
+
+def _vertex_normals(data: MeshData, of_faces: np.ndarray) -> np.ndarray:
+    """Returns the mean normal of the faces at each vertex, weighted by their angles there as in
+    Blender, (v, 3). of_faces: (c, 3), normal of the face of each corner.
+
+    Mesh.vertex_normals and Mesh.polygon_normals are no substitute: from 4.5 on, they contain the
+    custom normals.
+    """
+    places = data.vertices[data.corner_vertices].astype(float)
+    starts, last = data.face_offsets[:-1], data.face_offsets[1:] - 1
+    following, previous = np.arange(1, len(places) + 1), np.arange(-1, len(places) - 1)
+    following[last], previous[starts] = starts, last
+    edges = places[[following, previous]] - places
+    edges /= np.maximum(np.linalg.norm(edges, axis=-1, keepdims=True), 1e-30)
+    angles = np.arccos(np.clip(np.einsum('ck,ck->c', *edges), -1.0, 1.0))
+    sums = np.stack([np.bincount(data.corner_vertices, angles * part, len(data.vertices))
+                     for part in of_faces.T], axis=1)
+    return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-30)
 
 
 def _face_slots(mesh: bpy.types.Mesh, count: int) -> np.ndarray:

@@ -363,7 +363,7 @@ class _Exporter:
         role = _role(original, self.selected)
         if role == 'IGNORE':
             return
-        transform = np.array(instance.matrix_world)[:3]
+        transform = np.array(instance.matrix_world, float)[:3]
         if not np.isfinite(transform).all():
             self._refuse(item.name, Message("its transform is not finite: reset the transform"))
             return

@@ -51,7 +51,7 @@ def export_world(context: bpy.types.Context, images: ImagePixels, warnings: Warn
         return WorldData()
     # From 5.0 on, every world has nodes, and use_nodes only warns.
     if bpy.app.version < (5, 0, 0) and not world.use_nodes or world.node_tree is None:
-        return WorldData(np.array(world.color))
+        return WorldData(np.array(world.color, float))
     output = output_node(world.node_tree)
     if output is None:
         return WorldData()

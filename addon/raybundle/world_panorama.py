@@ -241,7 +241,7 @@ class _Renderer:
                           np.broadcast_to(across[:, None], (width, width)),
                           np.full((width, width), -1.0)], axis=-1)
         lengths = np.linalg.norm(local, axis=-1)
-        seen = (local / lengths[..., None]) @ np.array(rotation.to_matrix()).T
+        seen = (local / lengths[..., None]) @ np.array(rotation.to_matrix(), float).T
         return pixels, seen, (2.0 * half / width) ** 2 / lengths ** 3
 
     def _build(self) -> None:

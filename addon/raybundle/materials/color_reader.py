@@ -202,7 +202,7 @@ class ColorReader:
                 matrix = matrix.inverted_safe()
             layer, first = inner
             square = np.vstack([first, [0.0, 0.0, 1.0]])
-            second = np.array(matrix)[:2][:, [0, 1, 3]]
+            second = np.array(matrix, float)[:2][:, [0, 1, 3]]
             return layer, second @ square
         return None
 

@@ -191,7 +191,7 @@ def _bake(context: bpy.types.Context, item: bpy.types.Object, mesh: bpy.types.Me
     if not wanted.any():
         return BakedSurface(uvs, {})
     atlas = _atlas(mesh, np.array(item.evaluated_get(
-        context.evaluated_depsgraph_get()).matrix_world), wanted, pixel)
+        context.evaluated_depsgraph_get()).matrix_world, float), wanted, pixel)
     layer = mesh.uv_layers.new(name=_UV_MAP, do_init=False)
     if layer is None:
         raise RuntimeError(Message("the mesh has no room for another UV map, remove one"))
