@@ -489,8 +489,12 @@ def test_backfacing_separates_the_sides(new_material, roughness, model):
     front, back = (side.reflectance.constant for side in exported.sides)
     assert front.tolist() == [1, 0, 0]
     assert back[:2].tolist() == [0, 0]
-    # A rough surface absorbs some of the light that its colour reflects.
-    assert back[2] == 1 if roughness == 0 else 0.85 < back[2] < 1
+    # One facet of a rough surface absorbs some of the light that its colour reflects. From 4.3 on,
+    # Cycles adds the light that several facets reflect, and white facets reflect all light.
+    if roughness > 0 and bpy.app.version < (4, 3, 0):
+        assert 0.85 < back[2] < 1
+    else:
+        assert back[2] == pytest.approx(1)
     assert [side.diffuse.model for side in exported.sides] == [LAMBERT, model]
     assert result.warnings == []
 
