@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from .diffuse_angles import MEANS, TERMS, DiffuseAngles, angle_terms, burley, oren_nayar
-from .gloss import gloss_albedo, ior_of, seen_roughness
+from .gloss import fresnel, gloss_albedo, ior_of, seen_roughness
 from .layers import Layer, burley_sheen, clearcoat, microfibers
 
 # Groups of sockets. Each socket has its names by Blender version, and the value that is assumed if
@@ -32,6 +32,10 @@ SHEEN_SOCKETS = ((('Sheen Weight', 'Sheen'), 0.0), (('Sheen Roughness',), 0.5))
 COAT_TINT, SHEEN_TINT = (('Coat Tint',), 1.0), (('Sheen Tint',), 1.0)
 # The colour of the specular layer and of metals' edges. It is a number before 4.0.
 SPECULAR_TINT = ('Specular Tint',), 1.0 if bpy.app.version >= (4, 0, 0) else 0.0
+# From 4.5 on, the coat reflects light that several facets reflect in turn, and takes from the
+# surface beneath it what it reflects. In earlier versions it takes what a smooth coat would
+# reflect.
+_IS_COAT_MULTISCATTER = bpy.app.version >= (4, 5, 0)
 # Weights of the luminance that defines the hue of the base colour for tints before 4.0: for sheen,
 # and for the specular layer.
 _LUMINANCE, _ROUGH_LUMINANCE = np.array([0.2126, 0.7152, 0.0722]), np.array([0.3, 0.6, 0.1])
@@ -114,30 +118,32 @@ class PrincipledAlbedo:
             return self
         is_layered = bpy.app.version >= (4, 0, 0)
         under, above, leaving = np.ones(3), np.ones(3), self.leaving
+        ior = max(ior, 1.0)
         f0 = min(((ior - 1.0) / (ior + 1.0))**2, 0.99)
         if is_layered:
-            layer = gloss_albedo(roughness, ior)
-            from_above = gloss_albedo(roughness, ior, from_above=True)
-            terms = angle_terms(_VIEWS) - MEANS
+            covered, covered_above = _covered_by_coat(roughness, ior, f0)
             # The length of the path through the coat to each view, relative to the coat's
             # thickness.
-            depths = 1.0 / np.sqrt(1.0 - (1.0 - _VIEWS[:, None]**2) / max(ior, 1.0)**2)
+            depths = 1.0 / np.sqrt(1.0 - (1.0 - _VIEWS[:, None]**2) / ior**2)
             tint = np.clip(tint, 0.0, 1.0)
             let_out = 1.0 - weight + weight * tint**depths
             if filter_glossy is not None:
-                let_out *= 1.0 - weight * (layer.of(f0) + terms @ layer.by_angle(f0))[:, None]
+                let_out *= 1.0 - weight * covered[:, None]
             under = let_out.mean(axis=0)
-            above = (1.0 - weight * from_above.of(f0)) * (1.0 - weight + weight * tint)
-            leaving = leaving + np.linalg.lstsq(terms, let_out / under - 1.0, rcond=None)[0]
+            above = (1.0 - weight * covered_above) * (1.0 - weight + weight * tint)
+            leaving = leaving + np.linalg.lstsq(angle_terms(_VIEWS) - MEANS, let_out / under - 1.0,
+                                                rcond=None)[0]
         mirrored, by_angle = 0.0, np.zeros(TERMS)
         if filter_glossy is not None:
-            roughness = seen_roughness(roughness, filter_glossy)
+            seen = seen_roughness(roughness, filter_glossy)
             if is_layered:
-                coat = gloss_albedo(roughness, ior)
-                mirrored, by_angle = weight * float(coat.of(f0)), weight * coat.by_angle(f0)
+                coat = gloss_albedo(seen, ior)
+                gain = gloss_albedo(roughness, ior).gain(f0, _IS_COAT_MULTISCATTER)
+                mirrored, by_angle = weight * gain * coat.of(f0), weight * gain * coat.by_angle(f0)
             else:
-                coat = clearcoat(roughness)
+                coat = clearcoat(seen)
                 mirrored, by_angle = weight * coat.albedo, weight * coat.by_angle
+            roughness = seen
         gloss = self.specular * under + mirrored
         mean = (((self.specular * under).mean() * self.roughness + mirrored * roughness)
                 / max(gloss.mean(), 1e-6))
@@ -147,6 +153,17 @@ class PrincipledAlbedo:
             self.metal * under, self.metal_edge * under + mirrored,
             self.metal_by_angle * under + by_angle[:, None], self.several * under,
             self.several_by_angle * under, leaving, under)
+
+
+def _covered_by_coat(roughness: float, ior: float, f0: float) -> tuple[np.ndarray, float]:
+    """Returns the share of light that does not reach the surface beneath a coat of weight 1: at
+    _VIEWS, and for a view from straight above. f0: the coat's reflectance at normal incidence."""
+    if not _IS_COAT_MULTISCATTER:
+        return fresnel(_VIEWS, ior), f0
+    coat = gloss_albedo(roughness, ior)
+    by_angle = (angle_terms(_VIEWS) - MEANS) @ coat.covering_by_angle(f0, True)
+    return (coat.covering(f0, True) + by_angle,
+            float(gloss_albedo(roughness, ior, from_above=True).covering(f0, True)))
 
 
 def sheen_on(weight: float, roughness: float, tint: np.ndarray, base: np.ndarray, opaque: float
