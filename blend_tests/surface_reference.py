@@ -61,14 +61,20 @@ class SurfaceReference:
         """
         return self._interpolated(name, corners), self._values[name], self._weights[name]
 
+    def mean(self, names: Sequence[str]) -> np.ndarray:
+        """Returns the RGB mean of the light of Cycles over the area of all named objects, (3,)."""
+        truth = np.concatenate([self._values[name] for name in names])
+        area = np.concatenate([self._weights[name] for name in names])
+        return area @ truth / area.sum()
+
     def means(self, light: Light) -> tuple[np.ndarray, np.ndarray]:
         """Returns two RGB means over the area of all objects: of the shown light and of Cycles.
 
         light: baked light per corner.
         """
-        shown, truth, area = (np.concatenate(parts) for parts in
-                              zip(*(self.points(name, light[name]) for name in light)))
-        return area @ shown / area.sum(), area @ truth / area.sum()
+        shown, _, area = (np.concatenate(parts) for parts in
+                          zip(*(self.points(name, light[name]) for name in light)))
+        return area @ shown / area.sum(), self.mean(list(light))
 
     def error(self, light: Light) -> SurfaceError:
         points = {name: self._interpolated(name, values) for name, values in light.items()}

@@ -289,7 +289,7 @@ def test_subdivided_head(new_object, new_light, new_world, new_material, levels,
     modifier.levels = modifier.render_levels = levels
     new_light("Sun", 'SUN', 2.0, (0, 0, 5), angle=0.05).rotation_euler = (0.5, 0.4, 0)
     new_world((0.4, 0.5, 0.7))
-    expected = cycles_light([head], samples=512)[head.name]
+    expected = cycles_light([head], samples=256)[head.name]
     actual = raybundle_light([head], target_error=0.02, reconstruction='LEAST_SQUARES')[head.name]
     rms = np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected ** 2))
     print(f"rms {100 * rms:.2f} %, mean {100 * (actual.mean() / expected.mean() - 1):+.2f} %")

@@ -37,7 +37,7 @@ def room(new_object, new_material, new_light):
 def counterpart(output, items):
     if output == 'COMBINED':
         return cycles_light(items, ("EMIT", "DIRECT", "INDIRECT", "DIFFUSE", "COLOR"), "COMBINED",
-                            samples=256)
+                            samples=128)
     if output == 'DIRECT':
         return cycles_light(items, ("DIRECT",))
     both = cycles_light(items)

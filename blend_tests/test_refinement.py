@@ -15,7 +15,7 @@ from cycles_comparison import cycles_light, raybundle_light, square
 
 pytestmark = pytest.mark.needs_library
 
-SAMPLES = 1024
+SAMPLES = 512
 SHADOWED = ("North", "West")
 
 
