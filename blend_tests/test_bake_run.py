@@ -3,6 +3,7 @@
 a window and is tested by ui_test.py; here, tests drive the run themselves."""
 
 import time
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 
 import raybundle
 from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
+from drawn_layout import DrawnLayout
 from raybundle import bake_progress, bake_run, color_attribute, native
+from raybundle.progress_panel import draw_progress
 from surface_error import read_colors
 
 pytestmark = pytest.mark.needs_library
@@ -255,6 +258,23 @@ def test_the_progress_never_goes_back(two_boxes, start):
 def test_the_noise_so_far_is_in_plain_digits(noise, text):
     state = native.RunState(True, 'bundles', 0.0, noise, 0)
     assert bake_progress.BakeProgress({}).text(state) == text
+
+
+def test_a_narrow_panel_shows_the_whole_progress(two_boxes, start, monkeypatch):
+    run = start(**ENDLESS)
+    text = "14 %, noise 0.94 %, 38 s left"
+    monkeypatch.setattr(run.progress, 'text', lambda _state: text)
+    layout = DrawnLayout()
+    context = SimpleNamespace(region=SimpleNamespace(width=192),
+                              preferences=bpy.context.preferences)
+    assert draw_progress(layout, context)
+    assert layout.operators() == ["raybundle.stop"] * 2
+    # Names side by side would be cut off.
+    assert 'row' not in {method for method, *_ in layout.record}
+    if bpy.app.version < (4, 0, 0):
+        lines = layout.texts()[1:-2]
+        assert len(lines) > 1
+        assert " ".join(lines).replace("\N{NO-BREAK SPACE}", " ") == text
 
 
 def test_no_channels_are_baked_while_a_bake_runs(two_boxes, start):

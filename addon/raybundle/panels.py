@@ -123,7 +123,7 @@ class RAYBUNDLE_PT_render(RaybundleRenderPanel, bpy.types.Panel):
         layout = property_layout(self)
         settings = context.scene.raybundle
         draw_quality(layout, context.scene)
-        if not draw_progress(layout):
+        if not draw_progress(layout, context):
             draw_bake(layout)
             draw_live(layout, context)
         draw_preview(layout, settings)
@@ -310,7 +310,7 @@ class RAYBUNDLE_PT_sidebar(bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         draw_quality(layout, context.scene)
-        if not draw_progress(layout):
+        if not draw_progress(layout, context):
             column = layout.column(align=True)
             column.operator("raybundle.bake", text="Bake", icon='LIGHT')
             column.operator("raybundle.relight")

@@ -6,9 +6,10 @@ from __future__ import annotations
 import bpy
 
 from . import bake_run
+from .text_wrap import draw_wrapped
 
 
-def draw_progress(layout: bpy.types.UILayout) -> bool:
+def draw_progress(layout: bpy.types.UILayout, context: bpy.types.Context) -> bool:
     """Draws the progress of the running bake. Returns False, and draws nothing, if none runs, or
     only one of live mode."""
     run = bake_run.active()
@@ -20,10 +21,11 @@ def draw_progress(layout: bpy.types.UILayout) -> bool:
     if hasattr(column, 'progress'):  # from Blender 4.0 on
         column.progress(factor=run.progress.fraction, type='BAR', text=text)
     else:
-        column.label(text=text, icon='BLANK1')
-    row = column.row(align=True)
-    row.operator("raybundle.stop", text="Cancel", icon='CANCEL').keep = False
-    kept = row.row(align=True)
+        draw_wrapped(column, context, text, 'BLANK1')
+    # Below each other, because half of a narrow panel would cut the names off.
+    column = layout.column(align=True)
+    column.operator("raybundle.stop", text="Cancel", icon='CANCEL').keep = False
+    kept = column.column(align=True)
     kept.enabled = run.shows_light
     kept.operator("raybundle.stop", text="Stop and Keep", icon='CHECKMARK').keep = True
     return True
