@@ -29,7 +29,7 @@ PAUSE = 0.5  # s, in which Blender draws
 # Widths of the editor of properties, as share of the window.
 WIDE, NARROW = 0.36, 0.2
 # The later picture of a running bake: finished share, and pixels of the panel's upper part.
-SHARE, RUNNING_ROWS = 0.6, 216
+SHARE, RUNNING_ROWS = 0.6, 240
 
 
 def show_panel() -> None:
