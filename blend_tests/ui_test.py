@@ -8,7 +8,8 @@ HOME must be a new folder. Installs the zip in the Preferences, opens the file, 
 on with everything that a user does with the result. LAMP is the name of an object that emits light
 and that the 3D view shows. Each step is checked by the state of Blender and the pixels of the
 window, pictures of which are saved in DIR. SECONDS is how long the user hesitates before each click
-and each key. Prints how long the way to the lit room took. The exit code is 0 or 1.
+and each key. Prints how long the way to the lit room took. The exit code is 0 or 1, or 77 if this
+Blender installs add-ons in another way (from 4.2 on).
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ import ui_install  # noqa: E402
 import ui_live  # noqa: E402
 import ui_window  # noqa: E402
 from ui_window import MAIN, UiError  # noqa: E402
+
+SKIPPED = 77
 
 
 def steps(options: argparse.Namespace) -> Iterator[float]:
@@ -94,6 +97,8 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     if bpy.app.background:
         leave(1, "needs a window: start it without -b")
+    if bpy.app.version >= (4, 2, 0):
+        leave(SKIPPED, "skipped, because it knows only the Preferences of Blender before 4.2")
     ui_window.pace = options.pace
     # Software OpenGL would draw each picture of the 3D view eight times.
     bpy.context.preferences.system.viewport_aa = 'FXAA'
