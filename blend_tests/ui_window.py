@@ -174,7 +174,7 @@ class UiWindow:
         yield from self.move_to(place)
         bpy.context.window_manager.clipboard = ""
         xdotool("key", keys)
-        for _ in range(5):
+        for _ in range(8):
             yield 0.05
             if bpy.context.window_manager.clipboard:
                 break
