@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "job/report.h"
 
+#ifdef _WIN32
+#include <windows.h>  // declares the types that psapi.h uses
+
+#include <psapi.h>
+#else
 #include <sys/resource.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -14,9 +20,15 @@ namespace {
 
 // Returns the peak resident memory of the whole process so far, in bytes.
 int64_t peakMemoryBytes() {
+#ifdef _WIN32
+    PROCESS_MEMORY_COUNTERS counters{};
+    GetProcessMemoryInfo(GetCurrentProcess(), &counters, sizeof(counters));
+    return int64_t(counters.PeakWorkingSetSize);
+#else
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     return int64_t(usage.ru_maxrss) * 1024;
+#endif
 }
 
 // Functions that build JSON text. Only strings and numbers go through nlohmann::json. Its objects

@@ -14,21 +14,31 @@
 namespace raybundle {
 namespace {
 
-// Initialises oneTBB when the library is loaded, before there is a scene that could take the
-// memory. Returns false if there is not enough memory. Running out of memory at the first use would
-// be fatal for two reasons. oneTBB counts the processors at its first use, and if that throws,
-// every later use waits forever (2021.8: atomic_do_once stays pending when its function throws).
-// oneTBB also looks for its own libraries then, and glibc ends the process if there is no memory to
-// report a missing one.
-bool prepare() noexcept {
-    try {
-        tbb::task_arena().initialize();
-        return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) > 0;
-    } catch (const std::bad_alloc&) {
-        return false;
-    }
+// Initialises oneTBB at the first call. Returns false if there was not enough memory.
+bool isPrepared() noexcept {
+    static const bool is = [] {
+        try {
+            tbb::task_arena().initialize();
+            return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) >
+                   0;
+        } catch (const std::bad_alloc&) {
+            return false;
+        }
+    }();
+    return is;
 }
-const bool isPrepared = prepare();
+
+#ifndef _WIN32
+// Makes this call when the library is loaded, before there is a scene that could take the memory.
+// Running out of memory at the first use would be fatal for two reasons. oneTBB counts the
+// processors at its first use, and if that throws, every later use waits forever (2021.8:
+// atomic_do_once stays pending when its function throws). oneTBB also looks for its own libraries
+// then, and glibc ends the process if there is no memory to report a missing one.
+//
+// Not in Windows: MinGW's libraries run their initialisers backwards, those of oneTBB after this
+// one, and Windows holds a lock meanwhile that a new thread would wait for.
+[[maybe_unused]] const bool isPreparedEarly = isPrepared();
+#endif
 
 // Returns how many of `wanted` threads can exist at once, the caller's included, by starting as
 // many. The largest number reached is remembered and not tried again, because oneTBB keeps the
@@ -56,7 +66,7 @@ int startable(int wanted) {
 }  // namespace
 
 Threads::Threads(int asked) {
-    if (!isPrepared) throw std::bad_alloc();
+    if (!isPrepared()) throw std::bad_alloc();
     const int most =
         int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
     wanted = asked > 0 ? std::min(asked, most) : most;

@@ -73,15 +73,15 @@ EdgeSlope slopeAcross(const Cell& cell, int32_t from, int32_t to) {
         if (cell.corner[k] == from) start = k;
         if (cell.corner[k] == to) finish = k;
     }
-    glm::dvec3 far(0.0);
+    glm::dvec3 opposite(0.0);
     for (int k = 0; k < n; ++k)
-        if (k != start && k != finish) far += glm::dvec3(cell.position(k)) / double(n - 2);
+        if (k != start && k != finish) opposite += glm::dvec3(cell.position(k)) / double(n - 2);
     const glm::dvec3 origin = glm::dvec3(cell.position(start));
     const glm::dvec3 edge = glm::dvec3(cell.position(finish)) - origin;
     const double length = glm::length(edge);
-    const double along = glm::dot(far - origin, edge) / (length * length);
+    const double along = glm::dot(opposite - origin, edge) / (length * length);
     if (!std::isfinite(along)) return slope;
-    slope.height = std::max(glm::length(far - origin - along * edge), kLeastHeight * length);
+    slope.height = std::max(glm::length(opposite - origin - along * edge), kLeastHeight * length);
     const double at = std::clamp(along, -kMostAlong, 1 + kMostAlong);
     for (int k = 0; k < n; ++k)
         if (k != start && k != finish) slope.stencil[k] = 1.0 / (n - 2);
