@@ -27,6 +27,14 @@ def write_hash(library: Path, text: str | None = None) -> None:
     library.with_name(f"{library.name}.sha256").write_text(line if text is None else text)
 
 
+@pytest.mark.parametrize("platform, name", (("linux", "libraybundle.so"),
+                                            ("win32", "raybundle.dll"),
+                                            ("darwin", "libraybundle.dylib")))
+def test_the_library_is_the_one_of_the_platform(monkeypatch, platform, name):
+    monkeypatch.setattr(native.sys, "platform", platform)
+    assert native.library_path().name == name
+
+
 @pytest.mark.needs_library
 def test_a_whole_library_is_not_damaged(library):
     assert library_file.damage(library) is None
