@@ -10,7 +10,7 @@ import pytest
 import raybundle
 from conftest import CUBE_FACES, CUBE_VERTICES, FURNACE_LIGHT
 from drawn_layout import drawn
-from raybundle import bake_run, live_light, panels, preferences
+from raybundle import bake_run, export_operators, live_light, panels, preferences
 from raybundle.scene_export import export_scene
 from surface_error import read_colors
 
@@ -240,6 +240,24 @@ def test_a_file_that_is_opened_begins_no_bake(room, live, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=path)
     assert not bpy.context.scene.raybundle.live
     assert until_at_rest(live) == 0
+
+
+def test_the_export_of_a_draft_says_so(room, live, tmp_path, monkeypatch):
+    switch_on(live)
+    assert not said_of_export(tmp_path, monkeypatch)
+    change_power(bpy.context.scene)
+    bpy.context.view_layer.update()
+    next_draft(live)
+    assert said_of_export(tmp_path, monkeypatch) == [
+        "The light in the file is a draft of live mode: press Bake, and export again"]
+
+
+def said_of_export(folder, monkeypatch):
+    """Exports the scene, and returns what is said about drafts."""
+    said = []
+    monkeypatch.setattr(export_operators, 'translated', lambda text: said.append(text) or text)
+    assert bpy.ops.raybundle.export_gltf(filepath=str(folder / "room.glb")) == {'FINISHED'}
+    return [text for text in said if "draft" in text]
 
 
 # --------------------------------------------------------------------------------------------------

@@ -188,7 +188,11 @@ class RAYBUNDLE_OT_export_gltf(_NeedsLight, bpy.types.Operator):
         except ExportError as error:
             self.report({'ERROR'}, translated(error))
             return {'CANCELLED'}
-        for warning in report.warnings:
+        warnings = [*report.warnings]
+        if live.shows_draft(context.scene):
+            warnings.append(Message("The light in the file is a draft of live mode: press Bake, and "
+                                    "export again"))
+        for warning in warnings:
             self.report({'WARNING'}, translated(warning))
         self.report({'INFO'}, translated(report.summary()))
         return {'FINISHED'}
