@@ -29,10 +29,10 @@ WINDOW, SIZE = (640, 480), 320
 READY = "live light at"  # Blender prints it, with the place of the lamp on the screen
 
 # The lamp: its place, m, in front of the boxes; radius, m; power, W.
-PLACE, RADIUS, POWER = (0.0, -0.35, 1.62), 0.04, 9.0
+PLACE, RADIUS, POWER = (0.0, -0.35, 1.62), 0.04, 20.0
 # Half axes of the path of the mouse, pixels.
 ACROSS, DOWN = 105, 65
-COLORS = 96
+COLORS = 192
 
 
 # --------------------------------------------------------------------------------------------------
@@ -76,13 +76,18 @@ def show_scene() -> None:
         for name in ("floor", "axis_x", "axis_y", "cursor", "text", "outline_selected"):
             setattr(space.overlay, f"show_{name}", False)
         bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y
+        bpy.context.scene.raybundle.show_in = 'MATERIALS'
         bpy.context.scene.raybundle.live = True
         bpy.app.timers.register(wait, first_interval=1.0)
+
+    began = time.monotonic()
 
     def wait() -> float | None:
         from raybundle import bake_run
         if bake_run.active() is not None or not bpy.context.scene.raybundle.report:
             return 0.5
+        if time.monotonic() - began < 25.0:
+            return 0.5  # Blender compiles the shaders of the materials
         region = next(region for region in view().regions if region.type == 'WINDOW')
         place = location_3d_to_region_2d(region, view().spaces.active.region_3d, lamp.location)
         print(READY, region.x + int(place.x), window.height - 1 - region.y - int(place.y),
