@@ -25,8 +25,7 @@ from .native_scene import build_native_scene
 from .properties import BakeSettings, read_settings
 from .quality import OBJECT_FACTORS, full_bake
 from .scene_data import MeshData
-from .scene_export import (BakeTarget, SceneExport, export_lamps_again,
-                           export_scene)
+from .scene_export import BakeTarget, SceneExport, export_lamps_again, export_scene
 from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
                               subdivide)
 from .warning_lines import listed
@@ -89,10 +88,7 @@ def prepare(context: bpy.types.Context, overrides: dict[str, object], is_draft: 
     overrides, and errors: as in bake()."""
     started = time.perf_counter()
     scene = context.scene
-    try:
-        settings = read_settings(scene, overrides)
-    except ValueError as error:
-        raise BakeError(str(error)) from error
+    settings = _read_settings(scene, overrides)
     light_sets = read_light_sets(scene, settings.attribute)
     _check(scene, settings, light_sets)
     export, subdivided = _export(context, settings, light_sets)
@@ -102,9 +98,10 @@ def prepare(context: bpy.types.Context, overrides: dict[str, object], is_draft: 
 def prepare_lamps(context: bpy.types.Context, overrides: dict[str, object], is_draft: bool,
                   last: PreparedBake) -> PreparedBake | None:
     """Does what prepare() does, for a scene in which nothing but lamps has changed since `last` was
-    prepared, in a fraction of the time. Returns None if that is not possible."""
+    prepared, in a fraction of the time. Returns None if that is not possible. Errors: as in
+    bake()."""
     started = time.perf_counter()
-    settings = read_settings(context.scene, overrides)
+    settings = _read_settings(context.scene, overrides)
     # No export depends on these settings.
     same = replace(last.settings, target_error=settings.target_error,
                    max_bundles=settings.max_bundles)
@@ -115,6 +112,13 @@ def prepare_lamps(context: bpy.types.Context, overrides: dict[str, object], is_d
     if export is None:
         return None
     return _ready(replace(last, settings=settings, export=export, started=started), is_draft)
+
+
+def _read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> BakeSettings:
+    try:
+        return read_settings(scene, overrides)
+    except ValueError as error:
+        raise BakeError(str(error)) from error
 
 
 def _ready(prepared: PreparedBake, is_draft: bool) -> PreparedBake:

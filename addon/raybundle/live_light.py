@@ -77,8 +77,10 @@ class LiveLight:
         """Does what is to be done now. Returns the seconds until the next step."""
         scene = context.scene
         is_on = scene is not None and scene.raybundle.live
-        if is_on and not self._was_on:
+        if is_on != self._was_on:
+            # While live mode is off, nothing notes changes, and the export would only take memory.
             self._exported = None
+        if is_on and not self._was_on:
             self._note_change()
         self._was_on = is_on
         if self._run is not None:

@@ -81,7 +81,7 @@ class _Bakes:
         finally:
             context.window.cursor_modal_restore()
         self._next_draw = 0.0
-        self._switched_preview = False
+        self._switched_preview = None
         self._timer = context.window_manager.event_timer_add(_LOOK_SECONDS, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {'RUNNING_MODAL'}
@@ -115,8 +115,9 @@ class _Bakes:
                 viewport_preview.hide(context)
             return {'FINISHED'} if run.is_kept else {'CANCELLED'}
         goes_on = run.advance()
-        if run.shows_light:
-            self._switched_preview |= viewport_preview.show_interim(context)
+        # Once, so that the user can choose another shading meanwhile.
+        if run.shows_light and self._switched_preview is None:
+            self._switched_preview = viewport_preview.show_interim(context)
         if goes_on:
             return None
         with live.ignoring_changes(context):

@@ -62,6 +62,14 @@ TEST_F(ApiRun, GivesTheLightOfAnExecution) {
     EXPECT_EQ(cornerLight(instance), executed);
 }
 
+TEST_F(ApiRun, DraftMakesNoInterimLight) {
+    addFurnace();
+    ASSERT_EQ(rb_set_bake_int(bake, "draft", 1), RB_ERROR_NONE) << message();
+    start();
+    ASSERT_EQ(rb_finish_run(run), RB_ERROR_NONE) << message();
+    EXPECT_EQ(state().interim, 0);
+}
+
 TEST_F(ApiRun, ShowsLightWhileItGoesOn) {
     const int32_t instance = addFurnace();
     makeEndless();

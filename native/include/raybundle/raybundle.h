@@ -326,7 +326,7 @@ RB_API rb_error rb_set_instance_visibility(rb_scene scene, int32_t instance, boo
                                            bool exchanges);
 
 /* Sets how exactly the light of an instance is computed compared with the rest of the scene. Both
- * factors are 1 by default, and must be from 0.01 to 100. Otherwise returns RB_INVALID_ARGUMENT.
+ * factors are 1 by default, and must be from 0.01 to 100.
  *   noise        factor on target_error for this instance. Solvers other than LINE_REUSE follow it
  *                for the light that the first shot gathers only.
  *   patch_size   factor on the edge length of the patches of this instance */
@@ -571,7 +571,8 @@ typedef struct rb_run_state {
      * looked at for the first time. */
     double noise;
     /* Number of times that interim light was made. It rises only after rb_get_run_light has read
-     * the last one, so that light that nobody reads takes no time. */
+     * the last one, so that light that nobody reads takes no time. A bake with the setting draft
+     * makes none. */
     int32_t interim;
 } rb_run_state;
 
