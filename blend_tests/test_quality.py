@@ -89,8 +89,9 @@ def test_nothing_is_estimated_without_a_full_bake(report):
     assert quality.estimated_seconds(report, 0.02) is None
 
 
-def test_a_bake_that_reused_lines_keeps_the_earlier_time():
-    report = BakeReport(seconds={'total': 0.1}, skipped=[{'id': "UNCHANGED_GEOMETRY"}])
+@pytest.mark.parametrize("reused", ["UNCHANGED_GEOMETRY", "SCALED_DRAFT"])
+def test_a_bake_that_reused_lines_keeps_the_earlier_time(reused):
+    report = BakeReport(seconds={'total': 0.1}, skipped=[{'id': reused}])
     assert quality.full_bake(report, 0.01, json.dumps(FULL)) == FULL['full_bake']
     assert quality.full_bake(report, 0.01, "") == {}
     # The report of an earlier release

@@ -110,6 +110,9 @@ SKIPS = (
     "only the strengths of lights have changed since the last bake; their light was scaled",
     "these lights are as before, or have only changed their strengths; only the others were "
     "gathered",
+    "all stages",
+    "nothing or only the strengths of lights have changed since the last draft; its light was "
+    "scaled",
     "faces", "their area is zero or no larger than rounding errors", "projection of faces",
     "neighbouring faces of equal shape in one plane were projected together", "corners",
     "no result is needed there", "patches",

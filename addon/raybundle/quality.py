@@ -31,8 +31,9 @@ _KNEE = 0.02
 _POWERS = {'first_shot': (0.4, 0.95), 'bundles': (0.9, 1.4), 'solve': (0.9, 1.4)}
 # Stages whose time does not depend on the target.
 _FIXED = ('export', 'patches', 'reconstruction', 'write_back')
-# The identifier of a skip: a bake that reused patches and lines tells nothing of a full one's time.
-_REUSED = "UNCHANGED_GEOMETRY"
+# Identifiers of skips: a bake that reused patches and lines, or the light of a draft, tells nothing
+# of a full one's time.
+_REUSED = {"UNCHANGED_GEOMETRY", "SCALED_DRAFT"}
 
 
 class Factors(NamedTuple):
@@ -86,7 +87,7 @@ def full_bake(report: BakeReport, target_error: float, earlier: str) -> dict:
     """Returns what a report keeps to estimate costs: target_error and seconds, by stage, of the
     last bake that computed everything. That is this bake, or if it reused lines, the one that the
     earlier report names. earlier: a report as JSON, or ""."""
-    if any(item.get('id') == _REUSED for item in report.skipped):
+    if any(item.get('id') in _REUSED for item in report.skipped):
         return json.loads(earlier).get('full_bake', {}) if earlier else {}
     return {'target_error': target_error, 'seconds': dict(report.seconds)}
 

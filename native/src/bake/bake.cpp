@@ -13,9 +13,11 @@
 
 #include "bake/bake_warnings.h"
 #include "bake/bundle_solve.h"
+#include "bake/draft_light.h"
 #include "bake/first_shots.h"
 #include "bake/geometry_hash.h"
 #include "bake/interim.h"
+#include "bake/source_strengths.h"
 #include "bake/stopwatch.h"
 #include "bake/trace.h"
 #include "job/cancellation.h"
@@ -50,13 +52,14 @@ bool isFirstShotAll(const Patches& patches, const SetLights& lights) {
 }
 
 // Returns whether there are no surfaces or no light reaches any of them. Adds warnings about this,
-// and about each light set whose light reaches no surface.
+// and about each light set of the report whose light reaches no surface.
 bool isDark(const Scene& scene, const SetLights& lights, Report& report) {
     const bool isEmpty = lights.front().shot.irradiance.empty();
     const bool isDark = std::all_of(lights.begin(), lights.end(),
                                     [](const SetLight& light) { return light.isDark(); });
     for (const SetLight& light : lights)
-        if (light.set != kNoLightSet && light.isDark())
+        if (light.set != kNoLightSet && size_t(light.set) < report.lightSets.size() &&
+            light.isDark())
             report.warn(WarningId::DARK_LIGHT_SET,
                         "light set \"" + scene.lightSets[size_t(light.set)] +
                             "\": no light of the set reaches any surface, so that its result is "
@@ -92,6 +95,16 @@ void checkFinite(const std::vector<InstanceLight>& instances) {
 struct Bake::Exchanged {
     SideNoise noise;
     std::vector<float> exposed;  // per side: share of its area that nothing covers
+    Report::Energy ofLastSet{};  // the part of the report's energy that belongs to the last light
+};
+
+// What all stages compute, before it replaces the results of the last run.
+struct Bake::Results {
+    Report report;
+    Irradiance irradiance, ofLastSet;  // per side, W/m^2: by all light, and by the last light
+    Report::Energy energyOfLastSet;
+    std::vector<float> exposed;
+    std::vector<InstanceLight> light;
 };
 
 Bake::Bake() = default;
@@ -113,7 +126,7 @@ void Bake::run(const Scene& scene) {
                 const Threads threads(settings.threads);
                 tbb::task_arena(threads.count).execute([&] {
                     tbb::task_group(context).run_and_wait([&] {
-                        runStages(scene, threads);
+                        runAll(scene, threads);
                         isDone = true;
                     });
                 });
@@ -129,12 +142,54 @@ void Bake::run(const Scene& scene) {
     throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
 }
 
-void Bake::runStages(const Scene& scene, const Threads& threads) {
-    Report report;
-    std::vector<InstanceLight> made;  // moved to `light` when nothing can fail any more
+void Bake::runAll(const Scene& scene, const Threads& threads) {
+    if (DraftLight::isPossible(settings)) return runDraft(scene, threads);
+    draft.reset();
+    keep(runStages(scene, scene.lightSets.size(), threads));
+}
+
+// Scales the light of the last draft if possible. Otherwise runs all stages, with the sources apart
+// whose strengths change.
+void Bake::runDraft(const Scene& scene, const Threads& threads) {
+    double seconds = 0;
+    std::optional<Report> scaled;
+    std::optional<PartedScene> parted;
+    std::optional<Stopwatch> total(seconds);
+    const SourceStrengths now(scene, settings);
+    if (draft) scaled = draft->scale(now, light, irradiance);
+    total.reset();
+    if (scaled) {
+        scaled->totalSeconds = seconds;
+        json = scaled->json();
+        return;
+    }
+    std::vector<size_t> apart;
+    if (draft) apart = draft->sourcesToPart(now);
+    if (!apart.empty()) parted = partedScene(scene, apart);
+    draft.reset();
+    Results made = runStages(parted ? parted->scene : scene, scene.lightSets.size(), threads);
+    auto next = std::make_unique<DraftLight>(now, made.report);
+    if (parted)
+        next->part(std::move(apart), parted->home, made.ofLastSet, made.energyOfLastSet,
+                   made.light);
+    keep(std::move(made));
+    draft = std::move(next);
+}
+
+void Bake::keep(Results results) {
+    json = results.report.json();
+    irradiance = std::move(results.irradiance);
+    exposed = std::move(results.exposed);
+    light = std::move(results.light);
+    ran = true;
+}
+
+Bake::Results Bake::runStages(const Scene& scene, size_t reportedSets, const Threads& threads) {
+    Results made;
+    Report& report = made.report;
     {
         Stopwatch total(report.totalSeconds);
-        noteWhatIsGiven(scene, threads, report);
+        noteWhatIsGiven(scene, reportedSets, threads, report);
         makePatches(scene, report);
         const std::vector<CoarseShot> coarse = startLines(scene, report);
         const ShownLight shown(scene, trace->patches, gathersSparseResults(settings));
@@ -149,18 +204,19 @@ void Bake::runStages(const Scene& scene, const Threads& threads) {
         const Tiles tiles(trace->patches);
         const SolveInput input{shots, tiles, shown};
         Exchanged exchanged = exchange(input, lights, report);
-        irradiance = sumOf(lights);
-        made = show(input, lights, exchanged, report);
-        exposed = std::move(exchanged.exposed);
+        made.light = show(input, lights, exchanged, report);
+        made.irradiance = sumOf(lights);
+        made.ofLastSet = std::move(lights.back().irradiance);
+        made.energyOfLastSet = exchanged.ofLastSet;
+        made.exposed = std::move(exchanged.exposed);
     }
     throwIfCancelled();
     noteWhatWasTraced(report);
-    json = report.json();
-    light = std::move(made);
-    ran = true;
+    return made;
 }
 
-void Bake::noteWhatIsGiven(const Scene& scene, const Threads& threads, Report& report) const {
+void Bake::noteWhatIsGiven(const Scene& scene, size_t reportedSets, const Threads& threads,
+                           Report& report) const {
     report.warnings = scene.warnings;
     if (threads.count < threads.wanted)
         report.warn(WarningId::FEWER_THREADS,
@@ -168,7 +224,8 @@ void Bake::noteWhatIsGiven(const Scene& scene, const Threads& threads, Report& r
                         std::to_string(threads.wanted) +
                         " threads, so that the bake takes longer; free memory, or raise the "
                         "system's limit of threads");
-    for (const std::string& name : scene.lightSets) report.lightSets.push_back({name, 0});
+    for (size_t set = 0; set < reportedSets; ++set)
+        report.lightSets.push_back({scene.lightSets[set], 0});
 }
 
 void Bake::noteWhatWasTraced(Report& report) const {
@@ -265,9 +322,12 @@ Bake::Exchanged Bake::exchange(const SolveInput& in, SetLights& lights, Report& 
         const Transports transports = transportsOf(lights, in.shown);
         result.noise = BundleSolve(in, lights, transports).run(report);
         result.exposed = trace->exposedShare();
-        for (const SetLight& light : lights)
+        for (const SetLight& light : lights) {
+            result.ofLastSet = {};
             balanceEnergy({patches, result.exposed}, light, transports.front()->openShare(),
-                          report);
+                          result.ofLastSet);
+            report.energy.add(result.ofLastSet);
+        }
         warnOfImbalance(report);
         report.bundles = transports.front()->bundleCount();
         warnOfFewLines(in.scene, patches, trace->density.pixelSize, uint32_t(report.bundles),

@@ -24,6 +24,7 @@
 
 namespace raybundle {
 
+class DraftLight;
 class Interim;
 class Threads;
 struct SolveInput;
@@ -65,9 +66,15 @@ class Bake {
 
   private:
     struct Exchanged;
+    struct Results;
 
-    void runStages(const Scene& scene, const Threads& threads);
-    void noteWhatIsGiven(const Scene& scene, const Threads& threads, Report& report) const;
+    void runAll(const Scene& scene, const Threads& threads);
+    void runDraft(const Scene& scene, const Threads& threads);
+    void keep(Results results);
+    // Runs all stages. The report names the first `reportedSets` light sets of the scene.
+    Results runStages(const Scene& scene, size_t reportedSets, const Threads& threads);
+    void noteWhatIsGiven(const Scene& scene, size_t reportedSets, const Threads& threads,
+                         Report& report) const;
     void makePatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> startLines(const Scene& scene, Report& report);
     std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);
@@ -77,7 +84,8 @@ class Bake {
                                     const Exchanged& exchanged, Report& report);
     void noteWhatWasTraced(Report& report) const;
 
-    std::unique_ptr<Trace> trace;  // for the geometry of the last run
+    std::unique_ptr<Trace> trace;       // for the geometry of the last run
+    std::unique_ptr<DraftLight> draft;  // the last run, if it was a draft that can be scaled
     // Results of the last run per side, see patchIrradiance() and exposedShare().
     Irradiance irradiance;
     std::vector<float> exposed;

@@ -150,7 +150,7 @@ void warnOfMissedTarget(const Scene& scene, const MissedTarget& missed, Report& 
                              : "the bake stopped at " + bundles +
                                    " because it cannot count the lines of more bundles: ") +
                     "the noise " +
-                    (missed.set == kNoLightSet
+                    (missed.set == kNoLightSet || size_t(missed.set) >= report.lightSets.size()
                          ? ""
                          : "of light set \"" + scene.lightSets[size_t(missed.set)] + "\" ") +
                     "is " + percent(missed.noise) +

@@ -65,6 +65,8 @@ std::string array(const Items& items, const TextOf& textOf) {
     return listed(texts, '[', ']');
 }
 
+double sum(const glm::dvec3& power) { return power.x + power.y + power.z; }
+
 std::string errors(const Report::Errors& error) {
     return object({{"noise", text(error.noise)},
                    {"discretisation", text(error.discretisation)},
@@ -80,7 +82,9 @@ double Report::Errors::total() const {
 }
 
 double Report::balanceError() const {
-    return emitted > 0 ? std::abs(emitted - absorbed - escaped) / emitted : 0;
+    const double emitted = sum(energy.emitted);
+    const double lost = emitted - sum(energy.absorbed) - sum(energy.escaped);
+    return emitted > 0 ? std::abs(lost) / emitted : 0;
 }
 
 void Report::addNotesOf(Report other) {
@@ -110,9 +114,9 @@ std::string Report::json() const {
          {"shadow_rays", text(shadowRays)},
          {"estimated_error", text(estimatedError)},
          {"error", errors(error)},
-         {"energy", object({{"emitted", text(emitted)},
-                            {"absorbed", text(absorbed)},
-                            {"escaped", text(escaped)},
+         {"energy", object({{"emitted", text(sum(energy.emitted))},
+                            {"absorbed", text(sum(energy.absorbed))},
+                            {"escaped", text(sum(energy.escaped))},
                             {"balance_error", text(balanceError())}})},
          {"peak_memory_bytes", text(peakMemoryBytes())},
          {"light_sets", array(lightSets,

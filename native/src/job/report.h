@@ -33,6 +33,17 @@ struct Report {
         std::string status;
         Errors error{};  // relative to the object's own light
     };
+    // The power that sources emit, that surfaces absorb, and that leaves the scene, W, RGB.
+    struct Energy {
+        glm::dvec3 emitted{0.0}, absorbed{0.0}, escaped{0.0};
+
+        // Adds `factor` times another energy, by channel.
+        void add(const Energy& other, const glm::dvec3& factor = glm::dvec3(1.0)) {
+            emitted += factor * other.emitted;
+            absorbed += factor * other.absorbed;
+            escaped += factor * other.escaped;
+        }
+    };
     // Work that was left out, and how many times.
     struct Skip {
         SkippedWork work;
@@ -58,7 +69,7 @@ struct Report {
     uint64_t shadowRays = 0;
     double estimatedError = 0;  // relative noise of the irradiance on patch sides
     Errors error;               // of the shown light
-    double emitted = 0, absorbed = 0, escaped = 0;  // W, sum of the channels
+    Energy energy;
     std::vector<LightSet> lightSets;
     std::vector<Object> objects;
     Warnings warnings;
@@ -71,7 +82,8 @@ struct Report {
     // Appends the warnings and the skipped work of another report.
     void addNotesOf(Report other);
 
-    // Returns |emitted - absorbed - escaped| / emitted, or 0 if nothing is emitted.
+    // Returns |emitted - absorbed - escaped| / emitted, each summed over the channels, or 0 if
+    // nothing is emitted.
     double balanceError() const;
     // Returns the report as UTF-8 JSON. docs/c_api.md lists its keys. Its peak memory is that of
     // the process at the time of the call.

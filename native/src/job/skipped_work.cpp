@@ -19,6 +19,9 @@ constexpr SkippedText kTexts[] = {
     {"KEPT_LIGHTS", "first shot",
      "these lights are as before, or have only changed their strengths; only the others were "
      "gathered"},
+    {"SCALED_DRAFT", "all stages",
+     "nothing or only the strengths of lights have changed since the last draft; its light was "
+     "scaled"},
     {"DEGENERATE_FACES", "faces", "their area is zero or no larger than rounding errors"},
     {"SHEETS", "projection of faces",
      "neighbouring faces of equal shape in one plane were projected together"},

@@ -53,7 +53,7 @@ std::vector<BroughtByLines> broughtByLines(const LitSurfaces& surfaces,
 }  // namespace
 
 void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
-                   const std::vector<float>& openShare, Report& report) {
+                   const std::vector<float>& openShare, Report::Energy& energy) {
     const Patches& patches = surfaces.patches;
     const FirstShot& shot = light.shot;
     const Irradiance& irradiance = light.irradiance;
@@ -89,9 +89,9 @@ void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
     }
     // In a closed scene the redirected power is noise and stays in the balance.
     if (sumOfChannels(escaped) > sumOfChannels(shot.escaped)) escaped -= irradiance.redirected;
-    report.emitted += sumOfChannels(emitted);
-    report.absorbed += sumOfChannels(absorbed);
-    report.escaped += sumOfChannels(escaped);
+    energy.emitted += emitted;
+    energy.absorbed += absorbed;
+    energy.escaped += escaped;
 }
 
 double leakedShare(const Scene& scene, const Patches& patches, const std::vector<float>& weight,

@@ -14,12 +14,12 @@
 namespace raybundle {
 
 // Adds the power that one light set emits, the power that surfaces absorb, and the power that
-// leaves the scene to Report::emitted, absorbed and escaped, W. `light.irradiance` must be solved.
+// leaves the scene to `energy`. `light.irradiance` must be solved.
 // `openShare` is per side the share of its lines that leave the scene, see Transport::openShare().
 // For a side with a negative share, about which nothing is known, the mean of the other sides of
 // its object is used.
 void balanceEnergy(const LitSurfaces& surfaces, const SetLight& light,
-                   const std::vector<float>& openShare, Report& report);
+                   const std::vector<float>& openShare, Report::Energy& energy);
 
 // Returns the share of lines, 0 to 1, that leave the scene, or stay in it, only because the
 // projector lets lines pass through surfaces (ROULETTE). `open` and `exactOpen` are per side the
