@@ -114,8 +114,10 @@ struct Walls {
 Walls findWalls(const std::vector<Cell>& cells, const std::vector<Box>& boxes,
                 const CellVertices& vertices, std::map<uint32_t, Crossing>& crossings) {
     const std::vector<CellEdge> edges = sortedEdges(cells, vertices);
-    std::vector<glm::dvec3> normals(cells.size());
-    for (const CellEdge& edge : edges) normals[edge.cell] = cells[edge.cell].normal();
+    std::vector<glm::dvec3> normals(cells.size());  // of cells with patches
+    parallelFor(size_t(0), cells.size(), [&](size_t c) {
+        if (cells[c].hasPatches) normals[c] = cells[c].normal();
+    });
     DisjointSets joined(cells.size());
     for (size_t first = 0; first < edges.size();) {
         size_t end = first;
@@ -175,8 +177,9 @@ class CellsByPlace {
     // `cellsOf` is per wall, and empty for narrow walls; `boxes` is per cell.
     CellsByPlace(const Walls& all, const std::vector<std::vector<uint32_t>>& cellsOf,
                  const std::vector<Box>& boxes)
-        : trees(cellsOf.size()) {
+        : cellsOf(cellsOf), trees(cellsOf.size()) {
         parallelFor(size_t(0), cellsOf.size(), [&](size_t wall) {
+            if (cellsOf[wall].size() < 2) return;
             std::vector<Box> own;
             for (uint32_t c : cellsOf[wall]) own.push_back(boxes[c]);
             trees[wall].init(cellsOf[wall].begin(), cellsOf[wall].end(), own.begin(), own.end());
@@ -198,11 +201,15 @@ class CellsByPlace {
     }
     template <class Visit>
     void forEachCell(uint32_t wall, const Box& box, const Visit& visit) const {
-        forEachIn(trees[wall], trees[wall].getRootIndex(), box, visit);
+        if (cellsOf[wall].size() > 1)
+            forEachIn(trees[wall], trees[wall].getRootIndex(), box, visit);
+        else
+            visit(cellsOf[wall].front());
     }
 
   private:
-    std::vector<Tree> trees;  // per wall: its cells
+    const std::vector<std::vector<uint32_t>>& cellsOf;  // per wall
+    std::vector<Tree> trees;                            // per wall: its cells, if there are several
     Tree walls;
 };
 
@@ -236,9 +243,8 @@ bool isHigh(const Box& box, const Plane& plane, double least) {
 Crossings findCrossings(const std::vector<Cell>& cells, const std::vector<double>& sizes,
                         const CellVertices& vertices) {
     Crossings result;
-    std::vector<Box> boxes;
-    boxes.reserve(cells.size());
-    for (const Cell& cell : cells) boxes.push_back(boxOf(cell));
+    std::vector<Box> boxes(cells.size());
+    parallelFor(size_t(0), cells.size(), [&](size_t c) { boxes[c] = boxOf(cells[c]); });
     const Walls walls = findWalls(cells, boxes, vertices, result.ofCell);
     auto isWide = [&](uint32_t wall, double size) {
         return walls.width(wall) >= kLeastWidth * size;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patches/doubled_faces.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -40,7 +42,7 @@ class Search {
         std::vector<Place> sorted;
         for (size_t f = 0; f < faces.count(); ++f)
             sorted.push_back({glm::dot(centre(f), kAcrossAll), uint32_t(f)});
-        std::sort(sorted.begin(), sorted.end(), [](const Place& a, const Place& b) {
+        tbb::parallel_sort(sorted.begin(), sorted.end(), [](const Place& a, const Place& b) {
             return a.along != b.along ? a.along < b.along : a.face < b.face;
         });
         DoubledFaces result;

@@ -38,6 +38,8 @@ class FaceCutting {
             findDoubledFaces(scene, faces, placed.firstVertices(), patches.vertices);
         patches.doubledCorners = std::move(doubled.corners);
         patches.anyCoincide = doubled.anyCoincide;
+        patches.cells.reserve(faces.count());
+        cellSizes.reserve(faces.count());
         for (size_t i = 0; i < scene.instances.size(); ++i) addInstance(i, patchSize, doubled);
         const Crossings crossings = findCrossings(patches.cells, cellSizes, cellVertices());
         if (!crossings.isAll)
@@ -46,6 +48,7 @@ class FaceCutting {
                  "faces intersect in so many places that the smaller faces were not cut there. "
                  "Some light may leak through walls; delete or hide the unseen parts of objects "
                  "that intersect"});
+        patches.parents.reserve(patches.cells.size());
         for (uint32_t c = 0; c < patches.cells.size(); ++c) {
             throwIfCancelledAt(c);
             if (patches.cells[c].hasPatches) addParents(c, crossings, shells);

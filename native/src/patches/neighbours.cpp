@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "patches/neighbours.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <tuple>
 
@@ -92,7 +94,7 @@ std::vector<TilePair> neighbouringTiles(const Patches& patches, uint32_t firstPa
         else
             pairParallelogram(parent, pairs, border);
     }
-    std::sort(border.begin(), border.end(), [](const BorderEdge& a, const BorderEdge& b) {
+    tbb::parallel_sort(border.begin(), border.end(), [](const BorderEdge& a, const BorderEdge& b) {
         return std::make_pair(a.key(), a.tile) < std::make_pair(b.key(), b.tile);
     });
     for (size_t i = 0; i < border.size();) {

@@ -25,6 +25,7 @@ constexpr double kRounding = 4 * double(std::numeric_limits<float>::epsilon());
 }  // namespace
 
 std::vector<std::array<int, 3>> triangulate(const std::vector<glm::dvec3>& points) {
+    if (points.size() == 3) return {{0, 1, 2}};
     const glm::dvec3 normal = vectorArea(points);
     const double area = glm::length(normal);
     double rounding = 0;  // metres
