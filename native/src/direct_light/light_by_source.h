@@ -16,6 +16,7 @@
 #include <optional>
 #include <vector>
 
+#include "job/cancellation.h"
 #include "lights/light_source.h"
 #include "lights/receiver.h"
 
@@ -58,7 +59,7 @@ class LightBySource {
     std::vector<Gathered> scaled(const std::vector<Match>& matches,
                                  const IsUnpowered& isUnpowered) const {
         std::vector<Gathered> results(parts.size() / matches.size());
-        for (size_t receiver = 0; receiver < results.size(); ++receiver)
+        parallelFor(size_t(0), results.size(), [&](size_t receiver) {
             for (size_t k = 0; k < matches.size(); ++k)
                 if (const auto source = matches[k].source)
                     results[receiver].add(
@@ -66,6 +67,7 @@ class LightBySource {
                         parts[receiver * matches.size() + k].scaled(matches[k].factor),
                         isUnpowered(*source, receiver),
                         hash(uint32_t(receiver), uint32_t(*source)));
+        });
         return results;
     }
 

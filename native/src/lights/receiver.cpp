@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "job/cancellation.h"
 #include "patches/side.h"
 
 namespace raybundle {
@@ -87,29 +88,35 @@ Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
                const std::vector<ReceiverPair>& neighbours, float targetError) {
     // The mean light is that of the shown receivers, if they get any light. A sunny yard must not
     // set the error of a room.
-    double lit[2] = {0, 0}, litArea[2] = {0, 0};
-    std::vector<float> light(results.size());
-    for (size_t k = 0; k < results.size(); ++k) {
+    struct Wanted {
+        float light, weight, target, errorFactor;
+        bool isShown;
+    };
+    std::vector<Wanted> wanted(results.size());
+    parallelFor(size_t(0), results.size(), [&](size_t k) {
         const Receiver receiver = receiverAt(k);
-        light[k] = brightest(results[k].irradiance) + receiver.otherLight;
-        if (const double h = light[k]; h > 0) {
-            const double weight = receiver.point ? 1 : double(patches.area[patchOf(receiver.side)]);
-            lit[receiver.isShown] += weight * h;
-            litArea[receiver.isShown] += weight;
+        wanted[k] = {brightest(results[k].irradiance) + receiver.otherLight,
+                     receiver.point ? 1 : patches.area[patchOf(receiver.side)],
+                     receiver.targetFactor * targetError, receiver.errorFactor, receiver.isShown};
+    });
+    double lit[2] = {0, 0}, litArea[2] = {0, 0};
+    for (const Wanted& receiver : wanted)
+        if (receiver.light > 0) {
+            lit[receiver.isShown] += double(receiver.weight) * double(receiver.light);
+            litArea[receiver.isShown] += double(receiver.weight);
         }
-    }
     const bool anyShown = litArea[true] > 0;
     // The mean of the light is used, not the mean of its square, most of which may come from a few
     // receivers beside a lamp.
     const double meanLight = litArea[anyShown] > 0 ? lit[anyShown] / litArea[anyShown] : 0;
     const float floor = kDarkShare * float(meanLight);
-    std::vector<float> targets(results.size()), tolerance(results.size());
+    std::vector<float> tolerance(results.size());
     std::vector<bool> counts(results.size());
     for (size_t k = 0; k < results.size(); ++k) {
-        const Receiver receiver = receiverAt(k);
+        const Wanted& receiver = wanted[k];
         counts[k] = receiver.isShown || !anyShown;
-        targets[k] = receiver.targetFactor * targetError;
-        tolerance[k] = receiver.errorFactor * kDirectShare * targets[k] * std::max(floor, light[k]);
+        tolerance[k] =
+            receiver.errorFactor * kDirectShare * receiver.target * std::max(floor, receiver.light);
     }
     const float factor = laxity(results, counts, tolerance, kLaxShare * targetError * meanLight);
     for (float& error : tolerance) error *= factor;
@@ -119,7 +126,7 @@ Aims aimsAfter(const std::vector<Gathered>& results, const Patches& patches,
     for (uint32_t k = 0; k < results.size(); ++k)
         if (besideShadow[k] > 0 || std::sqrt(results[k].variance) > tolerance[k]) {
             further.receivers.push_back(k);
-            further.aims.push_back({tolerance[k], kFirstSamples, mostGrowth(targets[k]),
+            further.aims.push_back({tolerance[k], kFirstSamples, mostGrowth(wanted[k].target),
                                     besideShadow[k], nullptr, !hasNeighbour[k]});
         }
     return further;

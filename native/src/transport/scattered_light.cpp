@@ -166,6 +166,9 @@ struct ScatteredLight::Transfer {
     // combination of them. `rough` is the diffuse part of a rough surface that reflects all light.
     Matrix white = Matrix::Zero(), edge = white, rough = white;
     std::vector<Matrix> lobes;  // per lobe of the surface
+    // Means over all entries of the matrices above.
+    float whiteMean = 0, edgeMean = 0;
+    std::vector<float> lobeMeans;
 
     explicit Transfer(const Scattering& surface) {
         const glm::vec3 z(0, 0, 1);
@@ -180,11 +183,15 @@ struct ScatteredLight::Transfer {
         if (surface.hasGloss()) {
             white = gloss(1);
             edge = gloss(0);
+            whiteMean = white.mean();
+            edgeMean = edge.mean();
         }
-        for (const LobeReflectance& lobe : surface.lobes)
+        for (const LobeReflectance& lobe : surface.lobes) {
             lobes.push_back(between(
                 [&](const glm::vec3& from) { return Lobe::of(lobe.kind, z, from, lobe.roughness); },
                 true));
+            lobeMeans.push_back(lobes.back().mean());
+        }
         if (surface.isRough())
             rough = between(
                 [&](const glm::vec3& from) {
@@ -321,17 +328,26 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
     const Transfer& transfer = *transfers[2 * patches.parentAt(side).scattering + isBack(side)];
     using Light = Eigen::Matrix<float, kCells, 3>;
     const Light light = Eigen::Map<const Light>(arriving.front().data());
+    // Light of few sources comes from few cells.
+    std::array<uint32_t, kCells> lit{};
+    uint32_t litCount = 0;
+    for (uint32_t in = 0; in < kCells; ++in)
+        if (!light.row(in).isZero(0)) lit[litCount++] = in;
+    auto addLeaving = [&](const Transfer::Matrix& matrix, const Light& from, Light& sum) {
+        for (uint32_t k = 0; k < litCount; ++k)
+            for (int c = 0; c < 3; ++c) sum.col(c) += from(lit[k], c) * matrix.col(lit[k]);
+    };
     Light leaving = Light::Zero();
     if (surface.scattering().hasGloss()) {
         const glm::vec3 f0 = surface.f0(), rest = 1.0f - f0;
         const glm::vec3 scale =
-            surface.mirroredMean() / (f0 * transfer.white.mean() + rest * transfer.edge.mean());
-        leaving = (transfer.white * light) * diagonal(f0 * scale) +
-                  (transfer.edge * light) * diagonal(rest * scale);
+            surface.mirroredMean() / (f0 * transfer.whiteMean + rest * transfer.edgeMean);
+        addLeaving(transfer.white, light * diagonal(f0 * scale), leaving);
+        addLeaving(transfer.edge, light * diagonal(rest * scale), leaving);
     }
     for (size_t k = 0; k < transfer.lobes.size(); ++k) {
         const glm::vec3 mean = surface.lobeMean(surface.scattering().lobes[k]);
-        leaving += (transfer.lobes[k] * light) * diagonal(mean / transfer.lobes[k].mean());
+        addLeaving(transfer.lobes[k], light * diagonal(mean / transfer.lobeMeans[k]), leaving);
     }
     if (surface.scattering().isRough()) {
         Light diffuse = light;
@@ -339,7 +355,7 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
             const glm::vec3 share = surface.diffuseAt(Samples::instance().terms[in]);
             for (int c = 0; c < 3; ++c) diffuse(in, c) *= share[c];
         }
-        leaving += transfer.rough * diffuse;
+        addLeaving(transfer.rough, diffuse, leaving);
     }
     leaving.rowwise() -= leaving.colwise().mean().eval();
     leaving *= diagonal(glm::min((1.0f - patches.reflectance[side]) / kLeastAbsorbed, 1.0f));
