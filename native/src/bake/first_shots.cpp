@@ -75,7 +75,8 @@ SetLights shootSources(const StageInput& in, const ShownLight& shown,
     const Patches& patches = trace.patches;
     const Visibility& visibility = trace.visibilityOfLights();
     const uint64_t aims = shotHash(in.scene, settings, shown.sides(), !patches.scattering.empty());
-    const StandIns standIns(patches, settings.skipClusters ? &shown.sides() : nullptr);
+    const StandIns& standIns =
+        trace.standInsFor(settings.skipClusters ? &shown.sides() : nullptr, aims);
     const bool isGather = settings.gathersFirstShot();
     SetLights lights;
     const int32_t count = int32_t(in.scene.lightSets.size());

@@ -127,6 +127,12 @@ ProjectorInput Trace::exactInput(const Settings& settings) const {
     return exact;
 }
 
+const StandIns& Trace::standInsFor(const std::vector<bool>* isShown, uint64_t aims) {
+    if (!standIns || standIns->aims != aims)
+        standIns.emplace(AimedStandIns{aims, StandIns(patches, isShown)});
+    return standIns->standIns;
+}
+
 double Trace::linesPerBundle() const {
     return glm::pi<double>() * double(patches.radius) * double(patches.radius) /
            (double(density.pixelSize) * double(density.pixelSize));

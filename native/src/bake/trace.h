@@ -11,6 +11,7 @@
 #include "bundles/line_counts.h"
 #include "bundles/line_windows.h"
 #include "first_shot/first_shot.h"
+#include "first_shot/stand_ins.h"
 #include "job/progress.h"
 #include "job/report.h"
 #include "job/settings.h"
@@ -84,6 +85,11 @@ struct Trace {
         return solutions.try_emplace(lightSet, counts.sideCount()).first->second;
     }
 
+    // Returns the stand-ins for these shown sides (null: all sides are shown): those of the last
+    // call if `aims`, the result of shotHash(), is equal. The reference is valid until the next
+    // call.
+    const StandIns& standInsFor(const std::vector<bool>* isShown, uint64_t aims);
+
     // Returns the number of lines of a bundle through the bounding sphere of the scene, outside of
     // windows.
     double linesPerBundle() const;
@@ -112,6 +118,12 @@ struct Trace {
     };
     std::map<int32_t, Shot> shots;               // the last GATHER of each light set
     std::map<int32_t, LineSolutions> solutions;  // of each light set, per side of the clusters
+
+    struct AimedStandIns {
+        uint64_t aims;  // shotHash
+        StandIns standIns;
+    };
+    std::optional<AimedStandIns> standIns;  // of the last bake; empty before the first one
 };
 
 class Interim;

@@ -164,7 +164,7 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
         },
         input.settings.targetError,
         [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); }, {},
-        neighbouringGatherers(patches, standIns));
+        standIns.neighbours());
     shot.indirect.resize(n);
     for (const Gathered& result : results) shot.rays += result.rays;
     for (size_t side = 0; side < n; ++side) {

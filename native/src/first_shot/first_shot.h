@@ -73,7 +73,8 @@ struct FirstShotInput {
     const std::vector<Instance>* instances = nullptr;
     // GATHER only: which sides gather for other sides. Null: each side gathers for itself.
     const StandIns* standIns = nullptr;
-    // GATHER only: receives the irradiance per side, W/m^2, after the coarse pass. May be empty.
+    // GATHER only: receives the irradiance per side, W/m^2, after the coarse pass, and if that takes
+    // long, that of a single sample before it. May be empty.
     std::function<void(std::vector<glm::vec3>)> showCoarse = {};
 };
 
@@ -93,11 +94,6 @@ double localToGlobalRatio(double intersections, double meanReflectance, double s
 
 // Returns the reflectance of a side for the light of the first shot, which may depend on its angle.
 glm::vec3 shotReflectance(const Patches& patches, const FirstShot& shot, size_t side);
-
-// Returns the pairs of gatherers (indices in standIns.gatherers()) whose sides are beside each
-// other: sides of neighbouring tiles, and of the patches of one cut tile. Only sides that gather,
-// for themselves or for others, are paired.
-std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns);
 
 // Runs a first shot of the given kind.
 FirstShot firstShot(FirstShotKind kind, const FirstShotInput& input);

@@ -14,7 +14,6 @@
 #include "first_shot/first_shot.h"
 #include "first_shot/stand_ins.h"
 #include "job/cancellation.h"
-#include "patches/neighbours.h"
 #include "patches/side.h"
 
 namespace raybundle {
@@ -26,43 +25,9 @@ constexpr float kOthersError = 2;
 // Largest factor of the error. It applies to sides that reflect nothing, whose light only counts in
 // the energy balance.
 constexpr float kMostError = 10;
-
-// Returns the pairs of all sides beside each other, as indices of sides.
-std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
-    std::vector<uint32_t> firstOf;  // first patch of each tile; one more at the end
-    for (const Parent& parent : patches.parents)
-        for (uint32_t tile = 0; tile < parent.tileCount(); ++tile)
-            firstOf.push_back(parent.firstPatch + parent.firstOf(tile));
-    firstOf.push_back(uint32_t(patches.count()));
-    std::vector<ReceiverPair> pairs;
-    auto add = [&](uint32_t patch, uint32_t other) {
-        for (uint32_t back = 0; back < 2; ++back)
-            pairs.push_back({2 * patch + back, 2 * other + back});
-    };
-    for (const TilePair& tiles : neighbouringTiles(patches, 0, uint32_t(patches.parents.size()))) {
-        const uint32_t a = firstOf[tiles.first], b = firstOf[tiles.second];
-        for (uint32_t p = a; p < firstOf[tiles.first + 1]; ++p) add(p, b);
-        for (uint32_t p = b + 1; p < firstOf[tiles.second + 1]; ++p) add(p, a);
-    }
-    for (size_t tile = 0; tile + 1 < firstOf.size(); ++tile)
-        for (uint32_t p = firstOf[tile] + 1; p < firstOf[tile + 1]; ++p) add(p, p - 1);
-    return pairs;
-}
-
-}  // namespace
-
-std::vector<ReceiverPair> neighbouringGatherers(const Patches& patches, const StandIns& standIns) {
-    std::vector<ReceiverPair> pairs;
-    for (const ReceiverPair& sides : neighbouringSides(patches)) {
-        const ReceiverPair pair{standIns.numberOf(sides.first), standIns.numberOf(sides.second)};
-        if (standIns.gatherers()[pair.first] == sides.first &&
-            standIns.gatherers()[pair.second] == sides.second)
-            pairs.push_back(pair);
-    }
-    return pairs;
-}
-
-namespace {
+// With more pairs of a gatherer and a source than this, the coarse pass takes longer than somebody
+// wants to wait for the first light (100 ms on two processors).
+constexpr size_t kLongCoarsePass = 300000;
 
 // Returns the factor of the error allowed on a side whose light is not shown. Other surfaces get
 // the light of many such sides, whose errors average out: the variance of the sum is proportional
@@ -100,13 +65,28 @@ CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32
     return coarse;
 }
 
-// Returns the irradiance of each of `count` sides, W/m^2. `gathered` is per gatherer.
-std::vector<glm::vec3> irradianceOfSides(const std::vector<Gathered>& gathered,
-                                         const StandIns& standIns, size_t count) {
+// Returns the irradiance of each of `count` sides, W/m^2. irradianceAt(k) is that of gatherer k.
+template <class IrradianceAt>
+std::vector<glm::vec3> irradianceOfSides(const StandIns& standIns, size_t count,
+                                         const IrradianceAt& irradianceAt) {
     std::vector<glm::vec3> irradiance(count);
     for (uint32_t side = 0; side < count; ++side)
-        irradiance[side] = gathered[standIns.numberOf(side)].irradiance;
+        irradiance[side] = irradianceAt(standIns.numberOf(side));
     return irradiance;
+}
+
+// Shows the light of one sample of each source at shown sides, if the coarse pass will take long.
+void showFirstSamples(const FirstShotInput& input, const StandIns& standIns,
+                      const std::function<Receiver(size_t)>& receiverAt) {
+    const size_t count = standIns.gatherers().size();
+    if (!input.showCoarse || count * input.light.lightSources().size() < kLongCoarsePass) return;
+    std::vector<glm::vec3> sampled(count);
+    parallelFor(size_t(0), count, [&](size_t k) {
+        const Receiver receiver = receiverAt(k);
+        if (receiver.isShown) sampled[k] = input.light.sample(receiver, 0);
+    });
+    input.showCoarse(irradianceOfSides(standIns, input.patches.sideCount(),
+                                       [&](size_t k) { return sampled[k]; }));
 }
 
 // Adds what the gatherers have gathered to the shot, whose vectors have an entry per side.
@@ -168,10 +148,9 @@ FirstShot gather(const FirstShotInput& input) {
     std::vector<PowerShares> shares(sources.size());
     std::vector<Gathered> results;
     if (const auto matches = input.before ? input.before->match(sources) : std::nullopt) {
-        results =
-            light.gatherFresh(*input.before, *matches, receiverAt, target, report,
-                              matches->fresh.empty() ? std::vector<ReceiverPair>()
-                                                     : neighbouringGatherers(patches, standIns));
+        results = light.gatherFresh(
+            *input.before, *matches, receiverAt, target, report,
+            matches->fresh.empty() ? std::vector<ReceiverPair>() : standIns.neighbours());
         shot.bySource = input.before;
         shot.freshSources = matches->fresh.size();
         shares = light.powerShares(matches->fresh);
@@ -179,14 +158,17 @@ FirstShot gather(const FirstShotInput& input) {
             if (const auto source = matches->ofKept[k].source)
                 shares[*source] = input.before->powerShares[k];
     } else {
+        if (!input.fromTiles) showFirstSamples(input, standIns, receiverAt);
         auto bySource = std::make_shared<LightBySource>(sources, gatherers.size());
         bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
         LightBySource* const whole = bySource->isWhole ? bySource.get() : nullptr;
-        const std::vector<ReceiverPair> neighbours = neighbouringGatherers(patches, standIns);
+        const std::vector<ReceiverPair>& neighbours = standIns.neighbours();
         CoarseShot coarse = input.fromTiles ? coarseOfPatches(input, gatherers, receiverAt, report)
                                             : light.shootCoarsely(gatherers.size(), receiverAt,
                                                                   report, neighbours, whole);
-        if (input.showCoarse) input.showCoarse(irradianceOfSides(coarse.gathered, standIns, n));
+        if (input.showCoarse)
+            input.showCoarse(irradianceOfSides(
+                standIns, n, [&](size_t k) { return coarse.gathered[k].irradiance; }));
         results = light.gather(gatherers.size(), receiverAt, target, report, std::move(coarse),
                                neighbours, whole);
         shares = bySource->powerShares = light.powerShares();

@@ -6,12 +6,38 @@
 
 #include "job/cancellation.h"
 #include "patches/clusters.h"
+#include "patches/neighbours.h"
 #include "patches/side.h"
 #include "sampling/sobol.h"
 
 namespace raybundle {
+namespace {
 
-StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
+// Returns the pairs of all sides beside each other, as indices of sides.
+std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
+    std::vector<uint32_t> firstOf;  // first patch of each tile; one more at the end
+    for (const Parent& parent : patches.parents)
+        for (uint32_t tile = 0; tile < parent.tileCount(); ++tile)
+            firstOf.push_back(parent.firstPatch + parent.firstOf(tile));
+    firstOf.push_back(uint32_t(patches.count()));
+    std::vector<ReceiverPair> pairs;
+    auto add = [&](uint32_t patch, uint32_t other) {
+        for (uint32_t back = 0; back < 2; ++back)
+            pairs.push_back({2 * patch + back, 2 * other + back});
+    };
+    for (const TilePair& tiles : neighbouringTiles(patches, 0, uint32_t(patches.parents.size()))) {
+        const uint32_t a = firstOf[tiles.first], b = firstOf[tiles.second];
+        for (uint32_t p = a; p < firstOf[tiles.first + 1]; ++p) add(p, b);
+        for (uint32_t p = b + 1; p < firstOf[tiles.second + 1]; ++p) add(p, a);
+    }
+    for (size_t tile = 0; tile + 1 < firstOf.size(); ++tile)
+        for (uint32_t p = firstOf[tile] + 1; p < firstOf[tile + 1]; ++p) add(p, p - 1);
+    return pairs;
+}
+
+}  // namespace
+
+StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) : patches(patches) {
     const uint32_t count = uint32_t(patches.sideCount());
     std::vector<uint32_t> clusters;  // per patch
     if (isShown) {
@@ -64,6 +90,17 @@ StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) {
     for (uint32_t side = 0; side < count; ++side)
         if (const uint32_t cluster = clusterOf(side); cluster != kNoCluster)
             numbers[side] = numbers[standIns[cluster].side];
+}
+
+const std::vector<ReceiverPair>& StandIns::neighbours() const {
+    if (pairs) return *pairs;
+    pairs.emplace();
+    for (const ReceiverPair& pair : neighbouringSides(patches)) {
+        const ReceiverPair own{numberOf(pair.first), numberOf(pair.second)};
+        if (sides[own.first] == pair.first && sides[own.second] == pair.second)
+            pairs->push_back(own);
+    }
+    return *pairs;
 }
 
 }  // namespace raybundle

@@ -11,8 +11,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "lights/receiver.h"
 #include "patches/patches.h"
 
 namespace raybundle {
@@ -21,7 +23,7 @@ namespace raybundle {
 class StandIns {
   public:
     // `isShown`, per side, says whether the light of the side is shown. Null: all sides are shown,
-    // and each gathers for itself.
+    // and each gathers for itself. `patches` must outlive the object.
     StandIns(const Patches& patches, const std::vector<bool>* isShown);
 
     // Returns the sides that gather, in ascending order.
@@ -31,7 +33,15 @@ class StandIns {
     // Returns whether the gatherer with this index gathers for other sides too.
     bool isForOthers(uint32_t number) const { return !forOthers.empty() && forOthers[number]; }
 
+    // Returns the pairs of gatherers (indices in gatherers()) whose sides are beside each other:
+    // sides of neighbouring tiles, and of the patches of one cut tile. Only sides that gather, for
+    // themselves or for others, are paired. The first call finds them; it must not be made by two
+    // threads at once.
+    const std::vector<ReceiverPair>& neighbours() const;
+
   private:
+    const Patches& patches;
+    mutable std::optional<std::vector<ReceiverPair>> pairs;
     std::vector<uint32_t> sides;
     std::vector<uint32_t> numbers;  // per side; empty if all sides gather
     std::vector<bool> forOthers;    // per gatherer; empty if all sides gather
