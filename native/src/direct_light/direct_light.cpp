@@ -30,6 +30,10 @@ constexpr size_t kMostLookingAround = 1 << 19;
 // Largest number of passes. A receiver that finds the edge of a shadow may have neighbours that
 // have missed it too, so each pass may cause another one.
 constexpr int kMostPasses = 16;
+// At this target error or a larger one, as in drafts, no further pass is made for fewer than this
+// share of the receivers. To find them takes most of such a pass.
+constexpr float kLaxTarget = 0.2f;
+constexpr size_t kFewReceivers = 1000;  // of this many, one
 // Samples per source for comparing its light at the corners of a face. All corners use the same
 // samples.
 constexpr uint32_t kSlopeSamples = 32;
@@ -168,6 +172,8 @@ void DirectLight::refine(std::vector<Gathered>& results, Aims further, const Pas
         });
         for (size_t k = 0; k < further.receivers.size(); ++k)
             further.aims[k].outlook = last[further.receivers[k]].outlook;
+        const bool areFew = further.receivers.size() * kFewReceivers < results.size();
+        if (targetError >= kLaxTarget && areFew) break;
     }
 }
 

@@ -39,7 +39,7 @@ DirectedLight::DirectedLight(const Patches& patches, const FirstShot& shot, Of o
     if (patches.scattering.empty() && patches.byAngle.empty()) return;
     findMiddles();
     findLayers();
-    if (patches.scattering.empty() || shot.incoming.empty()) return;
+    if (patches.scattering.empty() || shot.incoming.empty() || of == Of::NOTHING) return;
     const size_t n = patches.sideCount(), blocks = (n + kBlock - 1) / kBlock;
     std::vector<std::vector<Part>> ofBlock(blocks);
     first.assign(n + 1, 0);

@@ -34,10 +34,10 @@ double shareOfLines(double bent, double reflected);
 // The exitance of surfaces that are not Lambert's, by direction.
 class DirectedLight : public DirectedEmission {
   public:
-    // Takes all light of a first shot, or the light that the first shot has not distributed further
-    // itself. The object is empty if the first shot has no directions of light, or if all surfaces
-    // are Lambert's. `patches` must outlive the object.
-    enum class Of { ALL, BEYOND_FIRST_SHOT };
+    // Takes all light of a first shot, the light that the first shot has not distributed further
+    // itself, or no light of it. The object is empty if the first shot has no directions of light,
+    // or if all surfaces are Lambert's. `patches` must outlive the object.
+    enum class Of { ALL, BEYOND_FIRST_SHOT, NOTHING };
     DirectedLight(const Patches& patches, const FirstShot& shot, Of of = Of::BEYOND_FIRST_SHOT);
 
     bool isNone() const { return all.empty(); }

@@ -77,15 +77,17 @@ ScaledSystem scaledSystem(const Patches& patches, const LineSystem& lines, Field
 
 LineReuse::LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
                      const glm::vec3& worldRadiance, const std::vector<float>& exposed,
-                     const std::vector<bool>* isShown, float targetError)
+                     const std::vector<bool>* isShown, const Accuracy& accuracy)
     : patches(patches),
       counts(counts),
       shot(shot),
       worldRadiance(worldRadiance),
       exposed(exposed),
       isShown(isShown),
-      targetError(targetError),
-      directedLight(patches, shot),
+      accuracy(accuracy),
+      directedLight(
+          patches, shot,
+          accuracy.isRough ? DirectedLight::Of::NOTHING : DirectedLight::Of::BEYOND_FIRST_SHOT),
       scatteredOfSources(patches, shot, worldRadiance != glm::vec3(0.0f)),
       hasEmission(std::any_of(shot.emission.begin(), shot.emission.end(),
                               [](const glm::vec3& e) { return e != glm::vec3(0.0f); })) {}
@@ -142,7 +144,8 @@ Irradiance LineReuse::solve(Half half, float tolerance, LineSolution& guess,
     // The first turn leaves out light that was sent by direction twice or more, and each further
     // turn leaves out light that was sent by direction once more often.
     double missing = 1;
-    for (int turn = 0; turn < kMostTurns && missing > kSettledTurns * double(targetError); ++turn) {
+    for (int turn = 0; turn < kMostTurns && missing > kSettledTurns * double(accuracy.targetError);
+         ++turn) {
         const double bent = findAngles(weights, guess.reflected, light, byAngle);
         light = solvePassed(half, tolerance, guess, weights, byAngle);
         missing = bent * (turn == 0 ? bent : missing);

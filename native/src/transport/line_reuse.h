@@ -57,14 +57,20 @@ void forEachSide(size_t n, const Body& body) {
 // The radiosity system of one light on the line counts, and its solution.
 class LineReuse {
   public:
+    // How accurately light by direction is computed.
+    struct Accuracy {
+        float targetError = 0.01f;  // the relative error allowed for all light
+        bool isRough = false;       // whether directed() treats both halves as it treats one
+    };
     // `exposed` is per side the share that no other surface covers, 0 to 1; if it is empty, the
     // share of `counts` is used. `isShown` is per side whether the light of the side is shown in
-    // the result; null: the light of all sides is shown. `targetError` is the relative error
-    // allowed for all light; light by direction is computed only as accurately as it requires. All
-    // references must outlive the object.
+    // the result; null: the light of all sides is shown. All references must outlive the object.
     LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
               const glm::vec3& worldRadiance, const std::vector<float>& exposed,
-              const std::vector<bool>* isShown = nullptr, float targetError = 0.01f);
+              const std::vector<bool>* isShown, const Accuracy& accuracy);
+    LineReuse(const Patches& patches, const LineCounts& counts, const FirstShot& shot,
+              const glm::vec3& worldRadiance, const std::vector<float>& exposed)
+        : LineReuse(patches, counts, shot, worldRadiance, exposed, nullptr, Accuracy{}) {}
 
     // Returns the irradiance from the lines of a half, or of both. In every channel, the residual
     // is at most `tolerance` times the right-hand side, and at most `tolerance` times the solution
@@ -102,6 +108,10 @@ class LineReuse {
     std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
 
   private:
+    // Returns whether directed() takes light from cells of directions, for lines of this half.
+    bool usesCells(Half half) const { return accuracy.isRough || half != Half::BOTH; }
+    // Returns whether a side sends no light of the sources by direction, as directed() takes it.
+    bool isUndirected(Half half, uint32_t side) const;
     // How many entries of a row suffice to represent it: the larger of the two numbers.
     struct Enough {
         // As a share of all entries of the row, 0 to 1.
@@ -160,7 +170,7 @@ class LineReuse {
     const glm::vec3 worldRadiance;
     const std::vector<float>& exposed;
     const std::vector<bool>* const isShown;
-    const float targetError;
+    const Accuracy accuracy;
     const DirectedLight directedLight;
     const ScatteredLight scatteredOfSources;
     bool hasEmission = false;

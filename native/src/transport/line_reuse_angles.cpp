@@ -44,7 +44,7 @@ constexpr size_t kInTask = 256;
 }  // namespace
 
 LineReuse::Enough LineReuse::enoughLines(double share) const {
-    const float entries = kLeastEntriesTimesError / targetError;
+    const float entries = kLeastEntriesTimesError / accuracy.targetError;
     return {share, size_t(std::clamp(entries, kFewestEntries, kMostEntries))};
 }
 
@@ -70,19 +70,24 @@ void LineReuse::alongLines(Half half, const LineWeights& weights, const Enough& 
     }
 }
 
+bool LineReuse::isUndirected(Half half, uint32_t side) const {
+    if (!usesCells(half)) return directedLight.isNone(side);
+    return scatteredOfSources.isDark(side) || (!shot.sentOn.empty() && shot.sentOn[side]);
+}
+
 std::vector<glm::vec3> LineReuse::directed(Half half, const LineWeights& weights) const {
-    if (directedLight.isNone()) return {};
+    if (scatteredOfSources.isNone() || shot.incoming.empty()) return {};
     const std::vector<float> exposed = exposedShare();
     std::vector<glm::vec3> brought(counts.sideCount(), glm::vec3(0.0f));
     const Enough enough = enoughLines(directedLight.neededLines());
     forEachSide<kInTask>(brought.size(), [&](uint32_t i) {
         alongLines(half, weights, enough, i, [&](float share, uint32_t from, uint32_t entry) {
-            if (directedLight.isNone(from) || exposed[from] <= 0) return;
+            if (isUndirected(half, from) || exposed[from] <= 0) return;
             brought[i] +=
                 share / exposed[from] *
-                (half == Half::BOTH ? directedLight.between(from, i, hash(i, entry))
-                                    : scatteredOfSources.towards(
-                                          from, directedLight.wayBetween(from, i, hash(i, entry))));
+                (!usesCells(half) ? directedLight.between(from, i, hash(i, entry))
+                                  : scatteredOfSources.towards(
+                                        from, directedLight.wayBetween(from, i, hash(i, entry))));
         });
     });
     return brought;

@@ -43,7 +43,7 @@ class LineReuseTransport : public Transport {
     explicit LineReuseTransport(const TransportInput& input)
         : input(input),
           solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed,
-                 input.isShown, input.settings.targetError),
+                 input.isShown, {input.settings.targetError, input.settings.draft != 0}),
           limit(size_t(input.settings.memoryLimit * 1e6)),
           own(input.solutions ? 0 : input.patches.sideCount()),
           last(input.solutions ? *input.solutions : own) {}

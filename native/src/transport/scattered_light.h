@@ -50,6 +50,9 @@ class ScatteredLight {
     bool isNone() const { return indices.empty(); }
     bool isNone(uint32_t side) const { return isNone() || indices[side] == kNone; }
 
+    // Returns whether this side sends light by direction.
+    bool isDark(uint32_t side) const { return isNone(side) || !(sent[indices[side]].unit > 0); }
+
     // The functions below require a side that is not isNone(). They may be called for several sides
     // at once.
     //
