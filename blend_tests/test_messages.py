@@ -122,7 +122,7 @@ def test_a_group_can_be_translated(german_file):
 def texts_of_library() -> str:
     """Returns the texts in the library's source, without names of values between them."""
     texts = []
-    for path in sorted((ROOT / "native" / "src").rglob("*.cpp")):
+    for path in sorted((ROOT / "native" / "src").rglob("*.[ch]*")):
         source = re.sub(r'"\s*\n\s*"', "", path.read_text(encoding="utf-8"))
         texts += re.findall(r'"((?:[^"\\\n]|\\.)*)"', source)
     return "\n".join(texts).replace('\\"', '"')
@@ -130,11 +130,12 @@ def texts_of_library() -> str:
 
 def test_templates_of_the_library_are_in_its_source():
     source = texts_of_library()
-    for template in (*library_messages.WARNINGS, *library_messages.SKIPS):
+    for template in (*library_messages.WARNINGS, *library_messages.ERRORS,
+                     *library_messages.SKIPS):
         for part in re.split(r"\{\w+\}", template):
             # The source makes some parts of several texts.
             for sentence in re.split(r"(?<= bundles)(?:: (?:the noise )?| )|(?<=noisiest parts)"
-                                     r"|(?<=each object\))", part):
+                                     r"|(?<=each object\))|(?= is too bright)", part):
                 assert len(sentence) < 12 or sentence.strip('":; ') in source, sentence
 
 
@@ -150,6 +151,12 @@ def test_templates_of_the_library_are_in_its_source():
      'max_bundles if the bake reached it', {'target': "2 %", 'objects': '"A" (5 %), "B" (4.1 %) '
                                                                         'and 2 more'}),
     ("bundles", {}),
+    ('light "A is too bright" is too bright; reduce it to at most 1e15 (W/m^2, W/sr or W/(m^2 sr))',
+     {'light': '"A is too bright"'}),
+    ("solver RANDOM_WALK does not work with light sets: it moves the light of all sets together "
+     "and cannot separate them; choose solver LINE_REUSE",
+     {'solver': "RANDOM_WALK", 'what': "light sets", 'instead': "solver LINE_REUSE",
+      'why': "it moves the light of all sets together and cannot separate them"}),
 ])
 def test_texts_of_the_library_are_recognised(text, values):
     message = recognised(text)

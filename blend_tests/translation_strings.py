@@ -122,7 +122,8 @@ def all_texts() -> list[Key]:
     for owner in (bpy.types.Scene, bpy.types.Object):
         found.update(texts_of_property(owner.bl_rna.properties['raybundle']))
     found.update((GENERAL, text)
-                 for text in (*library_messages.WARNINGS, *library_messages.SKIPS))
+                 for text in (*library_messages.WARNINGS, *library_messages.ERRORS,
+                              *library_messages.SKIPS))
     for path in ADDON.rglob("*.py"):
         found.update(texts_of_code(path.read_text(encoding="utf-8")))
     return sorted(((context, text) for context, text in found if text.strip()),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texts of the native library that the report of a bake shows: recognised by their templates,
-so that they can be translated.
+"""The texts of the native library that the report of a bake shows, and the errors that scenes and
+settings of a user can cause: recognised by their templates, so that they can be translated.
 
 The library makes its texts in English and passes no templates. A text that is not listed here, as
 of another release of the library, is shown in English.
@@ -101,6 +101,46 @@ WARNINGS = (
     "{count} more objects are too coarse for their light; the report lists the error of each "
     "object",
 )
+_TOO_BRIGHT = " is too bright; reduce it to at most 1e15 (W/m^2, W/sr or W/(m^2 sr))"
+# Errors. {what} is a name in the interface of the library.
+ERRORS = (
+    "the bake was cancelled", "out of memory",
+    "this processor does not support SSE 4.2 and POPCNT, which Raybundle requires",
+    "the ray tracer Embree could not {what}: out of memory",
+    "the ray tracer Embree could not {what}: it does not support this processor",
+    "the ray tracer Embree could not {what}",
+    "the scene has too many faces: it needs at least {count} patches, and only {most} are "
+    "possible; simplify meshes, or hide objects in renders",
+    "object {object}: its light is too bright to be stored; reduce the strength of the lights, or "
+    "move them away from the object",
+    "object {object} reaches further than 1e12 m from the origin",
+    "light {light} reaches further than 1e12 m from the origin",
+    "light {light}" + _TOO_BRIGHT, "material {material}: its emission" + _TOO_BRIGHT,
+    "the world radiance" + _TOO_BRIGHT, "a pixel of the world image" + _TOO_BRIGHT,
+    "light {light}: its strength must be finite and not negative",
+    "light {light}: its position, direction and size must be finite, and its size not negative",
+    "light {light}: its direction must not be zero",
+    "material {material}: reflectance and emission must be finite and not negative",
+    "object {object}: its transform is not finite",
+    "mesh {mesh}: {what} {index} is not a finite number",
+    "the world radiance must be finite",
+    "the pixels of the world image must be finite and not negative",
+    "solver {solver} does not work with {what}: {why}; choose {instead}",
+    "thesis_literal does not work with {what}: {why}; choose {instead}",
+    "lines_per_bundle 1 does not work with {what}: {why}; choose {instead}",
+    # {why}
+    "it moves no light while it traces, so that directions cannot adapt to the light",
+    "it passes light from one bundle to the next, so that directions must be independent",
+    "it passes all light from one bundle to the next, so that directions must be independent and "
+    "of equal weight",
+    "it does not converge with exchanges that are found with a small probability, because their "
+    "weights have no bound",
+    "it follows random local rays and has no bundles",
+    "it follows local rays and has no bundles to project",
+    "the pseudo-code of the thesis has no weights", "local rays have no pixels",
+    "single lines are traced without a projector", "it is a variant of another solver",
+    "it moves the light of all sets together and cannot separate them",
+)
 # What was skipped, and why.
 SKIPS = (
     "bundles and solve", "no light reaches any surface",
@@ -141,19 +181,19 @@ def _pattern(template: str) -> re.Pattern:
 
 
 # Longer templates first: a value of a shorter one could contain a part of a longer one.
-_PATTERNS = {template: _pattern(template) for template in sorted(WARNINGS, key=len, reverse=True)}
+_PATTERNS = {template: _pattern(template)
+             for template in sorted((*WARNINGS, *ERRORS), key=len, reverse=True)}
 
 
 # Panels are drawn at every movement of the mouse.
 @lru_cache(maxsize=256)
 def recognised(text: str) -> str:
-    """Returns a text of the library's report as a message, or as it is if its template is
-    unknown."""
+    """Returns a text of the library as a message, or as it is if its template is unknown."""
     if text in SKIPS:
         return Message(text)
     for template, pattern in _PATTERNS.items():
         if match := pattern.fullmatch(text):
-            return Message(template, **{name: _value(value)
+            return Message(template, **{name: recognised(value) if name == 'why' else _value(value)
                                         for name, value in match.groupdict().items()})
     return text
 

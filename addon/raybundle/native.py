@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import library_file
+from . import library_file, library_messages
 from .messages import Message
 from .surface_data import SurfaceData
 
@@ -300,7 +300,7 @@ def _declare(library: ctypes.CDLL) -> None:
     def raise_on_error(code: int, function: object, arguments: tuple) -> int:
         if code != ErrorCode.NONE:
             message = library.rb_get_error_message().decode(errors='replace')
-            raise RaybundleError(code, message)
+            raise RaybundleError(code, library_messages.recognised(message))
         return code
 
     for name, arguments in _FALLIBLE.items():
