@@ -91,10 +91,11 @@ void Trace::startLines(const Settings& settings) {
 }
 
 void Trace::measureExposedShare(uint32_t seed) {
-    if (!surrounding.exposed.empty()) return;
+    if (!surrounding.exposed.empty() || exposedFrom == counts.bundles) return;
     const std::vector<uint32_t> sides = counts.coveredInPart();
     const std::vector<float> share = exposedShareOf(sides, visibility, clusters, seed);
     for (size_t k = 0; k < sides.size(); ++k) counts.setExposedShare(sides[k], share[k]);
+    exposedFrom = counts.bundles;
 }
 
 Surroundings Trace::surroundingsOf(const Settings& settings) const {

@@ -54,7 +54,7 @@ struct Trace {
     bool isWhole() const { return tracer && tracer->bundleCount() == counts.bundles; }
 
     // Measures the exposed share of the sides that are partly covered according to the lines traced
-    // so far. Does nothing if `surrounding` is known.
+    // so far. Does nothing if `surrounding` is known, or no line was traced since the last call.
     void measureExposedShare(uint32_t seed);
 
     // Returns the surroundings of all sides, found by lines of exact projection. The exposed share
@@ -105,8 +105,9 @@ struct Trace {
     Surroundings surrounding;  // empty: `counts` has the exposed share
     LineDensity density{};
     std::vector<Report::Cut> cuts;
-    size_t uncutGaps = 0;  // patches beside narrow gaps that are not cut with this solver
-    LineCounts counts;     // per side of the clusters
+    size_t uncutGaps = 0;      // patches beside narrow gaps that are not cut with this solver
+    LineCounts counts;         // per side of the clusters
+    uint32_t exposedFrom = 0;  // number of bundles at the last measureExposedShare()
     std::unique_ptr<BundleTracer> tracer;
     Looks looks;  // looks at the noise along these lines, by earlier bakes
 
