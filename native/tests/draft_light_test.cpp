@@ -208,6 +208,18 @@ TEST(DraftLight, IsNotScaledWhereSourcesChangeByDifferentFactors) {
     expectAsFresh(bake, scene);
 }
 
+TEST(DraftLight, IsScaledAfterOneDraftWhenTheNextLampChanges) {
+    Bake bake;
+    runThree(bake, dimLamp, 1.1, 3);
+    for (const double factor : {1.1, 2.0}) {
+        Scene scene = changed(dimLamp, 3);
+        scene.lights[0].strength *= factor;
+        bake.run(scene);
+        EXPECT_EQ(skips(reportOf(bake), SkippedWork::SCALED_DRAFT), factor == 2);
+        expectAsFresh(bake, scene);
+    }
+}
+
 TEST(DraftLight, OfASourceThatWasDarkIsComputed) {
     Bake bake;
     setDraft(bake);

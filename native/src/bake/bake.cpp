@@ -151,20 +151,11 @@ void Bake::runAll(const Scene& scene, const Threads& threads) {
 // Scales the light of the last draft if possible. Otherwise runs all stages, with the sources apart
 // whose strengths change.
 void Bake::runDraft(const Scene& scene, const Threads& threads) {
-    double seconds = 0;
-    std::optional<Report> scaled;
-    std::optional<PartedScene> parted;
-    std::optional<Stopwatch> total(seconds);
     const SourceStrengths now(scene, settings);
-    if (draft) scaled = draft->scale(now, light, irradiance);
-    total.reset();
-    if (scaled) {
-        scaled->totalSeconds = seconds;
-        json = scaled->json();
-        return;
-    }
+    if (draft && scaleDraft(now)) return;
     std::vector<size_t> apart;
     if (draft) apart = draft->sourcesToPart(now);
+    std::optional<PartedScene> parted;
     if (!apart.empty()) parted = partedScene(scene, apart);
     draft.reset();
     Results made = runStages(parted ? parted->scene : scene, scene.lightSets.size(), threads);
@@ -174,6 +165,20 @@ void Bake::runDraft(const Scene& scene, const Threads& threads) {
                    made.light);
     keep(std::move(made));
     draft = std::move(next);
+}
+
+// Returns whether the light of the last draft could be scaled.
+bool Bake::scaleDraft(const SourceStrengths& now) {
+    double seconds = 0;
+    std::optional<Report> report;
+    {
+        Stopwatch total(seconds);
+        report = draft->scale(now, light, irradiance);
+    }
+    if (!report) return false;
+    report->totalSeconds = seconds;
+    json = report->json();
+    return true;
 }
 
 void Bake::keep(Results results) {

@@ -26,6 +26,7 @@ namespace raybundle {
 
 class DraftLight;
 class Interim;
+class SourceStrengths;
 class Threads;
 struct SolveInput;
 struct Trace;
@@ -70,6 +71,7 @@ class Bake {
 
     void runAll(const Scene& scene, const Threads& threads);
     void runDraft(const Scene& scene, const Threads& threads);
+    bool scaleDraft(const SourceStrengths& now);
     void keep(Results results);
     // Runs all stages. The report names the first `reportedSets` light sets of the scene.
     Results runStages(const Scene& scene, size_t reportedSets, const Threads& threads);

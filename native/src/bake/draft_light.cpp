@@ -60,8 +60,8 @@ void DraftLight::part(std::vector<size_t> sources, int32_t home, const Irradianc
 }
 
 std::vector<size_t> DraftLight::sourcesToPart(const SourceStrengths& now) const {
-    if (!now.areOfSameBake(strengths)) return {};
-    return now.changedSince(strengths);
+    if (!now.areOfSameBake(present)) return {};
+    return now.changedSince(present);
 }
 
 std::optional<Report> DraftLight::scale(const SourceStrengths& now,
@@ -97,6 +97,7 @@ std::optional<Report> DraftLight::scale(const SourceStrengths& now,
     tbb::parallel_for(
         size_t(0), light.size(), [&](size_t i) { scaleInstance(i, factor, light[i]); }, whole);
     parted->factor = factor;
+    present = now;
     return result;
 }
 

@@ -4,8 +4,9 @@
 // else has changed takes the light of these sources apart from the rest. From then on, their light
 // is scaled instead of computed.
 //
-// Source: the thesis transports the light of several sources one after the other; light is linear.
-// Differs: the result at the corners is scaled, not only the light of the first shot.
+// Source: thesis section 2.1.4 (the radiosity system is linear in the emission).
+// Differs: the result at the corners is scaled. It is nearly linear too: the reconstruction keeps
+// values within the range of the light around them, for the two parts separately.
 #pragma once
 
 #include <optional>
@@ -27,7 +28,7 @@ class DraftLight {
 
     // Keeps a draft with these strengths.
     DraftLight(const SourceStrengths& strengths, const Report& report)
-        : strengths(strengths), report(report) {}
+        : strengths(strengths), present(strengths), report(report) {}
 
     // Takes the light of a parted scene apart: moves the light of the last set from `light` to this
     // object, and adds it to the set `home`. `sources` are those apart (SourceStrengths), `home` is
@@ -37,12 +38,13 @@ class DraftLight {
               const Report::Energy& energy, std::vector<InstanceLight>& light);
 
     // Returns the sources that should be put apart, because nothing but their strengths has changed
-    // since this draft. Empty: there are none, or something else has changed.
+    // since this draft was made or scaled. Empty: there are none, or something else has changed.
     std::vector<size_t> sourcesToPart(const SourceStrengths& now) const;
 
     // Makes this a draft with other strengths: scales the light at corners and on patch sides, which
-    // keeps the relative errors of the draft. Returns its report, without times. Returns nothing, and changes nothing, if something else
-    // has changed, or if strengths have grown so much that the light may overflow.
+    // keeps its relative errors. Returns its report, without times. Returns nothing, and changes
+    // nothing, if something else has changed, or if strengths have grown so much that the light may
+    // overflow.
     std::optional<Report> scale(const SourceStrengths& now, std::vector<InstanceLight>& light,
                                 Irradiance& irradiance);
 
@@ -61,8 +63,9 @@ class DraftLight {
         bool mayGrow = true;     // whether the light is far from the limits of float
     };
 
-    SourceStrengths strengths;  // of the draft
-    Report report;              // of the draft
+    SourceStrengths strengths;  // with which the draft was made
+    SourceStrengths present;    // to which it has been scaled
+    Report report;              // of the draft as it was made
     std::optional<Part> parted;
 };
 
