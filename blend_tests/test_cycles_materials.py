@@ -130,6 +130,11 @@ def principled(tree):
     return tree.principled(Base_Color=RED)
 
 
+def missing_image(tree):
+    grey = tree.add('MixRGB', Fac=0.5, Color1=tree.add('TexImage'), Color2=(0.2, 0.2, 0.2, 1.0))
+    return tree.principled(Base_Color=grey)
+
+
 def transmission(tree):
     return tree.principled(Base_Color=RED, Transmission=0.5, IOR=1.0)
 
@@ -321,7 +326,7 @@ def velvet(tree):
     return tree.add('AddShader', _0=tree.add('BsdfDiffuse', Color=(0.2, 0.1, 0.05, 1.0)), _1=cloth)
 
 
-UNIFORM = (diffuse, principled, transmission, emission, alpha, mix, add)
+UNIFORM = (diffuse, principled, missing_image, transmission, emission, alpha, mix, add)
 COATS = (coated, roughly_coated)
 DIRECTED = (rough_diffuse, half_rough_diffuse, rough_base, smooth_principled, rough_principled,
             paint, tinted_specular, glossy_mix, *COATS, sheen, tinted_sheen, velvet)

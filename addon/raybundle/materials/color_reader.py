@@ -58,6 +58,10 @@ class Reading:
     results: frozenset[str] = frozenset()
 
 
+# The colour that Cycles shows instead of an image that it cannot load.
+_MISSING = np.array((1.0, 0.0, 1.0))
+
+
 class ColorReader:
     """Reads the colours and values of one node tree, for one side of a surface.
 
@@ -103,7 +107,7 @@ class ColorReader:
         if node.type == 'TEX_IMAGE':
             return self._image(node, source.output, path)
         if node.type == 'TEX_ENVIRONMENT':
-            return self._environment(node)
+            return self._environment(node, source.output)
         if node.type in ('ATTRIBUTE', 'VERTEX_COLOR') and source.output.name == 'Color':
             return self._attribute(node)
         if node.type in ('MIX', 'MIX_RGB'):
@@ -151,8 +155,7 @@ class ColorReader:
                path: tuple[bpy.types.Node, ...]) -> ColorExpression:
         pixels = self.images.read(node.image) if node.image else None
         if pixels is None:
-            self._warn(node, Message("has no image data: black is used"))
-            return ColorExpression()
+            return self._missing_image(node, output)
         mean = pixels.mean(axis=(0, 1), dtype=np.float64)
         if output.name != 'Color':
             self._inexact(node, Message("has a linked output {output}, which counts as 1",
@@ -206,11 +209,16 @@ class ColorReader:
             return layer, second @ square
         return None
 
-    def _environment(self, node: bpy.types.Node) -> ColorExpression:
+    def _missing_image(self, node: bpy.types.Node, output: bpy.types.NodeSocket
+                       ) -> ColorExpression:
+        self._warn(node, Message("has no image, or its file is missing: the magenta of Cycles is "
+                                 "used; restore the file, or choose an image"))
+        return ColorExpression(_MISSING if output.name == 'Color' else WHITE)
+
+    def _environment(self, node: bpy.types.Node, output: bpy.types.NodeSocket) -> ColorExpression:
         pixels = self.images.read(node.image) if node.image else None
         if pixels is None:
-            self._warn(node, Message("has no image data: black is used"))
-            return ColorExpression()
+            return self._missing_image(node, output)
         self._warn(node, Message("varies with the direction: its mean over the sphere is used"))
         if node.projection == 'MIRROR_BALL':
             return ColorExpression(pixels.mean(axis=(0, 1), dtype=np.float64))
