@@ -13,6 +13,7 @@ not part of it.
 
 from __future__ import annotations
 
+import itertools
 import random
 import sys
 import time
@@ -123,12 +124,16 @@ def live_rates() -> list[float]:
                 for node in material.node_tree.nodes if node.type == 'EMISSION']
     mesh = next(item for item in scene.objects if item.type == 'MESH')
 
+    # Up and down in turn, so that no column changes what the next ones measure.
+    factors = itertools.cycle((1.01, 1.0 / 1.01))
+
     def brighten() -> None:
+        factor = next(factors)
         for socket in emission:
-            socket.default_value *= 1.01
+            socket.default_value *= factor
 
     def change_power() -> None:
-        lamp.data.energy *= 1.01
+        lamp.data.energy *= next(factors)
 
     def move(item: bpy.types.Object) -> None:
         item.location.x += 0.001

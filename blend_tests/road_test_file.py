@@ -39,24 +39,32 @@ def baked_faces() -> int:
 def compare(names: list[str], samples: int, most: int) -> list[dict]:
     """Compares the light of objects with Cycles at their vertices.
 
-    Compares objects without modifiers and with at most `most` corners. Leaves out vertices on edges
-    where surfaces touch, because a single point decides there, and those without a value of Cycles,
-    which are those of black surfaces and metals. mean and rms are differences from two bakes of
-    Cycles without their noise, relative to Cycles' mean, or to DARK of the scene's mean if that is
-    more.
+    Compares objects without modifiers, with at most `most` corners, of which there are no
+    instances: Cycles may bake the light of an instance instead. Leaves out vertices on edges where
+    surfaces touch, because a single point decides there. Leaves out channels in which the diffuse
+    colour is 0 (all channels of black surfaces and metals, two of a pure red): Cycles divides the
+    light by the colour, and gives such a channel the mean of the others. mean and rms are
+    differences from two bakes of Cycles without their noise, relative to Cycles' mean, or to DARK
+    of the scene's mean if that is more.
     """
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    instanced = {instance.object.original for instance in depsgraph.object_instances
+                 if instance.is_instance}
     items = [item for item in map(bpy.data.objects.get, names)
-             if not item.modifiers and len(item.data.loops) <= most and item.data.users == 1]
+             if not item.modifiers and len(item.data.loops) <= most and item.data.users == 1
+             and item not in instanced]
     raybundle.bake(bpy.context, output='LIGHTING', domain='CORNER', data_type='FLOAT_COLOR',
                    attribute=ATTRIBUTE, reconstruction='POINT')
     ours = {item.name: read_colors(item, ATTRIBUTE).astype(float) for item in items}
     seen = off_contact_edges(items)
     bakes = [bake_objects(items, samples, seed) for seed in (0, 1)] if items else []
+    colors = bake_objects(items, 1, 0, passes=frozenset({"COLOR"})) if items else {}
     scene = np.mean([light.mean() for light in bakes[0].values()]) if items else 0.0
     result = []
     for item in items:
         name = item.name
         used = seen[name] & is_defined(item, bakes[0][name] + bakes[1][name])
+        used = used[:, None] & (colors[name] > 0.0)
         if not used.any():
             continue
         own, first, second = (light[name][used] for light in (ours, *bakes))
