@@ -328,26 +328,17 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
     const Transfer& transfer = *transfers[2 * patches.parentAt(side).scattering + isBack(side)];
     using Light = Eigen::Matrix<float, kCells, 3>;
     const Light light = Eigen::Map<const Light>(arriving.front().data());
-    // Light of few sources comes from few cells.
-    std::array<uint32_t, kCells> lit{};
-    uint32_t litCount = 0;
-    for (uint32_t in = 0; in < kCells; ++in)
-        if (!light.row(in).isZero(0)) lit[litCount++] = in;
-    auto addLeaving = [&](const Transfer::Matrix& matrix, const Light& from, Light& sum) {
-        for (uint32_t k = 0; k < litCount; ++k)
-            for (int c = 0; c < 3; ++c) sum.col(c) += from(lit[k], c) * matrix.col(lit[k]);
-    };
     Light leaving = Light::Zero();
     if (surface.scattering().hasGloss()) {
         const glm::vec3 f0 = surface.f0(), rest = 1.0f - f0;
         const glm::vec3 scale =
             surface.mirroredMean() / (f0 * transfer.whiteMean + rest * transfer.edgeMean);
-        addLeaving(transfer.white, light * diagonal(f0 * scale), leaving);
-        addLeaving(transfer.edge, light * diagonal(rest * scale), leaving);
+        leaving = (transfer.white * light) * diagonal(f0 * scale) +
+                  (transfer.edge * light) * diagonal(rest * scale);
     }
     for (size_t k = 0; k < transfer.lobes.size(); ++k) {
         const glm::vec3 mean = surface.lobeMean(surface.scattering().lobes[k]);
-        addLeaving(transfer.lobes[k], light * diagonal(mean / transfer.lobeMeans[k]), leaving);
+        leaving += (transfer.lobes[k] * light) * diagonal(mean / transfer.lobeMeans[k]);
     }
     if (surface.scattering().isRough()) {
         Light diffuse = light;
@@ -355,7 +346,7 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
             const glm::vec3 share = surface.diffuseAt(Samples::instance().terms[in]);
             for (int c = 0; c < 3; ++c) diffuse(in, c) *= share[c];
         }
-        addLeaving(transfer.rough, diffuse, leaving);
+        leaving += transfer.rough * diffuse;
     }
     leaving.rowwise() -= leaving.colwise().mean().eval();
     leaving *= diagonal(glm::min((1.0f - patches.reflectance[side]) / kLeastAbsorbed, 1.0f));
