@@ -19,6 +19,18 @@
 
 namespace raybundle {
 
+// The light of the sources that are apart, with the strengths of the draft.
+struct LightApart {
+    std::vector<size_t> sources;
+    int32_t home = kNoLightSet;
+    std::vector<CornerLight> atCorners;     // per instance
+    std::vector<std::vector<float>> error;  // per instance and corner, of all light
+    Irradiance onSides;
+    Report::Energy energy;
+    glm::dvec3 factor{1.0};  // that the light has been scaled by since the draft
+    bool mayGrow = true;     // whether the light is far from the limits of float
+};
+
 // The last draft.
 class DraftLight {
   public:
@@ -51,22 +63,10 @@ class DraftLight {
   private:
     void scaleInstance(size_t instance, const glm::dvec3& factor, InstanceLight& light) const;
 
-    // The light of the sources that are apart, with the strengths of the draft.
-    struct Part {
-        std::vector<size_t> sources;
-        int32_t home = kNoLightSet;
-        std::vector<CornerLight> atCorners;     // per instance
-        std::vector<std::vector<float>> error;  // per instance and corner, of all light
-        Irradiance onSides;
-        Report::Energy energy;
-        glm::dvec3 factor{1.0};  // that the light has been scaled by since the draft
-        bool mayGrow = true;     // whether the light is far from the limits of float
-    };
-
     SourceStrengths strengths;  // with which the draft was made
     SourceStrengths present;    // to which it has been scaled
     Report report;              // of the draft as it was made
-    std::optional<Part> parted;
+    std::optional<LightApart> parted;
 };
 
 }  // namespace raybundle
