@@ -155,14 +155,12 @@ void Bake::runDraft(const Scene& scene, const Threads& threads) {
     if (draft && scaleDraft(now)) return;
     std::vector<size_t> apart;
     if (draft) apart = draft->sourcesToPart(now);
-    std::optional<PartedScene> parted;
+    std::optional<Scene> parted;
     if (!apart.empty()) parted = partedScene(scene, apart);
     draft.reset();
-    Results made = runStages(parted ? parted->scene : scene, scene.lightSets.size(), threads);
+    Results made = runStages(parted ? *parted : scene, scene.lightSets.size(), threads);
     auto next = std::make_unique<DraftLight>(now, made.report);
-    if (parted)
-        next->part(std::move(apart), parted->home, made.ofLastSet, made.energyOfLastSet,
-                   made.light);
+    if (parted) next->part(std::move(apart), made.ofLastSet, made.energyOfLastSet, made.light);
     keep(std::move(made));
     draft = std::move(next);
 }

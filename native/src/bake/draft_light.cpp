@@ -39,11 +39,10 @@ bool DraftLight::isPossible(const Settings& settings) {
     return settings.draft && settings.countsLines() && settings.gathersFirstShot();
 }
 
-void DraftLight::part(std::vector<size_t> sources, int32_t home, const Irradiance& ofSources,
+void DraftLight::part(std::vector<size_t> sources, const Irradiance& ofSources,
                       const Report::Energy& energy, std::vector<InstanceLight>& light) {
     parted.emplace();
     parted->sources = std::move(sources);
-    parted->home = home;
     parted->energy = energy;
     parted->onSides.direct = ofSources.direct;
     parted->onSides.ofSources = ofSources.ofSources;
@@ -55,7 +54,6 @@ void DraftLight::part(std::vector<size_t> sources, int32_t home, const Irradianc
         if (instance.sets.empty()) continue;  // not reconstructed
         own = std::move(instance.sets.back());
         instance.sets.pop_back();
-        if (home != kNoLightSet) instance.sets[size_t(home)].add(own);
     }
 }
 
@@ -113,8 +111,6 @@ void DraftLight::scaleInstance(size_t instance, const glm::dvec3& factor,
             parted->error[instance][c] * (then > 0 ? std::max(0.0f, now / then) : 1.0f);
     }
     add(light, own, step);
-    if (parted->home != kNoLightSet && !light.sets.empty())
-        add(light.sets[size_t(parted->home)], own, step);
 }
 
 }  // namespace raybundle

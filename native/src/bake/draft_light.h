@@ -22,7 +22,6 @@ namespace raybundle {
 // The light of the sources that are apart, with the strengths of the draft.
 struct LightApart {
     std::vector<size_t> sources;
-    int32_t home = kNoLightSet;
     std::vector<CornerLight> atCorners;     // per instance
     std::vector<std::vector<float>> error;  // per instance and corner, of all light
     Irradiance onSides;
@@ -42,21 +41,20 @@ class DraftLight {
     DraftLight(const SourceStrengths& strengths, const Report& report)
         : strengths(strengths), present(strengths), report(report) {}
 
-    // Takes the light of a parted scene apart: moves the light of the last set from `light` to this
-    // object, and adds it to the set `home`. `sources` are those apart (SourceStrengths), `home` is
-    // their light set otherwise, `ofSources` their light on patch sides, and `energy` their part of
-    // the energy of the report. Call this at most once.
-    void part(std::vector<size_t> sources, int32_t home, const Irradiance& ofSources,
+    // Takes the light of a parted scene apart: moves that of its light set from `light` to this
+    // object. `sources` are those apart (SourceStrengths), `ofSources` is their light on patch
+    // sides, and `energy` their part of the energy of the report. Call this at most once.
+    void part(std::vector<size_t> sources, const Irradiance& ofSources,
               const Report::Energy& energy, std::vector<InstanceLight>& light);
 
     // Returns the sources that should be put apart, because nothing but their strengths has changed
     // since this draft was made or scaled. Empty: there are none, or something else has changed.
     std::vector<size_t> sourcesToPart(const SourceStrengths& now) const;
 
-    // Makes this a draft with other strengths: scales the light at corners and on patch sides, which
-    // keeps its relative errors. Returns its report, without times. Returns nothing, and changes
-    // nothing, if something else has changed, or if strengths have grown so much that the light may
-    // overflow.
+    // Makes this a draft with other strengths: scales the light at corners and on patch sides,
+    // which keeps its relative errors. Returns its report, without times. Returns nothing, and
+    // changes nothing, if something else has changed, or if strengths have grown so much that the
+    // light may overflow.
     std::optional<Report> scale(const SourceStrengths& now, std::vector<InstanceLight>& light,
                                 Irradiance& irradiance);
 

@@ -171,30 +171,21 @@ std::optional<glm::dvec3> SourceStrengths::growthSince(const SourceStrengths& be
     return growth;
 }
 
-std::optional<PartedScene> partedScene(const Scene& scene, const std::vector<size_t>& these) {
+std::optional<Scene> partedScene(const Scene& scene, const std::vector<size_t>& these) {
+    if (!scene.lightSets.empty()) return std::nullopt;
     const Apart apart(scene, these);
-    PartedScene result{scene, kNoLightSet};
-    Scene& parted = result.scene;
-    parted.lightSets.emplace_back();
-    const auto own = int32_t(parted.lightSets.size()) - 1;
-    std::optional<int32_t> home;
-    auto move = [&](int32_t& lightSet) {
-        const bool isSame = home.value_or(lightSet) == lightSet;
-        home = lightSet;
-        lightSet = own;
-        return isSame;
-    };
+    if (apart.hasWorld() && !scene.worldImage.pixels.empty()) return std::nullopt;
+    Scene parted = scene;
+    const int32_t own = parted.addLightSet("");
     for (size_t k = 0; k < parted.lights.size(); ++k)
-        if (apart.hasLamp(k) && !move(parted.lights[k].lightSet)) return std::nullopt;
+        if (apart.hasLamp(k)) parted.lights[k].lightSet = own;
     for (Instance& instance : parted.instances) {
         const Apart::Share share = apart.ofInstance(instance);
         if (share == Apart::Share::SOME) return std::nullopt;
-        if (share == Apart::Share::ALL && !move(instance.lightSet)) return std::nullopt;
+        if (share == Apart::Share::ALL) instance.lightSet = own;
     }
-    if (apart.hasWorld() && (!parted.worldImage.pixels.empty() || !move(parted.worldLightSet)))
-        return std::nullopt;
-    result.home = home.value_or(kNoLightSet);
-    return result;
+    if (apart.hasWorld()) parted.worldLightSet = own;
+    return parted;
 }
 
 }  // namespace raybundle

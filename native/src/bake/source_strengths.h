@@ -42,15 +42,9 @@ class SourceStrengths {
     std::vector<glm::dvec3> values;  // by number
 };
 
-// A scene in which some sources are apart: in a light set of their own, the last one.
-struct PartedScene {
-    Scene scene;
-    int32_t home = kNoLightSet;  // the light set that these sources belong to otherwise
-};
-
-// Puts the sources with these numbers (SourceStrengths) apart. Returns nothing if that is not
-// possible: they belong to several light sets, or share an object or the world with light that is
-// not among them. `these` must be ascending and not empty.
-std::optional<PartedScene> partedScene(const Scene& scene, const std::vector<size_t>& these);
+// Returns the scene with the sources of these numbers (SourceStrengths) apart: in a light set, the
+// only one. Returns nothing if that is not possible: the scene has light sets, or these sources
+// share an object or the world with light that is not among them. `these` must be ascending.
+std::optional<Scene> partedScene(const Scene& scene, const std::vector<size_t>& these);
 
 }  // namespace raybundle

@@ -42,8 +42,8 @@ float othersError(const Patches& patches, const StandIns& standIns, uint32_t sid
            std::max(1.0f, edge / std::sqrt(std::max(patches.area[patchOf(side)], 1e-30f)));
 }
 
-// Returns the coarse shot of the tiles, extended to the patches of cut tiles. Only these are sampled
-// here.
+// Returns the coarse shot of the tiles, extended to the patches of cut tiles. Only these are
+// sampled here.
 CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32_t>& gatherers,
                            const std::function<Receiver(size_t)>& receiverAt,
                            const std::function<void(double)>& report) {

@@ -30,8 +30,9 @@ namespace {
 // divided by the target error, between kFewestEntries and kMostEntries. The error of leaving out
 // the other entries must be small beside the target error. In an office and in a box, with all
 // surfaces painted or of metal, 64 entries deviate by 0.04 to 0.3 % (RMS) from all entries of a
-// row, 32 entries by 0.1 to 0.4 %, and 16 entries by 0.3 to 0.7 %. Bakes of the office with a target
-// of 5 % or more are as near to those with 2 % with 8 entries as with 16 (within 0.02 %, 3 seeds).
+// row, 32 entries by 0.1 to 0.4 %, and 16 entries by 0.3 to 0.7 %. Bakes of the office with a
+// target of 10 % and drafts are as near to a bake with 2 % with 8 entries as with 16 (within 0.02
+// %, 3 seeds).
 constexpr float kLeastEntriesTimesError = 0.4f;
 constexpr float kFewestEntries = 8, kMostEntries = 256;
 // The number of entries that are used at least to find which of the 36 cells of directions are open
