@@ -350,6 +350,32 @@ def test_meshes_with_the_same_counts_stay_apart_and_copies_do_not(new_object):
     assert len(result.meshes) == 2
 
 
+def test_meshes_that_differ_only_in_how_faces_are_shaded_stay_apart(new_object):
+    # The normals of a plane grid do not depend on the shading.
+    places = [(x, y, 0.0) for y in range(3) for x in range(3)]
+    faces = [(k, k + 1, k + 4, k + 3) for k in (0, 1, 3, 4)]
+    flat, smooth = (new_object(name, places, faces) for name in ("Flat", "Smooth"))
+    smooth.data.polygons.foreach_set('use_smooth', [True] * 4)
+    smooth.data.update()
+    bpy.context.view_layer.update()
+    meshes = [export().scene.meshes[item.mesh] for item in export().scene.instances]
+    assert [mesh.face_smooth.all() for mesh in meshes] == [False, True]
+    assert np.allclose(meshes[0].corner_normals, meshes[1].corner_normals)
+
+
+@pytest.mark.skipif(bpy.app.version >= (4, 1, 0), reason="marked edges always split normals")
+def test_marked_edges_are_sharp_where_blender_shades_them_so(new_object):
+    item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
+    item.data.polygons.foreach_set('use_smooth', [True] * 6)
+    item.data.edges[3].use_edge_sharp = True
+    item.data.update()
+    for is_auto in (False, True):
+        item.data.use_auto_smooth = is_auto
+        bpy.context.view_layer.update()
+        sharp = export().scene.meshes[0].sharp_edges
+        assert sharp.tolist() == ([list(item.data.edges[3].vertices)] if is_auto else [])
+
+
 # --------------------------------------------------------------------------------------------------
 # Bad geometry
 # --------------------------------------------------------------------------------------------------

@@ -196,9 +196,7 @@ class _Exporter:
         self._meshes: dict[tuple, int | MeshError] = {}
         # By the keys of _meshes: the digests (LastSurfaces) of the surfaces in the slots.
         self._taken: dict[tuple, list[str]] = {}
-        # Exported meshes by counts and digest. The digest of the first mesh with given counts is
-        # None until it is needed.
-        self._alike: dict[tuple[int, int, int], dict[bytes | None, int]] = {}
+        self._alike: dict[tuple, list[int]] = {}  # exported meshes by MeshData.key()
         # Numbers of instances that are not objects themselves, by the names of the instancing
         # object and of the instance's object.
         self._instance_counts: Counter[tuple[str, str]] = Counter()
@@ -474,19 +472,13 @@ class _Exporter:
         """Returns the index in SceneData.meshes of a mesh. A mesh with equal content, such as a
         copy that an earlier bake made, is added once."""
         meshes = self.result.scene.meshes
-        alike = self._alike.setdefault(data.counts, {})
-        if not alike:
-            # No mesh has the same counts, so a digest is not needed yet.
-            digest = None
-        else:
-            if None in alike:
-                first = alike.pop(None)
-                alike[meshes[first].digest()] = first
-            digest = data.digest()
-        if digest not in alike:
-            alike[digest] = len(meshes)
-            meshes.append(data)
-        return alike[digest]
+        alike = self._alike.setdefault(data.key(), [])
+        for index in alike:
+            if meshes[index].equals(data):
+                return index
+        alike.append(len(meshes))
+        meshes.append(data)
+        return alike[-1]
 
     def _corner_map(self, original: bpy.types.Object, evaluated: bpy.types.Mesh,
                     data: MeshData) -> CornerMap:
