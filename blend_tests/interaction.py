@@ -35,7 +35,7 @@ COLUMNS = ("export", "first light", "showing", "writing", *(f"stop: {s}" for s i
 LIVE_COLUMNS = ("power of a lamp", "place of a lamp", "emission", "place of a mesh")
 LIVE_SECONDS = 3.0  # of changes, per column of the second table
 # Seconds between two looks at a run, as in the add-on's operator.
-LOOK_SECONDS = 0.03
+LOOK_SECONDS = 0.01
 # A stop comes at a random time of this length after a stage has begun, s.
 LATEST_STOP = 0.3
 

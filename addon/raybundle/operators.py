@@ -21,7 +21,7 @@ from .subdivided_copy import remove_copies
 
 # Seconds between two looks at a running bake, and between two drawings of its progress. Software
 # renderers take a tenth of a second to draw.
-_LOOK_SECONDS, _DRAW_SECONDS = 0.03, 0.25
+_LOOK_SECONDS, _DRAW_SECONDS = 0.01, 0.25
 
 
 def _say(operator: bpy.types.Operator, report: BakeReport) -> set[str]:

@@ -153,39 +153,6 @@ TEST(FirstShot, LightsWithoutStrengthOrSizeDoNoHarm) {
     EXPECT_TRUE(std::isfinite(shot.front()) && std::isfinite(shot.back()));
 }
 
-TEST(FirstShot, ShowsOneSampleFirstWhereTheCoarsePassTakesLong) {
-    // Suns in many directions light both sides of a plate, all points alike.
-    Scene scene;
-    place(scene, grid("plate", {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 50, 50), grey("plate", 0.5f));
-    glm::vec2 lit(0.0f);  // on fronts and backs
-    for (int k = 0; k < 64; ++k) {
-        const double height = (k - 30) / 40.0;
-        scene.addLight(sunLight({1, 0.1 * k, height}, glm::dvec3(0.1)));
-        const double cosine = height / std::sqrt(1 + 0.01 * k * k + height * height);
-        lit[cosine > 0 ? 0 : 1] += float(0.1 * std::abs(cosine));
-    }
-    const Patches patches = subdivide(scene, 1, kMany);
-    const Visibility visibility(patches);
-    const Settings settings;
-    const DirectLight light(scene, patches, visibility, 0);
-    std::vector<bool> isShown(patches.sideCount());
-    for (size_t side = 0; side < isShown.size(); side += 2) isShown[side] = true;
-    const StandIns standIns(patches, nullptr);
-    FirstShotInput input{light, patches, visibility, settings, Progress()};
-    input.isShown = &isShown;
-    input.standIns = &standIns;
-    std::vector<std::vector<glm::vec3>> shown;
-    input.showCoarse = [&](std::vector<glm::vec3> irradiance) {
-        shown.push_back(std::move(irradiance));
-    };
-    gather(input);
-    ASSERT_EQ(shown.size(), 2u);
-    for (size_t side = 0; side < isShown.size(); ++side) {
-        EXPECT_NEAR(shown[0][side].x, side % 2 == 0 ? lit[0] : 0, kExact * lit[0]) << side;
-        EXPECT_NEAR(shown[1][side].x, lit[int(side % 2)], kExact * lit[0]) << side;
-    }
-}
-
 TEST(FirstShot, TheSameSeedGivesTheSameLight) {
     Scene scene = roomWithBoxes(0.5f);
     scene.addLight(areaLight({2, 1.6, 2.5}, {0.4, 0, 0}, {0, -0.4, 0}, glm::dvec3(1)));

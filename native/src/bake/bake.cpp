@@ -14,6 +14,7 @@
 #include "bake/bake_warnings.h"
 #include "bake/bundle_solve.h"
 #include "bake/draft_light.h"
+#include "bake/first_light.h"
 #include "bake/first_shots.h"
 #include "bake/geometry_hash.h"
 #include "bake/interim.h"
@@ -193,6 +194,7 @@ Bake::Results Bake::runStages(const Scene& scene, size_t reportedSets, const Thr
     {
         Stopwatch total(report.totalSeconds);
         noteWhatIsGiven(scene, reportedSets, threads, report);
+        showFirstLight(scene, report);
         makePatches(scene, report);
         const std::vector<CoarseShot> coarse = startLines(scene, report);
         const ShownLight shown(scene, trace->patches, gathersSparseResults(settings));
@@ -237,6 +239,13 @@ void Bake::noteWhatWasTraced(Report& report) const {
     report.cuts = trace->cuts;
     report.lines = trace->tracer->lineCount();
     report.exchanges = trace->counts.exchangeCount();
+}
+
+void Bake::showFirstLight(const Scene& scene, Report& report) const {
+    if (!interim) return;
+    Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
+    progress.report(RB_STAGE_PATCHES, 0);
+    offerFirstLight(scene, settings, *interim);
 }
 
 void Bake::makePatches(const Scene& scene, Report& report) {

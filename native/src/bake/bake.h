@@ -77,6 +77,7 @@ class Bake {
     Results runStages(const Scene& scene, size_t reportedSets, const Threads& threads);
     void noteWhatIsGiven(const Scene& scene, size_t reportedSets, const Threads& threads,
                          Report& report) const;
+    void showFirstLight(const Scene& scene, Report& report) const;
     void makePatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> startLines(const Scene& scene, Report& report);
     std::vector<CoarseShot> cutPatches(const Scene& scene, Report& report);

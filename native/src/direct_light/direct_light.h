@@ -51,6 +51,12 @@ constexpr size_t kFewSources = 4;
 
 struct ReceiverPlace;
 
+// Returns an unbiased estimate of the irradiance at a receiver from one sample of each source,
+// W/m^2. `index` is the index of the sample.
+glm::vec3 sampleEach(const std::vector<std::unique_ptr<LightSource>>& sources,
+                     const Patches& patches, const Visibility& visibility, const Receiver& receiver,
+                     uint32_t index, uint32_t seed);
+
 class DirectLight {
   public:
     // Prepares the sources of one light set, or with kNoLightSet the sources that belong to no set.
@@ -115,9 +121,10 @@ class DirectLight {
                              const std::vector<ReceiverPair>& neighbours,
                              LightBySource* bySource) const;
 
-    // Returns an unbiased estimate of the irradiance at a receiver from one sample of each source,
-    // W/m^2. `index` is the index of the sample.
-    glm::vec3 sample(const Receiver& receiver, uint32_t index) const;
+    // Returns the result of sampleEach() for the sources.
+    glm::vec3 sample(const Receiver& receiver, uint32_t index) const {
+        return sampleEach(sources, patches, visibility, receiver, index, seed);
+    }
 
     // Computes the irradiance that `count` points on a patch side get if nothing blocks the light,
     // W/m^2. If a source is so far away that its light changes by less than a share `even` over the

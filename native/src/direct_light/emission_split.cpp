@@ -139,6 +139,7 @@ EmissionSplit splitEmission(const Scene& scene, const Patches& patches,
     const size_t sides = patches.sideCount();
     EmissionSplit split{patches.emission, std::vector<glm::vec3>(sides),
                         std::vector<glm::vec3>(sides), std::vector<bool>(sides, false)};
+    if (!scene.emits()) return split;
     for (size_t side = 0; side < sides; ++side) {
         throwIfCancelledAt(side);
         const uint32_t instance = patches.parentAt(side).instance;

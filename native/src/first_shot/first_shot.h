@@ -73,8 +73,7 @@ struct FirstShotInput {
     const std::vector<Instance>* instances = nullptr;
     // GATHER only: which sides gather for other sides. Null: each side gathers for itself.
     const StandIns* standIns = nullptr;
-    // GATHER only: receives the irradiance per side, W/m^2, after the coarse pass, and if that
-    // takes long, that of a single sample before it. May be empty.
+    // GATHER only: receives the irradiance per side after the coarse pass, W/m^2. May be empty.
     std::function<void(std::vector<glm::vec3>)> showCoarse = {};
 };
 

@@ -25,9 +25,6 @@ constexpr float kOthersError = 2;
 // Largest factor of the error. It applies to sides that reflect nothing, whose light only counts in
 // the energy balance.
 constexpr float kMostError = 10;
-// With more pairs of a gatherer and a source than this, the coarse pass takes longer than somebody
-// wants to wait for the first light (100 ms on two processors).
-constexpr size_t kLongCoarsePass = 300000;
 
 // Returns the factor of the error allowed on a side whose light is not shown. Other surfaces get
 // the light of many such sides, whose errors average out: the variance of the sum is proportional
@@ -73,20 +70,6 @@ std::vector<glm::vec3> irradianceOfSides(const StandIns& standIns, size_t count,
     for (uint32_t side = 0; side < count; ++side)
         irradiance[side] = irradianceAt(standIns.numberOf(side));
     return irradiance;
-}
-
-// Shows the light of one sample of each source at shown sides, if the coarse pass will take long.
-void showFirstSamples(const FirstShotInput& input, const StandIns& standIns,
-                      const std::function<Receiver(size_t)>& receiverAt) {
-    const size_t count = standIns.gatherers().size();
-    if (!input.showCoarse || count * input.light.lightSources().size() < kLongCoarsePass) return;
-    std::vector<glm::vec3> sampled(count);
-    parallelFor(size_t(0), count, [&](size_t k) {
-        const Receiver receiver = receiverAt(k);
-        if (receiver.isShown) sampled[k] = input.light.sample(receiver, 0);
-    });
-    input.showCoarse(irradianceOfSides(standIns, input.patches.sideCount(),
-                                       [&](size_t k) { return sampled[k]; }));
 }
 
 // Adds what the gatherers have gathered to the shot, whose vectors have an entry per side.
@@ -158,7 +141,6 @@ FirstShot gather(const FirstShotInput& input) {
             if (const auto source = matches->ofKept[k].source)
                 shares[*source] = input.before->powerShares[k];
     } else {
-        if (!input.fromTiles) showFirstSamples(input, standIns, receiverAt);
         auto bySource = std::make_shared<LightBySource>(sources, gatherers.size());
         bySource->isWhole = bySource->hasRoom() && !input.fromTiles;
         LightBySource* const whole = bySource->isWhole ? bySource.get() : nullptr;

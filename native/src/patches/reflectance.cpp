@@ -160,7 +160,9 @@ void assignOpacity(const Scene& scene, Patches& patches) {
     auto materialOf = [&](const Parent& parent) -> const Material& {
         return scene.materialOf(parent.instance, size_t(parent.face));
     };
-    if (std::all_of(patches.parents.begin(), patches.parents.end(),
+    if (std::all_of(scene.materials.begin(), scene.materials.end(),
+                    [](const Material& material) { return material.isOpaque(); }) ||
+        std::all_of(patches.parents.begin(), patches.parents.end(),
                     [&](const Parent& parent) { return materialOf(parent).isOpaque(); }))
         return;
     patches.opacity.assign(patches.count(), 1.0f);

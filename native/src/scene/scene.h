@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -193,6 +194,12 @@ class Scene {
     const Material& materialOf(const Mesh& mesh, size_t face) const;
     const Material& materialOf(size_t instance, size_t face) const {
         return materialOf(meshes[instances[instance].mesh], face);
+    }
+
+    // Returns whether any material emits light.
+    bool emits() const {
+        return std::any_of(materials.begin(), materials.end(),
+                           [](const Material& material) { return material.emits(); });
     }
 
     std::vector<Image> images;

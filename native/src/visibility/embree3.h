@@ -21,10 +21,12 @@ struct Embree3 {
     decltype(&rtcNewScene) newScene;
     decltype(&rtcReleaseScene) releaseScene;
     decltype(&rtcSetSceneFlags) setSceneFlags;
+    decltype(&rtcSetSceneBuildQuality) setSceneBuildQuality;
     decltype(&rtcCommitScene) commitScene;
     decltype(&rtcNewGeometry) newGeometry;
     decltype(&rtcReleaseGeometry) releaseGeometry;
     decltype(&rtcSetNewGeometryBuffer) setNewGeometryBuffer;
+    decltype(&rtcSetGeometryBuildQuality) setGeometryBuildQuality;
     decltype(&rtcCommitGeometry) commitGeometry;
     decltype(&rtcAttachGeometry) attachGeometry;
     decltype(&rtcIntersect1) intersect1;

@@ -32,7 +32,7 @@ namespace {
 
 }  // namespace
 
-Visibility::Visibility(const Patches& patches, Blockers blockers)
+Visibility::Visibility(const Patches& patches, Blockers blockers, Queries queries)
     : patches(patches),
       surfaceOffset(kRelativeOffset * patches.radius),
       embree(std::make_unique<Embree>()) {
@@ -43,6 +43,7 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
     // Robust, so that rays do not slip between neighbouring triangles.
     embree3.setSceneFlags(embree->scene,
                           RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    if (queries == Queries::FEW) embree3.setSceneBuildQuality(embree->scene, RTC_BUILD_QUALITY_LOW);
 
     auto blocks = [&](const Parent& parent) {
         return blockers == Blockers::EXCHANGING ? parent.exchanges : parent.stopsDirect;
@@ -69,6 +70,8 @@ Visibility::Visibility(const Patches& patches, Blockers blockers)
             for (int k = 0; k < 4; ++k)
                 *indices++ = parent.vertex[parent.isTriangle && k == 3 ? 2 : k];
         }
+        if (queries == Queries::FEW)
+            embree3.setGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_LOW);
         embree3.commitGeometry(geometry);
         embree3.attachGeometry(embree->scene, geometry);
     }

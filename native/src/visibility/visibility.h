@@ -27,13 +27,18 @@ struct LineHit {
 // The surfaces that block: those that exchange light, or those that stop direct light.
 enum class Blockers { EXCHANGING, STOPPING_DIRECT };
 
+// What the acceleration structure is made for: many queries, or few, so that a structure that
+// answers slightly more slowly and is built in a third of the time is the faster one.
+enum class Queries { MANY, FEW };
+
 // Ray queries against the parents of a scene. All queries are thread-safe. Points are in metres
 // relative to Patches::centre, directions are unit vectors.
 class Visibility {
   public:
     // Builds the acceleration structure over the parents that block. `patches` must outlive the
     // object. Throws Error with OUT_OF_MEMORY, UNSUPPORTED_HARDWARE or UNKNOWN if Embree fails.
-    explicit Visibility(const Patches& patches, Blockers blockers = Blockers::EXCHANGING);
+    explicit Visibility(const Patches& patches, Blockers blockers = Blockers::EXCHANGING,
+                        Queries queries = Queries::MANY);
     ~Visibility();
 
     // Returns the share of the light, 0 to 1, that passes along a shadow ray from a patch side. The
