@@ -325,5 +325,25 @@ TEST(WorldImage, ABlackOneIsDark) {
     EXPECT_TRUE(warns(reportOf(bake), WarningId::NO_LIGHT));
 }
 
+TEST(WorldSource, IsMadeOncePerImageWhileItIsHeld) {
+    WorldImage image = painted(128, 64, sunAndSky);
+    const auto held = worldSource(image);
+    EXPECT_EQ(worldSource(image), held);
+    WorldImage changed = image;
+    changed.pixels[128 * 60 + 77].y += 0.5f;
+    auto other = worldSource(changed);
+    EXPECT_NE(other->irradiance({0, 0, 0}, {0, 0, 1}), held->irradiance({0, 0, 0}, {0, 0, 1}));
+    EXPECT_NE(other->shape, held->shape);
+    EXPECT_EQ(worldSource(changed), other);
+    // Of the same number of pixels, but of another shape.
+    changed.width = 64;
+    changed.height = 128;
+    EXPECT_NE(worldSource(changed)->shape, other->shape);
+    const std::weak_ptr<const WorldSource> last = other = worldSource(image);
+    EXPECT_FALSE(last.expired());
+    other.reset();
+    EXPECT_TRUE(last.expired());
+}
+
 }  // namespace
 }  // namespace raybundle

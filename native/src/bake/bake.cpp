@@ -24,6 +24,7 @@
 #include "job/cancellation.h"
 #include "job/combination.h"
 #include "job/threads.h"
+#include "lights/world_source.h"
 #include "patches/reflectance.h"
 #include "reconstruction/corner_gather.h"
 #include "reconstruction/left_out_corners.h"
@@ -194,6 +195,7 @@ Bake::Results Bake::runStages(const Scene& scene, size_t reportedSets, const Thr
     {
         Stopwatch total(report.totalSeconds);
         noteWhatIsGiven(scene, reportedSets, threads, report);
+        prepareWorld(scene, report);
         showFirstLight(scene, report);
         makePatches(scene, report);
         const std::vector<CoarseShot> coarse = startLines(scene, report);
@@ -239,6 +241,13 @@ void Bake::noteWhatWasTraced(Report& report) const {
     report.cuts = trace->cuts;
     report.lines = trace->tracer->lineCount();
     report.exchanges = trace->counts.exchangeCount();
+}
+
+// Makes the source of the world's image, or keeps it for an equal image.
+void Bake::prepareWorld(const Scene& scene, Report& report) {
+    Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
+    world = scene.worldImage.meanRadiance() == glm::vec3(0.0f) ? nullptr
+                                                               : worldSource(scene.worldImage);
 }
 
 void Bake::showFirstLight(const Scene& scene, Report& report) const {

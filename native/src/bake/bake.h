@@ -28,6 +28,7 @@ class DraftLight;
 class Interim;
 class SourceStrengths;
 class Threads;
+class WorldSource;
 struct SolveInput;
 struct Trace;
 
@@ -77,6 +78,7 @@ class Bake {
     Results runStages(const Scene& scene, size_t reportedSets, const Threads& threads);
     void noteWhatIsGiven(const Scene& scene, size_t reportedSets, const Threads& threads,
                          Report& report) const;
+    void prepareWorld(const Scene& scene, Report& report);
     void showFirstLight(const Scene& scene, Report& report) const;
     void makePatches(const Scene& scene, Report& report);
     std::vector<CoarseShot> startLines(const Scene& scene, Report& report);
@@ -87,8 +89,9 @@ class Bake {
                                     const Exchanged& exchanged, Report& report);
     void noteWhatWasTraced(Report& report) const;
 
-    std::unique_ptr<Trace> trace;       // for the geometry of the last run
-    std::unique_ptr<DraftLight> draft;  // the last run, if it was a draft that can be scaled
+    std::unique_ptr<Trace> trace;              // for the geometry of the last run
+    std::shared_ptr<const WorldSource> world;  // of the last run, which the next one may use
+    std::unique_ptr<DraftLight> draft;         // the last run, if it was a draft that can be scaled
     // Results of the last run per side, see patchIrradiance() and exposedShare().
     Irradiance irradiance;
     std::vector<float> exposed;

@@ -22,9 +22,10 @@
 namespace raybundle {
 namespace {
 
-// The first shot takes longer than this offer with more triangles than this, counted once for each
-// source and twice for the work that does not depend on the sources.
-constexpr size_t kFewTriangles = 150000;
+// The first shot takes far longer than this offer with more triangles than this, counted once for
+// each lamp, twice for the work that does not depend on the sources, and so many times for an image
+// of the world, which takes many samples.
+constexpr size_t kFewTriangles = 20000, kTimesForImage = 8;
 // With more rays than this, places near each other share the light of one, up to about kMostSharing
 // of them.
 constexpr size_t kManyRays = 75000, kMostSharing = 64;
@@ -42,7 +43,9 @@ bool isSlow(const Scene& scene) {
     size_t triangles = 0;
     for (const Instance& instance : scene.instances)
         triangles += triangleCount(scene.meshes[size_t(instance.mesh)]);
-    return triangles * (2 + scene.lights.size()) > kFewTriangles;
+    const size_t times =
+        2 + scene.lights.size() + (scene.worldImage.pixels.empty() ? 0 : kTimesForImage);
+    return triangles * times > kFewTriangles;
 }
 
 // Where light is sampled: near corner `corner` of the cell of a patch.
@@ -261,7 +264,7 @@ class FirstLight {
     const Visibility visibility;
     std::vector<glm::vec3>
         emission;  // per side, for the whole patch, W/m^2; empty if there is none
-    std::vector<std::unique_ptr<LightSource>> sources;
+    LightSources sources;
     glm::vec3 sky{0.0f};  // constant radiance of the world, W/(m^2 sr)
     std::vector<OfInstance> ofInstances;
 };

@@ -291,9 +291,9 @@ bool DirectLight::isUnpowered(size_t source, uint32_t side) const {
            !patches.parentAt(side).stopsDirect;
 }
 
-glm::vec3 sampleEach(const std::vector<std::unique_ptr<LightSource>>& sources,
-                     const Patches& patches, const Visibility& visibility, const Receiver& receiver,
-                     uint32_t index, uint32_t seed) {
+glm::vec3 sampleEach(const LightSources& sources, const Patches& patches,
+                     const Visibility& visibility, const Receiver& receiver, uint32_t index,
+                     uint32_t seed) {
     const ReceiverPlace place(patches, receiver);
     glm::vec3 sum(0.0f);
     for (size_t k = 0; k < sources.size(); ++k) {

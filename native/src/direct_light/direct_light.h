@@ -53,9 +53,9 @@ struct ReceiverPlace;
 
 // Returns an unbiased estimate of the irradiance at a receiver from one sample of each source,
 // W/m^2. `index` is the index of the sample.
-glm::vec3 sampleEach(const std::vector<std::unique_ptr<LightSource>>& sources,
-                     const Patches& patches, const Visibility& visibility, const Receiver& receiver,
-                     uint32_t index, uint32_t seed);
+glm::vec3 sampleEach(const LightSources& sources, const Patches& patches,
+                     const Visibility& visibility, const Receiver& receiver, uint32_t index,
+                     uint32_t seed);
 
 class DirectLight {
   public:
@@ -78,7 +78,7 @@ class DirectLight {
 
     // Returns the emission per side that is no source here and is left to the bundles, W/m^2.
     const std::vector<glm::vec3>& bundledEmission() const { return split->bundled; }
-    const std::vector<std::unique_ptr<LightSource>>& lightSources() const { return sources; }
+    const LightSources& lightSources() const { return sources; }
 
     // Gathers the light at `count` receivers with a relative standard error of about `targetError`
     // each. A coarse pass samples all receivers. Further passes sample those whose error is too
@@ -204,7 +204,7 @@ class DirectLight {
     const Skips skips;
     bool showsByAngle;                           // whether any material shows light by its angle
     std::unique_ptr<const EmissionSplit> split;  // the sources refer to it
-    std::vector<std::unique_ptr<LightSource>> sources;
+    LightSources sources;
 };
 
 }  // namespace raybundle

@@ -12,8 +12,7 @@ constexpr double kMostGrowth = 2;
 
 }  // namespace
 
-LightBySource::LightBySource(const std::vector<std::unique_ptr<LightSource>>& sources,
-                             size_t receivers) {
+LightBySource::LightBySource(const LightSources& sources, size_t receivers) {
     if (sources.empty() || receivers > kMostParts / sources.size()) return;
     for (const auto& source : sources) {
         shapes.push_back(source->shape);
@@ -22,8 +21,7 @@ LightBySource::LightBySource(const std::vector<std::unique_ptr<LightSource>>& so
     parts.resize(receivers * sources.size());
 }
 
-std::optional<LightBySource::Matches> LightBySource::match(
-    const std::vector<std::unique_ptr<LightSource>>& now) const {
+std::optional<LightBySource::Matches> LightBySource::match(const LightSources& now) const {
     if (!isWhole) return std::nullopt;
     Matches result{std::vector<Match>(shapes.size()), {}};
     std::vector<Match>& matches = result.ofKept;

@@ -26,7 +26,7 @@ namespace raybundle {
 class LightBySource {
   public:
     // Reserves memory for `receivers` receivers, or none if that would take too much.
-    LightBySource(const std::vector<std::unique_ptr<LightSource>>& sources, size_t receivers);
+    LightBySource(const LightSources& sources, size_t receivers);
 
     bool hasRoom() const { return !parts.empty(); }
     // Returns the light of one receiver: one entry per source.
@@ -51,7 +51,7 @@ class LightBySource {
     // Returns what has become of the sources. Returns nothing if more than half of the present
     // sources are fresh, if a source with parts is, or if a source has become a much larger part of
     // the light.
-    std::optional<Matches> match(const std::vector<std::unique_ptr<LightSource>>& now) const;
+    std::optional<Matches> match(const LightSources& now) const;
 
     // Returns the light at all receivers with the present strengths. isUnpowered(source, receiver)
     // takes the index of a present source; see Gathered::unpowered.

@@ -55,11 +55,10 @@ void joinMany(Groups& groups) {
 
 }  // namespace
 
-std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
-                                                      const std::vector<bool>& sourceSides,
-                                                      const std::vector<glm::vec3>& emission,
-                                                      const DirectedEmission* directed) {
-    std::vector<std::unique_ptr<LightSource>> sources;
+LightSources meshSources(const Scene& scene, const Patches& patches,
+                         const std::vector<bool>& sourceSides,
+                         const std::vector<glm::vec3>& emission, const DirectedEmission* directed) {
+    LightSources sources;
     using Group = std::tuple<uint32_t, int32_t, uint32_t>;  // instance, material and surface
     std::map<Group, std::vector<uint32_t>> groups;
     for (size_t p = 0; p < patches.parents.size(); ++p) {
@@ -93,13 +92,14 @@ std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const 
         for (uint32_t p : parents) enclosing.add(surfaces[patches.parents[p].surface]);
         for (uint32_t back = 0; back < 2; ++back) {
             if (most[back] == glm::vec3(0.0f)) continue;
-            sources.push_back(std::make_unique<MeshSource>(
+            auto source = std::make_shared<MeshSource>(
                 patches,
                 EmissiveFaces{parents, back, most[back], varies || directed ? &emission : nullptr,
-                              enclosing.box, enclosing.hides[back], directed}));
-            sources.back()->name = "object \"" + scene.instances[std::get<0>(key)].name + "\"";
-            sources.back()->magnitude = most[back];
-            sources.back()->shape = shapeOf(patches, parents, back, emission, most[back]);
+                              enclosing.box, enclosing.hides[back], directed});
+            source->name = "object \"" + scene.instances[std::get<0>(key)].name + "\"";
+            source->magnitude = most[back];
+            source->shape = shapeOf(patches, parents, back, emission, most[back]);
+            sources.push_back(std::move(source));
         }
     }
     return sources;

@@ -16,9 +16,8 @@ namespace raybundle {
 // patches, averaged over the whole patch, W/m^2, and 0 for sides that are not marked. `directed`
 // adds the dependence of the emission on the direction; null if there is none. All arguments must
 // outlive the sources, except `sourceSides`.
-std::vector<std::unique_ptr<LightSource>> meshSources(const Scene& scene, const Patches& patches,
-                                                      const std::vector<bool>& sourceSides,
-                                                      const std::vector<glm::vec3>& emission,
-                                                      const DirectedEmission* directed);
+LightSources meshSources(const Scene& scene, const Patches& patches,
+                         const std::vector<bool>& sourceSides,
+                         const std::vector<glm::vec3>& emission, const DirectedEmission* directed);
 
 }  // namespace raybundle

@@ -39,11 +39,10 @@ PatchPoint LightSource::placeOn(const ReceiverPlace& patch, glm::vec2 uv) const 
     return {patch.at(uv)};
 }
 
-std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
-                                                       const std::vector<bool>& sourceSides,
-                                                       const std::vector<glm::vec3>& emission,
-                                                       int32_t lightSet) {
-    std::vector<std::unique_ptr<LightSource>> sources;
+LightSources lightSources(const Scene& scene, const Patches& patches,
+                          const std::vector<bool>& sourceSides,
+                          const std::vector<glm::vec3>& emission, int32_t lightSet) {
+    LightSources sources;
     for (const Light& light : scene.lights) {
         if (light.strength == glm::dvec3(0.0) || light.lightSet != lightSet) continue;
         std::unique_ptr<LightSource> source = lampSource(light, patches.centre);
@@ -55,14 +54,8 @@ std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const
         sources.push_back(std::move(source));
     }
 
-    if (scene.worldLightSet == lightSet && !scene.worldImage.pixels.empty() &&
-        scene.worldImage.meanRadiance() != glm::vec3(0.0f)) {
-        Hasher hasher;
-        hasher.add(scene.worldImage.width, scene.worldImage.height);
-        hasher.add(scene.worldImage.pixels);
-        sources.push_back(std::make_unique<WorldSource>(scene.worldImage));
-        sources.back()->name = "the world";
-        sources.back()->shape = hasher.value();
+    if (scene.worldLightSet == lightSet && scene.worldImage.meanRadiance() != glm::vec3(0.0f)) {
+        sources.push_back(worldSource(scene.worldImage));
     }
 
     for (auto& source : meshSources(scene, patches, sourceSides, emission, nullptr))

@@ -199,13 +199,15 @@ class LightSource {
     virtual EmittedRay emit(const glm::vec4& u, float sceneRadius) const = 0;
 };
 
+// Sources are shared where it takes long to make them (lights/world_source.h).
+using LightSources = std::vector<std::shared_ptr<const LightSource>>;
+
 // Returns all sources of a light set whose light the first shot gathers: the lamps, the image of
 // the world if it is in the light set, and the emissive faces (lights/emissive_meshes.h).
 // `sourceSides` marks the patch sides that are light sources; `emission` is per patch side,
 // W/m^2. `scene`, `patches` and `emission` must outlive the sources.
-std::vector<std::unique_ptr<LightSource>> lightSources(const Scene& scene, const Patches& patches,
-                                                       const std::vector<bool>& sourceSides,
-                                                       const std::vector<glm::vec3>& emission,
-                                                       int32_t lightSet = kNoLightSet);
+LightSources lightSources(const Scene& scene, const Patches& patches,
+                          const std::vector<bool>& sourceSides,
+                          const std::vector<glm::vec3>& emission, int32_t lightSet = kNoLightSet);
 
 }  // namespace raybundle

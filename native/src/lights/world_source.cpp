@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <glm/gtc/constants.hpp>
 #include <limits>
+#include <mutex>
 
 #include "lights/receiver_place.h"
+#include "sampling/hasher.h"
 #include "sampling/sphere_sampling.h"
 
 namespace raybundle {
@@ -70,6 +73,11 @@ WorldImage refined(const WorldImage& image) {
 }  // namespace
 
 WorldSource::WorldSource(const WorldImage& given) : image(refined(given)) {
+    Hasher hasher;
+    hasher.add(given.width, given.height);
+    hasher.add(given.pixels);
+    shape = hasher.value();
+    name = "the world";
     for (int y = 0; y <= image.height; ++y) {
         const double elevation = glm::pi<double>() * (double(y) / image.height - 0.5);
         height.push_back(std::sin(elevation));
@@ -87,6 +95,12 @@ WorldSource::WorldSource(const WorldImage& given) : image(refined(given)) {
     leastCut = kLeastCut * regions[0].strength;
     findParts(0);
     findPartNeighbours();
+}
+
+bool WorldSource::isOf(const WorldImage& given) const {
+    return image.width == given.width && image.height == given.height &&
+           std::memcmp(image.pixels.data(), given.pixels.data(),
+                       image.pixels.size() * sizeof(glm::vec3)) == 0;
 }
 
 void WorldSource::findParts(uint32_t index) {
@@ -386,6 +400,18 @@ EmittedRay WorldSource::emit(const glm::vec4& u, float sceneRadius) const {
                             ? lights[choice.region].flux[c] / (choice.probability * all.flux[c])
                             : 0;
     return ray;
+}
+
+std::shared_ptr<const WorldSource> worldSource(const WorldImage& image) {
+    static std::mutex mutex;
+    static std::weak_ptr<const WorldSource> last;
+    const std::lock_guard lock(mutex);
+    std::shared_ptr<const WorldSource> source = last.lock();
+    if (!source || !source->isOf(image)) {
+        source = std::make_shared<const WorldSource>(image);
+        last = source;
+    }
+    return source;
 }
 
 }  // namespace raybundle
