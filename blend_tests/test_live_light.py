@@ -292,6 +292,19 @@ def exports(monkeypatch):
     return found
 
 
+@pytest.fixture
+def native_scenes(monkeypatch):
+    """The native scenes that were built."""
+    build, found = bake_module.build_native_scene, []
+
+    def noted(data):
+        found.append(build(data))
+        return found[-1]
+
+    monkeypatch.setattr(bake_module, 'build_native_scene', noted)
+    return found
+
+
 def skips(report):
     return [item['id'] for item in report.skipped]
 
@@ -306,13 +319,15 @@ def next_draft(live):
 
 
 @pytest.mark.parametrize("change", [change_power, change_color, move_lamp])
-def test_only_lamps_are_exported_again(room, live, exports, change):
+def test_only_lamps_are_exported_again(room, live, exports, native_scenes, change):
     switch_on(live)
     exports.clear()
+    native_scenes.clear()
     change(bpy.context.scene)
     bpy.context.view_layer.update()
     next_draft(live)
     assert exports == []
+    assert native_scenes == []
     draft = read_colors(room).copy()
     # The library keeps the light of the draft only if a whole export gives it the same scene.
     prepared = bake_module.prepare(bpy.context, live_light.DRAFT, True)

@@ -21,7 +21,7 @@ from .light_sets import LightSet, read_light_sets
 from .mesh_arrays import corner_vertices
 from .messages import Message, quoted
 from .native import ErrorCode, Progress, RaybundleError
-from .native_scene import build_native_scene
+from .native_scene import build_native_scene, replace_lights
 from .properties import BakeSettings, read_settings
 from .quality import OBJECT_FACTORS, full_bake
 from .scene_data import MeshData
@@ -122,9 +122,13 @@ def _read_settings(scene: bpy.types.Scene, overrides: dict[str, object]) -> Bake
 
 
 def _ready(prepared: PreparedBake, is_draft: bool) -> PreparedBake:
-    """Adds to a bake whose scene is exported what the native library needs."""
+    """Adds to a bake whose scene is exported what the native library needs. A native scene that the
+    bake has already, and that is open, may differ from the exported scene only in its lights."""
     prepared.native_bake = bake_cache.get_or_create(prepared.scene)
-    prepared.native_scene = build_native_scene(prepared.export.scene)
+    if prepared.native_scene is None or prepared.native_scene.is_closed:
+        prepared.native_scene = build_native_scene(prepared.export.scene)
+    else:
+        replace_lights(prepared.native_scene, prepared.export.scene)
     prepared.export_seconds = time.perf_counter() - prepared.started
     try:
         _apply_settings(prepared.native_bake, prepared.settings)

@@ -93,9 +93,13 @@ class BakeRun:
             self.prepared = last and prepare_lamps(context, overrides or {}, is_draft, last)
             if self.prepared is None:
                 self.prepared = prepare(context, overrides or {}, is_draft)
-        # The run keeps the native scene until it ends.
-        with self.prepared.native_scene:
+        try:
             self._run = native.Run(self.prepared.native_bake, self.prepared.native_scene)
+        finally:
+            # The run keeps the native scene until it ends. If only lamps change, live mode uses it
+            # for the next run too.
+            if not is_live:
+                self.prepared.native_scene.close()
         self._interim = InterimLight(self.prepared)
         self.state = self._run.state()
         # time.perf_counter() when light was last shown, or None if that has been drawn; and before

@@ -174,6 +174,7 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_add_sun_light': (_handle, _text, _floats, _floats, _float, _out(_int)),
     'rb_add_area_light': (_handle, _text, _floats, _floats, _floats, _floats, _enum, _out(_int)),
     'rb_set_light_spread': (_handle, _int, _float),
+    'rb_remove_lights': (_handle,),
     'rb_set_light_shadows': (_handle, _int, ctypes.c_bool),
     'rb_set_instance_visibility': (_handle, _int, ctypes.c_bool, ctypes.c_bool),
     'rb_set_instance_quality': (_handle, _int, ctypes.c_float, ctypes.c_float),
@@ -554,6 +555,10 @@ class Scene(_Handle):
     def set_light_shadows(self, light: int, casts_shadows: bool) -> None:
         """Sets whether surfaces block the light of a lamp. They do by default."""
         self._library.rb_set_light_shadows(self._pointer, light, casts_shadows)
+
+    def remove_lights(self) -> None:
+        """Removes all lights. Lights that are added get their ids."""
+        self._library.rb_remove_lights(self._pointer)
 
     def set_instance_visibility(self, instance: int, stops_direct: bool, exchanges: bool) -> None:
         """Sets which light an instance affects. stops_direct: whether the instance blocks direct

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from . import native
 from .quality import OBJECT_FACTORS
 from .scene_data import (AreaLightData, LightData, LightSetData, MeshData, PointLightData,
@@ -29,14 +31,23 @@ def build_native_scene(data: SceneData) -> native.Scene:
         scene.set_instance_quality(identifier, factors.noise, factors.patch_size)
         if instance.result_corners is not None:
             scene.set_result_corners(identifier, instance.result_corners)
-    for light in data.lights:
-        _add_light(scene, light)
+    _add_lights(scene, data.lights)
     scene.set_world(data.world)
     if data.world_image is not None:
         scene.set_world_image(data.world_image)
     for light_set in data.light_sets:
         _add_light_set(scene, light_set)
     return scene
+
+
+def replace_lights(scene: native.Scene, data: SceneData) -> None:
+    """Gives a native scene the lights of data, from which it must differ in nothing else. Raises
+    RaybundleError if the native library rejects a light."""
+    scene.remove_lights()
+    _add_lights(scene, data.lights)
+    for identifier, light_set in enumerate(data.light_sets):
+        for light in light_set.lights:
+            scene.set_light_set(light, identifier)
 
 
 def _add_mesh(scene: native.Scene, mesh: MeshData) -> None:
@@ -48,6 +59,11 @@ def _add_mesh(scene: native.Scene, mesh: MeshData) -> None:
         scene.set_mesh_uvs(identifier, mesh.uvs)
     if mesh.corner_colors is not None:
         scene.set_mesh_corner_colors(identifier, mesh.corner_colors)
+
+
+def _add_lights(scene: native.Scene, lights: Sequence[LightData]) -> None:
+    for light in lights:
+        _add_light(scene, light)
 
 
 def _add_light(scene: native.Scene, light: LightData) -> None:

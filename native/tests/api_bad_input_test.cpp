@@ -44,6 +44,7 @@ TEST(ApiNull, HandlesAreRefusedEverywhere) {
     expectInvalid(rb_set_light_cone(nullptr, 0, matrix, 1, 0, false), "scene");
     expectInvalid(rb_set_light_spread(nullptr, 0, 1), "scene");
     expectInvalid(rb_set_light_shadows(nullptr, 0, false), "scene");
+    expectInvalid(rb_remove_lights(nullptr), "scene");
     expectInvalid(rb_set_instance_visibility(nullptr, 0, true, true), "scene");
     expectInvalid(rb_set_instance_quality(nullptr, 0, 1, 1), "scene");
     expectInvalid(rb_set_result_corners(nullptr, 0, nullptr, 0), "scene");

@@ -56,6 +56,32 @@ TEST_F(ApiLightSets, GiveTheirPartOfTheLight) {
     for (float v : setLight(lamps, box)) EXPECT_EQ(v, 0);
 }
 
+TEST_F(ApiLightSets, StayWhenLampsAreAddedAnew) {
+    const float centre[3] = {0.5f, 0.5f, 0.5f}, corner[3] = {0.2f, 0.2f, 0.2f}, red[3] = {1, 0, 0};
+    const int32_t box = addFurnace(), lamps = addSet("lamps");
+    int32_t lamp = -1;
+    // Each bake begins anew.
+    ASSERT_EQ(rb_set_bake_int(bake, "skip.geometry", 0), RB_ERROR_NONE);
+    auto bakeWithLamp = [&](const float(&position)[3]) {
+        EXPECT_EQ(rb_add_point_light(scene, "lamp", position, red, 0, RB_POINT_DISK, &lamp),
+                  RB_ERROR_NONE);
+        EXPECT_EQ(lamp, 0);
+        EXPECT_EQ(rb_set_light_set(scene, lamp, lamps), RB_ERROR_NONE);
+        EXPECT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+        return setLight(lamps, box);
+    };
+    const std::vector<float> before = bakeWithLamp(centre);
+    ASSERT_EQ(rb_remove_lights(scene), RB_ERROR_NONE);
+    expectInvalid(rb_set_light_set(scene, lamp, lamps), "light 0");
+    const std::vector<float> moved = bakeWithLamp(corner);
+    EXPECT_NE(moved, before);
+    ASSERT_EQ(rb_remove_lights(scene), RB_ERROR_NONE);
+    EXPECT_EQ(bakeWithLamp(centre), before);
+    ASSERT_EQ(rb_remove_lights(scene), RB_ERROR_NONE);
+    ASSERT_EQ(rb_execute_bake(bake, scene), RB_ERROR_NONE) << message();
+    for (float v : setLight(lamps, box)) EXPECT_EQ(v, 0);
+}
+
 TEST_F(ApiLightSets, NameWhatIsWrong) {
     const int32_t box = addFurnace(), set = addSet("glow");
     int32_t other = -1;

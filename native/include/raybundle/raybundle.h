@@ -395,6 +395,10 @@ RB_API rb_error rb_set_light_spread(rb_scene scene, int32_t light, float spread)
  * light as emitted. */
 RB_API rb_error rb_set_light_shadows(rb_scene scene, int32_t light, bool casts_shadows);
 
+/* Removes all lights, whose ids are then given to lights that are added. All else of the scene
+ * stays, so that a scene whose lights have moved need not be made anew. */
+RB_API rb_error rb_remove_lights(rb_scene scene);
+
 /* Sets the constant radiance of the world around the scene: RGB, W/(m^2 sr), black by default.
  * Negative values count as 0. */
 RB_API rb_error rb_set_world(rb_scene scene, const float radiance[3]);

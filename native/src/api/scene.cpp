@@ -255,6 +255,13 @@ rb_error rb_set_light_shadows(rb_scene scene, int32_t light, bool casts_shadows)
     });
 }
 
+rb_error rb_remove_lights(rb_scene scene) {
+    return guarded([&] {
+        const HeldScene held(scene, "scene");
+        held->lights.clear();
+    });
+}
+
 rb_error rb_set_world(rb_scene scene, const float radiance[3]) {
     return guarded([&] {
         const HeldScene held(scene, "scene");
