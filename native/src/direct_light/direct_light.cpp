@@ -227,10 +227,9 @@ std::vector<Gathered> DirectLight::gatherFresh(const LightBySource& before,
         addFresh(results, matches.fresh, {receiverAt, targetError, progress, neighbours}, seen);
     // Receivers that already took as many samples as allowed also have a large error. A further
     // pass would not reduce it, so the error is compared with the one before.
-    const std::vector<Gathered> then = before.asItWas();
     Aims further = aimsAfter(results, patches, receiverAt, {}, targetError);
     further.keep([&](uint32_t k, const Aim&) {
-        const Gathered &now = results[k], &was = then[k];
+        const Gathered &now = results[k], was = before.asItWas(k);
         const float light = brightest(now.irradiance), lightThen = brightest(was.irradiance);
         return now.variance * lightThen * lightThen > kSameError * was.variance * light * light;
     });

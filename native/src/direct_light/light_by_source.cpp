@@ -67,10 +67,9 @@ std::optional<LightBySource::Matches> LightBySource::match(const LightSources& n
     return result;
 }
 
-std::vector<Gathered> LightBySource::asItWas() const {
-    std::vector<Match> same(shapes.size());
-    for (Match& match : same) match = {0, glm::vec3(1.0f)};
-    return scaled(same, [](size_t, size_t) { return false; });
+Gathered LightBySource::asItWas(size_t receiver) const {
+    const std::vector<Match> same(shapes.size(), {0, glm::vec3(1.0f)});
+    return scaled(same, receiver, [](size_t, size_t) { return false; });
 }
 
 }  // namespace raybundle

@@ -60,21 +60,28 @@ class LightBySource {
                                  const IsUnpowered& isUnpowered) const {
         std::vector<Gathered> results(parts.size() / matches.size());
         parallelFor(size_t(0), results.size(), [&](size_t receiver) {
-            for (size_t k = 0; k < matches.size(); ++k)
-                if (const auto source = matches[k].source)
-                    results[receiver].add(
-                        uint32_t(*source),
-                        parts[receiver * matches.size() + k].scaled(matches[k].factor),
-                        isUnpowered(*source, receiver),
-                        hash(uint32_t(receiver), uint32_t(*source)));
+            results[receiver] = scaled(matches, receiver, isUnpowered);
         });
         return results;
     }
 
-    // Returns the light of each receiver with the old strengths, and its variance.
-    std::vector<Gathered> asItWas() const;
+    // Returns the light of a receiver with the old strengths.
+    Gathered asItWas(size_t receiver) const;
 
   private:
+    template <class IsUnpowered>
+    Gathered scaled(const std::vector<Match>& matches, size_t receiver,
+                    const IsUnpowered& isUnpowered) const {
+        Gathered result;
+        for (size_t k = 0; k < matches.size(); ++k)
+            if (const auto source = matches[k].source)
+                result.add(uint32_t(*source),
+                           parts[receiver * matches.size() + k].scaled(matches[k].factor),
+                           isUnpowered(*source, receiver),
+                           hash(uint32_t(receiver), uint32_t(*source)));
+        return result;
+    }
+
     std::vector<uint64_t> shapes;       // per source
     std::vector<glm::vec3> magnitudes;  // per source
     std::vector<LightPart> parts;       // entry receiver * (number of sources) + source
