@@ -189,8 +189,14 @@ BundleSolve::Halves BundleSolve::seen() const {
 
 // Measures the noise that corners show. Each look does this anew instead of using the looks of
 // earlier bakes, so that equal light gets equal rays whatever was baked before. It is repeated
-// after extra rays, because their noise differs in kind from that of lines.
+// after extra rays, because their noise differs in kind from that of lines. A draft, which may take
+// hundredths of a second, makes do with the noise that is foretold.
 void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen) {
+    if (isDraft) {
+        shown = {std::vector<double>(growth.size(), kUsuallyOverForetold),
+                 std::vector<double>(look.ofLights().front().cells().size(), -1)};
+        return;
+    }
     shown = shownNoise(
         in.scene, {in.tiles.patches(), in.tiles.mean(in.trace.exposedShare(), patches.sideAreas())},
         look.ofLights().front(), halvesSeen.front(), in.settings.regularization, growth);

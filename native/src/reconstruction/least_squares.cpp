@@ -20,8 +20,7 @@ namespace {
 constexpr float kLeastBounding = 0.4f;
 // A face touches another surface if less than this share of it is exposed.
 constexpr double kTouched = 0.9;
-// Relative residual at which the iteration ends, and its maximum number of steps.
-constexpr double kTolerance = 1e-6;
+// Maximum number of steps of the iteration.
 constexpr Eigen::Index kMaxIterations = 2000;
 // Maximum relative residual of a fit that is shown.
 constexpr double kMostResidual = 1e-3;
@@ -190,11 +189,12 @@ using Fields = std::vector<const std::vector<glm::vec3>*>;  // each per side
 class NormalEquations {
   public:
     NormalEquations(const LitSurfaces& surfaces, const InstanceSide& surface, float regularization,
-                    const Fields& fields)
+                    const Fields& fields, double tolerance)
         : patches(surfaces.patches),
           surface(surface),
           exposed(surfaces.exposed),
           fields(fields),
+          tolerance(tolerance),
           terms(surface.regions.nodeCount),
           rhs(Eigen::MatrixXd::Zero(nodes(), Eigen::Index(columns()))),
           mostExposed(size_t(nodes()), 0.0f) {
@@ -229,7 +229,7 @@ class NormalEquations {
         Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper,
                                  CancellableJacobi>
             solver;
-        solver.setTolerance(kTolerance);
+        solver.setTolerance(tolerance);
         solver.setMaxIterations(kMaxIterations);
         solver.compute(matrix);
         Eigen::VectorXd fit = solver.solveWithGuess(rhs.col(Eigen::Index(column)), mean);
@@ -313,6 +313,7 @@ class NormalEquations {
     const InstanceSide& surface;
     const std::vector<float>& exposed;
     const Fields& fields;
+    const double tolerance;
     FitTerms terms;
     Eigen::MatrixXd rhs;
     Eigen::SparseMatrix<double> matrix;
@@ -327,10 +328,11 @@ class NormalEquations {
 
 LeastSquaresFit leastSquares(const LitSurfaces& surfaces, const InstanceSide& surface,
                              float regularization,
-                             const std::vector<const std::vector<glm::vec3>*>& fields) {
+                             const std::vector<const std::vector<glm::vec3>*>& fields,
+                             double tolerance) {
     const size_t nodes = surface.regions.nodeCount;
     if (nodes == 0) return {std::vector<std::vector<glm::vec3>>(fields.size())};
-    const NormalEquations equations(surfaces, surface, regularization, fields);
+    const NormalEquations equations(surfaces, surface, regularization, fields, tolerance);
     std::vector<std::vector<glm::vec3>> result(fields.size(), std::vector<glm::vec3>(nodes));
     std::atomic<bool> areSolved = true;
     parallelFor(size_t(0), equations.columns(), [&](size_t c) {

@@ -36,6 +36,10 @@ namespace raybundle {
 // patches are covered.
 constexpr float kLeastExposure = 1e-5f;
 
+// Relative residuals at which a fit differs from the exact one by its rounding only, and by less
+// than the noise of a draft.
+constexpr double kExactFit = 1e-6, kDraftFit = 5e-4;
+
 // The result of leastSquares().
 struct LeastSquaresFit {
     std::vector<std::vector<glm::vec3>> fields;  // per field and node, not negative
@@ -47,9 +51,11 @@ struct LeastSquaresFit {
 // Reconstructs several fields of light on one side of an instance. `surfaces.exposed` holds the
 // share of each patch side that counts, 0 to 1. `regularization` is the weight alpha of the
 // regularisation, without unit. Each of the `fields` is per patch side; the result is in the unit
-// of the field. Throws Error(CANCELLED) if the bake is cancelled.
+// of the field. The iteration ends at the relative residual `tolerance`. Throws Error(CANCELLED) if
+// the bake is cancelled.
 LeastSquaresFit leastSquares(const LitSurfaces& surfaces, const InstanceSide& surface,
                              float regularization,
-                             const std::vector<const std::vector<glm::vec3>*>& fields);
+                             const std::vector<const std::vector<glm::vec3>*>& fields,
+                             double tolerance = kExactFit);
 
 }  // namespace raybundle

@@ -103,6 +103,8 @@ double meanSquare(const Instance& instance, const InstanceLight& light) {
 // Copies the light of each node to all corners of the node.
 CornerLight cornerLight(const SmoothRegions& regions, const NodeLight& nodes) {
     CornerLight light;
+    for (auto* values : {&light.direct, &light.indirect, &light.exitance})
+        values->reserve(regions.nodeOf.size());
     for (uint32_t node : regions.nodeOf) {
         light.direct.push_back(nodes.direct[node]);
         light.indirect.push_back(nodes.indirect[node]);
@@ -133,7 +135,8 @@ using FieldList = std::vector<const Field*>;
 
 LeastSquaresFit byLeastSquares(const LitSurfaces& surfaces, const InstanceSide& surface,
                                const Settings& settings, const FieldList& fields) {
-    return leastSquares(surfaces, surface, settings.regularization, fields);
+    return leastSquares(surfaces, surface, settings.regularization, fields,
+                        settings.draft ? kDraftFit : kExactFit);
 }
 
 LeastSquaresFit byAreaAverage(const LitSurfaces& surfaces, const InstanceSide& surface,
