@@ -10,6 +10,7 @@
 #include "patches/side.h"
 #include "surfaces/translucence.h"
 #include "transport/conjugate_gradients.h"
+#include "transport/kept_lines.h"
 #include "transport/line_system.h"
 
 namespace raybundle {
@@ -137,7 +138,9 @@ Irradiance LineReuse::solve(Half half, float tolerance, Field& reflected) const 
 Irradiance LineReuse::solve(Half half, float tolerance, LineSolution& guess,
                             const LineWeights& weights) const {
     ByAngle byAngle;
-    byAngle.brought = byAngle.ofSources = directed(half, weights);
+    byAngle.ofSources =
+        accuracy.isRough ? directedAlongKept(half, weights, guess) : directed(half, weights);
+    byAngle.brought = byAngle.ofSources;
     Irradiance light = solvePassed(half, tolerance, guess, weights, byAngle);
     // A half only measures the noise, so it is solved once, without the dependence on angles.
     if (half != Half::BOTH || !directedLight.hasAngles()) return light;

@@ -108,6 +108,10 @@ class LineReuse {
     std::vector<glm::vec3> directed(Half half, const LineWeights& weights) const;
 
   private:
+    // Returns what directed() does. Keeps the lines in `guess` and takes those that are there.
+    std::vector<glm::vec3> directedAlongKept(Half half, const LineWeights& weights,
+                                             LineSolution& guess) const;
+    KeptLines keptLines(Half half, const LineWeights& weights, size_t ofSide) const;
     // Returns whether directed() takes light from cells of directions, for lines of this half.
     bool usesCells(Half half) const { return accuracy.isRough || half != Half::BOTH; }
     // Returns whether a side sends no light of the sources by direction, as directed() takes it.

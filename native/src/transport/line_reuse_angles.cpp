@@ -21,6 +21,7 @@
 #include "patches/side.h"
 #include "sampling/sobol.h"
 #include "scene/channels.h"
+#include "transport/kept_lines.h"
 #include "transport/line_reuse.h"
 
 namespace raybundle {
@@ -90,6 +91,39 @@ std::vector<glm::vec3> LineReuse::directed(Half half, const LineWeights& weights
                                   : scatteredOfSources.towards(
                                         from, directedLight.wayBetween(from, i, hash(i, entry))));
         });
+    });
+    return brought;
+}
+
+KeptLines LineReuse::keptLines(Half half, const LineWeights& weights, size_t ofSide) const {
+    KeptLines kept{ofSide, std::vector<KeptLines::Line>(ofSide * counts.sideCount())};
+    forEachSide<kInTask>(counts.sideCount(), [&](uint32_t i) {
+        const auto first = kept.lines.begin() + ptrdiff_t(ofSide * i);
+        alongLines(half, weights, {0, ofSide}, i, [&](float share, uint32_t from, uint32_t entry) {
+            first[entry] = {
+                from, share,
+                ScatteredLight::placeOf(patches.normal(from),
+                                        directedLight.wayBetween(from, i, hash(i, entry)))};
+        });
+    });
+    return kept;
+}
+
+std::vector<glm::vec3> LineReuse::directedAlongKept(Half half, const LineWeights& weights,
+                                                    LineSolution& guess) const {
+    if (scatteredOfSources.isNone() || shot.incoming.empty()) return {};
+    const size_t ofSide = enoughLines().entries;
+    if (!guess.lines || guess.lines->ofSide != ofSide)
+        guess.lines = std::make_shared<const KeptLines>(keptLines(half, weights, ofSide));
+    const KeptLines& kept = *guess.lines;
+    const std::vector<float> exposed = exposedShare();
+    std::vector<glm::vec3> brought(counts.sideCount(), glm::vec3(0.0f));
+    forEachSide<kInTask>(brought.size(), [&](uint32_t i) {
+        const KeptLines::Line* line = &kept.lines[ofSide * i];
+        for (size_t k = 0; k < ofSide && line->share > 0; ++k, ++line)
+            if (exposed[line->from] > 0 && !isUndirected(half, line->from))
+                brought[i] += line->share / exposed[line->from] *
+                              scatteredOfSources.towards(line->from, line->place);
     });
     return brought;
 }

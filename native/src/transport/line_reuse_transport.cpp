@@ -93,7 +93,10 @@ class LineReuseTransport : public Transport {
         const uint32_t bundles = input.counts.bundles;
         LineSolution& guess = last.of[size_t(half)];
         const bool isOfOthers = guess.bundles != bundles;
-        if (isOfOthers) guess.brought.clear();
+        if (isOfOthers) {
+            guess.brought.clear();
+            guess.lines.reset();
+        }
         if (!input.settings.skipWarmStart) {
             std::fill(guess.reflected.begin(), guess.reflected.end(), glm::vec3(0.0f));
             guess.passed.clear();

@@ -56,14 +56,10 @@ glm::vec2 cellsAt(glm::vec2 disk) {
     return (0.5f * p + 0.5f) * float(kEdge);
 }
 
-// The four cells around a direction, and the position of the direction in the square between their
-// centres.
-struct Around {
-    static constexpr int kWhole = 255;
-    // `first` is the index of the first cell. `s` and `t` are 0 to kWhole across the square.
-    uint8_t first = 0, s = 0, t = 0;
-
+// A place with its cells and their weights.
+struct Around : ScatteredLight::Place {
     Around() = default;
+    explicit Around(const Place& place) : Place(place) {}
     // `point` is a point of the unit square, times kEdge.
     explicit Around(const glm::vec2& point) {
         const glm::vec2 p = glm::clamp(point - 0.5f, 0.0f, float(kEdge - 1));
@@ -236,7 +232,7 @@ ScatteredLight::ScatteredLight(const Patches& patches, const FirstShot& shot, bo
     if (seesSky) open.resize(sent.size());
     if (shot.incoming.empty()) return;
     parallelFor(uint32_t(0), uint32_t(indices.size()), [&](uint32_t side) {
-        if (isNone(side)) return;
+        if (isNone(side) || shot.irradiance[side] == glm::vec3(0.0f)) return;
         Cells arriving{};
         for (size_t k = 0; k < Incoming::kCount; ++k)
             add(side, shot.incoming[side].direction(k),
@@ -359,9 +355,19 @@ void ScatteredLight::set(uint32_t side, const Cells& arriving) {
         for (int c = 0; c < 3; ++c) target.cells[out][size_t(c)] = int8_t(steps(out, c));
 }
 
+ScatteredLight::Place ScatteredLight::placeOf(const glm::vec3& normal, const glm::vec3& direction) {
+    const auto [x, y] = frame(normal);
+    return AroundTable::instance().at(x, y, direction);
+}
+
 glm::vec3 ScatteredLight::towards(uint32_t side, const glm::vec3& direction) const {
     const Sent& source = sent[indices[side]];
-    const Around& around = AroundTable::instance().at(source.x, source.y, direction);
+    return towards(side, AroundTable::instance().at(source.x, source.y, direction));
+}
+
+glm::vec3 ScatteredLight::towards(uint32_t side, const Place& place) const {
+    const Sent& source = sent[indices[side]];
+    const Around around(place);
     // The sum is in integers, because this needs fewer conversions to float.
     glm::ivec3 sum(0);
     const std::array<uint32_t, 4> at = around.cells();
@@ -370,7 +376,7 @@ glm::vec3 ScatteredLight::towards(uint32_t side, const glm::vec3& direction) con
         const auto& cell = source.cells[at[k]];
         sum += shares[k] * glm::ivec3(cell[0], cell[1], cell[2]);
     }
-    return source.unit / (Around::kWhole * Around::kWhole) * glm::vec3(sum);
+    return source.unit / (Place::kWhole * Place::kWhole) * glm::vec3(sum);
 }
 
 float ScatteredLight::contrast(uint32_t side) const {

@@ -37,6 +37,17 @@ class ScatteredLight {
     using Hemisphere = std::array<float, kCells>;
     using Cells = std::array<Hemisphere, 3>;  // by channel
 
+    // The four cells around a direction, and where the direction lies in the square between their
+    // centres.
+    struct Place {
+        static constexpr int kWhole = 255;
+        // `first` is the index of the first cell. `s` and `t` are 0 to kWhole across the square.
+        uint8_t first = 0, s = 0, t = 0;
+    };
+    // Returns the place of a direction in the cells of a side. `normal` is the normal of the side,
+    // `direction` a unit vector that points away from the side.
+    static Place placeOf(const glm::vec3& normal, const glm::vec3& direction);
+
     // Takes the light of a first shot, as if it came from the directions in shot.incoming. If there
     // are no such directions, no side sends anything yet. `seesSky` states whether there is an even
     // sky. `patches` must outlive the object.
@@ -78,6 +89,8 @@ class ScatteredLight {
     // It may be negative. `direction` is a unit vector that points away from the side. The exitance
     // is relative to the same area as the irradiance in set().
     glm::vec3 towards(uint32_t side, const glm::vec3& direction) const;
+    // Returns the same for the place of the direction.
+    glm::vec3 towards(uint32_t side, const Place& place) const;
     // Returns the RMS of towards() over all directions, by the channel with the largest magnitude,
     // W/m^2.
     float contrast(uint32_t side) const;

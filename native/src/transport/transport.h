@@ -62,6 +62,8 @@ struct Irradiance {
     }
 };
 
+struct KeptLines;
+
 // The half of the bundles that an estimate uses, or both halves.
 enum class Half { FIRST = 0, SECOND = 1, BOTH = 2 };
 
@@ -85,6 +87,8 @@ struct LineSolution {
     // W/m^2. Empty if not known.
     std::vector<glm::vec3> brought;
     uint32_t bundles = 0;  // number of bundles of the lines; 0 if there is no solution
+    // For light by direction in drafts. Null if none were chosen yet for these bundles.
+    std::shared_ptr<const KeptLines> lines;
 };
 
 // The solutions of LINE_REUSE for the light of one light set, and the weights of the lines.
