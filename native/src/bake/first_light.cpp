@@ -22,10 +22,6 @@
 namespace raybundle {
 namespace {
 
-// The first shot takes far longer than this offer with more triangles than this, counted once for
-// each lamp, twice for the work that does not depend on the sources, and so many times for an image
-// of the world, which takes many samples.
-constexpr size_t kFewTriangles = 20000, kTimesForImage = 8;
 // With more rays than this, places near each other share the light of one, up to about kMostSharing
 // of them.
 constexpr size_t kManyRays = 75000, kMostSharing = 64;
@@ -38,15 +34,6 @@ constexpr float kInside = 0.1f;
 constexpr size_t kMostEmissive = 30000;
 // Rays to a world of constant radiance, per place.
 constexpr uint32_t kSkyRays = 2;
-
-bool isSlow(const Scene& scene) {
-    size_t triangles = 0;
-    for (const Instance& instance : scene.instances)
-        triangles += triangleCount(scene.meshes[size_t(instance.mesh)]);
-    const size_t times =
-        2 + scene.lights.size() + (scene.worldImage.pixels.empty() ? 0 : kTimesForImage);
-    return triangles * times > kFewTriangles;
-}
 
 // Where light is sampled: near corner `corner` of the cell of a patch.
 struct Place {
@@ -272,7 +259,7 @@ class FirstLight {
 }  // namespace
 
 void offerFirstLight(const Scene& scene, const Settings& settings, Interim& interim) {
-    if (!interim.wantsLight() || !isSlow(scene)) return;
+    if (!interim.wantsLight()) return;
     const FirstLight light(scene, settings);
     if (!light.isDark()) interim.offer([&] { return light.atCorners(); });
 }

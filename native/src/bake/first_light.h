@@ -11,8 +11,7 @@
 
 namespace raybundle {
 
-// Offers the first light of the sources to `interim`, unless the bake's first shot will be about as
-// fast, or no source lights anything. The light has noise, no reflections and, on translucent
+// Offers the first light of the sources to `interim`, unless no source lights anything. The light has noise, no reflections and, on translucent
 // surfaces, nothing of the light from behind.
 void offerFirstLight(const Scene& scene, const Settings& settings, Interim& interim);
 
