@@ -99,6 +99,7 @@ void BundleSolve::look() {
     in.progress.report(RB_STAGE_SOLVE, 0);
     const std::vector<float> exposed = in.trace.exposedShare();
     for (size_t side = 0; side < weight.size(); ++side) weight[side] = area[side] * exposed[side];
+    throwIfCancelled();
     tileWeight = in.tiles.sum(weight);
     float tolerance = kHalfTolerance * float(in.settings.targetError);
     if (isDraft) tolerance = std::min(tolerance, kDraftTolerance);
@@ -109,6 +110,7 @@ void BundleSolve::look() {
     measureCorners(noise, now);
     errors = noise.relative();
     in.trace.looks = noise.looks();
+    throwIfCancelled();
     if (!noisyParts) return;
     noisyParts->look(noise, bundles, in.tiles.sum(in.trace.linesMet()), in.trace.linesMetByAll());
     in.trace.looks.shareOfParts = noisyParts->shares();
@@ -180,9 +182,15 @@ BundleSolve::Halves BundleSolve::seen() const {
     Halves result(lights.size());
     const std::vector<float> exposed = in.trace.exposedShare();
     for (size_t k = 0; k < lights.size(); ++k) {
-        for (size_t h = 0; h < 2; ++h) result[k][h] = in.shown.of(halves[k][h], exposed);
+        for (size_t h = 0; h < 2; ++h) {
+            throwIfCancelled();
+            result[k][h] = in.shown.of(halves[k][h], exposed);
+        }
         gathered.apply(result[k], weight);
-        for (Irradiance& half : result[k]) half = meanOver(in.tiles, half, weight);
+        for (Irradiance& half : result[k]) {
+            throwIfCancelled();
+            half = meanOver(in.tiles, half, weight);
+        }
     }
     return result;
 }

@@ -39,9 +39,11 @@ Tiles::Tiles(const Patches& cut) : original(cut) {
 std::vector<float> Tiles::sum(const std::vector<float>& weight) const {
     if (!uncut) return weight;
     std::vector<float> result(sideCount(), 0.0f);
-    for (size_t side = 0; side < result.size(); ++side)
+    for (size_t side = 0; side < result.size(); ++side) {
+        throwIfCancelledAt(side);
         for (size_t p = first[patchOf(side)]; p < first[patchOf(side) + 1]; ++p)
             result[side] += weight[sideOf(p, isBack(side))];
+    }
     return result;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "job/cancellation.h"
 #include "patches/side.h"
 
 namespace raybundle {
@@ -64,6 +65,7 @@ void Noise::measure(const std::array<Irradiance, 2>& half) {
     double squares = 0, direct = 0;
     signal = 0;
     for (size_t side = 0; side < n; ++side) {
+        throwIfCancelledAt(side);
         const glm::dvec3 a(half[0].direct[side] + half[0].indirect[side]);
         const glm::dvec3 b(half[1].direct[side] + half[1].indirect[side]);
         const double w = double(weight[side]);
@@ -86,6 +88,7 @@ void Noise::measure(const std::array<Irradiance, 2>& half) {
     double variance = 0;
     ofCells.assign(cells.size(), {});
     for (size_t c = 0; c < cells.size(); ++c) {
+        throwIfCancelledAt(c);
         const Cell& cell = cells[c];
         if (!(cell.weight > 0)) continue;
         const double noise = glm::dot(cell.difference, cell.difference) / cell.weight;
@@ -167,6 +170,8 @@ SetNoise::SetNoise(const Looks& before, std::vector<std::vector<float>> errors,
 
 template <class Look>
 void SetNoise::lookAtAll(const std::vector<std::array<Irradiance, 2>>& halves, const Look& look) {
+    throwIfCancelled();
+    if (halves.size() == 1) return look(noises.front(), halves.front());
     std::array<Irradiance, 2> all = halves.front();
     for (size_t k = 1; k < halves.size(); ++k) {
         look(noises[k], halves[k]);

@@ -226,8 +226,10 @@ void NoisyParts::look(const SetNoise& noise, uint32_t count, const std::vector<f
                       double all) {
     const std::vector<double> squares = squaresOf(noise);
     for (Part& part : parts) part.lines = 0;
-    for (size_t side = 0; side < partOf.size(); ++side)
+    for (size_t side = 0; side < partOf.size(); ++side) {
+        throwIfCancelledAt(side);
         if (partOf[side] != kNone) parts[partOf[side]].lines += double(lines[side]);
+    }
     const bool isSeenBefore =
         bundles == 0 && count == before.bundles && before.shareOfParts.size() == parts.size();
     for (size_t p = 0; p < parts.size(); ++p) {

@@ -50,8 +50,10 @@ ShownNoise shownNoise(const Scene& scene, const LitSurfaces& surfaces, const Noi
     const std::vector<Noise::OfCell>& cells = noise.cells();
     std::array<std::vector<glm::vec3>, 2> light = {halves[0].direct, halves[1].direct};
     for (size_t h = 0; h < 2; ++h)
-        for (size_t side = 0; side < light[h].size(); ++side)
+        for (size_t side = 0; side < light[h].size(); ++side) {
+            throwIfCancelledAt(side);
             light[h][side] += halves[h].indirect[side];
+        }
     ShownNoise result{std::vector<double>(growth.size(), kUsuallyOverForetold),
                       std::vector<double>(cells.size(), -1)};
     parallelFor(size_t(0), growth.size(), [&](size_t i) {
