@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "visibility/visibility.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "job/cancellation.h"
 #include "job/error.h"
 #include "patches/opacity.h"
 #include "patches/side.h"
@@ -28,6 +31,17 @@ namespace {
                     (isMemory                            ? ": out of memory"
                      : code == RTC_ERROR_UNSUPPORTED_CPU ? ": it does not support this processor"
                                                          : ""));
+}
+
+// Builds the tree of a scene. The threads of the builder for few queries wait for each other without
+// sleeping, so that the build takes five times as long when two of them get the same processor. A
+// small tree is therefore built with one processor left free. A large one, which takes longer than
+// somebody waits for the end of a bake that was cancelled, must end with it.
+void commit(RTCScene scene, size_t quads, Queries queries) {
+    constexpr size_t kSmallTree = 1000000;
+    if (queries == Queries::MANY || quads > kSmallTree) return embree3.commitScene(scene);
+    const int threads = std::max(1, tbb::this_task_arena::max_concurrency() - 1);
+    tbb::task_arena(threads).execute([&] { embree3.commitScene(scene); });
 }
 
 }  // namespace
@@ -64,18 +78,18 @@ Visibility::Visibility(const Patches& patches, Blockers blockers, Queries querie
         if (!vertices || !indices)
             fail(embree3.getDeviceError(embree->device), "create its buffers");
         std::memcpy(vertices, patches.vertices.data(), patches.vertices.size() * sizeof(glm::vec3));
-        for (const Parent& parent : patches.parents) {
-            if (!blocks(parent)) continue;
+        parallelFor(size_t(0), quads, [&](size_t quad) {
+            const Parent& parent = patches.parents[embree->parentOf[quad]];
             // A triangle is stored as a quad whose last corner is repeated.
-            for (int k = 0; k < 4; ++k)
-                *indices++ = parent.vertex[parent.isTriangle && k == 3 ? 2 : k];
-        }
+            for (size_t k = 0; k < 4; ++k)
+                indices[4 * quad + k] = parent.vertex[parent.isTriangle && k == 3 ? 2 : k];
+        });
         if (queries == Queries::FEW)
             embree3.setGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_LOW);
         embree3.commitGeometry(geometry);
         embree3.attachGeometry(embree->scene, geometry);
     }
-    embree3.commitScene(embree->scene);
+    commit(embree->scene, quads, queries);
     const RTCError error = embree3.getDeviceError(embree->device);
     if (error != RTC_ERROR_NONE) fail(error, "build its tree");
 }
