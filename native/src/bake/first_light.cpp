@@ -24,7 +24,7 @@ namespace {
 
 // With more rays than this, places near each other share the light of one, up to about kMostSharing
 // of them.
-constexpr size_t kManyRays = 75000, kMostSharing = 64;
+constexpr size_t kManyRays = 60000, kMostSharing = 64;
 // Faces share their light at a vertex if the cosine between their normals is larger than this.
 constexpr float kSameWay = 0.9f;
 // Where light at a vertex is sampled: on a face, at this share of the way from the vertex to the
@@ -72,7 +72,6 @@ class FirstLight {
     }
 
     std::vector<InstanceLight> atCorners() const {
-        const std::vector<glm::vec3> colors = diffuseReflectances(scene, patches);
         std::vector<InstanceLight> result(ofInstances.size());
         parallelFor(size_t(0), result.size(), [&](size_t i) {
             const Instance& instance = scene.instances[i];
@@ -88,10 +87,10 @@ class FirstLight {
                 if (patch == kNoParent) return;
                 const uint32_t side = shownSide(patch);
                 const float opacity = patches.opacityOf(patch);
+                const glm::vec3 color = diffuseReflectance(scene, patches, side) +
+                                        opacity * patches.translucenceOf(side);
                 out.direct[c] = of.irradiance[of.placeOf[c]];
-                out.exitance[c] =
-                    opacity * patches.emission[side] +
-                    (colors[side] + opacity * patches.translucenceOf(side)) * out.direct[c];
+                out.exitance[c] = opacity * patches.emission[side] + color * out.direct[c];
             });
         });
         return result;
@@ -249,8 +248,8 @@ class FirstLight {
     const uint32_t seed;
     const Patches patches;
     const Visibility visibility;
-    std::vector<glm::vec3>
-        emission;  // per side, for the whole patch, W/m^2; empty if there is none
+    // Per side, for the whole patch, W/m^2. Empty if there is none.
+    std::vector<glm::vec3> emission;
     LightSources sources;
     glm::vec3 sky{0.0f};  // constant radiance of the world, W/(m^2 sr)
     std::vector<OfInstance> ofInstances;

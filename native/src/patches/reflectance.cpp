@@ -253,18 +253,18 @@ void assignMaterials(const Scene& scene, Patches& patches) {
     });
 }
 
+glm::vec3 diffuseReflectance(const Scene& scene, const Patches& patches, uint32_t side) {
+    const Parent& parent = patches.parentAt(side);
+    const MaterialSide& surface =
+        scene.materialOf(parent.instance, size_t(parent.face)).sides[isBack(side)];
+    const glm::vec3 all = patches.opacityOf(patchOf(side)) * patches.reflectance[side];
+    return glm::clamp(surface.colorScale * all + surface.colorOffset, 0.0f, 1.0f);
+}
+
 std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& patches) {
     std::vector<glm::vec3> diffuse(patches.sideCount());
-    parallelFor(size_t(0), patches.parents.size(), [&](size_t i) {
-        const Parent& parent = patches.parents[i];
-        const Material& material = scene.materialOf(parent.instance, size_t(parent.face));
-        const uint32_t first = 2 * parent.firstPatch;
-        for (uint32_t side = first; side < first + 2 * parent.patchCount(); ++side) {
-            const MaterialSide& surface = material.sides[isBack(side)];
-            const glm::vec3 all = patches.opacityOf(patchOf(side)) * patches.reflectance[side];
-            diffuse[side] = glm::clamp(surface.colorScale * all + surface.colorOffset, 0.0f, 1.0f);
-        }
-    });
+    parallelFor(uint32_t(0), uint32_t(diffuse.size()),
+                [&](uint32_t side) { diffuse[side] = diffuseReflectance(scene, patches, side); });
     return diffuse;
 }
 

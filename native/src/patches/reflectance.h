@@ -22,8 +22,9 @@ void assignOpacity(const Scene& scene, Patches& patches);
 // the patch, because a lookup at one point would alias.
 void assignMaterials(const Scene& scene, Patches& patches);
 
-// Returns per side the diffuse part of its reflectance, relative to the whole patch, including the
-// share that its opacity lets through.
+// Return for a side, or per side, the diffuse part of its reflectance, relative to the whole patch,
+// including the share that its opacity lets through.
+glm::vec3 diffuseReflectance(const Scene& scene, const Patches& patches, uint32_t side);
 std::vector<glm::vec3> diffuseReflectances(const Scene& scene, const Patches& patches);
 
 }  // namespace raybundle

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "job/cancellation.h"
-#include "job/large_pages.h"
 #include "job/settings.h"
 #include "patches/reflectance.h"
 #include "scene/triangulation.h"
@@ -144,17 +143,12 @@ Patches wholeFaces(const Scene& scene) {
     if (count == 0 || count > kMostPatches || firstVertex.back() > UINT32_MAX ||
         !placeVertices(scene, firstVertex, patches))
         return Patches();
-    parallelInvoke(
-        [&] {
-            reserveInLargePages(patches.parents, count);
-            patches.parents.resize(count);
-        },
-        [&] {
-            reserveInLargePages(patches.cells, count);
-            patches.cells.resize(count);
-            patches.parentOf.resize(count);
-            patches.area.resize(count);
-        });
+    parallelInvoke([&] { patches.parents.resize(count); },
+                   [&] {
+                       patches.cells.resize(count);
+                       patches.parentOf.resize(count);
+                       patches.area.resize(count);
+                   });
     patches.tileCount = count;
     for (uint32_t i = 0; i < scene.instances.size(); ++i) {
         const Faces faces(scene, i, firstVertex[i], firstTriangle[i], patches);
