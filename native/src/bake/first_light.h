@@ -11,8 +11,8 @@
 
 namespace raybundle {
 
-// Offers the first light of the sources to `interim`, unless no source lights anything. The light has noise, no reflections and, on translucent
-// surfaces, nothing of the light from behind.
+// Offers the first light of the sources to `interim`, unless no source lights anything. The light
+// has noise, no reflections and, on translucent surfaces, nothing of the light from behind.
 void offerFirstLight(const Scene& scene, const Settings& settings, Interim& interim);
 
 }  // namespace raybundle

@@ -33,10 +33,10 @@ namespace {
                                                          : ""));
 }
 
-// Builds the tree of a scene. The threads of the builder for few queries wait for each other without
-// sleeping, so that the build takes five times as long when two of them get the same processor. A
-// small tree is therefore built with one processor left free. A large one, which takes longer than
-// somebody waits for the end of a bake that was cancelled, must end with it.
+// Builds the tree of a scene. The threads of the builder for few queries wait for each other
+// without sleeping, so that the build takes five times as long when two of them get the same
+// processor. A small tree is therefore built with one processor left free. A large one, which takes
+// longer than somebody waits for the end of a bake that was cancelled, must end with it.
 void commit(RTCScene scene, size_t quads, Queries queries) {
     constexpr size_t kSmallTree = 1000000;
     if (queries == Queries::MANY || quads > kSmallTree) return embree3.commitScene(scene);
