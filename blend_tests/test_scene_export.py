@@ -363,17 +363,16 @@ def test_meshes_that_differ_only_in_how_faces_are_shaded_stay_apart(new_object):
     assert np.allclose(meshes[0].corner_normals, meshes[1].corner_normals)
 
 
-@pytest.mark.skipif(bpy.app.version >= (4, 1, 0), reason="marked edges always split normals")
-def test_marked_edges_are_sharp_where_blender_shades_them_so(new_object):
+def test_marked_edges_are_sharp_however_they_are_shaded(new_object):
+    # The user guide says: mark edges as sharp where light must not be blended.
     item = new_object("Box", CUBE_VERTICES, CUBE_FACES)
-    item.data.polygons.foreach_set('use_smooth', [True] * 6)
     item.data.edges[3].use_edge_sharp = True
-    item.data.update()
-    for is_auto in (False, True):
-        item.data.use_auto_smooth = is_auto
+    for is_smooth in (False, True):
+        item.data.polygons.foreach_set('use_smooth', [is_smooth] * 6)
+        item.data.update()
         bpy.context.view_layer.update()
         sharp = export().scene.meshes[0].sharp_edges
-        assert sharp.tolist() == ([list(item.data.edges[3].vertices)] if is_auto else [])
+        assert sharp.tolist() == [list(item.data.edges[3].vertices)]
 
 
 # --------------------------------------------------------------------------------------------------

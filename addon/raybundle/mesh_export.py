@@ -147,13 +147,10 @@ def _corner_normals(mesh: bpy.types.Mesh, vertices_of_corners: np.ndarray, sizes
 
 
 def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Returns the two vertices of each edge that is shaded sharp because it is marked so, (e, 2)
-    int32. Before 4.1, Blender shades across these edges unless the mesh has Auto Smooth."""
-    sharp = None
-    if HAS_ATTRIBUTES:
-        sharp = read_attribute(mesh, 'sharp_edge', 'EDGE', 'BOOLEAN', bool)
-    elif mesh.use_auto_smooth:
-        sharp = read(mesh.edges, 'use_edge_sharp', bool)
+    """Returns the two vertices of each edge that is marked sharp, (e, 2) int32. Before 4.1, Blender
+    shades across these edges unless the mesh has Auto Smooth, but light is never blended there."""
+    sharp = (read_attribute(mesh, 'sharp_edge', 'EDGE', 'BOOLEAN', bool)
+             if HAS_ATTRIBUTES else read(mesh.edges, 'use_edge_sharp', bool))
     if sharp is None or not sharp.any():
         return np.empty((0, 2), np.int32)
     return read(mesh.edges, 'vertices', np.int32, 2)[sharp]
