@@ -54,9 +54,8 @@ LightSources lightSources(const Scene& scene, const Patches& patches,
         sources.push_back(std::move(source));
     }
 
-    if (scene.worldLightSet == lightSet && scene.worldImage.meanRadiance() != glm::vec3(0.0f)) {
+    if (scene.worldLightSet == lightSet && scene.worldImage.meanRadiance() != glm::vec3(0.0f))
         sources.push_back(worldSource(scene.worldImage));
-    }
 
     for (auto& source : meshSources(scene, patches, sourceSides, emission, nullptr))
         sources.push_back(std::move(source));
