@@ -35,6 +35,8 @@ Embree3::Embree3()
       releaseScene(find("rtcReleaseScene", &rtcReleaseScene)),
       setSceneFlags(find("rtcSetSceneFlags", &rtcSetSceneFlags)),
       setSceneBuildQuality(find("rtcSetSceneBuildQuality", &rtcSetSceneBuildQuality)),
+      setSceneProgressMonitorFunction(
+          find("rtcSetSceneProgressMonitorFunction", &rtcSetSceneProgressMonitorFunction)),
       commitScene(find("rtcCommitScene", &rtcCommitScene)),
       newGeometry(find("rtcNewGeometry", &rtcNewGeometry)),
       releaseGeometry(find("rtcReleaseGeometry", &rtcReleaseGeometry)),

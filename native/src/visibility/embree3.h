@@ -22,6 +22,7 @@ struct Embree3 {
     decltype(&rtcReleaseScene) releaseScene;
     decltype(&rtcSetSceneFlags) setSceneFlags;
     decltype(&rtcSetSceneBuildQuality) setSceneBuildQuality;
+    decltype(&rtcSetSceneProgressMonitorFunction) setSceneProgressMonitorFunction;
     decltype(&rtcCommitScene) commitScene;
     decltype(&rtcNewGeometry) newGeometry;
     decltype(&rtcReleaseGeometry) releaseGeometry;

@@ -5,6 +5,8 @@
 // query. Only the source files of this folder include this header.
 #pragma once
 
+#include <tbb/task_group.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -31,10 +33,17 @@ inline float offsetAt(const Patches& patches, uint32_t parent) {
 
 // The acceleration structure. Owns Embree's device and scene.
 struct Visibility::Embree {
+    // The context of the build. An Embree scene keeps a context of its own whose parent is the one
+    // in which it was built, and oneTBB follows the parents of all contexts whenever any work is
+    // cancelled or throws. The parent must therefore live as long as the scene.
+    tbb::task_group_context building{tbb::task_group_context::isolated};
     RTCDevice device = nullptr;
     RTCScene scene = nullptr;
     // Per quad of the scene: index into Patches::parents.
     std::vector<uint32_t> parentOf;
+
+    // Builds the tree of the scene. Ends early if the bake of the calling thread is cancelled.
+    void build(Queries queries);
 
     ~Embree() {
         if (scene) embree3.releaseScene(scene);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "visibility/visibility.h"
 
+#include <tbb/task.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -31,17 +32,6 @@ namespace {
                     (isMemory                            ? ": out of memory"
                      : code == RTC_ERROR_UNSUPPORTED_CPU ? ": it does not support this processor"
                                                          : ""));
-}
-
-// Builds the tree of a scene. The threads of the builder for few queries wait for each other
-// without sleeping, so that the build takes five times as long when two of them get the same
-// processor. A small tree is therefore built with one processor left free. A large one, which takes
-// longer than somebody waits for the end of a bake that was cancelled, must end with it.
-void commit(RTCScene scene, size_t quads, Queries queries) {
-    constexpr size_t kSmallTree = 1000000;
-    if (queries == Queries::MANY || quads > kSmallTree) return embree3.commitScene(scene);
-    const int threads = std::max(1, tbb::this_task_arena::max_concurrency() - 1);
-    tbb::task_arena(threads).execute([&] { embree3.commitScene(scene); });
 }
 
 }  // namespace
@@ -89,12 +79,34 @@ Visibility::Visibility(const Patches& patches, Blockers blockers, Queries querie
         embree3.commitGeometry(geometry);
         embree3.attachGeometry(embree->scene, geometry);
     }
-    commit(embree->scene, quads, queries);
+    embree->build(queries);
     const RTCError error = embree3.getDeviceError(embree->device);
     if (error != RTC_ERROR_NONE) fail(error, "build its tree");
 }
 
 Visibility::~Visibility() = default;
+
+// The threads of the builder for few queries wait for each other without sleeping, so that the
+// build takes five times as long when two of them get the same processor. One is left free.
+void Visibility::Embree::build(Queries queries) {
+    // The context of the build is not that of the bake, so Embree asks whether to go on.
+    tbb::task_group_context* const bake = tbb::task::current_context();
+    embree3.setSceneProgressMonitorFunction(
+        scene,
+        [](void* context, double) {
+            return !context ||
+                   !static_cast<tbb::task_group_context*>(context)->is_group_execution_cancelled();
+        },
+        bake);
+    const auto commit = [&] {
+        tbb::task_group(building).run_and_wait([&] { embree3.commitScene(scene); });
+    };
+    if (queries == Queries::FEW)
+        tbb::task_arena(std::max(1, tbb::this_task_arena::max_concurrency() - 1)).execute(commit);
+    else
+        commit();
+    embree3.setSceneProgressMonitorFunction(scene, nullptr, nullptr);
+}
 
 struct Visibility::FromSide : SideQuery {
     FromSide(const Visibility& visibility, uint32_t side)
