@@ -39,8 +39,9 @@ namespace raybundle {
 // The result of the coarse pass of a first shot, with few samples at each receiver.
 struct CoarseShot {
     std::vector<Gathered> gathered;  // per receiver
-    std::vector<bool> seen;          // per source: whether it lights any receiver
-    double bundled = 0;              // estimated irradiance by emission left to the bundles, W/m^2
+    // Per source, and for all sources that are sampled as one: whether it lights any receiver.
+    std::vector<bool> seen;
+    double bundled = 0;  // estimated irradiance by emission left to the bundles, W/m^2
     // Per receiver: where the samples of a source that surrounds it went. Empty: not kept.
     std::vector<Sightings> sightings = {};
 };
@@ -49,6 +50,7 @@ struct CoarseShot {
 // weights of the sources are estimated.
 constexpr size_t kFewSources = 4;
 
+class JointSource;
 struct ReceiverPlace;
 
 // Returns an unbiased estimate of the irradiance at a receiver from one sample of each source,
@@ -148,7 +150,8 @@ class DirectLight {
     DirectLight(const Scene& scene, const Patches& patches, const Visibility& visibility,
                 uint32_t seed, const Skips& skips, std::unique_ptr<const EmissionSplit> split);
 
-    using Seen = std::vector<std::atomic<bool>>;  // per source: whether it lights any receiver
+    // Per source, and for those sampled as one: whether it lights any receiver.
+    using Seen = std::vector<std::atomic<bool>>;
 
     // Returns the light at a receiver, given by its index, for an aim.
     using GatherAt = std::function<Gathered(uint32_t receiver, const Aim& aim)>;
@@ -191,6 +194,9 @@ class DirectLight {
     void look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,
               Sightings& sightings, Gathered& sum) const;
     std::vector<float> unblockedWeights(const ReceiverPlace& place) const;
+    float shareOfTolerance(float share) const;
+    std::vector<JointSource> jointSources(uint32_t side, const ReceiverPlace& place,
+                                          const std::vector<float>& weights) const;
     bool isOutOfSight(const LightSource& source, const ReceiverPlace& place) const;
     // Returns, per angle term and channel, how much more of the light a side shows if a term is
     // larger, relative to all light that it shows. `angles` holds the means of the angleTerms of

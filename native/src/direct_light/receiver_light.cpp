@@ -10,6 +10,7 @@
 #include "direct_light/direct_light.h"
 #include "direct_light/outlook.h"
 #include "direct_light/source_samples.h"
+#include "lights/joint_source.h"
 #include "lights/receiver_place.h"
 #include "patches/side.h"
 
@@ -21,6 +22,10 @@ constexpr int kFewSamples = 4;
 // A source that gives less than kSmallShare of the light that a receiver could get takes
 // kFewSamples. A source below kMiddleShare takes half as many samples as others.
 constexpr float kSmallShare = 0.06f, kMiddleShare = 0.25f;
+// At least this number of such sources are sampled as one, each with at least this share of the
+// weight of all sources.
+constexpr size_t kFewestJoined = 12;
+constexpr float kLeastWeight = 1e-4f;
 // n samples all miss a part with the share s of a source with the probability (1 - s)^n; the
 // estimate is then off by s. The mean of this error over all samples is at most kMissed / n.
 constexpr float kMissed = 0.37f;
@@ -59,10 +64,11 @@ glm::vec4 surplusAngles(const SampleSums& all, const SampleSums& block) {
 // Samples one source at one receiver until the error is small enough.
 class DirectLight::SourceGather {
   public:
-    SourceGather(const DirectLight& light, size_t index, const Receiver& receiver,
-                 const ReceiverPlace& place, const Aim& aim)
+    // `index` is that of the source; the random numbers depend on it.
+    SourceGather(const DirectLight& light, const LightSource& source, size_t index,
+                 const Receiver& receiver, const ReceiverPlace& place, const Aim& aim)
         : light(light),
-          source(*light.sources[index]),
+          source(source),
           receiver(receiver),
           place(place),
           aim(aim),
@@ -240,6 +246,31 @@ std::vector<float> DirectLight::unblockedWeights(const ReceiverPlace& place) con
     return weights;
 }
 
+// Returns the factor on the tolerance of a source that gives this share of the light. The variance
+// that the receiver may have is divided among the sources by their weight, but each gets at least
+// an equal share, because a bright source may be hidden. With few sources seldom more than one has
+// noise, so that each may have all of the variance.
+float DirectLight::shareOfTolerance(float share) const {
+    if (sources.size() <= kFewSources) return 1;
+    return std::sqrt(std::max(share, 1 / float(sources.size())));
+}
+
+// Returns the dim sources of a receiver, joined: those with power of their own, and those without.
+// A few sources are not joined.
+std::vector<JointSource> DirectLight::jointSources(uint32_t side, const ReceiverPlace& place,
+                                                   const std::vector<float>& weights) const {
+    const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
+    std::vector<JointSource> joints(2, JointSource(sources));
+    for (uint32_t k = 0; k < sources.size(); ++k)
+        if (weights[k] < kSmallShare * total && JointSource::canJoin(*sources[k]) &&
+            !isOutOfSight(*sources[k], place) && !sources[k]->isSteepOn(place))
+            // A source whose samples were below the horizon may light another part of the receiver.
+            joints[isUnpowered(k, side)].add(k, std::max(weights[k], kLeastWeight * total));
+    for (size_t k = joints.size(); k-- > 0;)
+        if (joints[k].joined().size() < kFewestJoined) joints.erase(joints.begin() + ptrdiff_t(k));
+    return joints;
+}
+
 AngleFactors DirectLight::shownByAngle(uint32_t side, const glm::vec4& angles) const {
     AngleFactors factors{};
     if (!showsByAngle) return factors;
@@ -261,18 +292,21 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
     const ReceiverPlace place(patches, receiver);
     const std::vector<float> weights = unblockedWeights(place);
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
+    // Dim sources are joined, unless the light of each is to be kept.
+    const std::vector<JointSource> joints = parts || weights.empty() || receiver.passingOnly
+                                                ? std::vector<JointSource>()
+                                                : jointSources(receiver.side, place, weights);
+    std::vector<bool> isJoined(joints.empty() ? 0 : sources.size(), false);
+    for (const JointSource& joint : joints)
+        for (const uint32_t k : joint.joined()) isJoined[k] = true;
     for (size_t k = 0; k < sources.size(); ++k) {
+        if (!isJoined.empty() && isJoined[k]) continue;
         if (receiver.passingOnly && sources[k]->castsShadows &&
             patches.parentAt(receiver.side).stopsDirect)
             continue;
         const float share = weights.empty() ? 1 : weights[k] / std::max(total, 1e-30f);
         Aim own = aim;
-        // The variance that the receiver may have is divided among the sources by their weight, but
-        // each gets at least an equal share, because a bright source may be hidden. With few
-        // sources seldom more than one has noise, so that each may have all of the variance.
-        if (sources.size() > kFewSources)
-            own.tolerance *=
-                std::sqrt(std::max(weights.empty() ? 0 : share, 1 / float(sources.size())));
+        own.tolerance *= shareOfTolerance(weights.empty() ? 0 : share);
         if (share < kSmallShare)
             own.samples = kFewSamples;
         else if (share < kMiddleShare)
@@ -285,6 +319,16 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
         sum.add(uint32_t(k), part, isUnpowered(k, receiver.side), hash(receiver.seed, uint32_t(k)));
         if (parts) parts[k] = part;
     }
+    for (const JointSource& joint : joints) {
+        Aim own = aim;
+        own.outlook = nullptr;
+        own.tolerance *= shareOfTolerance(joint.all() / std::max(total, 1e-30f));
+        sum.weak += joint.joined().size();
+        const uint32_t random = hash(receiver.seed, ~joint.joined().front());
+        const LightPart part = SourceGather(*this, joint, random, receiver, place, own)
+                                   .run(seen[sources.size()], nullptr, sum);
+        sum.add(joint.strongest(), part, isUnpowered(joint.strongest(), receiver.side), random);
+    }
     return sum;
 }
 
@@ -295,7 +339,8 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver,
         ++sum.hidden;
         return {};
     }
-    return SourceGather(*this, index, receiver, place, aim).run(seen[index], sightings, sum);
+    return SourceGather(*this, *sources[index], index, receiver, place, aim)
+        .run(seen[index], sightings, sum);
 }
 
 void DirectLight::look(const LightSource& source, const Receiver& receiver, const Outlook& outlook,
