@@ -8,6 +8,7 @@
 
 #include "bundles/directions.h"
 #include "first_shot/directed_light.h"
+#include "first_shot/spot_coverage.h"
 #include "patches/side.h"
 #include "scene/channels.h"
 
@@ -25,26 +26,17 @@ constexpr double kMostArea = 0.05;
 // more bundles. (The dishes of a laid table, 48 objects, took longer at a target of 0.2 % than the
 // whole bake without bright spots.)
 constexpr double kWorthwhileBundles = 50;
+// Beyond this number, further objects take little more time, since a receiver samples them as one
+// (lights/joint_source.h).
+constexpr size_t kMostApart = 12;
+
+// Largest number of times that light is gathered from bright spots. They reflect some of each
+// other's light.
+constexpr int kMostRounds = 4;
 
 // An island whose mean light is less than this share of that of the brightest island is ignored, so
 // that something dark far below a room does not make the room's walls bright spots.
 constexpr double kDarkIsland = 0.01;
-
-// Number of points on a side that are tested for another surface lying on it.
-constexpr uint32_t kLooks = 16;
-
-// Returns whether nothing lies on a side. If a part of the side were covered, the light would come
-// from the rest alone.
-bool isUncovered(const FirstShotInput& input, const Visibility& exchange, uint32_t side) {
-    const glm::vec3 normal = input.patches.normal(side);
-    for (uint32_t k = 0; k < kLooks; ++k) {
-        const glm::vec4 u = sobolPoint(k, side);
-        if (exchange.isBlocked(side, input.patches.point(patchOf(side), {u.x, u.y}), normal,
-                               input.patches.islandAt(side).touchDistance))
-            return false;
-    }
-    return true;
-}
 
 // Returns the area that a line stands for at a parent, relative to lines outside all windows.
 double lineShare(const LineDensity& density, uint32_t parent) {
@@ -64,13 +56,12 @@ struct IslandLight {
     double mean() const { return area > 0 ? power / area : 0; }  // W/m^2
 };
 
-// Returns an emission split whose sources are the bright spots, with their reflected light. It is
-// empty if there are no bright spots, or if gathering does not pay.
-EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchange,
-                          const LineDensity& density, const FirstShot& shot) {
+// Returns the sides that are bright spots by what they send of the light `sent` that is left to the
+// bundles (per side, W/m^2). There are none if gathering their light does not pay.
+std::vector<uint32_t> brightSides(const FirstShotInput& input, const LineDensity& density,
+                                  const FirstShot& shot, const std::vector<glm::vec3>& sent) {
     const Patches& patches = input.patches;
     const size_t n = patches.sideCount();
-    EmissionSplit spots;
     std::vector<double> exitance(n, 0.0);  // brightest channel, W/m^2
     std::vector<IslandLight> islands(patches.islands.size());
     for (size_t side = 0; side < n; ++side) {
@@ -81,8 +72,9 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
         const bool isInside = parent.isSolid && !parent.isInward && isBack(side);
         if (!parent.exchanges || isInside) continue;
         const double area = double(patches.area[patchOf(side)]);
-        exitance[side] = double(brightest(reflected(patches, shot, side)));
-        island.power += area * (exitance[side] + double(brightest(shot.emission[side])));
+        exitance[side] = double(brightest(sent[side]));
+        island.power += area * double(brightest(reflected(patches, shot, side)) +
+                                      brightest(shot.emission[side]));
         if (!isBack(side))
             island.reflectance += area * double(brightest(patches.reflectance[side]));
     }
@@ -95,10 +87,10 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
         all.reflectance += island.reflectance;
         all.area += island.area;
     }
-    if (!(all.area > 0)) return spots;
+    if (!(all.area > 0)) return {};
     // Includes all bounces that stay in the scene.
     const double mean = all.mean() / std::max(0.05, 1 - all.reflectance / all.area);
-    if (!(mean > 0)) return spots;
+    if (!(mean > 0)) return {};
     // The noise that sides cause on others is proportional to the square of their contrast, to
     // their area, and to the area that a line stands for.
     double inSpots = 0, inRest = 0, areaOfSpots = 0;
@@ -113,21 +105,17 @@ EmissionSplit brightSpots(const FirstShotInput& input, const Visibility& exchang
         areaOfSpots += area;
         objects.insert(patches.parentAt(uint32_t(side)).instance);
     }
-    if (areaOfSpots > kMostArea * all.area) return spots;
+    if (areaOfSpots > kMostArea * all.area) return {};
     auto bundlesFor = [&](double squares) {
         return std::pow(std::sqrt(squares / all.area) / double(input.settings.targetError),
                         1 / kNoiseSlope);
     };
     const double spared = bundlesFor(inSpots + inRest) - bundlesFor(inRest);
-    if (!(spared > kWorthwhileBundles * double(objects.size()))) return spots;
-    spots.ofSources.resize(n);
-    spots.isSource.resize(n);
-    for (size_t side = 0; side < n; ++side)
-        if (exitance[side] > kBright * mean && isUncovered(input, exchange, uint32_t(side))) {
-            spots.isSource[side] = true;
-            spots.ofSources[side] = reflected(patches, shot, side);
-        }
-    return spots;
+    if (!(spared > kWorthwhileBundles * double(std::min(objects.size(), kMostApart)))) return {};
+    std::vector<uint32_t> bright;
+    for (uint32_t side = 0; side < n; ++side)
+        if (exitance[side] > kBright * mean) bright.push_back(side);
+    return bright;
 }
 
 }  // namespace
@@ -136,47 +124,60 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
                          const Visibility& exchange, const LineDensity& density, FirstShot& shot) {
     const Patches& patches = input.patches;
     if (!patches.translucence.empty() || !patches.opacity.empty()) return 0;
-    EmissionSplit spots = brightSpots(input, exchange, density, shot);
     const size_t n = patches.sideCount();
-    const size_t count = size_t(std::count(spots.isSource.begin(), spots.isSource.end(), true));
-    if (count == 0) return 0;
     std::vector<glm::vec3> unshot(n);
     for (size_t side = 0; side < n; ++side)
-        if (patches.parentAt(uint32_t(side)).exchanges && !spots.isSource[side])
+        if (patches.parentAt(uint32_t(side)).exchanges)
             unshot[side] = reflected(patches, shot, side);
-    const std::vector<bool> isSpot = spots.isSource;
-    if (!patches.scattering.empty())
-        spots.directed =
-            std::make_shared<const DirectedLight>(patches, shot, DirectedLight::Of::ALL);
-    const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707);
-    const DirectLight light(scene, patches, exchange, seed, input.settings, std::move(spots));
     std::optional<StandIns> alone;
     const StandIns& standIns = input.standIns ? *input.standIns : alone.emplace(patches, nullptr);
     const std::vector<uint32_t>& gatherers = standIns.gatherers();
-    const std::vector<Gathered> results = light.gather(
-        gatherers.size(),
-        [&](size_t k) {
-            const uint32_t side = gatherers[k];
-            Receiver receiver{side, patches.normal(side), std::nullopt, side};
-            receiver.isShown = !input.isShown || (*input.isShown)[side];
-            receiver.otherLight = brightest(shot.irradiance[side]);
-            return receiver;
-        },
-        input.settings.targetError,
-        [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); }, {},
-        standIns.neighbours());
-    shot.indirect.resize(n);
-    for (const Gathered& result : results) shot.rays += result.rays;
-    for (size_t side = 0; side < n; ++side) {
-        const Gathered& result = results[standIns.numberOf(uint32_t(side))];
-        shot.indirect[side] = result.irradiance;
-        unshot[side] += patches.reflectance[side] * result.irradiance;
-        shot.error[side] = std::hypot(shot.error[side], std::sqrt(result.variance));
+    std::vector<bool> areSpots(n, false);
+    // Only the first light that a side sends has known directions.
+    const int mostRounds = patches.scattering.empty() ? kMostRounds : 1;
+    for (int round = 0; round < mostRounds; ++round) {
+        SpotSources spots =
+            spotSources(patches, exchange, brightSides(input, density, shot, unshot), unshot);
+        if (spots.sides.empty()) break;
+        if (round == 0) shot.indirect.resize(n);
+        for (const uint32_t side : spots.sides) {
+            areSpots[side] = true;
+            unshot[side] = glm::vec3(0.0f);
+        }
+        if (!patches.scattering.empty())
+            spots.light.directed =
+                std::make_shared<const DirectedLight>(patches, shot, DirectedLight::Of::ALL);
+        const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707 + uint32_t(round));
+        const DirectLight light(scene, patches, exchange, seed, input.settings,
+                                std::move(spots.light));
+        const std::vector<Gathered> results = light.gather(
+            gatherers.size(),
+            [&](size_t k) {
+                const uint32_t side = gatherers[k];
+                Receiver receiver{side, patches.normal(side), std::nullopt, side};
+                receiver.isShown = !input.isShown || (*input.isShown)[side];
+                receiver.otherLight = brightest(shot.irradiance[side] + shot.indirect[side]);
+                return receiver;
+            },
+            input.settings.targetError,
+            [&](double done) { input.progress.report(RB_STAGE_FIRST_SHOT, done); }, {},
+            standIns.neighbours());
+        for (const Gathered& result : results) shot.rays += result.rays;
+        for (size_t side = 0; side < n; ++side) {
+            // Shadow rays end just before a bright spot, and so do not meet the bottom of a solid
+            // that stands on it. The inside of the solid gets no light through it.
+            const Parent& parent = patches.parentAt(uint32_t(side));
+            if (isBack(side) && spots.covers.count(parent.surface) > 0) continue;
+            const Gathered& result = results[standIns.numberOf(uint32_t(side))];
+            shot.indirect[side] += result.irradiance;
+            if (parent.exchanges) unshot[side] += patches.reflectance[side] * result.irradiance;
+            shot.error[side] = std::hypot(shot.error[side], std::sqrt(result.variance));
+        }
     }
-    for (size_t side = 0; side < n; ++side)
-        if (!patches.parentAt(uint32_t(side)).exchanges) unshot[side] = glm::vec3(0.0f);
+    const size_t count = size_t(std::count(areSpots.begin(), areSpots.end(), true));
+    if (count == 0) return 0;
     shot.unshot = std::move(unshot);
-    shot.sentOn = isSpot;
+    shot.sentOn = std::move(areSpots);
     return count;
 }
 

@@ -11,8 +11,9 @@
 // Differs:
 // - The light is gathered where it arrives and not shot, like that of the sources
 //   (first_shot/gather.cpp).
-// - This is done once, and only if it takes less time than the bundles that would be needed
-//   otherwise.
+// - Bright spots that see each other, as inside the shade of a lamp, light each other. What they
+//   reflect of that light is gathered too, in further rounds (not if any surface is not Lambert's).
+//   Each round is made only if it takes less time than the bundles that would be needed otherwise.
 #pragma once
 
 #include "bundles/line_windows.h"
