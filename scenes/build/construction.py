@@ -392,6 +392,18 @@ def set_world(colour: Colour = (0, 0, 0), strength: float = 1.0) -> None:
     bpy.context.scene.world = world
 
 
+def set_sky() -> None:
+    """Gives the scene a world that varies with the direction: Blender's sky, without its sun."""
+    set_world(strength=0.3)
+    tree = bpy.context.scene.world.node_tree
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_disc = False
+    sky.sun_elevation = math.radians(50)
+    sky.location = (-500, 0)
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    tree.links.new(sky.outputs[0], background.inputs["Color"])
+
+
 def set_render_settings(scene: bpy.types.Scene) -> None:
     """Sets up Cycles without denoising, with all diffuse bounces that matter and sRGB output."""
     scene.render.engine = "CYCLES"
