@@ -8,7 +8,6 @@
 
 #include "bundles/directions.h"
 #include "first_shot/directed_light.h"
-#include "first_shot/spot_coverage.h"
 #include "patches/side.h"
 #include "scene/channels.h"
 
@@ -37,6 +36,34 @@ constexpr int kMostRounds = 4;
 // An island whose mean light is less than this share of that of the brightest island is ignored, so
 // that something dark far below a room does not make the room's walls bright spots.
 constexpr double kDarkIsland = 0.01;
+
+// Number of points on a side that are tested for another surface lying on it: at first, and if any
+// of these is covered.
+constexpr uint32_t kLooks = 16, kMoreLooks = 256;
+// A side of which less than this share is exposed is no bright spot.
+constexpr float kLeastExposed = 0.1f;
+
+// Returns the share of a side that nothing lies on. Returns 0 if that is too little for a source,
+// or if a sheet lies on the side: unlike a solid, it does not block all shadow rays to what it
+// covers.
+float exposedShare(const Patches& patches, const Visibility& exchange, uint32_t side) {
+    const glm::vec3 normal = patches.normal(side);
+    const float touching = patches.islandAt(side).touchDistance;
+    uint32_t covered = 0, looks = 0;
+    for (const uint32_t most : {kLooks, kMoreLooks}) {
+        for (; looks < most; ++looks) {
+            const glm::vec4 u = sobolPoint(looks, side);
+            const auto met = exchange.firstHit(side, patches.point(patchOf(side), {u.x, u.y}),
+                                               normal, nullptr, touching);
+            if (!met) continue;
+            if (!patches.parentAt(*met).isSolid) return 0;
+            ++covered;
+        }
+        if (covered == 0) return 1;
+    }
+    const float share = 1 - float(covered) / float(looks);
+    return share < kLeastExposed ? 0 : share;
+}
 
 // Returns the area that a line stands for at a parent, relative to lines outside all windows.
 double lineShare(const LineDensity& density, uint32_t parent) {
@@ -136,20 +163,26 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
     // Only the first light that a side sends has known directions.
     const int mostRounds = patches.scattering.empty() ? kMostRounds : 1;
     for (int round = 0; round < mostRounds; ++round) {
-        SpotSources spots =
-            spotSources(patches, exchange, brightSides(input, density, shot, unshot), unshot);
-        if (spots.sides.empty()) break;
-        if (round == 0) shot.indirect.resize(n);
-        for (const uint32_t side : spots.sides) {
-            areSpots[side] = true;
+        EmissionSplit spots;
+        for (const uint32_t side : brightSides(input, density, shot, unshot)) {
+            const float exposed = exposedShare(patches, exchange, side);
+            if (exposed == 0) continue;
+            if (spots.isSource.empty()) {
+                spots.isSource.resize(n);
+                spots.ofSources.resize(n);
+            }
+            spots.isSource[side] = areSpots[side] = true;
+            // The light arrives on the exposed part, and leaves from there.
+            spots.ofSources[side] = unshot[side] / exposed;
             unshot[side] = glm::vec3(0.0f);
         }
+        if (spots.isSource.empty()) break;
+        if (round == 0) shot.indirect.resize(n);
         if (!patches.scattering.empty())
-            spots.light.directed =
+            spots.directed =
                 std::make_shared<const DirectedLight>(patches, shot, DirectedLight::Of::ALL);
         const uint32_t seed = hash(uint32_t(input.settings.seed), 0x5707 + uint32_t(round));
-        const DirectLight light(scene, patches, exchange, seed, input.settings,
-                                std::move(spots.light));
+        const DirectLight light(scene, patches, exchange, seed, input.settings, std::move(spots));
         const std::vector<Gathered> results = light.gather(
             gatherers.size(),
             [&](size_t k) {
@@ -164,13 +197,10 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
             standIns.neighbours());
         for (const Gathered& result : results) shot.rays += result.rays;
         for (size_t side = 0; side < n; ++side) {
-            // Shadow rays end just before a bright spot, and so do not meet the bottom of a solid
-            // that stands on it. The inside of the solid gets no light through it.
-            const Parent& parent = patches.parentAt(uint32_t(side));
-            if (isBack(side) && spots.covers.count(parent.surface) > 0) continue;
             const Gathered& result = results[standIns.numberOf(uint32_t(side))];
             shot.indirect[side] += result.irradiance;
-            if (parent.exchanges) unshot[side] += patches.reflectance[side] * result.irradiance;
+            if (patches.parentAt(uint32_t(side)).exchanges)
+                unshot[side] += patches.reflectance[side] * result.irradiance;
             shot.error[side] = std::hypot(shot.error[side], std::sqrt(result.variance));
         }
     }

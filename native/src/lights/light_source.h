@@ -38,7 +38,7 @@ struct LightSample {
 
     // Returns the shadow ray from the receiver's point to the sampled point.
     ShadowRay ray(const glm::vec3& point) const {
-        return {point, direction, std::max(0.0f, distance - margin), parent};
+        return {point, direction, std::max(0.0f, distance - margin), parent, margin};
     }
     // Sets the margin for a planar source with the given normal (unit) and half thickness (metres).
     void setMargin(const glm::vec3& normal, float halfThickness) {

@@ -15,6 +15,9 @@ struct ShadowRay {
     glm::vec3 direction;          // unit vector towards the light
     float distance;               // metres; may be infinite
     uint32_t target = kNoParent;  // parent on which the ray ends, which does not block it
+    // How far the point of the light source lies beyond `distance`, metres. On this part of the ray
+    // only a solid that stands on the target blocks it.
+    float margin = 0;
 };
 
 }  // namespace raybundle

@@ -60,6 +60,17 @@ bool goesOn(SideQuery& start, uint32_t id, uint32_t other, const Hit& hit) {
            start.passage.goesOn(other, hit.point);
 }
 
+// Returns whether a surface at the end of a shadow ray covers the target: one through which the ray
+// leaves a solid that stands on the target. It comesBefore the target (patches/coincidence.h).
+bool coversTarget(const SideQuery& start, uint32_t id, uint32_t other, const glm::vec3& direction) {
+    const Patches& patches = *start.passage.patches;
+    const Parent &cover = patches.parents[other], &target = patches.parents[start.target[id]];
+    auto leavesSolid = [&](const Parent& parent) {
+        return parent.isSolid && glm::dot(parent.normal, direction) > 0;
+    };
+    return leavesSolid(cover) && !leavesSolid(target) && areParallel(cover, target);
+}
+
 // Returns whether the squares of a vector's components are well within the range of floats. For
 // other rays, including those of NaN, Embree's assertions would end the process. setRay() makes
 // them meet nothing; shadow rays of this kind count as blocked.
@@ -123,6 +134,20 @@ void passStart(const RTCFilterFunctionNArguments* args) {
         if (args->valid[k] == 0) continue;
         const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, k)];
         if (goesOn(start, RTCRayN_id(args->ray, args->N, k), other, Hit(args, k)))
+            args->valid[k] = 0;
+    }
+}
+
+void passStartAndEnd(const RTCFilterFunctionNArguments* args) {
+    SideQuery& start = *reinterpret_cast<SideQuery*>(args->context);
+    for (uint32_t k = 0; k < args->N; ++k) {
+        if (args->valid[k] == 0) continue;
+        const uint32_t other = start.passage.parentOf[RTCHitN_primID(args->hit, args->N, k)];
+        const uint32_t id = RTCRayN_id(args->ray, args->N, k);
+        const Hit hit(args, k);
+        const bool isAtEnd = hit.distance > start.lastPart[id];
+        if (goesOn(start, id, other, hit) ||
+            (isAtEnd && !coversTarget(start, id, other, hit.direction)))
             args->valid[k] = 0;
     }
 }

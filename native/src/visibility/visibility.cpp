@@ -118,7 +118,12 @@ struct Visibility::FromSide : SideQuery {
         normal = patches.normal(side);
         zone = 2 * offsetAt(patches, parent);
         target.fill(kNoParent);
+        lastPart.fill(std::numeric_limits<float>::infinity());
+        const Parent& own = patches.parents[parent];
+        isInside = own.isSolid && !own.isInward && !isFront;
     }
+    bool isInside;  // whether the rays leave into a solid, which may stand on a target
+
     // Moves the start of a ray slightly behind the surface, so that the ray meets surfaces that
     // coincide with it. The shift is along the ray, not along the normal, so that the ray still
     // passes through the point.
@@ -137,6 +142,13 @@ struct Visibility::FromSide : SideQuery {
             const float end = std::max(zone, kRelativeOffset * length);
             if (length <= end) return false;
             setRay(ray, from, segment / length, length - end);
+            // A solid that stands on the target covers it at the far end or beyond it. Only rays
+            // from the inside of the solid meet nothing of it before.
+            if (isInside && shadow.target != kNoParent && ray.tfar >= 0) {
+                context.filter = passStartAndEnd;
+                lastPart[id] = ray.tfar;
+                ray.tfar = length + shadow.margin + end;
+            }
         } else {
             setRay(ray, from, shadow.direction, shadow.distance);
         }
