@@ -38,8 +38,9 @@ def outlines() -> list[np.ndarray]:
     outside = 0.3 + 0.15 * np.sin(4.5 * height + 0.3)
     vase = np.concatenate([np.stack([outside, height], axis=1),
                            np.stack([outside - 0.04, height * 0.96 + 0.03], axis=1)[::-1]])
-    drum = np.stack([0.4 + 0.3 * np.cos(angle) * np.abs(np.cos(angle)) ** -0.4,
-                     0.4 + 0.4 * np.sin(angle) * np.abs(np.sin(angle)) ** 0.2], axis=1)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    drum = np.stack([0.4 + 0.3 * np.sign(cosine) * np.abs(cosine) ** 0.6,
+                     0.4 + 0.4 * np.sign(sine) * np.abs(sine) ** 1.2], axis=1)
     return [ring, vase, drum]
 
 

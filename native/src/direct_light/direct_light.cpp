@@ -96,13 +96,13 @@ void DirectLight::shootCoarsely(CoarseShot& coarse, const std::vector<uint32_t>&
                                 const std::function<void(double)>& progress,
                                 const std::vector<ReceiverPair>& neighbours,
                                 LightBySource* bySource) const {
-    coarse.seen.resize(sources.size() + 1);
+    Seen seen = noneSeen();
+    coarse.seen.resize(seen.size());
     coarse.bundled = 0;
     for (size_t side = 0; side < split->bundled.size(); ++side)
         coarse.bundled += double(patches.area[patchOf(side)] * brightest(split->bundled[side])) /
                           patches.totalArea;
     if (sources.empty()) return;
-    Seen seen(sources.size() + 1);
     const std::vector<bool> hasNeighbour = haveNeighbours(coarse.gathered.size(), neighbours);
     Aims first{these, {}};
     for (uint32_t k : these)
@@ -141,7 +141,7 @@ std::vector<Gathered> DirectLight::gather(
         first = shootCoarsely(count, receiverAt, progress, neighbours, bySource);
     std::vector<Gathered> results = std::move(first.gathered);
     if (sources.empty()) return results;
-    Seen seen(sources.size() + 1);
+    Seen seen = noneSeen();
     for (size_t k = 0; k < seen.size(); ++k) seen[k] = first.seen[k];
 
     Aims further = aimsAfter(results, patches, receiverAt, neighbours, targetError);
@@ -221,7 +221,7 @@ std::vector<Gathered> DirectLight::gatherFresh(const LightBySource& before,
         before.scaled(matches.ofKept, [&](size_t source, size_t receiver) {
             return isUnpowered(source, receiverAt(receiver).side);
         });
-    Seen seen(sources.size() + 1);
+    Seen seen = noneSeen();
     for (std::atomic<bool>& source : seen) source = true;
     if (!matches.fresh.empty())
         addFresh(results, matches.fresh, {receiverAt, targetError, progress, neighbours}, seen);

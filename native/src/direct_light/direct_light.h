@@ -152,6 +152,7 @@ class DirectLight {
 
     // Per source, and for those sampled as one: whether it lights any receiver.
     using Seen = std::vector<std::atomic<bool>>;
+    Seen noneSeen() const { return Seen(sources.size() + 1); }
 
     // Returns the light at a receiver, given by its index, for an aim.
     using GatherAt = std::function<Gathered(uint32_t receiver, const Aim& aim)>;

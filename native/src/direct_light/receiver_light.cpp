@@ -64,8 +64,8 @@ glm::vec4 surplusAngles(const SampleSums& all, const SampleSums& block) {
 // Samples one source at one receiver until the error is small enough.
 class DirectLight::SourceGather {
   public:
-    // `index` is that of the source; the random numbers depend on it.
-    SourceGather(const DirectLight& light, const LightSource& source, size_t index,
+    // `random` selects the random numbers, and must differ from source to source.
+    SourceGather(const DirectLight& light, const LightSource& source, uint32_t random,
                  const Receiver& receiver, const ReceiverPlace& place, const Aim& aim)
         : light(light),
           source(source),
@@ -78,7 +78,7 @@ class DirectLight::SourceGather {
           isInside(light.skips.skipInside && !source.staysInside() && isBack(receiver.side) &&
                    light.patches.parentAt(receiver.side).isSolid),
           mostSamples(aim.mostGrowth * source.mostSamples()),
-          seed(hash(light.seed, hash(receiver.seed, uint32_t(index)))),
+          seed(hash(light.seed, hash(receiver.seed, random))),
           samples(light.visibility, source, place, receiver.side, seed),
           origins(seed) {
         if (isGuided) samples.guideBy(outlook->seen);
@@ -256,10 +256,11 @@ float DirectLight::shareOfTolerance(float share) const {
 }
 
 // Returns the dim sources of a receiver, joined: those with power of their own, and those without.
-// A few sources are not joined.
+// A few sources are not joined, nor are sources beside one whose light at the receiver overflows.
 std::vector<JointSource> DirectLight::jointSources(uint32_t side, const ReceiverPlace& place,
                                                    const std::vector<float>& weights) const {
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
+    if (weights.size() < kFewestJoined || !std::isfinite(total)) return {};
     std::vector<JointSource> joints(2, JointSource(sources));
     for (uint32_t k = 0; k < sources.size(); ++k)
         if (weights[k] < kSmallShare * total && JointSource::canJoin(*sources[k]) &&
@@ -339,7 +340,7 @@ LightPart DirectLight::gatherFrom(size_t index, const Receiver& receiver,
         ++sum.hidden;
         return {};
     }
-    return SourceGather(*this, *sources[index], index, receiver, place, aim)
+    return SourceGather(*this, *sources[index], uint32_t(index), receiver, place, aim)
         .run(seen[index], sightings, sum);
 }
 

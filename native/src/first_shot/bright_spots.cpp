@@ -8,8 +8,10 @@
 
 #include "bundles/directions.h"
 #include "first_shot/directed_light.h"
+#include "patches/clusters.h"
 #include "patches/side.h"
 #include "scene/channels.h"
+#include "visibility/exposed_share.h"
 
 namespace raybundle {
 namespace {
@@ -41,32 +43,48 @@ constexpr double kWorthFurtherRound = 1000;
 // that something dark far below a room does not make the room's walls bright spots.
 constexpr double kDarkIsland = 0.01;
 
-// Number of points on a side that are tested for another surface lying on it: at first, and if any
-// of these is covered.
-constexpr uint32_t kLooks = 16, kMoreLooks = 256;
+// Number of points on a side that are tested for another surface lying on it.
+constexpr uint32_t kLooks = 16;
 // A side of which less than this share is exposed is no bright spot.
 constexpr float kLeastExposed = 0.1f;
 
-// Returns the share of a side that nothing lies on. Returns 0 if that is too little for a source,
-// or if a sheet lies on the side: unlike a solid, it does not block all shadow rays to what it
-// covers.
-float exposedShare(const Patches& patches, const Visibility& exchange, uint32_t side) {
-    const glm::vec3 normal = patches.normal(side);
-    const float touching = patches.islandAt(side).touchDistance;
-    uint32_t covered = 0, looks = 0;
-    for (const uint32_t most : {kLooks, kMoreLooks}) {
-        for (; looks < most; ++looks) {
-            const glm::vec4 u = sobolPoint(looks, side);
-            const auto met = exchange.firstHit(side, patches.point(patchOf(side), {u.x, u.y}),
-                                               normal, nullptr, touching);
-            if (!met) continue;
-            if (!patches.parentAt(*met).isSolid) return 0;
-            ++covered;
-        }
-        if (covered == 0) return 1;
+// What lies on a side.
+enum class Cover { NOTHING, SOLID, SHEET };
+
+Cover coverOf(const Patches& patches, const Visibility& exchange, uint32_t side) {
+    Cover found = Cover::NOTHING;
+    for (uint32_t k = 0; k < kLooks; ++k) {
+        const glm::vec4 u = sobolPoint(k, side);
+        const auto met =
+            exchange.firstHit(side, patches.point(patchOf(side), {u.x, u.y}), patches.normal(side),
+                              nullptr, patches.islandAt(side).touchDistance);
+        if (!met) continue;
+        if (!patches.parentAt(*met).isSolid) return Cover::SHEET;
+        found = Cover::SOLID;
     }
-    const float share = 1 - float(covered) / float(looks);
-    return share < kLeastExposed ? 0 : share;
+    return found;
+}
+
+// Returns per side of `bright` the share that is exposed. Returns 0 if that is too little for a
+// source, or if a sheet lies on the side: unlike a solid, it does not block all shadow rays to what
+// it covers.
+std::vector<float> exposedShares(const FirstShotInput& input, const Visibility& exchange,
+                                 const std::vector<uint32_t>& bright) {
+    std::vector<float> shares(bright.size(), 1.0f);
+    std::vector<uint32_t> covered;  // sides on which solids stand
+    std::vector<size_t> at;         // their indices in `bright`
+    for (size_t k = 0; k < bright.size(); ++k) {
+        const Cover cover = coverOf(input.patches, exchange, bright[k]);
+        if (cover == Cover::SHEET) shares[k] = 0;
+        if (cover != Cover::SOLID) continue;
+        covered.push_back(bright[k]);
+        at.push_back(k);
+    }
+    const std::vector<float> exposed =
+        exposedShareOf(covered, exchange, Clusters(input.patches), uint32_t(input.settings.seed));
+    for (size_t k = 0; k < at.size(); ++k)
+        shares[at[k]] = exposed[k] < kLeastExposed ? 0 : exposed[k];
+    return shares;
 }
 
 // Returns the area that a line stands for at a parent, relative to lines outside all windows.
@@ -171,17 +189,19 @@ size_t gatherBrightSpots(const Scene& scene, const FirstShotInput& input,
     // Only the first light that a side sends has known directions.
     const int mostRounds = patches.scattering.empty() ? kMostRounds : 1;
     for (int round = 0; round < mostRounds; ++round) {
+        const std::vector<uint32_t> bright = brightSides(input, density, shot, unshot, round);
+        const std::vector<float> exposed = exposedShares(input, exchange, bright);
         EmissionSplit spots;
-        for (const uint32_t side : brightSides(input, density, shot, unshot, round)) {
-            const float exposed = exposedShare(patches, exchange, side);
-            if (exposed == 0) continue;
+        for (size_t k = 0; k < bright.size(); ++k) {
+            if (exposed[k] == 0) continue;
+            const uint32_t side = bright[k];
             if (spots.isSource.empty()) {
                 spots.isSource.resize(n);
                 spots.ofSources.resize(n);
             }
             spots.isSource[side] = areSpots[side] = true;
             // The light arrives on the exposed part, and leaves from there.
-            spots.ofSources[side] = unshot[side] / exposed;
+            spots.ofSources[side] = unshot[side] / exposed[k];
             unshot[side] = glm::vec3(0.0f);
         }
         if (spots.isSource.empty()) break;

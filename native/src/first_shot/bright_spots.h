@@ -13,7 +13,8 @@
 //   (first_shot/gather.cpp).
 // - Bright spots that see each other, as inside the shade of a lamp, light each other. What they
 //   reflect of that light is gathered too, in further rounds (not if any surface is not Lambert's).
-//   Each round is made only if it takes less time than the bundles that would be needed otherwise.
+// - The first round is made only if it takes less time than the bundles that would be needed
+//   otherwise, a further round only if it saves very many bundles.
 #pragma once
 
 #include "bundles/line_windows.h"

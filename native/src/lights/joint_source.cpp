@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "lights/joint_source.h"
 
+#include <algorithm>
 #include <limits>
 
 namespace raybundle {
