@@ -106,6 +106,11 @@ struct Parent {
     // Returns the affine coordinates of a point in the plane of the parent. The point is in m,
     // relative to Patches::centre.
     glm::vec2 affineAt(const glm::dvec3& point) const;
+    // Returns how far affine coordinates lie outside the parent; negative inside.
+    float outside(glm::vec2 st) const {
+        const float beyond = isTriangle ? st.x + st.y - 1 : std::max(st.x, st.y) - 1;
+        return std::max({-st.x, -st.y, beyond});
+    }
     // Returns the area of the parent, m^2.
     float area() const { return glm::length(glm::cross(a, b)) * (isTriangle ? 0.5f : 1.0f); }
 };

@@ -23,21 +23,6 @@ constexpr float kUpright = 1e-3f;
 // less of the light around the plates.
 constexpr float kNarrowGap = 8, kInsideGap = 1.0f / 32;
 
-// Returns how far a point lies outside a parent, in affine coordinates of the parent; negative
-// inside.
-float outside(const Parent& parent, glm::vec2 st) {
-    const float beyond = parent.isTriangle ? st.x + st.y - 1 : std::max(st.x, st.y) - 1;
-    return std::max({-st.x, -st.y, beyond});
-}
-
-// Returns the affine coordinates of a point (m, relative to Patches::centre) in a parent.
-glm::vec2 affine(const Parent& parent, const glm::vec3& point) {
-    const glm::dvec3 a(parent.a), b(parent.b), d = glm::dvec3(point) - glm::dvec3(parent.origin);
-    const glm::dvec3 n = glm::cross(a, b);
-    const double area2 = glm::dot(n, n);
-    return {glm::dot(glm::cross(d, b), n) / area2, glm::dot(glm::cross(a, d), n) / area2};
-}
-
 }  // namespace
 
 std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& patches,
@@ -48,7 +33,7 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
     const float turn = placed.side == RB_SIDE_BACK ? -1.0f : 1.0f;
 
     // Each receiver lies on the parent of the corner's cells that contains its point or is nearest
-    // to it. `nearest` is per corner: the smallest result of outside() so far.
+    // to it. `nearest` is per corner: the smallest result of Parent::outside() so far.
     std::vector<float> nearest(mesh.cornerCount(), INFINITY);
     std::vector<CornerReceiver> receivers(mesh.cornerCount());
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
@@ -61,8 +46,8 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
         for (int k = 0; k < n; ++k) {
             const int32_t corner = cell.corner[k];
             const glm::vec3 point = glm::mix(cell.position(k), centre, kTowardsMiddle);
-            const glm::vec2 st = affine(parent, point);
-            const float off = outside(parent, st);
+            const glm::vec2 st = parent.affineAt(point);
+            const float off = parent.outside(st);
             if (off >= nearest[corner]) continue;
             nearest[corner] = off;
             receivers[corner].corner = corner;

@@ -1,0 +1,544 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "patches/refined_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "job/cancellation.h"
+#include "scene/triangulation.h"
+
+namespace raybundle {
+namespace {
+
+// Angles whose cosine is larger are too small: 20 degrees, and a little more because positions are
+// stored as floats.
+const double kSmall = std::cos(20.3 * 3.14159265358979323846 / 180);
+// The good triangles of a face are too many if an angle of its first triangulation is less than
+// that of a rectangle that is this many times as long as wide.
+constexpr double kThin = 10;
+// Edges are flipped only between triangles whose planes differ by less than this angle, radians.
+constexpr double kFlat = 1e-3;
+// Least gain of a flip, as the sine of the angle by which the sum of the two opposite angles
+// exceeds 180 degrees.
+constexpr double kLeastGain = 1e-7;
+// Bisections for better angles, per triangle to be improved: at small angles of the source they
+// may go on for long.
+constexpr size_t kMostSteps = 30;
+// Triangles with a shorter edge than this are not improved: the share of the shortest edge that a
+// face has without improvements. It bounds what happens at small angles of the source.
+constexpr double kShortest = 0.3;
+// Edges shorter than this share of the largest coordinate are not bisected: positions are floats.
+constexpr double kLeastOfFarthest = 1e-6;
+
+size_t next(size_t k) { return k == 2 ? 0 : k + 1; }
+size_t last(size_t k) { return k == 0 ? 2 : k - 1; }
+
+}  // namespace
+
+RefinedMesh::RefinedMesh(const Mesh& source, const glm::dmat4& toWorld)
+    : source(source),
+      toWorld(toWorld),
+      hasDoubles(source.faceCount(), 0),
+      isTouched(source.faceCount(), 0),
+      isThin(source.faceCount(), 0),
+      shortest(source.faceCount(), INFINITY) {
+    // Vertices at the same position share a place.
+    std::vector<uint32_t> order(source.vertices.size());
+    for (uint32_t v = 0; v < order.size(); ++v) order[v] = v;
+    auto key = [&](uint32_t v) {
+        // Adding 0 makes -0 equal to 0.
+        const glm::vec3 p = source.vertices[v] + 0.0f;
+        return std::array<float, 3>{p.x, p.y, p.z};
+    };
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+    vertices.resize(order.size());
+    for (size_t k = 0; k < order.size(); ++k) {
+        throwIfCancelledAt(k);
+        const glm::dvec3 position(source.vertices[order[k]]);
+        if (k == 0 || key(order[k - 1]) != key(order[k]))
+            places.push_back(toWorld * glm::dvec4(position, 1.0));
+        vertices[order[k]] = {position, uint32_t(places.size() - 1)};
+    }
+    for (const glm::dvec3& place : places)
+        for (int axis = 0; axis < 3; ++axis)
+            leastEdge = std::max(leastEdge, kLeastOfFarthest * std::abs(place[axis]));
+    findDoubles();
+    addFaces();
+    linkRings();
+    std::vector<uint32_t> inner;
+    for (uint32_t t = 0; t < all.size(); ++t)
+        for (uint32_t k = 0; k < 3; ++k)
+            if (all[t].sourceEdge[k] < 0) inner.push_back(3 * t + k);
+    flipAll(std::move(inner));
+    noteThinFaces();
+    noteShortestEdges(0);
+}
+
+std::vector<int32_t> RefinedMesh::cornersInOrder(int32_t face) const {
+    std::vector<int32_t> corners;
+    for (int32_t c = source.faceOffsets[size_t(face)]; c < source.faceOffsets[size_t(face) + 1];
+         ++c)
+        corners.push_back(c);
+    const auto first = std::min_element(corners.begin(), corners.end(), [&](int32_t a, int32_t b) {
+        return placeOf(a) < placeOf(b);
+    });
+    std::rotate(corners.begin(), first, corners.end());
+    if (placeOf(corners.back()) < placeOf(corners[1]))
+        std::reverse(corners.begin() + 1, corners.end());
+    return corners;
+}
+
+void RefinedMesh::findDoubles() {
+    const int32_t count = int32_t(source.faceCount());
+    std::vector<std::pair<uint64_t, int32_t>> order;  // a sum that does not depend on the order
+    for (int32_t f = 0; f < count; ++f) {
+        throwIfCancelledAt(size_t(f));
+        uint64_t sum = 0;
+        for (int32_t c = source.faceOffsets[size_t(f)]; c < source.faceOffsets[size_t(f) + 1]; ++c)
+            sum += uint64_t(placeOf(c) + 1) * uint64_t(placeOf(c) + 7);
+        order.emplace_back(sum, f);
+        doubleOf.push_back(f);
+    }
+    std::sort(order.begin(), order.end());
+    auto placesOf = [&](int32_t face) {
+        std::vector<uint32_t> result;
+        for (int32_t c : cornersInOrder(face)) result.push_back(placeOf(c));
+        return result;
+    };
+    for (size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+        while (end < order.size() && order[end].first == order[begin].first) ++end;
+        if (end == begin + 1) continue;
+        std::map<std::vector<uint32_t>, int32_t> first;
+        for (size_t k = begin; k < end; ++k) {
+            const int32_t face = order[k].second;
+            const int32_t same = first.try_emplace(placesOf(face), face).first->second;
+            if (same == face) continue;
+            doubleOf[size_t(face)] = same;
+            hasDoubles[size_t(same)] = hasDoubles[size_t(face)] = 1;
+        }
+    }
+}
+
+// Triangles without three different places are left out: they have no area, and the edges beside
+// them are one edge.
+void RefinedMesh::addFaces() {
+    for (size_t f = 0; f < source.faceCount(); ++f) {
+        throwIfCancelledAt(f);
+        firstOfFace.push_back(uint32_t(all.size()));
+        const int32_t begin = source.faceOffsets[f], end = source.faceOffsets[f + 1];
+        std::vector<int32_t> corners;
+        bool isReversed = false;
+        if (hasDoubles[f]) {
+            corners = cornersInOrder(int32_t(f));
+            isReversed = corners[1] != (corners[0] + 1 == end ? begin : corners[0] + 1);
+        } else {
+            for (int32_t c = begin; c < end; ++c) corners.push_back(c);
+        }
+        std::vector<glm::dvec3> polygon;
+        for (int32_t c : corners)
+            polygon.push_back(source.vertices[size_t(source.cornerVertices[size_t(c)])]);
+        for (const std::array<int, 3>& of : triangulate(polygon)) {
+            std::array<int32_t, 3> at{corners[size_t(of[0])], corners[size_t(of[1])],
+                                      corners[size_t(of[2])]};
+            if (isReversed) std::swap(at[1], at[2]);
+            Triangle triangle;
+            triangle.face = int32_t(f);
+            for (size_t k = 0; k < 3; ++k) {
+                triangle.vertex[k] = uint32_t(source.cornerVertices[size_t(at[k])]);
+                triangle.place[k] = placeOf(at[k]);
+                triangle.sourceEdge[k] =
+                    at[next(k)] == (at[k] + 1 == end ? begin : at[k] + 1) ? at[k] : -1;
+            }
+            if (triangle.place[0] == triangle.place[1] || triangle.place[1] == triangle.place[2] ||
+                triangle.place[2] == triangle.place[0])
+                continue;
+            add(triangle);
+            sourceTriangles.push_back(at);
+        }
+    }
+    firstOfFace.push_back(uint32_t(all.size()));
+    made.clear();
+}
+
+// Links the edges between the same two places. Edges within a face are linked only to each other
+// and to those of its doubles.
+void RefinedMesh::linkRings() {
+    struct Entry {
+        uint32_t a, b;
+        int32_t face;  // of an edge within a face; -1 for edges of the source
+        uint32_t edge;
+        bool operator<(const Entry& o) const {
+            return std::tie(a, b, face, edge) < std::tie(o.a, o.b, o.face, o.edge);
+        }
+        bool isBeside(const Entry& o) const { return a == o.a && b == o.b && face == o.face; }
+    };
+    std::vector<Entry> entries;
+    for (uint32_t t = 0; t < all.size(); ++t)
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t a = all[t].place[k], b = all[t].place[next(k)];
+            entries.push_back({std::min(a, b), std::max(a, b),
+                               all[t].sourceEdge[k] < 0 ? doubleOf[size_t(all[t].face)] : -1,
+                               3 * t + k});
+        }
+    std::sort(entries.begin(), entries.end());
+    std::vector<uint32_t> edges;
+    for (size_t k = 0; k < entries.size(); ++k) {
+        edges.push_back(entries[k].edge);
+        if (k + 1 < entries.size() && entries[k].isBeside(entries[k + 1])) continue;
+        link(edges);
+        edges.clear();
+    }
+}
+
+void RefinedMesh::noteThinFaces() {
+    const double thin = std::cos(std::atan(1 / kThin));
+    for (const Triangle& triangle : all)
+        if (triangle.isAlive && !(smallestAngle(triangle)[0] < thin))
+            isThin[size_t(triangle.face)] = 1;
+}
+
+void RefinedMesh::noteShortestEdges(size_t firstTriangle) {
+    for (size_t t = firstTriangle; t < all.size(); ++t) {
+        double& least = shortest[size_t(all[t].face)];
+        for (size_t k = 0; k < 3; ++k) least = std::min(least, std::sqrt(edgeLength2(all[t], k)));
+    }
+    improvedFrom = all.size();
+}
+
+glm::dvec3 RefinedMesh::areaVector(const Triangle& triangle) const {
+    const glm::dvec3& a = position(triangle, 0);
+    return glm::cross(position(triangle, 1) - a, position(triangle, 2) - a);
+}
+
+double RefinedMesh::area(const Triangle& triangle) const {
+    return 0.5 * glm::length(areaVector(triangle));
+}
+
+double RefinedMesh::edgeLength2(const Triangle& triangle, size_t edge) const {
+    // From the smaller place, so that both triangles of an edge find the same length.
+    const uint32_t a = triangle.place[edge], b = triangle.place[next(edge)];
+    const glm::dvec3 along = places[std::max(a, b)] - places[std::min(a, b)];
+    return glm::dot(along, along);
+}
+
+double RefinedMesh::longestEdge(const Triangle& triangle) const {
+    return std::sqrt(edgeLength2(triangle, longest(triangle)));
+}
+
+bool RefinedMesh::isShorter(const Triangle& a, size_t edgeOfA, const Triangle& b,
+                            size_t edgeOfB) const {
+    auto key = [&](const Triangle& triangle, size_t edge) {
+        const uint32_t p = triangle.place[edge], q = triangle.place[next(edge)];
+        return std::make_tuple(edgeLength2(triangle, edge), std::min(p, q), std::max(p, q));
+    };
+    return key(a, edgeOfA) < key(b, edgeOfB);
+}
+
+size_t RefinedMesh::longest(const Triangle& triangle) const {
+    size_t best = 0;
+    for (size_t k = 1; k < 3; ++k)
+        if (isShorter(triangle, best, triangle, k)) best = k;
+    return best;
+}
+
+std::array<double, 2> RefinedMesh::smallestAngle(const Triangle& triangle) const {
+    std::array<double, 2> result{-1, 0};
+    for (size_t k = 0; k < 3; ++k) {
+        const glm::dvec3 a = position(triangle, next(k)) - position(triangle, k);
+        const glm::dvec3 b = position(triangle, last(k)) - position(triangle, k);
+        const double cosine = glm::dot(a, b) / std::sqrt(glm::dot(a, a) * glm::dot(b, b));
+        if (!(cosine <= result[0])) result = {cosine, double(k)};
+    }
+    return result;
+}
+
+// Between two edges of the source, no bisection can enlarge an angle.
+bool RefinedMesh::isPoor(const Triangle& triangle) const {
+    const size_t face = size_t(triangle.face);
+    if (!triangle.isAlive || !isTouched[face] || isThin[face] || hasDoubles[face]) return false;
+    const auto [cosine, corner] = smallestAngle(triangle);
+    if (!(cosine > kSmall)) return false;
+    for (size_t k = 0; k < 3; ++k)
+        if (edgeLength2(triangle, k) < std::pow(kShortest * shortest[size_t(triangle.face)], 2))
+            return false;
+    const size_t at = size_t(corner);
+    return triangle.sourceEdge[at] < 0 || triangle.sourceEdge[last(at)] < 0;
+}
+
+uint32_t RefinedMesh::add(const Triangle& triangle) {
+    all.push_back(triangle);
+    const uint32_t index = uint32_t(all.size() - 1);
+    for (uint32_t k = 0; k < 3; ++k) all.back().ring[k] = 3 * index + k;
+    made.push_back(index);
+    return index;
+}
+
+std::vector<uint32_t> RefinedMesh::ringOf(uint32_t edge) const {
+    std::vector<uint32_t> ring{edge};
+    for (uint32_t at = all[edge / 3].ring[edge % 3]; at != edge; at = all[at / 3].ring[at % 3])
+        ring.push_back(at);
+    return ring;
+}
+
+void RefinedMesh::link(const std::vector<uint32_t>& edges) {
+    for (size_t k = 0; k < edges.size(); ++k)
+        all[edges[k] / 3].ring[edges[k] % 3] = edges[k + 1 == edges.size() ? 0 : k + 1];
+}
+
+void RefinedMesh::replaceInRing(uint32_t old, uint32_t now) {
+    std::vector<uint32_t> ring = ringOf(old);
+    ring.front() = now;
+    link(ring);
+}
+
+uint32_t RefinedMesh::addPoint(uint32_t triangle, const glm::dvec3& point) {
+    points.push_back(point);
+    all[triangle].points.push_back(uint32_t(points.size() - 1));
+    return uint32_t(points.size() - 1);
+}
+
+void RefinedMesh::bisect(uint32_t edge) {
+    const std::vector<uint32_t> ring = ringOf(edge);
+    const uint32_t end = all[edge / 3].place[edge % 3];  // the place at one end
+    const uint32_t middle = uint32_t(places.size());
+    places.push_back(0.5 * (places[end] + places[all[edge / 3].place[next(edge % 3)]]));
+    std::map<std::array<uint32_t, 2>, uint32_t> vertexBetween;
+    std::vector<uint32_t> atEnd, beyond, outer;
+    for (uint32_t one : ring) {
+        const Triangle old = all[one / 3];
+        const size_t k = one % 3, b = next(k), c = last(k);
+        const std::array<uint32_t, 2> ends{std::min(old.vertex[k], old.vertex[b]),
+                                           std::max(old.vertex[k], old.vertex[b])};
+        const auto [found, isNew] = vertexBetween.try_emplace(ends, uint32_t(vertices.size()));
+        if (isNew)
+            vertices.push_back(
+                {0.5 * (vertices[ends[0]].position + vertices[ends[1]].position), middle});
+        const uint32_t vertex = found->second;
+        Triangle half = old;
+        half.points.clear();
+        half.place = {old.place[k], middle, old.place[c]};
+        half.vertex = {old.vertex[k], vertex, old.vertex[c]};
+        half.sourceEdge = {old.sourceEdge[k], -1, old.sourceEdge[c]};
+        const uint32_t first = add(half);
+        half.place = {middle, old.place[b], old.place[c]};
+        half.vertex = {vertex, old.vertex[b], old.vertex[c]};
+        half.sourceEdge = {old.sourceEdge[k], old.sourceEdge[b], -1};
+        const uint32_t second = add(half);
+        all[one / 3].isAlive = false;
+        isTouched[size_t(old.face)] = 1;
+        replaceInRing(3 * (one / 3) + uint32_t(c), 3 * first + 2);
+        replaceInRing(3 * (one / 3) + uint32_t(b), 3 * second + 1);
+        link({3 * first + 1, 3 * second + 2});
+        const bool beginsAtEnd = old.place[k] == end;
+        (beginsAtEnd ? atEnd : beyond).push_back(3 * first);
+        (beginsAtEnd ? beyond : atEnd).push_back(3 * second);
+        outer.push_back(3 * first + 2);
+        outer.push_back(3 * second + 1);
+        const glm::dvec3 across = places[old.place[c]] - places[middle];
+        const glm::dvec3 side = glm::cross(across, areaVector(old));
+        for (uint32_t p : old.points) {
+            // cross(across, normal) points away from the first half.
+            const bool isFirst = glm::dot(side, points[p] - places[middle]) < 0;
+            all[isFirst ? first : second].points.push_back(p);
+        }
+        all[one / 3].points = {};
+    }
+    link(atEnd);
+    link(beyond);
+    flipAll(std::move(outer));
+}
+
+void RefinedMesh::flipAll(std::vector<uint32_t> stack) {
+    while (!stack.empty()) {
+        const uint32_t edge = stack.back();
+        stack.pop_back();
+        if (all[edge / 3].isAlive) flipIfBetter(edge, stack);
+    }
+}
+
+// Delaunay's condition for two triangles abc and bad: the angles at c and d sum to at most 180
+// degrees.
+bool RefinedMesh::flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack) {
+    const uint32_t other = all[edge / 3].ring[edge % 3];
+    if (other == edge || all[other / 3].ring[other % 3] != edge) return false;
+    const size_t i = edge % 3, j = other % 3;
+    const Triangle one = all[edge / 3], two = all[other / 3];
+    if (one.sourceEdge[i] >= 0 || one.face != two.face || one.vertex[i] != two.vertex[next(j)] ||
+        one.vertex[next(i)] != two.vertex[j] || one.place[last(i)] == two.place[last(j)])
+        return false;
+    const glm::dvec3 a = position(one, i), b = position(one, next(i)), c = position(one, last(i)),
+                     d = position(two, last(j));
+    const glm::dvec3 first = areaVector(one), second = areaVector(two);
+    const glm::dvec3 sum = first + second;
+    const double size = glm::length(sum);
+    if (!(size > 0)) return false;
+    const glm::dvec3 normal = sum / size;
+    // A triangle without area lies in any plane.
+    auto isFlat = [&](const glm::dvec3& v) {
+        return glm::dot(v, normal) >= 0 && glm::length(v - glm::dot(v, normal) * normal) <=
+                                               kFlat * glm::length(v) + 1e-9 * size;
+    };
+    if (!isFlat(first) || !isFlat(second)) return false;
+    auto sine = [](const glm::dvec3& u, const glm::dvec3& v) {
+        return glm::length(glm::cross(u, v));
+    };
+    const double sinC = sine(a - c, b - c), cosC = glm::dot(a - c, b - c);
+    const double sinD = sine(a - d, b - d), cosD = glm::dot(a - d, b - d);
+    const double scale = std::sqrt(glm::dot(a - c, a - c) * glm::dot(b - c, b - c) *
+                                   glm::dot(a - d, a - d) * glm::dot(b - d, b - d));
+    if (!(sinC * cosD + cosC * sinD < -kLeastGain * scale)) return false;
+    auto turned = [&](const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& r) {
+        return glm::dot(glm::cross(q - p, r - p), normal);
+    };
+    if (!(turned(a, d, c) > 1e-9 * size) || !(turned(d, b, c) > 1e-9 * size)) return false;
+
+    Triangle made = one;
+    made.points.clear();
+    made.place = {one.place[i], two.place[last(j)], one.place[last(i)]};
+    made.vertex = {one.vertex[i], two.vertex[last(j)], one.vertex[last(i)]};
+    made.sourceEdge = {two.sourceEdge[next(j)], -1, one.sourceEdge[last(i)]};
+    const uint32_t atA = add(made);
+    made.place = {two.place[last(j)], one.place[next(i)], one.place[last(i)]};
+    made.vertex = {two.vertex[last(j)], one.vertex[next(i)], one.vertex[last(i)]};
+    made.sourceEdge = {two.sourceEdge[last(j)], one.sourceEdge[next(i)], -1};
+    const uint32_t atB = add(made);
+    const uint32_t t = 3 * (edge / 3), u = 3 * (other / 3);
+    replaceInRing(u + uint32_t(next(j)), 3 * atA);
+    replaceInRing(t + uint32_t(last(i)), 3 * atA + 2);
+    replaceInRing(u + uint32_t(last(j)), 3 * atB);
+    replaceInRing(t + uint32_t(next(i)), 3 * atB + 1);
+    link({3 * atA + 1, 3 * atB + 2});
+    const glm::dvec3 side = glm::cross(c - d, normal);  // points away from a
+    for (const uint32_t triangle : {edge / 3, other / 3}) {
+        for (uint32_t p : all[triangle].points) {
+            const bool isAtA = glm::dot(side, points[p] - d) < 0;
+            all[isAtA ? atA : atB].points.push_back(p);
+        }
+        all[triangle].isAlive = false;
+        all[triangle].points = {};
+    }
+    for (uint32_t changed : {3 * atA, 3 * atA + 2, 3 * atB, 3 * atB + 1}) stack.push_back(changed);
+    return true;
+}
+
+void RefinedMesh::refine(uint32_t triangle) {
+    if (!(longestEdge(all[triangle]) > leastEdge)) return;
+    while (all[triangle].isAlive) {
+        uint32_t at = triangle;
+        size_t edge = longest(all[at]);
+        for (bool isLongest = false; !isLongest;) {
+            isLongest = true;
+            for (uint32_t beside : ringOf(3 * at + uint32_t(edge))) {
+                const size_t longer = longest(all[beside / 3]);
+                if (longer == beside % 3) continue;
+                at = beside / 3;
+                edge = longer;
+                isLongest = false;
+                break;
+            }
+        }
+        bisect(3 * at + uint32_t(edge));
+    }
+}
+
+void RefinedMesh::improve(size_t mostVertices) {
+    noteShortestEdges(improvedFrom);
+    std::vector<uint32_t> pending;
+    auto take = [&] {
+        for (uint32_t t : made)
+            if (isPoor(all[t])) pending.push_back(t);
+        made.clear();
+    };
+    take();
+    for (size_t steps = kMostSteps * pending.size(), k = 0; k < pending.size() && steps > 0; ++k) {
+        throwIfCancelledAt(k);
+        if (!isPoor(all[pending[k]])) continue;
+        if (vertexCount() >= mostVertices) break;
+        refine(pending[k]);
+        --steps;
+        take();
+    }
+    improvedFrom = all.size();
+}
+
+// Barycentric coordinates in the triangle of the face's own triangulation that contains the
+// position, or that is nearest to containing it.
+void RefinedMesh::locate(int32_t face, const glm::dvec3& position, std::array<int32_t, 3>& corners,
+                         std::array<float, 3>& weights) const {
+    double best = -INFINITY;
+    for (uint32_t t = firstOfFace[size_t(face)]; t < firstOfFace[size_t(face) + 1]; ++t) {
+        std::array<glm::dvec3, 3> at;
+        for (size_t k = 0; k < 3; ++k)
+            at[k] = source.vertices[size_t(source.cornerVertices[size_t(sourceTriangles[t][k])])];
+        const glm::dvec3 normal = glm::cross(at[1] - at[0], at[2] - at[0]);
+        const double scale = glm::dot(normal, normal);
+        if (!(scale > 0) && std::isfinite(best)) continue;
+        std::array<double, 3> w{1, 0, 0};
+        if (scale > 0) {
+            w[1] = glm::dot(normal, glm::cross(at[2] - position, at[0] - position)) / scale;
+            w[2] = glm::dot(normal, glm::cross(at[0] - position, at[1] - position)) / scale;
+            w[0] = 1 - w[1] - w[2];
+        }
+        const double least = std::min({w[0], w[1], w[2]});
+        if (!(least > best)) continue;
+        best = least;
+        corners = sourceTriangles[t];
+        double sum = 0;
+        for (double& weight : w) sum += weight = std::max(weight, 0.0);
+        for (size_t k = 0; k < 3; ++k) weights[k] = float(w[k] / sum);
+    }
+}
+
+FinerMesh RefinedMesh::result() const {
+    FinerMesh mesh;
+    mesh.sourceCornerCount = source.cornerCount();
+    for (const Vertex& vertex : vertices) mesh.vertices.emplace_back(vertex.position);
+    auto addCorner = [&](uint32_t vertex, int32_t sourceEdge) {
+        mesh.cornerVertices.push_back(int32_t(vertex));
+        mesh.sourceEdges.push_back(sourceEdge);
+        mesh.sourceCorners.emplace_back();
+        mesh.sourceWeights.emplace_back();
+    };
+    auto endFace = [&](int32_t face) {
+        mesh.faceOffsets.push_back(int32_t(mesh.cornerVertices.size()));
+        mesh.sourceFaces.push_back(face);
+    };
+    std::vector<std::vector<uint32_t>> living(source.faceCount());
+    for (uint32_t t = 0; t < all.size(); ++t)
+        if (all[t].isAlive) living[size_t(all[t].face)].push_back(t);
+    for (int32_t f = 0; f < int32_t(source.faceCount()); ++f) {
+        throwIfCancelledAt(size_t(f));
+        const int32_t begin = source.faceOffsets[size_t(f)],
+                      end = source.faceOffsets[size_t(f) + 1];
+        if (!isTouched[size_t(f)]) {
+            for (int32_t c = begin; c < end; ++c) {
+                addCorner(uint32_t(source.cornerVertices[size_t(c)]), c);
+                mesh.sourceCorners.back() = {c, c, c};
+                mesh.sourceWeights.back() = {1, 0, 0};
+            }
+            endFace(f);
+            continue;
+        }
+        std::map<uint32_t, int32_t> cornerOf;  // of the source's vertices
+        for (int32_t c = begin; c < end; ++c)
+            cornerOf.emplace(uint32_t(source.cornerVertices[size_t(c)]), c);
+        for (uint32_t t : living[size_t(f)]) {
+            for (size_t k = 0; k < 3; ++k) {
+                addCorner(all[t].vertex[k], all[t].sourceEdge[k]);
+                if (const auto own = cornerOf.find(all[t].vertex[k]); own != cornerOf.end()) {
+                    mesh.sourceCorners.back() = {own->second, own->second, own->second};
+                    mesh.sourceWeights.back() = {1, 0, 0};
+                } else {
+                    locate(f, vertices[all[t].vertex[k]].position, mesh.sourceCorners.back(),
+                           mesh.sourceWeights.back());
+                }
+            }
+            endFace(f);
+        }
+    }
+    return mesh;
+}
+
+}  // namespace raybundle
