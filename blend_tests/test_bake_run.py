@@ -210,7 +210,7 @@ def test_a_change_of_the_scene_is_said(two_boxes, start):
     assert not any("was changed" in warning for warning in to_the_end(start(seed=1)).warnings)
 
 
-@pytest.mark.parametrize("topology", ['KEEP', 'SUBDIVIDE'])
+@pytest.mark.parametrize("topology", ['KEEP', 'SUBDIVIDE', 'ADAPTIVE'])
 def test_another_scene_may_be_shown_at_the_end(two_boxes, start, topology):
     run = start(topology=topology, patch_size=0.3)
     baked = bpy.context.scene

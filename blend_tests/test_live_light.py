@@ -112,7 +112,7 @@ def test_the_light_follows(room, live, change):
     assert np.abs(light - before).max() > 0.05 * scale
 
 
-@pytest.mark.parametrize("topology", ['KEEP', 'SUBDIVIDE'])
+@pytest.mark.parametrize("topology", ['KEEP', 'SUBDIVIDE', 'ADAPTIVE'])
 def test_the_light_that_is_written_is_no_change(room, live, topology):
     bpy.context.scene.raybundle.topology = topology
     bpy.context.scene.raybundle.patch_size = 0.3

@@ -23,7 +23,9 @@ SCENE_PROPERTIES = """scope target_error output attribute domain data_type topol
 OPERATORS = ("bake", "relight", "clear", "preview")
 
 # Settings of the library that Blender does not show. They are for studies with the C interface.
-NOT_IN_BLENDER = ["draft", "min_bundles", "thesis_literal", "plane_coherence", "regularization"]
+# The topology decides adapt_meshes.
+NOT_IN_BLENDER = ["adapt_meshes", "draft", "min_bundles", "thesis_literal", "plane_coherence",
+                  "regularization"]
 # Properties with a narrower range than in the library, where studies use the full range.
 NARROWER = {'target_error': (0.0005, 1.0)}
 RNA_TYPES = {int: 'INT', float: 'FLOAT', str: 'ENUM'}

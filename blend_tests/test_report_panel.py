@@ -132,6 +132,7 @@ def test_times(seconds, text):
 
 @pytest.mark.parametrize("text, advised", [
     (COARSE, {'topology': 'SUBDIVIDE', 'patch_size': 0.05}),
+    (COARSE.rpartition("SUBDIVIDE")[0] + "ADAPTIVE", {'topology': 'ADAPTIVE'}),
     (SOLVER, {'solver': 'LINE_REUSE', 'first_shot': 'GATHER'}),
     (CUT_OFF, {'data_type': 'FLOAT_COLOR'}),
     (UNLIT, {}),

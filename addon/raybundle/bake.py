@@ -17,6 +17,8 @@ import numpy as np
 from . import bake_cache, color_attribute, native
 from .bake_report import BakeError, BakeReport, ObjectReport
 from .corner_map import CornerMap, grouped_mean
+from .finer_copy import create_copies, find_copies, originals_shown
+from .finer_mesh import FinerMesh, adapted, subdivide
 from .light_sets import LightSet, read_light_sets
 from .mesh_arrays import corner_vertices
 from .messages import Message, quoted
@@ -26,8 +28,6 @@ from .properties import BakeSettings, read_settings
 from .quality import OBJECT_FACTORS, full_bake
 from .scene_data import MeshData
 from .scene_export import BakeTarget, SceneExport, export_lamps_again, export_scene
-from .subdivided_copy import (SubdividedMesh, create_copies, find_copies, originals_shown,
-                              subdivide)
 from .warning_lines import listed
 
 
@@ -40,7 +40,7 @@ class TargetLight:
     light: np.ndarray
     error: np.ndarray | None  # (n,), the stated error; None: not written
     # the finer mesh that receives the light; None: the object's own mesh
-    subdivided: SubdividedMesh | None
+    finer: FinerMesh | None
     # The light of each light set, (n, 3), by name of the attribute.
     set_lights: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -53,8 +53,9 @@ class PreparedBake:
     settings: BakeSettings
     light_sets: list[LightSet]
     export: SceneExport
-    # The finer mesh of each target, by the target's position in SceneData.instances.
-    subdivided: dict[int, SubdividedMesh]
+    # The finer mesh of each target, by the target's position in SceneData.instances. Those of the
+    # topology 'ADAPTIVE' are known only when the bake has run.
+    finer: dict[int, FinerMesh]
     started: float  # time.perf_counter() at the beginning
     native_bake: native.Bake | None = None
     native_scene: native.Scene | None = None  # the owner of this object closes it
@@ -84,15 +85,17 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
 
 def prepare(context: bpy.types.Context, overrides: dict[str, object], is_draft: bool = False
             ) -> PreparedBake:
-    """Exports the context's scene, in Object Mode. is_draft: the library's setting `draft`.
-    overrides, and errors: as in bake()."""
+    """Exports the context's scene, in Object Mode. is_draft: the library's setting `draft`. A draft
+    of adapted meshes keeps those that there are. overrides, and errors: as in bake()."""
     started = time.perf_counter()
     scene = context.scene
     settings = _read_settings(scene, overrides)
+    if is_draft and settings.topology == 'ADAPTIVE' and find_copies(scene):
+        settings = replace(settings, topology='KEEP')
     light_sets = read_light_sets(scene, settings.attribute)
     _check(scene, settings, light_sets)
-    export, subdivided = _export(context, settings, light_sets)
-    return _ready(PreparedBake(scene, settings, light_sets, export, subdivided, started), is_draft)
+    export, finer = _export(context, settings, light_sets)
+    return _ready(PreparedBake(scene, settings, light_sets, export, finer, started), is_draft)
 
 
 def prepare_lamps(context: bpy.types.Context, overrides: dict[str, object], is_draft: bool,
@@ -225,27 +228,32 @@ def _check(scene: bpy.types.Scene, settings: BakeSettings, light_sets: list[Ligh
 
 
 def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list[LightSet]
-            ) -> tuple[SceneExport, dict[int, SubdividedMesh]]:
+            ) -> tuple[SceneExport, dict[int, FinerMesh]]:
     """Exports the scene. For topology 'SUBDIVIDE' also returns the finer mesh of each target, by
     the target's position in SceneData.instances. Raises BakeError if there is nothing to bake."""
-    refine = settings.topology == 'SUBDIVIDE'
     selected = None
     if settings.scope == 'SELECTED':
         selected = {item for item in context.scene.objects if item.select_get()}
-        if refine:
+        if writes_copies(settings):
             # A selected copy counts as a selection of its original.
             selected |= {original for original, copy in find_copies(context.scene).items()
                          if copy in selected}
-    with originals_shown(context.scene) if refine else nullcontext():
+    with originals_shown(context.scene) if writes_copies(settings) else nullcontext():
         export = export_scene(context, selected, light_sets, settings.patch_size,
                               settings.attribute)
     _leave_out_unwritable(export, settings)
     if not export.targets:
         raise BakeError(_nothing_to_bake(settings, export))
-    if refine:
+    if settings.topology == 'SUBDIVIDE':
         return export, _refine(export, settings)
-    _want_written_corners(export)
+    if settings.topology == 'KEEP':
+        _want_written_corners(export)
     return export, {}
+
+
+def writes_copies(settings: BakeSettings) -> bool:
+    """Returns whether the light is written to finer copies of the objects."""
+    return settings.topology != 'KEEP'
 
 
 def _nothing_to_bake(settings: BakeSettings, export: SceneExport) -> Message:
@@ -265,9 +273,8 @@ def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
     objects still reflect and block light."""
     writable = []
     for target in export.targets:
-        # A subdivided copy has its own mesh, but is placed in the collections of its original
-        # object.
-        owner = target.object if settings.topology == 'SUBDIVIDE' else target.object.data
+        # A finer copy has its own mesh, but is placed in the collections of its original object.
+        owner = target.object if writes_copies(settings) else target.object.data
         if owner.library is None and owner.override_library is None:
             writable.append(target)
             continue
@@ -282,7 +289,7 @@ def _leave_out_unwritable(export: SceneExport, settings: BakeSettings) -> None:
     export.targets[:] = writable
 
 
-def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, SubdividedMesh]:
+def _refine(export: SceneExport, settings: BakeSettings) -> dict[int, FinerMesh]:
     """Replaces the mesh of each target by a finer mesh. Returns the finer meshes by position of the
     instance in SceneData.instances."""
     scene = export.scene
@@ -314,6 +321,8 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
         section, _, skip = name.partition(".")
         if section == "skip":
             native_bake.set(name, skip not in settings.skips_off)
+        elif name == 'adapt_meshes':
+            native_bake.set(name, settings.topology == 'ADAPTIVE')
         elif hasattr(settings, name):
             native_bake.set(name, getattr(settings, name))
 
@@ -344,7 +353,10 @@ def _read_results(prepared: PreparedBake) -> list[TargetLight]:
     results = []
     for target in export.targets:
         mesh = export.scene.meshes[export.scene.instances[target.instance].mesh]
-        finer = prepared.subdivided.get(target.instance)
+        finer = prepared.finer.get(target.instance)
+        if settings.topology == 'ADAPTIVE':
+            finer = adapted(mesh, native_bake.adapted_mesh(target.instance))
+            mesh = finer.data
         corner_map = target.corner_map if finer is None else CornerMap(mesh.corner_count)
 
         def read_light(light_set: int | None = None) -> np.ndarray:
@@ -396,11 +408,14 @@ def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
 
 def _write(context: bpy.types.Context, lights: list[TargetLight], settings: BakeSettings,
            export: SceneExport, native_report: dict) -> list[ObjectReport]:
-    """Writes the light to the targets, or to their subdivided copies. Returns a report for each
+    """Writes the light to the targets, or to their finer copies. Returns a report for each
     target."""
     copies: dict[bpy.types.Object, bpy.types.Object] = {}
-    if settings.topology == 'SUBDIVIDE':
-        copies = create_copies(context, {item.target.object: item.subdivided for item in lights})
+    if writes_copies(settings):
+        copies, warnings = create_copies(
+            context, {item.target.object: item.finer for item in lights})
+        for warning in warnings:
+            export.warnings.add(warning)
     else:
         lights = _resolve_shared_meshes(lights, settings, export)
     lights = [replace(item, light=exposed(item.light, settings)) for item in lights]

@@ -15,7 +15,8 @@ from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_tip as tip_
 
 from . import native
-from .bake import PreparedBake, object_mode, prepare, prepare_lamps, write_results
+from .bake import (PreparedBake, object_mode, prepare, prepare_lamps, write_results,
+                   writes_copies)
 from .bake_progress import BakeProgress
 from .bake_report import BakeError, BakeReport
 from .interim_light import InterimLight
@@ -159,7 +160,7 @@ class BakeRun:
         prepared = self.prepared
         try:
             self._run.finish()
-            if prepared.subdivided and context.scene != prepared.scene:
+            if writes_copies(prepared.settings) and context.scene != prepared.scene:
                 # Copies are evaluated and placed in the scene that the window shows.
                 raise BakeError(Message("The window shows another scene than the one that was "
                                         "baked: nothing was written, show that scene and bake "

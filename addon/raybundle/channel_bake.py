@@ -18,11 +18,11 @@ import numpy as np
 from . import color_attribute
 from .bake import bake
 from .bake_report import BakeError, BakeReport
+from .finer_copy import find_copies
 from .materials.last_surfaces import LastSurfaces
 from .mesh_arrays import read
 from .messages import Message
 from .native import Progress
-from .subdivided_copy import find_copies
 
 NONE, AO = 'NONE', 'AO'
 CHANNELS = ('channel_r', 'channel_g', 'channel_b', 'channel_a')  # of scene.raybundle

@@ -33,7 +33,7 @@ class InterimLight:
             written.add(mesh)
             exported = export.scene.meshes[export.scene.instances[target.instance].mesh]
             light = run.light(target.instance, settings.output, exported.corner_count)
-            finer = self._prepared.subdivided.get(target.instance)
+            finer = self._prepared.finer.get(target.instance)
             if finer is not None:
                 light = finer.at_source(light)
             light = at_elements(light, target.corner_map, mesh, settings.domain)

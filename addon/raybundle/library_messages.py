@@ -96,8 +96,12 @@ WARNINGS = (
     "target_error takes long and gains little; add lamps, or accept the noise",
     "object {object}: its faces, {edge} wide on average, are too coarse for its light. "
     "Interpolation over the faces causes an error of {error}. Edges of about {wanted} would reduce "
-    "the error to {limit}; subdivide the mesh, or choose the topology SUBDIVIDE with patch_size "
-    "{size}",
+    "the error to {limit}; subdivide the mesh, or choose the topology ADAPTIVE",
+    "object {object}: its faces, {edge} wide on average, are too coarse for its light. "
+    "Interpolation over the faces causes an error of {error}. Edges of about {wanted} would reduce "
+    "the error to {limit}; lower target_error, or raise max_vertices if it was reached",
+    "max_vertices ({count}) was reached before the meshes could follow the light to the target; "
+    "raise max_vertices, or raise target_error",
     "{count} more objects are too coarse for their light; the report lists the error of each "
     "object",
 )

@@ -205,6 +205,9 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_get_set_corner_light': (_handle, _int, _int, _enum, _floats, _size),
     'rb_get_set_vertex_light': (_handle, _int, _int, _enum, _floats, _size),
     'rb_get_corner_error': (_handle, _int, _floats, _size),
+    'rb_get_adapted_mesh_size': (_handle, _int, _out(_size), _out(_size), _out(_size)),
+    'rb_get_adapted_mesh': (_handle, _int, _floats, _size, _ints, _ints, _floats, _ints, _size,
+                            _ints, _ints, _size),
     'rb_get_report': (_handle, _out(_text)),
     'rb_new_subdivision': (_floats, _size, _ints, _size, _ints, _size, _float, _out(_handle)),
     'rb_get_subdivision_size': (_handle, _out(_size), _out(_size)),
@@ -664,6 +667,21 @@ def _setting_type(name: str) -> type:
     return settings()[name].type if name in settings() else float
 
 
+@dataclasses.dataclass(frozen=True)
+class AdaptedMesh:
+    """A mesh whose faces lie on those of a source mesh, with n vertices, c corners and f faces."""
+
+    vertices: np.ndarray  # (n, 3) float32, object space, m; those of the source come first
+    corner_vertices: np.ndarray  # (c,) int32
+    source_corners: np.ndarray  # (c, 3) int32, the source's corners between which a corner lies
+    source_weights: np.ndarray  # (c, 3) float32, their weights, which sum to 1
+    # (c,) int32: the source's corner at which the source's edge begins on which the edge from the
+    # corner to the next lies; -1: it crosses a face of the source.
+    source_edges: np.ndarray
+    face_offsets: np.ndarray  # (f + 1,) int32, the first corner of each face
+    source_faces: np.ndarray  # (f,) int32, the source's face that contains the face
+
+
 class Bake(_Handle):
     """A bake: its settings, execution and results. Patches and lines are kept for the next
     execution."""
@@ -762,6 +780,23 @@ class Bake(_Handle):
         error = np.empty(count, np.float32)
         self._library.rb_get_corner_error(self._pointer, instance, _as_floats(error), count)
         return error
+
+    def adapted_mesh(self, instance: int) -> AdaptedMesh:
+        """Returns the mesh at whose corners the light of an instance is, after an execution with
+        the setting adapt_meshes. Raises RaybundleError if the last one had it off."""
+        sizes = [_size() for _ in range(3)]
+        self._library.rb_get_adapted_mesh_size(self._pointer, instance, *map(ctypes.byref, sizes))
+        vertices, corners, faces = (size.value for size in sizes)
+        mesh = AdaptedMesh(np.empty((vertices, 3), np.float32), np.empty(corners, np.int32),
+                           np.empty((corners, 3), np.int32), np.empty((corners, 3), np.float32),
+                           np.empty(corners, np.int32), np.empty(faces + 1, np.int32),
+                           np.empty(faces, np.int32))
+        self._library.rb_get_adapted_mesh(
+            self._pointer, instance, _as_floats(mesh.vertices), vertices,
+            _as_ints(mesh.corner_vertices), _as_ints(mesh.source_corners),
+            _as_floats(mesh.source_weights), _as_ints(mesh.source_edges), corners,
+            _as_ints(mesh.face_offsets), _as_ints(mesh.source_faces), faces)
+        return mesh
 
     def report(self) -> dict:
         """Returns the native part of the report of the last successful execution. Raises

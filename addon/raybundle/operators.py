@@ -12,12 +12,12 @@ from . import bake_cache, bake_run, color_attribute, viewport_preview
 from .bake import bake
 from .bake_progress import BakeProgress
 from .bake_report import BakeError, BakeReport
+from .finer_copy import remove_copies
 from .light_sets import written_attributes
 from .live_light import live
 from .materials.last_surfaces import LastSurfaces
 from .messages import Message, quoted, translated
 from .native import ErrorCode, RaybundleError
-from .subdivided_copy import remove_copies
 
 # Seconds between two looks at a running bake, and between two drawings of its progress. Software
 # renderers take a tenth of a second to draw.
@@ -203,7 +203,7 @@ class RAYBUNDLE_OT_stop(bpy.types.Operator):
 
 
 class RAYBUNDLE_OT_clear(bpy.types.Operator):
-    """Remove the baked attributes and the subdivided copies, and free the memory of the lines"""
+    """Remove the baked attributes and the finer copies, and free the memory of the lines"""
     bl_idname = "raybundle.clear"
     bl_label = "Clear Bake"
     bl_options = {'REGISTER', 'UNDO'}

@@ -161,8 +161,12 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
     def draw(self, context):
         layout = property_layout(self)
         settings = context.scene.raybundle
-        for name in ("target_percent", "topology", "patch_size", "refine", "contacts",
-                     "reconstruction", "final_gather"):
+        for name in ("target_percent", "topology"):
+            layout.prop(settings, name)
+        row = layout.row()
+        row.active = settings.topology == 'ADAPTIVE'
+        row.prop(settings, "max_vertices")
+        for name in ("patch_size", "refine", "contacts", "reconstruction", "final_gather"):
             layout.prop(settings, name)
 
 
@@ -242,7 +246,7 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
                      "write_error", "show_result"):
             layout.prop(settings, name)
         column = layout.column()
-        # Subdivided copies never share a mesh.
+        # Finer copies never share a mesh.
         column.active = settings.topology == 'KEEP'
         column.prop(settings, "shared_meshes")
 

@@ -50,6 +50,10 @@ enum_topology = (
     ('KEEP', "Keep", "Write to the existing vertices of the meshes"),
     ('SUBDIVIDE', "Subdivide",
      "Write to a finer copy of each object, and hide the original until you press Clear"),
+    ('ADAPTIVE', "Adaptive",
+     "Write to a copy of each object that has more vertices where the light needs them, at the "
+     "edges of shadows, at contacts and near lamps, and hide the original until you press Clear. "
+     "The light is computed twice"),
 )
 
 enum_shared_meshes = (
@@ -305,6 +309,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     topology: EnumProperty(
         name="Topology", description="Whether the bake writes to the meshes or to finer copies",
         items=enum_topology, default='KEEP')
+    max_vertices: IntProperty(
+        name="Maximum Vertices",
+        description="Maximum number of vertices of all adapted meshes together; meshes that have "
+                    "more keep theirs",
+        default=100_000, min=1, max=2 ** 26, soft_max=10_000_000)
     shared_meshes: EnumProperty(
         name="Shared", description="How the light of baked objects with the same mesh is written",
         items=enum_shared_meshes, default='SINGLE_USER')
@@ -449,7 +458,7 @@ class RaybundleObjectSettings(bpy.types.PropertyGroup):
                                     "with the scene", items=quality.enum_object_quality,
         default='SCENE')
     source: PointerProperty(
-        name="Source", description="The original of this subdivided copy",
+        name="Source", description="The original of this finer copy",
         type=bpy.types.Object, poll=_is_mesh_object)
     last_surfaces: StringProperty(
         name="Last Surfaces",
@@ -471,6 +480,7 @@ class BakeSettings:
     clamp: bool
     write_error: bool
     topology: str
+    max_vertices: int
     shared_meshes: str
     patch_size: float
     max_patches: int

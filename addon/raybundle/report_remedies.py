@@ -12,10 +12,10 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import IntProperty, StringProperty
 
+from .finer_copy import find_copies
 from .messages import Message, translated
 from .properties import assign
 from .report_data import Line, read_report, warning_lines
-from .subdivided_copy import find_copies
 
 # Advice ends a warning: "choose solver LINE_REUSE and first_shot GATHER".
 _ADVICE = re.compile(r'\b(solver|first_shot|projector|small_patches|topology) ([A-Z][A-Z_]+)\b'
@@ -135,7 +135,7 @@ class _InObjectMode(_OfWarning):
 
 def _select(operator: bpy.types.Operator, context: bpy.types.Context,
             items: list[bpy.types.Object]) -> bool:
-    """Selects only these objects and makes the first one active. Objects that are subdivided copies
+    """Selects only these objects and makes the first one active. Objects that are finer copies
     of hidden ones are selected in their place. Returns whether any was selected."""
     view_layer = context.view_layer
     copies = find_copies(context.scene)

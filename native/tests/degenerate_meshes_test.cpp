@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
@@ -132,7 +133,8 @@ struct Result {
     double patches = 0, bundles = 0, rays = 0, error = 0, noise = 0, balance = 0;
 };
 
-enum class Topology { KEEP, SUBDIVIDE };
+enum class Topology { KEEP, SUBDIVIDE, ADAPTIVE };
+constexpr const char* kTopologies[] = {"KEEP", "SUBDIVIDE", "ADAPTIVE"};
 
 // Adds the light at each vertex of a clean face: the mean over the faces with the same normal.
 void addLight(const Mesh& clean, const Mesh& mesh, const std::vector<glm::vec3>& corners,
@@ -174,7 +176,8 @@ Mesh meshOf(const Polygons& polygons_) {
 
 // Bakes a floor under a box, lit by a lamp and a sky. `clean` holds the floor and the box.
 Result bakeMeshes(const std::vector<Mesh>& clean, std::vector<Mesh> meshes,
-                  Reconstruction reconstruction, const glm::dmat4& turn, bool inMeshes) {
+                  Reconstruction reconstruction, const glm::dmat4& turn, bool inMeshes,
+                  bool adapts) {
     Scene scene;
     std::vector<Mesh> wanted = clean;
     for (size_t k = 0; k < meshes.size(); ++k) {
@@ -192,6 +195,7 @@ Result bakeMeshes(const std::vector<Mesh>& clean, std::vector<Mesh> meshes,
     Bake bake;
     bake.settings.reconstruction = reconstruction;
     bake.settings.targetError = 0.03f;
+    bake.settings.adaptMeshes = adapts;
     bake.run(scene);
     const Json report = reportOf(bake);
     Result result;
@@ -202,8 +206,9 @@ Result bakeMeshes(const std::vector<Mesh>& clean, std::vector<Mesh> meshes,
     result.noise = report["error"]["noise"];
     result.balance = report["energy"]["balance_error"];
     for (size_t k = 0; k < meshes.size(); ++k)
-        addLight(wanted[k], meshes[k], cornerLight(bake, int32_t(k), RB_OUTPUT_LIGHTING),
-                 result.light);
+        addLight(wanted[k],
+                 adapts ? bake.adaptedMesh(int32_t(k)).withAttributesOf(meshes[k]) : meshes[k],
+                 cornerLight(bake, int32_t(k), RB_OUTPUT_LIGHTING), result.light);
     return result;
 }
 
@@ -215,17 +220,22 @@ Mesh subdivided(const Mesh& mesh) {
     return polygons("fine", fine.vertices, faces);
 }
 
-TEST(DegenerateMeshes, HaveTheLightOfCleanOnesAtTheirCost) {
+// Bakes degenerate meshes, each with the topology that `topologyOf` returns for its seed, and
+// expects the light of the clean ones, at most at `mostBundles` times their bundles.
+void expectLightOfCleanOnes(const std::function<Topology(int seed)>& topologyOf,
+                            double mostBundles) {
     const char* const count = std::getenv("RAYBUNDLE_DEGENERATE_MESHES");
     const std::vector<Mesh> clean = {grid("floor", {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, 6, 6),
                                      box("box", {-1, -1, 1}, {1, 1, 2}, false)};
-    double mostOff = 0, mostPatches = 0, mostBundles = 0, mostRays = 0;
+    double mostOff = 0, mostPatches = 0, bundles = 0, mostRays = 0;
     for (int seed = 0; seed < (count ? std::atoi(count) : kMeshes); ++seed) {
         const Reconstruction reconstruction =
             kReconstructions[size_t(seed) % std::size(kReconstructions)].value;
-        const bool isSubdivided = seed % 2 == 1, inMeshes = seed / 2 % 2 == 1;
-        SCOPED_TRACE("seed " + std::to_string(seed) + ", " + choiceName(reconstruction) +
-                     (isSubdivided ? ", SUBDIVIDE" : ", KEEP"));
+        const Topology topology = topologyOf(seed);
+        const bool isSubdivided = topology == Topology::SUBDIVIDE, inMeshes = seed / 2 % 2 == 1,
+                   adapts = topology == Topology::ADAPTIVE;
+        SCOPED_TRACE("seed " + std::to_string(seed) + ", " + choiceName(reconstruction) + ", " +
+                     kTopologies[size_t(topology)]);
         std::mt19937 random{uint32_t(seed)};
         auto uniform = [&] { return std::uniform_real_distribution<double>(-1, 1)(random); };
         const glm::dmat4 turn = glm::rotate(glm::dmat4(1), 3 * uniform(),
@@ -235,8 +245,8 @@ TEST(DegenerateMeshes, HaveTheLightOfCleanOnesAtTheirCost) {
         if (isSubdivided)
             for (std::vector<Mesh>* meshes : {&before, &after})
                 for (Mesh& mesh : *meshes) mesh = subdivided(mesh);
-        const Result wanted = bakeMeshes(clean, before, reconstruction, turn, inMeshes);
-        const Result found = bakeMeshes(clean, after, reconstruction, turn, inMeshes);
+        const Result wanted = bakeMeshes(clean, before, reconstruction, turn, inMeshes, adapts);
+        const Result found = bakeMeshes(clean, after, reconstruction, turn, inMeshes, adapts);
         double squares = 0, all = 0;
         for (size_t k = 0; k < wanted.light.size(); ++k) {
             ASSERT_TRUE(std::isfinite(found.light[k])) << k;
@@ -246,18 +256,29 @@ TEST(DegenerateMeshes, HaveTheLightOfCleanOnesAtTheirCost) {
         const double off = std::sqrt(squares / all);
         mostOff = std::max(mostOff, off / wanted.error);
         mostPatches = std::max(mostPatches, found.patches / wanted.patches);
-        mostBundles = std::max(mostBundles, found.bundles / wanted.bundles);
+        bundles = std::max(bundles, found.bundles / wanted.bundles);
         mostRays = std::max(mostRays, found.rays / wanted.rays);
         EXPECT_LT(off, wanted.error);
         EXPECT_LT(found.balance, 5e-3);
         EXPECT_LT(found.patches, 2 * wanted.patches);
-        EXPECT_LT(found.bundles, 2 * wanted.bundles);
+        EXPECT_LT(found.bundles, mostBundles * wanted.bundles);
         EXPECT_LT(found.rays, 2 * wanted.rays);
     }
     std::printf(
         "[ figures  ] at most: light %.2f of the stated error off; times the patches %.2f, the "
         "bundles %.2f, the shadow rays %.2f\n",
-        mostOff, mostPatches, mostBundles, mostRays);
+        mostOff, mostPatches, bundles, mostRays);
+}
+
+TEST(DegenerateMeshes, HaveTheLightOfCleanOnesAtTheirCost) {
+    expectLightOfCleanOnes(
+        [](int seed) { return seed % 2 == 1 ? Topology::SUBDIVIDE : Topology::KEEP; }, 2);
+}
+
+// The triangles beside a defect differ from those of the clean mesh, and a bake whose noise is near
+// the target may take one look more, at twice the bundles.
+TEST(DegenerateMeshes, AreAdaptedToTheLightOfCleanOnes) {
+    expectLightOfCleanOnes([](int) { return Topology::ADAPTIVE; }, 3);
 }
 
 }  // namespace

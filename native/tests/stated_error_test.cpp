@@ -224,7 +224,7 @@ TEST(StatedError, IsTheSurfaceErrorWithinAFactorOfTwo) {
 TEST(StatedError, NamesCoarseObjectsAndTheEdgesTheyNeed) {
     const Json report = errorsOf(groundBelowLamp(3), 0.1f);
     ASSERT_TRUE(mentions(report["warnings"], "object \\\"square\\\"")) << report["warnings"];
-    EXPECT_TRUE(mentions(report["warnings"], "SUBDIVIDE"));
+    EXPECT_TRUE(mentions(report["warnings"], "ADAPTIVE"));
     EXPECT_GT(double(report["error"]["mesh"]), 0.05);
     // The warning promises an error of 5 % with the edges that it names.
     const std::string text = report["warnings"][0];

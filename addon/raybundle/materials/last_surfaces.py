@@ -106,7 +106,7 @@ class LastSurfaces:
             self._taken[item] = " ".join(digests)
 
     def share(self, original: bpy.types.Object, copy: bpy.types.Object) -> None:
-        """Keeps the digests of the original for a copy (subdivided_copy.py), which has the same
+        """Keeps the digests of the original for a copy (finer_copy.py), which has the same
         slots."""
         if original in self._taken:
             self._taken[copy] = self._taken[original]

@@ -548,6 +548,33 @@ RB_API rb_error rb_get_set_vertex_light(rb_bake bake, int32_t set, int32_t insta
  * noise, discretisation and mesh error. */
 RB_API rb_error rb_get_corner_error(rb_bake bake, int32_t instance, float* error, size_t count);
 
+/* These two functions return the adapted mesh of an instance with role RB_ROLE_BAKE, after a bake
+ * with the setting adapt_meshes: the mesh at whose corners and vertices the functions above return
+ * the light. It has the faces of the instance's mesh, its source, and triangles in place of those
+ * faces that were divided. Fail with RB_ERROR_INVALID_OPERATION if the last successful execution
+ * had adapt_meshes off.
+ *
+ * The first writes the numbers of vertices, corners and faces. The second copies the mesh into
+ * arrays of the caller, whose counts must be these.
+ *   vertices         3 * vertex_count floats, object space, metres; those of the source come first
+ *   corner_vertices  the vertex index of each corner, face after face; corner_count values
+ *   source_corners   the three corners of the source between which each corner lies,
+ *                    3 * corner_count corner indices
+ *   source_weights   the weights of the three corners, which sum to 1; 3 * corner_count floats
+ *   source_edges     if the edge from a corner to the next of its face lies on an edge of the
+ *                    source: the corner at which this edge begins in the source's face; otherwise
+ *                    -1; corner_count values
+ *   face_offsets     as in rb_add_mesh, face_count + 1 values
+ *   source_faces     the face of the source that contains each face, face_count values */
+RB_API rb_error rb_get_adapted_mesh_size(rb_bake bake, int32_t instance, size_t* vertex_count,
+                                         size_t* corner_count, size_t* face_count);
+RB_API rb_error rb_get_adapted_mesh(rb_bake bake, int32_t instance, float* vertices,
+                                    size_t vertex_count, int32_t* corner_vertices,
+                                    int32_t* source_corners, float* source_weights,
+                                    int32_t* source_edges, size_t corner_count,
+                                    int32_t* face_offsets, int32_t* source_faces,
+                                    size_t face_count);
+
 /* Writes a pointer to the report of the last successful rb_execute_bake to *json: JSON in UTF-8.
  * The string is valid until the bake runs again or is released. docs/c_api.md lists the keys. */
 RB_API rb_error rb_get_report(rb_bake bake, const char** json);

@@ -82,6 +82,14 @@ void fillStruct(Struct* target, Struct value, const char* name) {
     std::memcpy(target, &value, value.size);
 }
 
+// Copies values to an array of the caller that has as many. Throws Error(INVALID_ARGUMENT) if it is
+// NULL.
+template <class Value, class Number>
+void copyArray(const std::vector<Value>& values, Number* to, const char* name) {
+    needArray(to, values.size(), name);
+    if (!values.empty()) std::memcpy(to, values.data(), values.size() * sizeof(Value));
+}
+
 // Copies light to the caller's array of 3 * `count` floats. Throws Error(INVALID_ARGUMENT) if the
 // array is NULL or has another length.
 void copyLight(const std::vector<glm::vec3>& light, float* rgb, size_t count);

@@ -48,14 +48,10 @@ rb_error rb_get_subdivision(rb_subdivision subdivision, float* vertices, size_t 
         const ConformingSubdivision& s = *held;
         needCount(vertex_count, s.vertices.size(), "vertex_count");
         needCount(triangle_count, s.triangles.size(), "triangle_count");
-        auto copy = [](const auto& values, void* to, const char* name) {
-            needArray(to, values.size(), name);
-            if (!values.empty()) std::memcpy(to, values.data(), values.size() * sizeof(values[0]));
-        };
-        copy(s.vertices, vertices, "vertices");
-        copy(s.triangles, triangles, "triangles");
-        copy(s.sourceFaces, source_faces, "source_faces");
-        copy(s.sourceCorners, source_corners, "source_corners");
-        copy(s.sourceWeights, source_weights, "source_weights");
+        copyArray(s.vertices, vertices, "vertices");
+        copyArray(s.triangles, triangles, "triangles");
+        copyArray(s.sourceFaces, source_faces, "source_faces");
+        copyArray(s.sourceCorners, source_corners, "source_corners");
+        copyArray(s.sourceWeights, source_weights, "source_weights");
     });
 }

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/adaptation.h"
 #include "bake/bake_warnings.h"
 #include "bake/bundle_solve.h"
 #include "bake/draft_light.h"
@@ -30,6 +31,7 @@
 #include "reconstruction/left_out_corners.h"
 #include "reconstruction/reconstruction.h"
 #include "reconstruction/shown_light.h"
+#include "refinement/adapted_meshes.h"
 #include "refinement/contacts.h"
 #include "refinement/refinement.h"
 #include "stated_error/energy_balance.h"
@@ -107,6 +109,7 @@ struct Bake::Results {
     Report::Energy energyOfLastSet;
     std::vector<float> exposed;
     std::vector<InstanceLight> light;
+    std::vector<FinerMesh> adapted;  // per instance; empty if no meshes are adapted
 };
 
 Bake::Bake() = default;
@@ -136,15 +139,21 @@ void Bake::run(const Scene& scene) {
     } catch (...) {
         progress = callers;
         trace.reset();
+        traceOfSources.reset();
         throw;
     }
     progress = callers;
     if (isDone) return;
-    if (cancelled == Cancelled::ANYWHERE) trace.reset();
+    if (cancelled == Cancelled::ANYWHERE) {
+        trace.reset();
+        traceOfSources.reset();
+    }
     throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
 }
 
 void Bake::runAll(const Scene& scene, const Threads& threads) {
+    if (settings.adaptMeshes) return runAdapted(scene, threads);
+    traceOfSources.reset();
     if (DraftLight::isPossible(settings)) return runDraft(scene, threads);
     draft.reset();
     keep(runStages(scene, scene.lightSets.size(), threads));
@@ -167,6 +176,26 @@ void Bake::runDraft(const Scene& scene, const Threads& threads) {
     draft = std::move(next);
 }
 
+// Bakes the meshes as they are, adapts them to that light, and bakes the adapted meshes.
+void Bake::runAdapted(const Scene& scene, const Threads& threads) {
+    draft.reset();
+    const Progress callers = progress;
+    FirstPassProgress firstPass(callers);
+    progress = firstPass.progress();
+    std::swap(trace, traceOfSources);
+    Results first = runStages(scene, scene.lightSets.size(), threads, true);
+    std::swap(trace, traceOfSources);
+    progress = callers;
+    if (interim)
+        interim->convertBy([meshes = first.adapted](std::vector<InstanceLight> light) {
+            return atSources(light, meshes);
+        });
+    Results made = runStages(adaptedScene(scene, first.adapted), scene.lightSets.size(), threads);
+    addFirstPass(first.report, made.report);
+    made.adapted = std::move(first.adapted);
+    keep(std::move(made));
+}
+
 // Returns whether the light of the last draft could be scaled.
 bool Bake::scaleDraft(const SourceStrengths& now) {
     double seconds = 0;
@@ -186,10 +215,12 @@ void Bake::keep(Results results) {
     irradiance = std::move(results.irradiance);
     exposed = std::move(results.exposed);
     light = std::move(results.light);
+    adapted = std::move(results.adapted);
     ran = true;
 }
 
-Bake::Results Bake::runStages(const Scene& scene, size_t reportedSets, const Threads& threads) {
+Bake::Results Bake::runStages(const Scene& scene, size_t reportedSets, const Threads& threads,
+                              bool adapts) {
     Results made;
     Report& report = made.report;
     {
@@ -211,7 +242,7 @@ Bake::Results Bake::runStages(const Scene& scene, size_t reportedSets, const Thr
         const Tiles tiles(trace->patches);
         const SolveInput input{shots, tiles, shown};
         Exchanged exchanged = exchange(input, lights, report);
-        made.light = show(input, lights, exchanged, report);
+        made.light = show(input, lights, exchanged, report, adapts ? &made.adapted : nullptr);
         made.irradiance = sumOf(lights);
         made.ofLastSet = std::move(lights.back().irradiance);
         made.energyOfLastSet = exchanged.ofLastSet;
@@ -373,29 +404,40 @@ Transports Bake::transportsOf(const SetLights& lights, const ShownLight& shown) 
     return makeTransports(settings.solver, inputs);
 }
 
-// Returns the light at the corners of each instance, with its stated error.
+// Returns the light at the corners of each instance, with its stated error. Stores meshes that
+// follow this light in `meshes`, if it is not null.
 std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lights,
-                                      const Exchanged& exchanged, Report& report) {
+                                      const Exchanged& exchanged, Report& report,
+                                      std::vector<FinerMesh>* meshes) {
     Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
     const Patches& patches = trace->patches;
-    std::vector<InstanceLight> made = reconstruct(
-        {{patches, exchanged.exposed}, in.scene, trace->visibility, lights, in.shown, settings},
-        progress, report);
+    const ReconstructionInput input{
+        {patches, exchanged.exposed}, in.scene, trace->visibility, lights, in.shown, settings};
+    std::vector<InstanceLight> made = reconstruct(input, progress, report);
     std::vector<float> weight = patches.sideAreas();
     const std::vector<float> exposedOfTiles = in.tiles.mean(exchanged.exposed, weight);
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exchanged.exposed[side];
     const std::vector<InstanceRange> ranges = instanceRanges(in.scene, patches);
     const SideNoise& noise = exchanged.noise;
-    stateErrors(in.scene, in.tiles, ranges,
-                {meanOver(in.tiles, in.shown.of(lights, exchanged.exposed), weight), exposedOfTiles,
-                 noise.ofBundles, noise.direct, noise.ofObjects, noise.isOutOfReach},
-                settings, made, report);
+    const Irradiance ofTiles = meanOver(in.tiles, in.shown.of(lights, exchanged.exposed), weight);
+    const SideErrors sides{ofTiles,      exposedOfTiles,  noise.ofBundles,
+                           noise.direct, noise.ofObjects, noise.isOutOfReach};
+    stateErrors(in.scene, in.tiles, ranges, sides, settings, made, report);
+    if (meshes) *meshes = adaptMeshes({input, in.tiles, sides}, ranges, progress, report);
     fillLeftOutCorners(patches, ranges, made, report);
     checkFinite(made);
     return made;
 }
 
 const Patches& Bake::patches() const { return trace->patches; }
+
+const FinerMesh& Bake::adaptedMesh(int32_t instance) const {
+    instanceLight(instance);  // throws if there is none
+    if (adapted.empty())
+        throw Error(RB_ERROR_INVALID_OPERATION,
+                    "the last bake has not adapted the meshes; set adapt_meshes to 1");
+    return adapted[size_t(instance)];
+}
 
 const CornerLight& Bake::setLight(int32_t set, int32_t instance) const {
     const InstanceLight& all = instanceLight(instance);

@@ -13,6 +13,7 @@
 #include "job/progress.h"
 #include "job/report.h"
 #include "job/settings.h"
+#include "patches/finer_mesh.h"
 #include "patches/tiles.h"
 #include "reconstruction/instance_light.h"
 #include "reconstruction/shown_light.h"
@@ -65,6 +66,10 @@ class Bake {
     // Returns the result of an instance by the light of one light set. Throws as instanceLight()
     // does, and Error(INVALID_ARGUMENT) if the last run had no such light set.
     const CornerLight& setLight(int32_t set, int32_t instance) const;
+    // Returns the mesh of an instance at whose corners the result is, if the last run has adapted
+    // the meshes (Settings::adaptMeshes). Throws as instanceLight() does, and
+    // Error(INVALID_OPERATION) if it has not.
+    const FinerMesh& adaptedMesh(int32_t instance) const;
 
   private:
     struct Exchanged;
@@ -72,10 +77,13 @@ class Bake {
 
     void runAll(const Scene& scene, const Threads& threads);
     void runDraft(const Scene& scene, const Threads& threads);
+    void runAdapted(const Scene& scene, const Threads& threads);
     bool scaleDraft(const SourceStrengths& now);
     void keep(Results results);
-    // Runs all stages. The report names the first `reportedSets` light sets of the scene.
-    Results runStages(const Scene& scene, size_t reportedSets, const Threads& threads);
+    // Runs all stages. The report names the first `reportedSets` light sets of the scene. If
+    // `adapts` is true, the results hold meshes that follow the light.
+    Results runStages(const Scene& scene, size_t reportedSets, const Threads& threads,
+                      bool adapts = false);
     void noteWhatIsGiven(const Scene& scene, size_t reportedSets, const Threads& threads,
                          Report& report) const;
     void prepareWorld(const Scene& scene, Report& report);
@@ -86,16 +94,19 @@ class Bake {
     Exchanged exchange(const SolveInput& in, SetLights& lights, Report& report);
     Transports transportsOf(const SetLights& lights, const ShownLight& shown) const;
     std::vector<InstanceLight> show(const SolveInput& in, const SetLights& lights,
-                                    const Exchanged& exchanged, Report& report);
+                                    const Exchanged& exchanged, Report& report,
+                                    std::vector<FinerMesh>* meshes);
     void noteWhatWasTraced(Report& report) const;
 
     std::unique_ptr<Trace> trace;              // for the geometry of the last run
+    std::unique_ptr<Trace> traceOfSources;     // of the first pass of the last run with two
     std::shared_ptr<const WorldSource> world;  // of the last run, which the next one may use
     std::unique_ptr<DraftLight> draft;         // the last run, if it was a draft that can be scaled
     // Results of the last run per side, see patchIrradiance() and exposedShare().
     Irradiance irradiance;
     std::vector<float> exposed;
     std::vector<InstanceLight> light;
+    std::vector<FinerMesh> adapted;  // per instance; empty if the last run adapted no meshes
     std::string json;
     bool ran = false;
 };

@@ -11,6 +11,7 @@ namespace raybundle {
 void Interim::offer(const std::function<std::vector<InstanceLight>()>& make) {
     if (!isWanted) return;
     std::vector<InstanceLight> next = make();
+    if (converted) next = converted(std::move(next));
     const std::lock_guard lock(mutex);
     light = std::move(next);
     isWanted = false;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "bake/trace.h"
@@ -25,6 +26,10 @@ class Interim {
     bool wantsLight() const { return isWanted; }
     void offer(const std::function<std::vector<InstanceLight>()>& make);
     void setNoise(double relative) { lastNoise = relative; }
+    // From now on, what offer() gets is passed through `convert` before it is kept.
+    void convertBy(std::function<std::vector<InstanceLight>(std::vector<InstanceLight>)> convert) {
+        converted = std::move(convert);
+    }
 
     // Called by the reader. read() returns the radiance of an output at the corners of an instance,
     // W/(m^2 sr). Throws Error(INVALID_OPERATION) if there is no light yet, and
@@ -35,6 +40,7 @@ class Interim {
     double noise() const { return lastNoise; }
 
   private:
+    std::function<std::vector<InstanceLight>(std::vector<InstanceLight>)> converted;
     std::mutex mutex;
     std::vector<InstanceLight> light;
     std::atomic<bool> isWanted{true};

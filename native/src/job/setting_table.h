@@ -78,6 +78,13 @@ inline constexpr Setting kSettings[] = {
      "Use smaller patches beside gaps much narrower than a patch, such as on a table below the "
      "rim of a plate",
      &Settings::contacts},
+    {"adapt_meshes",
+     "Give the meshes vertices where the light needs them and show the light there; the bake "
+     "computes the light twice",
+     &Settings::adaptMeshes},
+    {"max_vertices",
+     "Maximum number of vertices of all adapted meshes together; meshes that have more keep theirs",
+     &Settings::maxVertices, 1, double(1 << 26)},
     {"draft",
      "Light at once instead of little noise: no rays from noisy surfaces, and no last solve after "
      "those that measure the noise",

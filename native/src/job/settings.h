@@ -26,6 +26,8 @@ struct Settings : Skips {
     int maxPatches = 100000;
     int refine = 0;
     int contacts = 1;
+    int adaptMeshes = 0;
+    int maxVertices = 100000;
     int draft = 0;
     int minBundles = 64;
     int maxBundles = kMostWindowBundles;

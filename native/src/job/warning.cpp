@@ -14,8 +14,9 @@ constexpr const char* kNames[] = {
     "NO_ANGLES",           "UNCUT_GAPS",          "FEW_LINES",        "DIRECT_NOISE",
     "MAX_BUNDLES",         "UNCOUNTABLE_LINES",   "MEMORY_LIMIT",     "BROKEN_CYCLES",
     "WRONG_EXCHANGES",     "UNSETTLED_EXCHANGE",  "ENERGY_BALANCE",   "UNSOLVED_FIT",
-    "NO_LIGHT_ON_SIDE",    "NOISY_OBJECTS",       "COARSE_MESH"};
-static_assert(std::size(kNames) == size_t(WarningId::COARSE_MESH) + 1);
+    "NO_LIGHT_ON_SIDE",    "NOISY_OBJECTS",       "COARSE_MESH",
+    "MAX_VERTICES"};
+static_assert(std::size(kNames) == size_t(WarningId::MAX_VERTICES) + 1);
 
 }  // namespace
 

@@ -38,7 +38,8 @@ enum class WarningId {
     UNSOLVED_FIT,
     NO_LIGHT_ON_SIDE,
     NOISY_OBJECTS,
-    COARSE_MESH
+    COARSE_MESH,
+    MAX_VERTICES
 };
 
 // Returns the identifier as it is in the report, such as "CLAMPED_REFLECTANCE". The string is

@@ -300,9 +300,10 @@ void warnOfNoise(std::vector<std::pair<double, std::string>> noises, double targ
 using CoarseMesh = std::pair<double, std::string>;
 
 // Returns the warning if the mesh of an object is too coarse. `limit` is the largest relative error
-// that is allowed.
+// that is allowed, and `remedy` what the warning advises.
 std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, double noiseScale,
-                                     double limit, double smoothShare, double stepShare) {
+                                     double limit, double smoothShare, double stepShare,
+                                     const char* remedy) {
     const double mesh = std::sqrt(s.mesh(noiseScale) / s.signal);
     if (mesh <= limit || s.cells == 0) return std::nullopt;
     const double faceEdge = std::sqrt(s.cellArea / s.cells);
@@ -314,9 +315,7 @@ std::optional<CoarseMesh> coarseMesh(const std::string& name, const Squares& s, 
             " wide on average, are too coarse for its light. Interpolation over the faces causes "
             "an error of " +
             inPercent(mesh) + ". Edges of about " + inMetres(edge) + " would reduce the error to " +
-            inPercent(limit) +
-            "; subdivide the mesh, or choose the topology SUBDIVIDE with patch_size " +
-            inMetres(0.5 * edge)};
+            inPercent(limit) + "; " + remedy};
 }
 
 // Warns of coarse meshes and names those with the largest errors.
@@ -357,6 +356,9 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
     const double shown = report.error.noise;  // measured by the bake at all corners
     const double limit = std::max(kCoarse, kCoarseTargets * targetError);
     double discretisation = 0;
+    const char* const remedy = settings.adaptMeshes
+                                   ? "lower target_error, or raise max_vertices if it was reached"
+                                   : "subdivide the mesh, or choose the topology ADAPTIVE";
     std::vector<CoarseMesh> coarse;
     std::vector<std::pair<double, std::string>> noisy;
     for (size_t i = 0; i < light.size(); ++i) {
@@ -378,7 +380,7 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         if (!errsAlike && noise > allowed && brightness > kNearlyBlack * kNearlyBlack)
             noisy.push_back({noise, light[i].name});
         if (!(brightness > kDark)) continue;
-        if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step))
+        if (auto mesh = coarseMesh(light[i].name, own, noiseScale, limit, smooth, step, remedy))
             coarse.push_back(std::move(*mesh));
     }
     warnOfNoise(std::move(noisy), targetError, sides.isOutOfReach, report);

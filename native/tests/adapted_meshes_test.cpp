@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Meshes that follow the light: where they get vertices, how many, and what their light is.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numeric>
+
+#include "bake/bake.h"
+#include "bake/interim.h"
+#include "job/error.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+const glm::dvec3 kToSun = glm::normalize(glm::dvec3(0.6, 0.35, 1));
+constexpr double kSun = 2;  // W/m^2 at normal incidence
+constexpr float kHalf = 5;  // half the edge of the plane, m
+const glm::vec3 kLow{-0.5f, -0.5f, 0}, kHigh{0.5f, 0.5f, 1};
+
+// A black cube on a black plane under a sun: the light of the plane is known.
+Scene cubeOnPlane(const glm::dmat4& turn = glm::dmat4(1.0), int cuts = 1) {
+    Scene scene;
+    place(scene,
+          grid("plane", {-kHalf, -kHalf, 0}, {2 * kHalf, 0, 0}, {0, 2 * kHalf, 0}, cuts, cuts),
+          grey("black", 0), turn);
+    place(scene, box("cube", kLow, kHigh, false), grey("black", 0), turn);
+    scene.addLight(sunLight(glm::dvec3(turn * glm::dvec4(kToSun, 0)), glm::dvec3(kSun)));
+    return scene;
+}
+
+// Returns the irradiance of the plane at a point, W/m^2: that of the sun unless the cube is in the
+// way.
+double irradianceAt(const glm::dvec3& p) {
+    double from = 0, to = 1e9;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double a = (double(kLow[axis]) - p[axis]) / kToSun[axis],
+                     b = (double(kHigh[axis]) - p[axis]) / kToSun[axis];
+        from = std::max(from, std::min(a, b));
+        to = std::min(to, std::max(a, b));
+    }
+    return from < to ? 0 : kSun * kToSun.z;
+}
+
+// Returns the RMS difference of the shown light of the plane from the truth, relative to the RMS of
+// the truth, over the plane outside of the cube.
+double surfaceError(const Mesh& mesh, const std::vector<glm::vec3>& light) {
+    double squares = 0, all = 0;
+    auto add = [&](const std::array<int32_t, 3>& corner) {
+        std::array<glm::dvec3, 3> at;
+        for (size_t k = 0; k < 3; ++k)
+            at[k] = mesh.vertices[size_t(mesh.cornerVertices[size_t(corner[k])])];
+        const double area = glm::length(glm::cross(at[1] - at[0], at[2] - at[0]));
+        constexpr int kCuts = 12;
+        for (int i = 0; i < kCuts; ++i)
+            for (int j = 0; i + j < kCuts; ++j) {
+                const double u = (i + 1.0 / 3) / kCuts, v = (j + 1.0 / 3) / kCuts;
+                const glm::dvec3 p = (1 - u - v) * at[0] + u * at[1] + v * at[2];
+                if (std::abs(p.x) < 0.5 && std::abs(p.y) < 0.5) continue;
+                const double shown = kPi * ((1 - u - v) * double(light[size_t(corner[0])].x) +
+                                            u * double(light[size_t(corner[1])].x) +
+                                            v * double(light[size_t(corner[2])].x));
+                squares += area * std::pow(shown - irradianceAt(p), 2);
+                all += area * std::pow(irradianceAt(p), 2);
+            }
+    };
+    for (size_t f = 0; f < mesh.faceCount(); ++f)
+        for (int32_t c = mesh.faceOffsets[f] + 2; c < mesh.faceOffsets[f + 1]; ++c)
+            add({mesh.faceOffsets[f], c - 1, c});
+    return std::sqrt(squares / all);
+}
+
+Mesh adaptedMesh(const Bake& bake, const Scene& scene, int32_t instance) {
+    return bake.adaptedMesh(instance).withAttributesOf(
+        scene.meshes[size_t(scene.instances[size_t(instance)].mesh)]);
+}
+
+size_t vertexCount(const Bake& bake, const Scene& scene) {
+    size_t count = 0;
+    for (int32_t i = 0; i < int32_t(scene.instances.size()); ++i)
+        count += bake.adaptedMesh(i).vertices.size();
+    return count;
+}
+
+struct Measured {
+    size_t vertices = 0;
+    double error = 0;  // of the plane
+};
+
+Measured bakeCubeOnPlane(const Scene& scene, float target, bool adapts, int maxVertices = 100000) {
+    Bake bake;
+    bake.settings.targetError = target;
+    bake.settings.adaptMeshes = adapts;
+    bake.settings.maxVertices = maxVertices;
+    bake.run(scene);
+    const Mesh plane = adapts ? adaptedMesh(bake, scene, 0) : scene.meshes[0];
+    return {plane.vertices.size(), surfaceError(plane, cornerLight(bake, 0, RB_OUTPUT_LIGHTING))};
+}
+
+TEST(AdaptedMeshes, EvenLightNeedsNoVertices) {
+    const Scene scene = closedCube(0.5f, 1);
+    Bake bake;
+    bake.settings.adaptMeshes = 1;
+    bake.run(scene);
+    const FinerMesh& mesh = bake.adaptedMesh(0);
+    EXPECT_EQ(mesh.vertices.size(), scene.meshes[0].vertices.size());
+    EXPECT_EQ(mesh.cornerVertices, scene.meshes[0].cornerVertices);
+    for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
+        EXPECT_NEAR(double(light.x), 1 / kPi / (1 - 0.5), 1e-3);
+}
+
+// The truth is known. A grid with ten times the vertices has more error: its squares are larger
+// than the triangles at the edge of the shadow.
+TEST(AdaptedMeshes, AShadowNeedsVerticesAlongItsEdgeAlone) {
+    const Scene scene = cubeOnPlane();
+    const double kept = bakeCubeOnPlane(scene, 0.02f, false).error;
+    EXPECT_GT(kept, 0.1);
+    double before = kept;
+    for (float target : {0.04f, 0.02f, 0.01f}) {
+        const Measured adapted = bakeCubeOnPlane(scene, target, true);
+        std::printf("[ figures  ] target %.3f: %zu vertices, error %.4f\n", double(target),
+                    adapted.vertices, adapted.error);
+        // The edge is harder than any function of linear pieces: its error is 1.1 to 1.6 targets.
+        EXPECT_LT(adapted.error, 2 * double(target));
+        EXPECT_LT(adapted.error, 0.8 * before);
+        before = adapted.error;
+        const int cuts = int(std::sqrt(10 * double(adapted.vertices)));
+        EXPECT_GT(bakeCubeOnPlane(cubeOnPlane(glm::dmat4(1.0), cuts), target, false).error,
+                  adapted.error);
+    }
+}
+
+TEST(AdaptedMeshes, AreThoseOfTheTurnedScene) {
+    const glm::dmat4 turn = glm::translate(
+        glm::rotate(glm::dmat4(1.0), 0.83, glm::dvec3(0.3, 1, 0.5)), glm::dvec3(40, -70, 20));
+    const Measured straight = bakeCubeOnPlane(cubeOnPlane(), 0.02f, true),
+                   turned = bakeCubeOnPlane(cubeOnPlane(turn), 0.02f, true);
+    // Of two edges of equal length, rounding decides which one is divided first.
+    EXPECT_NEAR(double(turned.vertices), double(straight.vertices),
+                0.1 * double(straight.vertices));
+    EXPECT_NEAR(turned.error, straight.error, 0.15 * straight.error);
+}
+
+TEST(AdaptedMeshes, KeepTheLimitOfVertices) {
+    const Scene scene = cubeOnPlane();
+    for (int most : {40, 100, 150}) {
+        Bake bake;
+        bake.settings.targetError = 0.005f;
+        bake.settings.adaptMeshes = 1;
+        bake.settings.maxVertices = most;
+        bake.run(scene);
+        EXPECT_LE(vertexCount(bake, scene), size_t(most));
+        EXPECT_GT(vertexCount(bake, scene), size_t(most) / 2);
+        EXPECT_TRUE(warns(reportOf(bake), WarningId::MAX_VERTICES));
+    }
+    Bake bake;
+    bake.settings.adaptMeshes = 1;
+    bake.settings.maxVertices = 5;  // the meshes have 12
+    bake.run(scene);
+    EXPECT_EQ(vertexCount(bake, scene), 12u);
+    EXPECT_TRUE(warns(reportOf(bake), WarningId::MAX_VERTICES));
+}
+
+// The plane and a fence share nothing but the light: the plane's mesh is the same beside it.
+TEST(AdaptedMeshes, EveryObjectOfAMeshGetsItsOwn) {
+    Scene scene;
+    const Mesh plane = rectangle("plane", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0});
+    place(scene, plane, grey("grey", 0.3f));
+    scene.addInstance({"other", 0, glm::translate(glm::dmat4(1.0), glm::dvec3(10, 0, 0))});
+    place(scene, box("cube", {-0.5f, -0.5f, 0.5f}, {0.5f, 0.5f, 1}, false), grey("grey", 0.3f));
+    scene.addLight(sunLight(kToSun, glm::dvec3(kSun)));
+    Bake bake;
+    bake.settings.adaptMeshes = 1;
+    bake.run(scene);
+    EXPECT_GT(bake.adaptedMesh(0).vertices.size(), 50u);
+    EXPECT_EQ(bake.adaptedMesh(1).vertices.size(), 4u);
+}
+
+TEST(AdaptedMeshes, LightOfSetsSumsToTheLight) {
+    Scene scene = roomWithBoxes(0.5f);
+    scene.addLight(pointLight({1, 1, 2}, glm::dvec3(3)));
+    scene.addLight(areaLight({3, 2.5, 2.6}, {0.3, 0, 0}, {0, -0.2, 0}, glm::dvec3(4)));
+    scene.lights[0].lightSet = scene.addLightSet("one");
+    scene.lights[1].lightSet = scene.addLightSet("two");
+    Bake bake;
+    setQuick(bake);
+    bake.settings.adaptMeshes = 1;
+    bake.run(scene);
+    const std::vector<glm::vec3> all = cornerLight(bake, 0, RB_OUTPUT_LIGHTING);
+    ASSERT_EQ(all.size(), bake.adaptedMesh(0).cornerVertices.size());
+    std::vector<glm::vec3> sum = bake.setLight(0, 0).perCorner(RB_OUTPUT_LIGHTING);
+    const std::vector<glm::vec3> two = bake.setLight(1, 0).perCorner(RB_OUTPUT_LIGHTING);
+    for (size_t c = 0; c < sum.size(); ++c) sum[c] += two[c];
+    EXPECT_LT(difference(sum, all), 1e-5);
+}
+
+TEST(AdaptedMeshes, DoNotDependOnThreads) {
+    std::array<std::vector<glm::vec3>, 2> light;
+    for (int threads : {1, 2}) {
+        Bake bake;
+        setQuick(bake);
+        bake.settings.adaptMeshes = 1;
+        bake.settings.threads = threads;
+        bake.run(litRoom());
+        light[size_t(threads - 1)] = everything(bake);
+    }
+    ASSERT_EQ(light[0].size(), light[1].size());
+    EXPECT_LT(difference(light[0], light[1]), 1e-5);
+}
+
+// The solve of a second bake starts from the first one, and its light differs by a hundredth of the
+// noise. A triangle whose error is at the limit may then be divided or not.
+TEST(AdaptedMeshes, OfASecondBakeAreThoseOfAFreshOne) {
+    const Scene before = litRoom();
+    Scene after = litRoom();
+    after.lights[0].position = {1, 1, 2.6};
+    Bake again, fresh;
+    for (Bake* bake : {&again, &fresh}) {
+        setQuick(*bake);
+        bake->settings.adaptMeshes = 1;
+    }
+    again.run(before);
+    again.run(after);
+    fresh.run(after);
+    for (int32_t i = 0; i < 3; ++i) {
+        const double count = double(fresh.adaptedMesh(i).vertices.size());
+        EXPECT_NEAR(double(again.adaptedMesh(i).vertices.size()), count, 0.05 * count);
+    }
+    EXPECT_NEAR(indirectPower(again), indirectPower(fresh), 2e-3 * indirectPower(fresh));
+    // Without adaptation, the light is that of the meshes as they are.
+    again.settings.adaptMeshes = fresh.settings.adaptMeshes = 0;
+    Bake kept;
+    setQuick(kept);
+    again.run(after);
+    kept.run(after);
+    EXPECT_LT(difference(everything(again), everything(kept)), 1e-5);
+    EXPECT_THROW(again.adaptedMesh(0), Error);
+}
+
+TEST(AdaptedMeshes, InterimLightIsAtTheCornersOfTheSources) {
+    const Scene scene = cubeOnPlane();
+    Bake bake;
+    Interim interim;
+    bake.interim = &interim;
+    bake.settings.adaptMeshes = 1;
+    struct Reader {
+        Interim& interim;
+        int32_t seen = 0;
+        std::vector<size_t> sizes{};
+    } reader{interim};
+    bake.progress = Progress(
+        [](void* user, rb_stage, double) {
+            auto& self = *static_cast<Reader*>(user);
+            if (self.interim.count() > self.seen) {
+                self.seen = self.interim.count();
+                self.sizes.push_back(self.interim.read(0, RB_OUTPUT_LIGHTING).size());
+            }
+            return true;
+        },
+        &reader);
+    bake.run(scene);
+    EXPECT_GT(bake.adaptedMesh(0).cornerVertices.size(), 4u);
+    EXPECT_GE(reader.sizes.size(), 2u);
+    for (size_t size : reader.sizes) EXPECT_EQ(size, 4u);
+}
+
+}  // namespace
+}  // namespace raybundle
