@@ -61,6 +61,10 @@ class SurfaceReference:
         """
         return self._interpolated(name, corners), self._values[name], self._weights[name]
 
+    def truth(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the light of Cycles at the points of an object, (points, 3), and their weights."""
+        return self._values[name], self._weights[name]
+
     def mean(self, names: Sequence[str]) -> np.ndarray:
         """Returns the RGB mean of the light of Cycles over the area of all named objects, (3,)."""
         truth = np.concatenate([self._values[name] for name in names])

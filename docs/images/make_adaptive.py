@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes the picture of the three topologies in the user guide.
+
+    blender -b --factory-startup -P docs/images/make_adaptive.py -- docs/images/adaptive.png
+
+A cube on a plane of one face, in the sun: KEEP, SUBDIVIDE and ADAPTIVE, with the edges of the mesh
+that shows the light. Prints the vertices of each.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scenes")]
+sys.dont_write_bytecode = True
+
+import attribute_picture  # noqa: E402
+import raybundle  # noqa: E402
+from build import cube_on_plane  # noqa: E402
+
+ATTRIBUTE = "Radiosity"
+WIDTH, HEIGHT, GAP = 400, 340, 4  # pixels
+EDGE = 0.012  # m
+
+
+def draw(topology: str, path: Path) -> None:
+    """Bakes the scene and renders it with the edges of its meshes as grey bars."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    cube_on_plane.build(bpy.context)
+    report = raybundle.bake(bpy.context, topology=topology, output='COMBINED')
+    baked = [item.name for item in report.objects]
+    print(topology, sum(len(bpy.data.objects[name].data.vertices) for name in baked), "vertices,",
+          f"stated error {100 * report.error['total']:.1f} %")
+    for name in baked:
+        edges = bpy.data.objects[name].copy()
+        edges.data = edges.data.copy()
+        while edges.data.color_attributes:
+            edges.data.color_attributes.remove(edges.data.color_attributes[0])
+        bars = edges.modifiers.new("Edges", 'WIREFRAME')
+        bars.thickness, bars.use_even_offset = EDGE, False
+        bpy.context.scene.collection.objects.link(edges)
+    render = bpy.context.scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
+    attribute_picture.render(bpy.context, baked, ATTRIBUTE, path)
+
+
+def pixels(path: Path) -> np.ndarray:
+    """Returns (HEIGHT, WIDTH, 4), bottom row first."""
+    image = bpy.data.images.load(str(path))
+    values = np.empty(WIDTH * HEIGHT * 4, np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(HEIGHT, WIDTH, 4)
+
+
+def main(out: Path) -> None:
+    raybundle.register()
+    parts = []
+    with tempfile.TemporaryDirectory() as folder:
+        for topology in ('KEEP', 'SUBDIVIDE', 'ADAPTIVE'):
+            path = Path(folder) / f"{topology}.png"
+            draw(topology, path)
+            parts += [pixels(path), np.ones((HEIGHT, GAP, 4), np.float32)]
+    sheet = np.concatenate(parts[:-1], axis=1)
+    image = bpy.data.images.new("Topologies", sheet.shape[1], HEIGHT)
+    image.pixels.foreach_set(np.ascontiguousarray(sheet).ravel())
+    image.filepath_raw, image.file_format = str(out), 'PNG'
+    image.save()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[sys.argv.index("--") + 1]).resolve())
