@@ -69,6 +69,9 @@ def test_vertices_follow_the_shadow(cube_on_plane):
     assert len(cube_on_plane.data.vertices) == 6 and not cube_on_plane.data.color_attributes
     assert 60 < len(copy.data.vertices) < 1000
     assert report.error["mesh"] < 0.4 * kept.error["mesh"]
+    count = sum(len(copy_of(item).data.vertices)
+                for item in (cube_on_plane, bpy.data.objects["Cube"]))
+    assert report.vertices == {'before': 14, 'after': count} and not kept.vertices
     # Most vertices lie at the shadow, which takes a fiftieth of the plane.
     points = np.array([vertex.co for vertex in copy.data.vertices])
     assert np.median(np.linalg.norm(points[:, :2], axis=1)) < 2.5

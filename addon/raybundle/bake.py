@@ -156,6 +156,7 @@ def write_results(context: bpy.types.Context, prepared: PreparedBake,
     report = BakeReport.from_native(native_report)
     for entry, light_set in zip(report.light_sets, prepared.light_sets):
         entry['attribute'] = light_set.attribute
+    report.vertices = _vertex_counts(lights)
     report.objects = objects + [ObjectReport(name, 0, status)
                                 for name, status in export.statuses.items()]
     # The library's warnings come first, because one of lost or created light is the first of them
@@ -441,6 +442,15 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
     export.last.write(names)
     _warn_of_clipping(lights, settings, export)
     return reports
+
+
+def _vertex_counts(lights: list[TargetLight]) -> dict[str, int]:
+    """Returns BakeReport.vertices."""
+    copied = [item for item in lights if item.finer is not None]
+    if not copied:
+        return {}
+    return {'before': sum(item.finer.source_vertex_count for item in copied),
+            'after': sum(len(item.finer.data.vertices) for item in copied)}
 
 
 def exposed(light: np.ndarray, settings: BakeSettings) -> np.ndarray:

@@ -46,6 +46,9 @@ class BakeReport:
     # In W, except balance_error, which is relative.
     energy: dict[str, float] = field(default_factory=dict)
     peak_memory_bytes: int = 0
+    # Of the objects whose light was written to finer copies, with modifiers; keys: before, after.
+    # {}: there are no copies.
+    vertices: dict[str, int] = field(default_factory=dict)
     light_sets: list[dict] = field(default_factory=list)  # keys: name, attribute, estimated_error
     objects: list[ObjectReport] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

@@ -24,6 +24,7 @@ class FinerMesh:
     source_corners: np.ndarray
     source_weights: np.ndarray
     source_corner_count: int
+    source_vertex_count: int
     # (c,) int32: the source's corner at which the source's edge begins on which the edge from the
     # corner to the next lies; -1: it lies on none. None: not known.
     source_edges: np.ndarray | None = None
@@ -55,7 +56,8 @@ def subdivide(mesh: MeshData, transform: np.ndarray, max_edge: float) -> FinerMe
         vertices_of_corners = subdivision.triangles.reshape(-1)
         result = FinerMesh(mesh, subdivision.source_faces,
                            subdivision.source_corners.reshape(-1, 3),
-                           subdivision.source_weights.reshape(-1, 3), mesh.corner_count)
+                           subdivision.source_weights.reshape(-1, 3), mesh.corner_count,
+                           len(mesh.vertices))
         vertex_count = len(subdivision.vertices)
     # Interpolate in object space, because the transform may be flat and have no inverse.
     vertices = np.zeros((vertex_count, 3), np.float32)
@@ -68,7 +70,7 @@ def adapted(mesh: MeshData, finer: AdaptedMesh) -> FinerMesh:
     """Returns the mesh that the native library has adapted to the light. mesh: its source."""
     return _with_attributes(
         FinerMesh(mesh, finer.source_faces, finer.source_corners, finer.source_weights,
-                  mesh.corner_count, finer.source_edges),
+                  mesh.corner_count, len(mesh.vertices), finer.source_edges),
         finer.vertices, finer.corner_vertices, finer.face_offsets)
 
 

@@ -57,6 +57,9 @@ class RAYBUNDLE_PT_last_bake(_LastBakePanel, bpy.types.Panel):
                            f"{percent(noisiest[0])}, {noisiest[1]}")
         self._draw_row(column, iface_("Patches"), f"{report['patches']:,}")
         self._draw_row(column, iface_("Bundles"), f"{report['bundles']:,}")
+        if vertices := report.get('vertices'):
+            self._draw_row(column, iface_("Vertices"),
+                           f"{vertices['before']:,} \N{RIGHTWARDS ARROW} {vertices['after']:,}")
 
     @staticmethod
     def _draw_row(column: bpy.types.UILayout, name: str, value: str) -> None:
