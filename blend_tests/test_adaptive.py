@@ -155,7 +155,7 @@ def test_every_attribute_is_carried_over(cube_on_plane, new_material):
         scale = 1.0 if name == "First" else 2.0
         layer.data.foreach_set(
             'uv', (scale * corner_positions(mesh)[:, :2]).astype(np.float32).ravel())
-    mesh.uv_layers.active_index = 1
+    mesh.uv_layers.active = mesh.uv_layers["Second"]
     report = bake()
     assert not [warning for warning in report.warnings if "has no" in str(warning)]
     copy = copy_of(cube_on_plane).data

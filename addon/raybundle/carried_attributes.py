@@ -81,8 +81,8 @@ def _carry_uv_layers(source: bpy.types.Mesh, mesh: bpy.types.Mesh, finer: FinerM
         uvs = finer.interpolated(read(layer.data, 'uv', np.float32, 2))
         new.data.foreach_set('uv', uvs.astype(np.float32).ravel())
         new.active_render = layer.active_render
-    if source.uv_layers:
-        mesh.uv_layers.active_index = source.uv_layers.active_index
+    if source.uv_layers.active is not None:
+        mesh.uv_layers.active = mesh.uv_layers[source.uv_layers.active.name]
 
 
 def _carry_edges(source: bpy.types.Mesh, mesh: bpy.types.Mesh, finer: FinerMesh) -> None:
