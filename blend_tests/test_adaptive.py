@@ -79,6 +79,12 @@ def test_vertices_follow_the_shadow(cube_on_plane):
     assert light.min() < 0.2 * light.max()
 
 
+def test_vertices_are_counted_before_one_decides(cube_on_plane):
+    counted = bake(topology='KEEP', count_adaptive=True)
+    assert not counted.vertices and len(cube_on_plane.data.vertices) == 6
+    assert bake().vertices['after'] == pytest.approx(counted.adaptive_vertices, rel=0.05)
+
+
 def test_there_is_neither_a_gap_nor_a_t_junction(cube_on_plane):
     bake(target_error=0.01)
     assert border_length(copy_of(cube_on_plane)) == pytest.approx(40.0, rel=1e-5)

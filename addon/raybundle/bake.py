@@ -136,6 +136,8 @@ def _ready(prepared: PreparedBake, is_draft: bool) -> PreparedBake:
     try:
         _apply_settings(prepared.native_bake, prepared.settings)
         prepared.native_bake.set('draft', is_draft)
+        if is_draft:
+            prepared.native_bake.set('count_adaptive', False)
     except BaseException:
         prepared.native_scene.close()
         raise

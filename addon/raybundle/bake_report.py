@@ -46,6 +46,9 @@ class BakeReport:
     # In W, except balance_error, which is relative.
     energy: dict[str, float] = field(default_factory=dict)
     peak_memory_bytes: int = 0
+    # Number of vertices that all copies have, or would have, with the topology 'ADAPTIVE'. 0: not
+    # counted.
+    adaptive_vertices: int = 0
     # Of the objects whose light was written to finer copies, with modifiers; keys: before, after.
     # {}: there are no copies.
     vertices: dict[str, int] = field(default_factory=dict)
@@ -69,7 +72,7 @@ class BakeReport:
         report = cls()
         for name in ('seconds', 'patches', 'refined', 'bundles', 'lines', 'exchanges',
                      'shadow_rays', 'estimated_error', 'error', 'energy', 'peak_memory_bytes',
-                     'light_sets', 'warnings', 'warning_ids', 'skipped'):
+                     'adaptive_vertices', 'light_sets', 'warnings', 'warning_ids', 'skipped'):
             if name in values:
                 setattr(report, name, values[name])
         report.warnings = [recognised(line) for line in report.warnings]

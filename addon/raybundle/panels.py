@@ -166,6 +166,9 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
         row = layout.row()
         row.active = settings.topology == 'ADAPTIVE'
         row.prop(settings, "max_vertices")
+        row = layout.row()
+        row.active = settings.topology != 'ADAPTIVE'
+        row.prop(settings, "count_adaptive")
         for name in ("patch_size", "refine", "contacts", "reconstruction", "final_gather"):
             layout.prop(settings, name)
 

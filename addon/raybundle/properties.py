@@ -314,6 +314,10 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         description="Maximum number of vertices of all adapted meshes together; meshes that have "
                     "more keep theirs",
         default=100_000, min=1, max=2 ** 26, soft_max=10_000_000)
+    count_adaptive: BoolProperty(
+        name="Count Adaptive",
+        description="Count the vertices that the topology Adaptive would need, without changing "
+                    "any mesh; takes some time more")
     shared_meshes: EnumProperty(
         name="Shared", description="How the light of baked objects with the same mesh is written",
         items=enum_shared_meshes, default='SINGLE_USER')
@@ -481,6 +485,7 @@ class BakeSettings:
     write_error: bool
     topology: str
     max_vertices: int
+    count_adaptive: bool
     shared_meshes: str
     patch_size: float
     max_patches: int

@@ -60,6 +60,9 @@ class RAYBUNDLE_PT_last_bake(_LastBakePanel, bpy.types.Panel):
         if vertices := report.get('vertices'):
             self._draw_row(column, iface_("Vertices"),
                            f"{vertices['before']:,} \N{RIGHTWARDS ARROW} {vertices['after']:,}")
+        elif adaptive := report.get('adaptive_vertices'):
+            self._draw_row(column, iface_("If Adaptive"),
+                           iface_("{count} vertices").format(count=f"{adaptive:,}"))
 
     @staticmethod
     def _draw_row(column: bpy.types.UILayout, name: str, value: str) -> None:

@@ -166,7 +166,19 @@ TEST(AdaptedMeshes, KeepTheLimitOfVertices) {
     EXPECT_TRUE(warns(reportOf(bake), WarningId::MAX_VERTICES));
 }
 
-// The plane and a fence share nothing but the light: the plane's mesh is the same beside it.
+TEST(AdaptedMeshes, AreCountedBeforeOneDecides) {
+    const Scene scene = cubeOnPlane();
+    Bake bake;
+    bake.settings.countAdaptive = 1;
+    bake.run(scene);
+    const size_t counted = reportOf(bake)["adaptive_vertices"];
+    EXPECT_EQ(cornerLight(bake, 0, RB_OUTPUT_LIGHTING).size(), 4u);
+    bake.settings.adaptMeshes = 1;
+    bake.run(scene);
+    EXPECT_EQ(vertexCount(bake, scene), counted);
+    EXPECT_EQ(size_t(reportOf(bake)["adaptive_vertices"]), counted);
+}
+
 TEST(AdaptedMeshes, EveryObjectOfAMeshGetsItsOwn) {
     Scene scene;
     const Mesh plane = rectangle("plane", {-2, -2, 0}, {4, 0, 0}, {0, 4, 0});

@@ -59,6 +59,7 @@ void addFirstPass(const Report& first, Report& second) {
         second.seconds[stage] += first.seconds[stage];
     second.totalSeconds += first.totalSeconds;
     second.shadowRays += first.shadowRays;
+    second.adaptiveVertices = first.adaptiveVertices;
     for (const Warning& warning : first.warnings)
         if (warning.id == WarningId::MAX_VERTICES) second.warnings.push_back(warning);
 }

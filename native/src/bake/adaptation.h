@@ -37,7 +37,8 @@ class FirstPassProgress {
     double most = 0;  // share that was reported, 0 to 1
 };
 
-// Adds the times and the rays of the first pass to the report of the second.
+// Adds the times, the rays, the vertices and the limit of the first pass to the report of the
+// second.
 void addFirstPass(const Report& first, Report& second);
 
 }  // namespace raybundle

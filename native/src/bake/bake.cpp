@@ -423,7 +423,12 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
     const SideErrors sides{ofTiles,      exposedOfTiles,  noise.ofBundles,
                            noise.direct, noise.ofObjects, noise.isOutOfReach};
     stateErrors(in.scene, in.tiles, ranges, sides, settings, made, report);
-    if (meshes) *meshes = adaptMeshes({input, in.tiles, sides}, ranges, progress, report);
+    if (meshes || (settings.countAdaptive && !settings.adaptMeshes)) {
+        std::vector<FinerMesh> adapted =
+            adaptMeshes({input, in.tiles, sides}, ranges, progress, report);
+        for (const FinerMesh& mesh : adapted) report.adaptiveVertices += mesh.vertices.size();
+        if (meshes) *meshes = std::move(adapted);
+    }
     fillLeftOutCorners(patches, ranges, made, report);
     checkFinite(made);
     return made;

@@ -119,6 +119,7 @@ std::string Report::json() const {
                             {"escaped", text(sum(energy.escaped))},
                             {"balance_error", text(balanceError())}})},
          {"peak_memory_bytes", text(peakMemoryBytes())},
+         {"adaptive_vertices", text(adaptiveVertices)},
          {"light_sets", array(lightSets,
                               [](const LightSet& set) {
                                   return object({{"name", text(set.name)},

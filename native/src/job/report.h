@@ -74,6 +74,8 @@ struct Report {
     std::vector<Object> objects;
     Warnings warnings;
     std::vector<Skip> skipped;
+    // Number of vertices that all meshes have if they are adapted to the light. 0: not counted.
+    size_t adaptiveVertices = 0;
 
     // Adds a warning.
     void warn(WarningId id, std::string text) { warnings.push_back({id, std::move(text)}); }

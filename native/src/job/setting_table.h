@@ -85,6 +85,10 @@ inline constexpr Setting kSettings[] = {
     {"max_vertices",
      "Maximum number of vertices of all adapted meshes together; meshes that have more keep theirs",
      &Settings::maxVertices, 1, double(1 << 26)},
+    {"count_adaptive",
+     "Count the vertices that the topology Adaptive would need, without changing any mesh; takes "
+     "some time more",
+     &Settings::countAdaptive},
     {"draft",
      "Light at once instead of little noise: no rays from noisy surfaces, and no last solve after "
      "those that measure the noise",

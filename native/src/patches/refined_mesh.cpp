@@ -39,7 +39,6 @@ size_t last(size_t k) { return k == 0 ? 2 : k - 1; }
 
 RefinedMesh::RefinedMesh(const Mesh& source, const glm::dmat4& toWorld)
     : source(source),
-      toWorld(toWorld),
       hasDoubles(source.faceCount(), 0),
       isTouched(source.faceCount(), 0),
       isThin(source.faceCount(), 0),

@@ -125,7 +125,6 @@ class RefinedMesh {
                 std::array<float, 3>& weights) const;
 
     const Mesh& source;
-    const glm::dmat4 toWorld;
     std::vector<Triangle> all;
     std::vector<glm::dvec3> places, points;  // m
     std::vector<Vertex> vertices;
