@@ -44,8 +44,7 @@ double rounded(double value) {
 
 AdaptedMesh::AdaptedMesh(const KnownLight& known, uint32_t instance, const InstanceRange& range,
                          double meanSquare)
-    : known(known),
-      light(known, instance, range),
+    : light(known, instance, range),
       refined(known.scene.meshes[size_t(known.scene.instances[instance].mesh)],
               glm::translate(glm::dmat4(1.0), -known.patches.centre) *
                   known.scene.instances[instance].transform) {

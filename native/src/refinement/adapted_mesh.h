@@ -75,7 +75,6 @@ class AdaptedMesh {
     glm::dvec3 middle(const RefinedMesh::Triangle& triangle) const;
     double smallestShare(const RefinedMesh::Triangle& triangle, const glm::dvec3& place) const;
 
-    const KnownLight& known;
     const FaceLight light;
     RefinedMesh refined;
     // Mean square errors that are allowed: on average over the scene, and over this object. Summed
