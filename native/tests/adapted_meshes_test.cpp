@@ -148,7 +148,7 @@ TEST(AdaptedMeshes, AreThoseOfTheTurnedScene) {
 
 TEST(AdaptedMeshes, KeepTheLimitOfVertices) {
     const Scene scene = cubeOnPlane();
-    for (int most : {40, 100, 150}) {
+    for (int most : {40, 41, 42, 43, 99, 100, 150, 151}) {
         Bake bake;
         bake.settings.targetError = 0.005f;
         bake.settings.adaptMeshes = 1;

@@ -298,8 +298,8 @@ uint32_t RefinedMesh::addPoint(uint32_t triangle, const glm::dvec3& point) {
     return uint32_t(points.size() - 1);
 }
 
-void RefinedMesh::bisect(uint32_t edge) {
-    const std::vector<uint32_t> ring = ringOf(edge);
+void RefinedMesh::bisect(const std::vector<uint32_t>& ring) {
+    const uint32_t edge = ring.front();
     const uint32_t end = all[edge / 3].place[edge % 3];  // the place at one end
     const uint32_t middle = uint32_t(places.size());
     places.push_back(0.5 * (places[end] + places[all[edge / 3].place[next(edge % 3)]]));
@@ -422,7 +422,7 @@ bool RefinedMesh::flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack) {
     return true;
 }
 
-void RefinedMesh::refine(uint32_t triangle) {
+void RefinedMesh::refine(uint32_t triangle, size_t mostVertices) {
     if (!(longestEdge(all[triangle]) > leastEdge)) return;
     while (all[triangle].isAlive) {
         uint32_t at = triangle;
@@ -438,7 +438,10 @@ void RefinedMesh::refine(uint32_t triangle) {
                 break;
             }
         }
-        bisect(3 * at + uint32_t(edge));
+        const std::vector<uint32_t> ring = ringOf(3 * at + uint32_t(edge));
+        // At most one vertex for each triangle of the ring.
+        if (ring.size() > mostVertices - std::min(mostVertices, vertexCount())) return;
+        bisect(ring);
     }
 }
 
@@ -455,7 +458,7 @@ void RefinedMesh::improve(size_t mostVertices) {
         throwIfCancelledAt(k);
         if (!isPoor(all[pending[k]])) continue;
         if (vertexCount() >= mostVertices) break;
-        refine(pending[k]);
+        refine(pending[k], mostVertices);
         --steps;
         take();
     }

@@ -77,10 +77,11 @@ class RefinedMesh {
     const glm::dvec3& point(uint32_t index) const { return points[index]; }
 
     // Divides a triangle, and before it those beyond its longest edge whose own longest edge is
-    // longer. Does nothing if the triangle is not alive, or as small as rounding errors.
-    void refine(uint32_t triangle);
-    // Refines triangles with angles below 20 degrees in faces that bisections have reached, as long
-    // as there are fewer than `mostVertices` vertices.
+    // longer. Does nothing if the triangle is not alive, or as small as rounding errors. Stops before
+    // the result has more than `mostVertices` vertices.
+    void refine(uint32_t triangle, size_t mostVertices = SIZE_MAX);
+    // Refines triangles with angles below 20 degrees in faces that bisections have reached, up to
+    // `mostVertices` vertices.
     void improve(size_t mostVertices);
 
     // Returns the mesh as it is now.
@@ -117,7 +118,8 @@ class RefinedMesh {
     void replaceInRing(uint32_t old, uint32_t now);
     void link(const std::vector<uint32_t>& edges);
     std::vector<uint32_t> ringOf(uint32_t edge) const;
-    void bisect(uint32_t edge);
+    // Divides the triangles of a ring.
+    void bisect(const std::vector<uint32_t>& ring);
     // Flips edges until those on the stack and all that their flips change are Delaunay's.
     void flipAll(std::vector<uint32_t> stack);
     bool flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack);

@@ -135,7 +135,7 @@ bool refine(const Meshes& meshes, const std::vector<TriangleError>& marks, size_
         }
         RefinedMesh& mesh = meshes[mark.mesh]->mesh();
         const size_t before = mesh.vertexCount();
-        mesh.refine(mark.triangle);
+        mesh.refine(mark.triangle, before + (mostVertices > count ? mostVertices - count : 0));
         count += mesh.vertexCount() - before;
     }
     for (const auto& adapted : meshes) {
