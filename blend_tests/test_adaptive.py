@@ -105,7 +105,11 @@ def test_the_limit_of_vertices_is_kept_and_named(cube_on_plane):
     report = bake(max_vertices=90, target_error=0.005)
     assert sum(len(copy_of(item).data.vertices)
                for item in (cube_on_plane, bpy.data.objects["Cube"])) <= 90
-    assert any("max_vertices" in str(warning) for warning in report.warnings)
+    assert any("max_vertices (90) was reached" in warning for warning in report.warnings)
+    report = bake(max_vertices=14)
+    assert report.vertices == {'before': 14, 'after': 14}
+    assert any("max_vertices (14) is not more than the 14 vertices" in warning
+               for warning in report.warnings)
 
 
 def test_only_selected_objects_get_a_copy(cube_on_plane):

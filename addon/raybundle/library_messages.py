@@ -102,6 +102,8 @@ WARNINGS = (
     "the error to {limit}; lower target_error, or raise max_vertices if it was reached",
     "max_vertices ({count}) was reached before the meshes could follow the light to the target; "
     "raise max_vertices, or raise target_error",
+    "max_vertices ({count}) is not more than the {vertices} vertices that the meshes have, so that "
+    "none is added for the light; raise max_vertices",
     "{count} more objects are too coarse for their light; the report lists the error of each "
     "object",
 )

@@ -153,27 +153,37 @@ std::vector<FinerMesh> adaptMeshes(const KnownLight& known,
                                    const std::vector<InstanceRange>& ranges,
                                    const Progress& progress, Report& report) {
     const Scene& scene = known.scene;
-    const ShownArea shown(known, ranges);
+    const size_t mostOfAll = size_t(known.settings.maxVertices);
     std::vector<FinerMesh> result(scene.instances.size());
-    std::vector<size_t> instances;  // of `meshes`
-    Meshes meshes;
-    size_t kept = 0;  // vertices of the meshes that stay as they are
+    std::vector<size_t> worthwhile;
+    size_t vertices = 0, kept = 0;  // of all meshes, and of those that stay as they are
     for (size_t i = 0; i < scene.instances.size(); ++i) {
         const Instance& instance = scene.instances[i];
         if (instance.role != RB_ROLE_BAKE) continue;
+        const Mesh& mesh = scene.meshes[size_t(instance.mesh)];
         const Report::Errors& error = report.objects[i].error;
-        if (std::hypot(error.mesh, error.discretisation) >
-            kWorthMesh * double(instance.noiseFactor * known.settings.targetError)) {
-            meshes.push_back(
-                std::make_unique<AdaptedMesh>(known, uint32_t(i), ranges[i], shown.meanSquare));
-            instances.push_back(i);
-        } else {
-            const Mesh& mesh = scene.meshes[size_t(instance.mesh)];
-            result[i] = FinerMesh::of(mesh);
-            kept += mesh.vertices.size();
-        }
+        const bool isWorth = std::hypot(error.mesh, error.discretisation) >
+                             kWorthMesh * double(instance.noiseFactor * known.settings.targetError);
+        if (isWorth) worthwhile.push_back(i);
+        result[i] = FinerMesh::of(mesh);
+        vertices += mesh.vertices.size();
+        kept += isWorth ? 0 : mesh.vertices.size();
     }
-    const size_t most = std::max(size_t(known.settings.maxVertices), kept) - kept;
+    if (worthwhile.empty()) return result;
+    if (vertices >= mostOfAll) {
+        report.warn(WarningId::MAX_VERTICES,
+                    "max_vertices (" + std::to_string(mostOfAll) + ") is not more than the " +
+                        std::to_string(vertices) +
+                        " vertices that the meshes have, so that none is added for the light; "
+                        "raise max_vertices");
+        return result;
+    }
+    const ShownArea shown(known, ranges);
+    Meshes meshes;
+    for (size_t i : worthwhile)
+        meshes.push_back(
+            std::make_unique<AdaptedMesh>(known, uint32_t(i), ranges[i], shown.meanSquare));
+    const size_t most = mostOfAll - kept;
     bool isEnough = true;
     for (int round = 0; round < kMostRounds && isEnough; ++round) {
         measure(known, meshes, progress, report);
@@ -183,10 +193,10 @@ std::vector<FinerMesh> adaptMeshes(const KnownLight& known,
     }
     if (!isEnough)
         report.warn(WarningId::MAX_VERTICES,
-                    "max_vertices (" + std::to_string(known.settings.maxVertices) +
+                    "max_vertices (" + std::to_string(mostOfAll) +
                         ") was reached before the meshes could follow the light to the target; "
                         "raise max_vertices, or raise target_error");
-    for (size_t m = 0; m < meshes.size(); ++m) result[instances[m]] = meshes[m]->mesh().result();
+    for (size_t m = 0; m < meshes.size(); ++m) result[worthwhile[m]] = meshes[m]->mesh().result();
     return result;
 }
 
