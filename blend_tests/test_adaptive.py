@@ -239,6 +239,19 @@ def test_shape_keys_below_modifiers_are_named(cube_on_plane):
         'more vertices']
 
 
+def test_modifiers_that_copy_faces_are_no_matter(cube_on_plane):
+    modifier = bpy.data.objects["Cube"].modifiers.new("Array", 'ARRAY')
+    modifier.count, modifier.relative_offset_displace = 3, (2.0, 0.0, 0.0)
+    kept = bake(topology='KEEP')
+    assert any("Modifiers copy faces" in warning for warning in kept.warnings)
+    bpy.ops.raybundle.clear()
+    assert not any("Modifiers" in warning for warning in bake().warnings)
+    # Each of the three cubes is there, with its own light.
+    copy = copy_of(bpy.data.objects["Cube"]).data
+    assert {round(vertex.co.x) for vertex in copy.vertices} >= {0, 2, 4}
+    assert len(copy.vertices) >= 24
+
+
 def test_smooth_shading_is_kept(new_object, new_light, new_material):
     bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8)
     sphere = bpy.context.object

@@ -243,7 +243,7 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
                          if copy in selected}
     with originals_shown(context.scene) if writes_copies(settings) else nullcontext():
         export = export_scene(context, selected, light_sets, settings.patch_size,
-                              settings.attribute)
+                              settings.attribute, writes_copies(settings))
     _leave_out_unwritable(export, settings)
     if not export.targets:
         raise BakeError(_nothing_to_bake(settings, export))

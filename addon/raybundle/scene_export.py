@@ -72,18 +72,19 @@ class SceneExport:
 
 def export_scene(context: bpy.types.Context, selected: Collection[bpy.types.Object] | None = None,
                  light_sets: Sequence[LightSet] = (), patch_size: float = 0.0,
-                 attribute: str | None = None) -> SceneExport:
+                 attribute: str | None = None, to_copies: bool = False) -> SceneExport:
     """Exports the context's scene. The user's data is unchanged afterwards.
 
     selected: original objects to bake, None for all. Other objects still reflect and block light.
     light_sets: sets whose members are recorded. patch_size: m, 0 for the native library's choice;
     it determines the size of the images that Cycles bakes. attribute: name of the attribute for the
-    light, None for that of the scene's settings. Raises BakeError if a light is in several light
-    sets.
+    light, None for that of the scene's settings. to_copies: whether the light is written to copies
+    of the evaluated meshes, for which it does not matter what modifiers have done. Raises BakeError
+    if a light is in several light sets.
     """
     if attribute is None:
         attribute = context.scene.raybundle.attribute
-    exporter = _Exporter(context, selected, light_sets, attribute)
+    exporter = _Exporter(context, selected, light_sets, attribute, to_copies)
     exporter.bake_surfaces(patch_size)
     changed = _meshes_with_changed_topology(context, selected)
     try:
@@ -180,9 +181,10 @@ class _Exporter:
 
     def __init__(self, context: bpy.types.Context,
                  selected: Collection[bpy.types.Object] | None,
-                 light_sets: Sequence[LightSet], attribute: str) -> None:
+                 light_sets: Sequence[LightSet], attribute: str, to_copies: bool) -> None:
         self.context = context
         self.selected = selected
+        self.to_copies = to_copies
         self.last = LastSurfaces(context.scene)
         self.result = SceneExport(last=self.last)
         self.results = result_names([attribute, *self.last.attributes,
@@ -487,6 +489,8 @@ class _Exporter:
                                                       len(mesh.polygons)):
             return CornerMap(len(mesh.loops))
         corner_map = build_corner_map(mesh, evaluated)
+        if self.to_copies:
+            return corner_map
         if corner_map.untraced:
             self._untraced.append(original.name)
         if corner_map.copied:
