@@ -37,7 +37,8 @@ from surface_reference import SurfaceReference  # noqa: E402
 TARGETS = (0.04, 0.02, 0.01, 0.005)
 # The file, patch sizes of SUBDIVIDE, m, and that of the mesh of the truth.
 SCENES = {
-    "cube_on_plane": (ROOT / "build/scenes/cube_on_plane.blend", (0.4, 0.2, 0.1, 0.05, 0.025), 0.03),
+    "cube_on_plane": (
+        ROOT / "build/scenes/cube_on_plane.blend", (0.4, 0.2, 0.1, 0.05, 0.025), 0.03),
     "open_court": (ROOT / "scenes/open_court.blend", (1.0, 0.5, 0.25, 0.12), 0.15),
     "cornell_box": (ROOT / "scenes/cornell_box.blend", (0.3, 0.15, 0.08, 0.04), 0.05),
 }

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a mesh of the user has is carried over to a finer mesh on its faces: material slots, UV maps,
-colours and all other attributes, normals, sharp edges, seams, creases, vertex groups and shape keys.
+"""What a mesh of the user has is carried over to a finer mesh on its faces: material slots, UV
+maps, colours and all other attributes, normals, sharp edges, seams, creases, vertex groups and shape
+keys.
 
-Values that can be mixed are interpolated over the source's faces. Others, such as whole numbers, are
-those of the nearest corner.
+Values that can be mixed are interpolated over the source's faces. Others, such as whole numbers,
+are those of the nearest corner.
 """
 
 from __future__ import annotations
@@ -182,9 +183,10 @@ def write_vertex_groups(copy: bpy.types.Object, original: bpy.types.Object, grou
     for of_original, (vertices, weights) in zip(original.vertex_groups, groups):
         group = copy.vertex_groups.new(name=of_original.name)
         group.lock_weight = of_original.lock_weight
-        # All vertices of equal weight at once.
-        for weight in np.unique(weights):
-            group.add(vertices[weights == weight].tolist(), float(weight), 'REPLACE')
+        # Blender takes all vertices of equal weight at once.
+        values, first = np.unique(np.sort(weights), return_index=True)
+        for weight, alike in zip(values, np.split(vertices[np.argsort(weights)], first[1:])):
+            group.add(alike.tolist(), float(weight), 'REPLACE')
     if groups:
         copy.vertex_groups.active_index = original.vertex_groups.active_index
 

@@ -159,6 +159,7 @@ SKIPS = (
     "all stages",
     "nothing or only the strengths of lights have changed since the last draft; its light was "
     "scaled",
+    "the second pass", "no mesh needed more vertices for its light",
     "faces", "their area is zero or no larger than rounding errors", "projection of faces",
     "neighbouring faces of equal shape in one plane were projected together", "corners",
     "no result is needed there", "patches",

@@ -110,6 +110,12 @@ TEST(AdaptedMeshes, EvenLightNeedsNoVertices) {
     const FinerMesh& mesh = bake.adaptedMesh(0);
     EXPECT_EQ(mesh.vertices.size(), scene.meshes[0].vertices.size());
     EXPECT_EQ(mesh.cornerVertices, scene.meshes[0].cornerVertices);
+    EXPECT_TRUE(skips(reportOf(bake), SkippedWork::SECOND_PASS));
+    Bake kept;
+    kept.run(scene);
+    EXPECT_LT(difference(cornerLight(bake, 0, RB_OUTPUT_LIGHTING),
+                         cornerLight(kept, 0, RB_OUTPUT_LIGHTING)),
+              1e-6);
     for (const glm::vec3& light : cornerLight(bake, 0, RB_OUTPUT_LIGHTING))
         EXPECT_NEAR(double(light.x), 1 / kPi / (1 - 0.5), 1e-3);
 }

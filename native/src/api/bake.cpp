@@ -118,8 +118,7 @@ rb_error rb_get_corner_error(rb_bake bake, int32_t instance, float* error, size_
         const HeldBake held(bake, "bake");
         const std::vector<float>& values = held->instanceLight(instance).error;
         needCount(count, values.size(), "count");
-        needArray(error, count, "error");
-        if (count) std::memcpy(error, values.data(), count * sizeof(float));
+        copyArray(values, error, "error");
     });
 }
 

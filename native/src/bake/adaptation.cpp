@@ -6,13 +6,26 @@
 
 namespace raybundle {
 
+namespace {
+
+const Mesh& meshOf(const Scene& scene, size_t instance) {
+    return scene.meshes[size_t(scene.instances[instance].mesh)];
+}
+
+}  // namespace
+
+bool areAnyFiner(const Scene& scene, const std::vector<FinerMesh>& adapted) {
+    for (size_t i = 0; i < adapted.size(); ++i)
+        if (adapted[i].isFinerThan(meshOf(scene, i))) return true;
+    return false;
+}
+
 Scene adaptedScene(const Scene& scene, const std::vector<FinerMesh>& adapted) {
     Scene result = scene;
     for (size_t i = 0; i < adapted.size(); ++i) {
-        if (adapted[i].faceCount() == 0) continue;
-        Instance& instance = result.instances[i];
-        result.meshes.push_back(adapted[i].withAttributesOf(scene.meshes[size_t(instance.mesh)]));
-        instance.mesh = int32_t(result.meshes.size()) - 1;
+        if (!adapted[i].isFinerThan(meshOf(scene, i))) continue;
+        result.meshes.push_back(adapted[i].withAttributesOf(meshOf(scene, i)));
+        result.instances[i].mesh = int32_t(result.meshes.size()) - 1;
     }
     return result;
 }

@@ -14,8 +14,12 @@
 
 namespace raybundle {
 
-// Returns the scene with the adapted meshes of its instances. Instances whose adapted mesh is empty
-// keep their mesh. `adapted` is per instance.
+// Returns whether any adapted mesh is finer than the mesh of its instance. `adapted` is per
+// instance.
+bool areAnyFiner(const Scene& scene, const std::vector<FinerMesh>& adapted);
+
+// Returns the scene with the adapted meshes of its instances. Instances whose adapted mesh is not
+// finer keep their mesh. `adapted` is per instance.
 Scene adaptedScene(const Scene& scene, const std::vector<FinerMesh>& adapted);
 
 // Returns the light at the corners of the source meshes, of light at the corners of the adapted

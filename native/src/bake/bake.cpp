@@ -186,6 +186,10 @@ void Bake::runAdapted(const Scene& scene, const Threads& threads) {
     Results first = runStages(scene, scene.lightSets.size(), threads, true);
     std::swap(trace, traceOfSources);
     progress = callers;
+    if (!areAnyFiner(scene, first.adapted)) {
+        first.report.skip(SkippedWork::SECOND_PASS, 1);
+        return keep(std::move(first));
+    }
     if (interim)
         interim->convertBy([meshes = first.adapted](std::vector<InstanceLight> light) {
             return atSources(light, meshes);

@@ -22,6 +22,7 @@ constexpr SkippedText kTexts[] = {
     {"SCALED_DRAFT", "all stages",
      "nothing or only the strengths of lights have changed since the last draft; its light was "
      "scaled"},
+    {"SECOND_PASS", "the second pass", "no mesh needed more vertices for its light"},
     {"DEGENERATE_FACES", "faces", "their area is zero or no larger than rounding errors"},
     {"SHEETS", "projection of faces",
      "neighbouring faces of equal shape in one plane were projected together"},

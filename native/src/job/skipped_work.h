@@ -18,6 +18,7 @@ enum class SkippedWork {
     SCALED_LIGHTS,
     KEPT_LIGHTS,
     SCALED_DRAFT,
+    SECOND_PASS,
     DEGENERATE_FACES,
     SHEETS,
     UNWANTED_CORNERS,

@@ -28,6 +28,8 @@ struct FinerMesh {
     // Returns the mesh whose faces are those of the source.
     static FinerMesh of(const Mesh& source);
 
+    // Returns whether the mesh has vertices that the source does not have.
+    bool isFinerThan(const Mesh& source) const { return vertices.size() > source.vertices.size(); }
     size_t faceCount() const { return sourceFaces.size(); }
     // Returns the value at a corner of values at the corners of the source.
     template <class Value>

@@ -67,8 +67,6 @@ class RefinedMesh {
     double longestEdge(const Triangle& triangle) const;
     // Returns the number of vertices of the result.
     size_t vertexCount() const { return vertices.size(); }
-    // Returns the number of vertices of the source.
-    size_t sourceVertexCount() const { return source.vertices.size(); }
 
     // Adds a point in a triangle (m, in the world) and returns its index, which counts from 0. It
     // is handed on to the triangles that replace the triangle.
@@ -77,8 +75,8 @@ class RefinedMesh {
     const glm::dvec3& point(uint32_t index) const { return points[index]; }
 
     // Divides a triangle, and before it those beyond its longest edge whose own longest edge is
-    // longer. Does nothing if the triangle is not alive, or as small as rounding errors. Stops before
-    // the result has more than `mostVertices` vertices.
+    // longer. Does nothing if the triangle is not alive, or as small as rounding errors. Stops
+    // before the result has more than `mostVertices` vertices.
     void refine(uint32_t triangle, size_t mostVertices = SIZE_MAX);
     // Refines triangles with angles below 20 degrees in faces that bisections have reached, up to
     // `mostVertices` vertices.
@@ -88,6 +86,10 @@ class RefinedMesh {
     FinerMesh result() const;
 
   private:
+    // The corners, or edges, of a triangle that follow and precede number k.
+    static size_t next(size_t k) { return k == 2 ? 0 : k + 1; }
+    static size_t last(size_t k) { return k == 0 ? 2 : k - 1; }
+
     struct Vertex {
         glm::dvec3 position;  // in the source's space
         uint32_t place;
@@ -110,9 +112,11 @@ class RefinedMesh {
     // Returns the longest edge of a triangle, 0 to 2. Among equal edges it is the same one for all
     // triangles that have them.
     size_t longest(const Triangle& triangle) const;
-    bool isShorter(const Triangle& a, size_t edgeOfA, const Triangle& b, size_t edgeOfB) const;
-    // Returns the cosine of the smallest angle of a triangle, and the corner where it is.
-    std::array<double, 2> smallestAngle(const Triangle& triangle) const;
+    struct Angle {
+        double cosine;
+        size_t corner;  // of the triangle, 0 to 2
+    };
+    Angle smallestAngle(const Triangle& triangle) const;
     bool isPoor(const Triangle& triangle) const;
     uint32_t add(const Triangle& triangle);
     void replaceInRing(uint32_t old, uint32_t now);

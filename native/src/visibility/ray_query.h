@@ -144,15 +144,15 @@ struct SideQuery : RayQuery {
     // error.
     std::array<float, Visibility::kPacket> behind;
     std::array<uint32_t, Visibility::kPacket> target;
-    // Per ray of passStartAndEnd(): the distance along the ray from which only a solid that stands on
-    // the target blocks it, metres.
+    // Per ray of passStartAndEnd(): the distance along the ray from which only a solid that stands
+    // on the target blocks it, metres.
     std::array<float, Visibility::kPacket> lastPart;
 };
 
 // Filter for rays of a SideQuery of which it is only asked whether they are blocked.
 void passStart(const RTCFilterFunctionNArguments* args);
-// The same filter for rays from the inside of a solid to a target on which the solid may stand. Such
-// rays end beyond the target, and from SideQuery::lastPart on only the solid blocks them.
+// The same filter for rays from the inside of a solid to a target on which the solid may stand.
+// Such rays end beyond the target, and from SideQuery::lastPart on only the solid blocks them.
 void passStartAndEnd(const RTCFilterFunctionNArguments* args);
 // Filter for a ray of a SideQuery that searches for the first surface.
 void meetAfterStart(const RTCFilterFunctionNArguments* args);
