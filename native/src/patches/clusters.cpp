@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <tuple>
 #include <unordered_map>
 
 #include "job/cancellation.h"
 #include "patches/side.h"
 #include "sampling/mix_bits.h"
+#include "scene/disjoint_sets.h"
 
 namespace raybundle {
 namespace {
@@ -21,6 +24,10 @@ constexpr int kNormalCells = 8;
 constexpr float kWidth = 0.5f;
 // Patches larger than this share of a cell's area are in no cluster.
 constexpr float kSmall = 0.25f;
+// Largest width of the patches of a dense surface, relative to the target edge of a tile, and the
+// smallest number of such patches.
+constexpr float kDense = 0.5f;
+constexpr double kFewestOfDense = 1000;
 
 // Returns the cell of a unit normal, by the octahedral map.
 int cellOf(const glm::vec3& normal) {
@@ -45,6 +52,83 @@ struct HashOf {
     }
 };
 
+// Returns whether a patch may be in a cluster: it is a whole face that is opaque and not
+// translucent.
+bool canJoin(const Patches& patches, uint32_t patch) {
+    return patches.parentAt(2 * patch).patchCount() == 1 && patches.opacityOf(patch) == 1.0f &&
+           patches.translucenceOf(2 * patch) == glm::vec3(0.0f) &&
+           patches.translucenceOf(2 * patch + 1) == glm::vec3(0.0f);
+}
+
+// Returns per cell the number of its parents.
+std::vector<uint32_t> piecesOfCells(const Patches& patches) {
+    std::vector<uint32_t> pieces(patches.cells.size());
+    for (const Parent& parent : patches.parents) ++pieces[parent.cell];
+    return pieces;
+}
+
+// Returns per connected surface whether a wall passes through any of its cells or stands on an edge
+// (patches/crossings.h).
+std::vector<bool> surfacesWithWalls(const Patches& patches, const std::vector<uint32_t>& pieces) {
+    std::vector<bool> result;
+    for (size_t p = 0; p < patches.parents.size(); ++p) {
+        throwIfCancelledAt(p);
+        const Parent& parent = patches.parents[p];
+        result.resize(std::max(result.size(), size_t(parent.surface) + 1));
+        if (pieces[parent.cell] > 1 || patches.cells[parent.cell].parted)
+            result[parent.surface] = true;
+    }
+    return result;
+}
+
+// Parts clusters through which walls pass, so that no light gets through these walls: only patches
+// that are connected within a cluster stay together, and pieces of cells are in no cluster.
+void partAtWalls(const Patches& patches, std::vector<uint32_t>& cluster) {
+    const std::vector<uint32_t> pieces = piecesOfCells(patches);
+    const std::vector<bool> hasWalls = surfacesWithWalls(patches, pieces);
+    if (std::find(hasWalls.begin(), hasWalls.end(), true) == hasWalls.end()) return;
+    struct Edge {
+        uint32_t low, high, patch;
+    };
+    std::vector<Edge> edges;
+    for (uint32_t patch = 0; patch < cluster.size(); ++patch) {
+        throwIfCancelledAt(patch);
+        const Parent& parent = patches.parentAt(2 * patch);
+        if (cluster[patch] == kNoCluster || !hasWalls[parent.surface]) continue;
+        if (pieces[parent.cell] > 1) {
+            cluster[patch] = kNoCluster;
+            continue;
+        }
+        const int n = parent.isTriangle ? 3 : 4;
+        for (int k = 0; k < n; ++k) {
+            if (patches.cells[parent.cell].parted >> k & 1) continue;
+            const auto [low, high] =
+                std::minmax(parent.vertex[size_t(k)], parent.vertex[size_t((k + 1) % n)]);
+            edges.push_back({low, high, patch});
+        }
+    }
+    std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
+        return std::tie(a.low, a.high, a.patch) < std::tie(b.low, b.high, b.patch);
+    });
+    DisjointSets joined(cluster.size());
+    for (size_t k = 1; k < edges.size(); ++k) {
+        const Edge &a = edges[k - 1], &b = edges[k];
+        if (a.low == b.low && a.high == b.high && cluster[a.patch] == cluster[b.patch])
+            joined.join(a.patch, b.patch);
+    }
+    // Clusters of surfaces without walls keep one number, as if they were connected.
+    std::map<std::pair<uint32_t, uint32_t>, uint32_t> numbers;
+    for (uint32_t patch = 0; patch < cluster.size(); ++patch) {
+        if (cluster[patch] == kNoCluster) continue;
+        const bool isParted = hasWalls[patches.parentAt(2 * patch).surface];
+        cluster[patch] =
+            numbers
+                .emplace(std::make_pair(cluster[patch], isParted ? joined.root(patch) : UINT32_MAX),
+                         uint32_t(numbers.size()))
+                .first->second;
+    }
+}
+
 }  // namespace
 
 std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn) {
@@ -65,16 +149,41 @@ std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<boo
                       uint32_t(place.z)};
         cluster[patch] = clusters.emplace(key, uint32_t(clusters.size())).first->second;
     }
+    partAtWalls(patches, cluster);
     return cluster;
+}
+
+std::vector<bool> findDense(const Patches& patches) {
+    struct Surface {
+        double area = 0, count = 0;
+    };
+    std::vector<Surface> surfaces;
+    auto isSmall = [&](uint32_t patch, double area) {
+        const double edge = double(kDense * patches.islandAt(2 * patch).size);
+        return area <= edge * edge;
+    };
+    const std::vector<uint32_t> pieces = piecesOfCells(patches);
+    std::vector<bool> isDense(patches.count());
+    for (uint32_t patch = 0; patch < isDense.size(); ++patch) {
+        throwIfCancelledAt(patch);
+        isDense[patch] = canJoin(patches, patch) && pieces[patches.parentAt(2 * patch).cell] == 1 &&
+                         isSmall(patch, double(patches.area[patch]));
+        const size_t number = patches.parentAt(2 * patch).surface;
+        surfaces.resize(std::max(surfaces.size(), number + 1));
+        surfaces[number].area += isDense[patch] * double(patches.area[patch]);
+        surfaces[number].count += isDense[patch];
+    }
+    for (uint32_t patch = 0; patch < isDense.size(); ++patch) {
+        const Surface& surface = surfaces[patches.parentAt(2 * patch).surface];
+        isDense[patch] = isDense[patch] && surface.count >= kFewestOfDense;
+    }
+    return isDense;
 }
 
 Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&all) {
     std::vector<bool> isIn(all.count());
     for (uint32_t patch = 0; patch < isIn.size(); ++patch)
-        isIn[patch] = !isShown[2 * patch] && !isShown[2 * patch + 1] &&
-                      all.parentAt(2 * patch).patchCount() == 1 && all.opacityOf(patch) == 1.0f &&
-                      all.translucenceOf(2 * patch) == glm::vec3(0.0f) &&
-                      all.translucenceOf(2 * patch + 1) == glm::vec3(0.0f);
+        isIn[patch] = !isShown[2 * patch] && !isShown[2 * patch + 1] && canJoin(all, patch);
     const std::vector<uint32_t> cluster = findClusters(all, isIn);
     std::vector<uint32_t> numberOf;  // per cluster with patches so far, its patch of `joined`
     std::vector<uint32_t> number(all.count()), size;

@@ -218,6 +218,8 @@ struct Patches {
     size_t degenerateFaces = 0;  // faces that were left out because they have no area
     // Corners of faces that were left out because another face in the same place stands for them.
     std::vector<DoubledCorner> doubledCorners;
+    // Per patch, see findDense() in patches/clusters.h.
+    std::vector<bool> isDense;
     // Whether any faces coincide, also those that could not be left out.
     bool anyCoincide = false;
 

@@ -8,6 +8,7 @@
 #include "job/cancellation.h"
 #include "job/error.h"
 #include "job/settings.h"
+#include "patches/clusters.h"
 #include "patches/face_cutting.h"
 #include "patches/patches.h"
 #include "patches/placement.h"
@@ -58,6 +59,7 @@ void fillPatches(const Scene& scene, Patches& patches) {
     patches.sheets = findSheets(patches);
     assignOpacity(scene, patches);
     assignMaterials(scene, patches);
+    patches.isDense = findDense(patches);
 }
 
 }  // namespace
