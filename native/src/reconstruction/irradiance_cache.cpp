@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reconstruction/irradiance_cache.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "job/cancellation.h"
+#include "sampling/mix_bits.h"
+#include "sampling/sphere_sampling.h"
+
+namespace raybundle {
+namespace {
+
+// Reach of a record as a share of the harmonic mean distance of the surfaces around, and the
+// largest distance between the unit normals of a record and of a place that it is used at.
+constexpr float kReach = 0.35f, kAngle = 0.4f;
+// Distances along the normal count this many times: records on another layer of a surface are not
+// used.
+constexpr float kAlongNormal = 4;
+// Weight of the assumption that light does not vary, relative to the weight of all records. It
+// decides where there are too few records to tell, or where position and normal vary together.
+constexpr double kEven = 0.05;
+// More records than this around a place gain nothing, so that their reach is shortened.
+constexpr double kMostAround = 24;
+// A record reaches kShorter times as far as before if the mean squared difference around it exceeds
+// noise by more than kMostSurplus times what is allowed, and by kCertain of its standard
+// deviations.
+constexpr float kShorter = 0.7f;
+constexpr double kMostSurplus = 1, kCertain = 1;
+
+double powerOf(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
+
+}  // namespace
+
+size_t IrradianceCache::CellHash::operator()(const Cell& cell) const {
+    uint64_t mixed = mixBits(uint64_t(cell.level));
+    for (int k = 0; k < 3; ++k) mixed = mixBits(mixed ^ uint32_t(cell.at[k]));
+    return size_t(mixed);
+}
+
+float IrradianceCache::reachOf(const CachePlace& place) const {
+    return std::min(largestReach, kReach / std::max(place.nearness, 1e-30f));
+}
+
+void IrradianceCache::add(const CachePlace& place, const CachedLight& light) {
+    records.push_back({place, light, reachOf(place), kAngle});
+}
+
+float IrradianceCache::weightOf(const Record& record, const CachePlace& place) const {
+    const glm::vec3 off = place.position - record.place.position;
+    const float along = kAlongNormal * glm::dot(off, record.place.normal + place.normal) / 2;
+    const float distance = std::sqrt(glm::dot(off, off) + along * along);
+    const float turn = glm::distance(record.place.normal, place.normal);
+    return std::max(0.0f, 1 - distance / std::min(record.reach, reachOf(place))) *
+           std::max(0.0f, 1 - turn / record.angle);
+}
+
+void IrradianceCache::buildIndex() {
+    cells.clear();
+    hasLevel.fill(false);
+    for (uint32_t k = 0; k < records.size(); ++k) {
+        throwIfCancelledAt(k);
+        const Record& record = records[k];
+        // The width of the cells is between two and four times the reach.
+        const int level = std::clamp(int(std::ceil(std::log2(2 * record.reach))), -32, 31);
+        const float width = std::ldexp(1.0f, level);
+        hasLevel[size_t(level + 32)] = true;
+        const glm::ivec3 low(glm::floor((record.place.position - record.reach) / width)),
+            high(glm::floor((record.place.position + record.reach) / width));
+        for (int x = low.x; x <= high.x; ++x)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int z = low.z; z <= high.z; ++z) cells[{level, {x, y, z}}].push_back(k);
+    }
+}
+
+template <class Visit>
+void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit) const {
+    for (int level = -32; level < 32; ++level) {
+        if (!hasLevel[size_t(level + 32)]) continue;
+        const auto found =
+            cells.find({level, glm::ivec3(glm::floor(place.position / std::ldexp(1.0f, level)))});
+        if (found == cells.end()) continue;
+        for (const uint32_t k : found->second)
+            if (const float weight = weightOf(records[k], place); weight > 0) visit(k, weight);
+    }
+}
+
+// The light at a place is the constant part of a linear function of position and normal in the
+// plane of the place, fitted to the records around it. The light is therefore a sum of the light of
+// the records, with factors that add up to 1.
+IrradianceCache::Interpolated IrradianceCache::interpolate(const CachePlace& place,
+                                                           uint32_t without) const {
+    constexpr int kTerms = 5;
+    using Terms = Eigen::Matrix<double, kTerms, 1>;
+    const auto [x, y] = frame(place.normal);
+    auto termsOf = [&, x = x, y = y](const Record& record) {
+        const glm::vec3 off = (record.place.position - place.position) / record.reach;
+        const glm::vec3 turn = record.place.normal / record.angle;
+        Terms terms;
+        terms << 1, double(glm::dot(off, x)), double(glm::dot(off, y)), double(glm::dot(turn, x)),
+            double(glm::dot(turn, y));
+        return terms;
+    };
+    Eigen::Matrix<double, kTerms, kTerms> matrix = Eigen::Matrix<double, kTerms, kTerms>::Zero();
+    double sum = 0;
+    forEachAround(place, [&](uint32_t k, float weight) {
+        if (k == without) return;
+        const Terms terms = termsOf(records[k]);
+        matrix += double(weight) * terms * terms.transpose();
+        sum += double(weight);
+    });
+    Interpolated result;
+    result.light.variance = INFINITY;
+    if (!(sum > 0)) return result;
+    for (int k = 1; k < kTerms; ++k) matrix(k, k) += kEven * sum;
+    const Terms solution = matrix.ldlt().solve(Terms::Unit(0));
+    CachedLight& light = result.light;
+    light.variance = 0;
+    double squares = 0;
+    forEachAround(place, [&](uint32_t k, float weight) {
+        if (k == without) return;
+        const double factor = double(weight) * solution.dot(termsOf(records[k]));
+        const CachedLight& own = records[k].light;
+        light.carried += float(factor) * own.carried;
+        light.reflected += float(factor) * own.reflected;
+        light.surrounding += float(factor) * own.surrounding;
+        light.open += float(factor) * own.open;
+        light.variance += factor * factor * own.variance;
+        light.allowed += double(weight) / sum * own.allowed;
+        squares += factor * factor;
+    });
+    for (glm::vec3* part : {&light.carried, &light.reflected, &light.surrounding})
+        *part = glm::max(*part, 0.0f);
+    result.records = 1 / squares;
+    return result;
+}
+
+void IrradianceCache::update(bool compares) {
+    buildIndex();
+    if (!compares) return;
+    // Per record: the squared difference from what others predict beyond the noise, and the noise,
+    // (W/m^2)^2. The noise is negative if no other record reaches it.
+    struct Test {
+        double surplus = 0, noise = -1;
+    };
+    std::vector<Test> tests(records.size());
+    parallelFor(size_t(0), records.size(), [&](size_t k) {
+        const Record& own = records[k];
+        const CachedLight others = interpolate(own.place, uint32_t(k)).light;
+        if (std::isinf(others.variance)) return;
+        tests[k].noise = own.light.variance + others.variance;
+        tests[k].surplus = powerOf(own.light.total() - others.total()) - tests[k].noise;
+    });
+    std::vector<float> factor(records.size(), 1.0f);
+    std::vector<uint8_t> isShortened(records.size());
+    parallelFor(size_t(0), records.size(), [&](size_t k) {
+        double surplus = 0, noise = 0, sum = 0, squares = 0, count = 0;
+        forEachAround(records[k].place, [&](uint32_t other, float weight) {
+            ++count;
+            if (tests[other].noise < 0) return;
+            surplus += double(weight) * tests[other].surplus;
+            noise += double(weight) * tests[other].noise;
+            sum += double(weight);
+            squares += double(weight * weight);
+        });
+        // The number of records around a place grows with the square of their reach.
+        factor[k] = float(std::sqrt(std::min(1.0, kMostAround / std::max(1.0, count))));
+        if (!(sum > 0)) return;
+        // The square of a normally distributed difference deviates by sqrt(2) times its mean.
+        const double deviation = std::sqrt(2 * squares) / sum * noise / sum;
+        isShortened[k] =
+            surplus / sum > kMostSurplus * records[k].light.allowed + kCertain * deviation;
+    });
+    for (size_t k = 0; k < records.size(); ++k) {
+        records[k].reach *= isShortened[k] ? std::min(factor[k], kShorter) : factor[k];
+        if (isShortened[k]) records[k].angle *= kShorter;
+    }
+    buildIndex();
+}
+
+}  // namespace raybundle
