@@ -175,8 +175,9 @@ SKIPS = (
     "the noise has reached its target", "iterations of a solve",
     "the solve started from the last solution", "final gather",
     "interpolation gives the light at these corners", "light on patches",
-    "only few corners need a result; they gathered the light themselves", "reconstruction",
-    "the objects only occlude",
+    "only few corners need a result; they gathered the light themselves",
+    "the mesh is dense; light from around was gathered at some vertices and interpolated between",
+    "reconstruction", "the objects only occlude",
 )
 _NAMES_AND_MORE = re.compile(r'(?P<names>.*") and (?P<count>\d+) more')
 

@@ -67,6 +67,8 @@ TEST_P(ResultCorners, HaveTheLightThatTheyHaveAmongAllForFewerRays) {
     const bool isOfPatches = GetParam() == Reconstruction::LEAST_SQUARES;
     for (Bake* bake : {&whole, &part})
         if (isOfPatches) bake->settings.maxBundles = bake->settings.minBundles;
+    // All corners show the light of patches, although the ball is dense.
+    if (isOfPatches) whole.settings.finalGather = 0;
     whole.run(scene);
     fine.settings.targetError = 0.008f;
     fine.settings.seed = 1;

@@ -234,7 +234,7 @@ Bake::Results Bake::runStages(const Scene& scene, size_t reportedSets, const Thr
         showFirstLight(scene, report);
         makePatches(scene, report);
         const std::vector<CoarseShot> coarse = startLines(scene, report);
-        const ShownLight shown(scene, trace->patches, gathersSparseResults(settings));
+        const ShownLight shown(scene, trace->patches, settings);
         report.skip(SkippedWork::UNWANTED_CORNERS, scene.cornersWithoutResult());
         const StageInput shots{scene, settings, progress, *trace, interim};
         SetLights lights = shootSources(shots, shown, coarse, report);
@@ -333,9 +333,11 @@ std::vector<CoarseShot> Bake::startLines(const Scene& scene, Report& report) {
 std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     Patches& patches = trace->patches;
     Cuts cuts;
+    // The nodes of dense surfaces gather their light, which no cut would sharpen.
+    const bool cutsDense = !gathersDenseSurfaces(settings);
     if (settings.contacts) {
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
-        cuts = contactCuts(patches, trace->visibility, size_t(settings.maxPatches));
+        cuts = contactCuts(patches, trace->visibility, size_t(settings.maxPatches), cutsDense);
     }
     // With other methods, cut patches are noisier: other solvers follow the lines of single
     // patches, and other first shots send rays from the sources to patches. Smaller patches get
@@ -350,7 +352,7 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
         const size_t most =
             size_t(settings.maxPatches) - std::min(size_t(settings.maxPatches), cuts.morePatches());
-        cuts.add(worthwhileCuts(scene, patches, shots, most, settings.targetError));
+        cuts.add(worthwhileCuts(scene, patches, shots, most, settings.targetError, cutsDense));
     }
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
     if (cuts.count() > 0) {
@@ -424,8 +426,11 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
     const std::vector<InstanceRange> ranges = instanceRanges(in.scene, patches);
     const SideNoise& noise = exchanged.noise;
     const Irradiance ofTiles = meanOver(in.tiles, in.shown.of(lights, exchanged.exposed), weight);
-    const SideErrors sides{ofTiles,      exposedOfTiles,  noise.ofBundles,
-                           noise.direct, noise.ofObjects, noise.isOutOfReach};
+    std::vector<bool> isGathered(in.tiles.sideCount());
+    for (uint32_t side = 0; side < isGathered.size(); ++side)
+        isGathered[side] = in.shown.isGathered(in.tiles.firstSide(side));
+    const SideErrors sides{ofTiles,         exposedOfTiles, noise.ofBundles,   noise.direct,
+                           noise.ofObjects, isGathered,     noise.isOutOfReach};
     stateErrors(in.scene, in.tiles, ranges, sides, settings, made, report);
     if (meshes || (settings.countAdaptive && !settings.adaptMeshes)) {
         std::vector<FinerMesh> adapted =

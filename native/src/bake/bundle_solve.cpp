@@ -58,7 +58,8 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       tileWeight(input.tiles.sideCount(), 0),
       errorOfSets(gathered.errorsOf(lights, input.tiles)),
       noise(input.trace.looks, errorOfSets, tileWeight, input.tiles.patches()),
-      growth(cornerGrowth(input.scene, input.tiles.patches())),
+      allGathered(input.shown.instancesAllGathered()),
+      growth(cornerGrowth(input.scene, input.tiles.patches(), allGathered)),
       rule(input.settings, mostBundles(patches, input.trace.density), tracer.bundleCount()),
       // No extra rays if the caller fixes or limits the number of bundles, because the result of
       // these bundles is then wanted.
@@ -207,7 +208,8 @@ void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen)
     }
     shown = shownNoise(
         in.scene, {in.tiles.patches(), in.tiles.mean(in.trace.exposedShare(), patches.sideAreas())},
-        look.ofLights().front(), halvesSeen.front(), in.settings.regularization, growth);
+        look.ofLights().front(), halvesSeen.front(), in.settings.regularization, growth,
+        allGathered);
 }
 
 // States the noise that remains, and why no bundles were added.
@@ -286,7 +288,8 @@ SideNoise keepFirstShot(const SolveInput& in, SetLights& lights, std::vector<flo
     report.estimatedError = errors.front();
     for (size_t set = 0; set < report.lightSets.size(); ++set)
         report.lightSets[set].estimatedError = errors[set + 1];
-    const std::vector<double> growth = cornerGrowth(in.scene, in.tiles.patches());
+    const std::vector<double> growth =
+        cornerGrowth(in.scene, in.tiles.patches(), in.shown.instancesAllGathered());
     CornerNoise corners =
         noiseAtCorners(in.scene, in.tiles.patches(), noise.ofLights().front(), growth,
                        std::vector<double>(growth.size(), kUsuallyOverForetold));

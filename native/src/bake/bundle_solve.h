@@ -71,6 +71,7 @@ class BundleSolve {
     // Per light and side of the tiles: standard error of the first shot, W/m^2.
     std::vector<std::vector<float>> errorOfSets;
     SetNoise noise;
+    const std::vector<bool> allGathered;   // per instance, see ShownLight::instancesAllGathered
     const std::vector<double> growth;      // per instance, see cornerGrowth
     ShownNoise shown;                      // at corners, of the last look
     std::optional<NoisyParts> noisyParts;  // empty unless the solver counts lines

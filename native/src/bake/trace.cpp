@@ -57,7 +57,7 @@ LineDensity densityOf(const Patches& patches) {
 Clusters clustersOf(const Scene& scene, const Patches& patches, const Settings& settings) {
     if (!settings.skipClusters || !settings.hasLineWindows() || !settings.gathersFirstShot())
         return Clusters(patches);
-    return Clusters(patches, shownSides(scene, patches, gathersSparseResults(settings)));
+    return Clusters(patches, shownSides(scene, patches, settings));
 }
 
 Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Scene& scene,

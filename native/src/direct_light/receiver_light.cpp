@@ -291,7 +291,9 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
                              Sightings* sightings) const {
     Gathered sum;
     const ReceiverPlace place(patches, receiver);
-    const std::vector<float> weights = unblockedWeights(place);
+    const bool onlySurrounding = receiver.of == Receiver::Of::SURROUNDING;
+    const std::vector<float> weights =
+        onlySurrounding ? std::vector<float>() : unblockedWeights(place);
     const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
     // Dim sources are joined, unless the light of each is to be kept.
     const std::vector<JointSource> joints = parts || weights.empty() || receiver.passingOnly
@@ -302,6 +304,8 @@ Gathered DirectLight::gather(const Receiver& receiver, const Aim& aim, Seen& see
         for (const uint32_t k : joint.joined()) isJoined[k] = true;
     for (size_t k = 0; k < sources.size(); ++k) {
         if (!isJoined.empty() && isJoined[k]) continue;
+        if (receiver.of != Receiver::Of::ALL && sources[k]->surrounds() != onlySurrounding)
+            continue;
         if (receiver.passingOnly && sources[k]->castsShadows &&
             patches.parentAt(receiver.side).stopsDirect)
             continue;

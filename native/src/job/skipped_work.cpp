@@ -46,6 +46,8 @@ constexpr SkippedText kTexts[] = {
     {"SMOOTH_CORNERS", "final gather", "interpolation gives the light at these corners"},
     {"SPARSE_CORNERS", "light on patches",
      "only few corners need a result; they gathered the light themselves"},
+    {"DENSE_NODES", "final gather",
+     "the mesh is dense; light from around was gathered at some vertices and interpolated between"},
     {"OCCLUDERS", "reconstruction", "the objects only occlude"},
 };
 static_assert(std::size(kTexts) == size_t(SkippedWork::OCCLUDERS) + 1);

@@ -36,6 +36,7 @@ enum class SkippedWork {
     WARM_STARTS,
     SMOOTH_CORNERS,
     SPARSE_CORNERS,
+    DENSE_NODES,
     OCCLUDERS
 };
 

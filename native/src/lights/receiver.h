@@ -31,6 +31,8 @@ struct Receiver {
     // on surfaces that do not stop direct light, that of all sources. Lines that end at the first
     // surface cannot bring this light.
     bool passingOnly = false;
+    // The sources whose light is gathered: all, those that surround the receiver, or the others.
+    enum class Of { ALL, SURROUNDING, OTHERS } of = Of::ALL;
     float errorFactor = 1;   // factor on the error that the receiver may have
     float targetFactor = 1;  // factor on the target error: that of the object
     bool isShown = true;     // false: the result shows only light that this receiver reflects

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "job/cancellation.h"
-#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {
@@ -13,27 +12,6 @@ namespace {
 // Corners gather no light of their own on a patch side whose exposed share is not above this value:
 // they keep the light of the patches.
 constexpr float kHalfCovered = 0.5f;
-
-// Returns the RMS of the light of all baked sides, over the channels and the exposed area, W/m^2.
-double meanLight(const Scene& scene, const LitSurfaces& surfaces,
-                 const std::vector<InstanceRange>& ranges, const Irradiance& light) {
-    double squares = 0, area = 0;
-    for (size_t i = 0; i < ranges.size(); ++i) {
-        if (scene.instances[i].role != RB_ROLE_BAKE) continue;
-        for (uint32_t p = ranges[i].firstParent; p < ranges[i].lastParent; ++p) {
-            const Parent& parent = surfaces.patches.parents[p];
-            for (uint32_t k = 0; k < parent.patchCount(); ++k) {
-                const uint32_t side =
-                    2 * (parent.firstPatch + k) + uint32_t(scene.instances[i].side);
-                const glm::dvec3 h(light.direct[side] + light.indirect[side]);
-                const double weight = surfaces.exposedArea(side);
-                squares += weight * glm::dot(h, h) / 3;
-                area += weight;
-            }
-        }
-    }
-    return area > 0 ? std::sqrt(squares / area) : 0;
-}
 
 // Sets the allowed errors of the receivers from index `first` on. Corners at one node contribute to
 // one mean, and only the error of this mean counts, so that each corner may have a larger error.
@@ -46,11 +24,6 @@ void shareErrors(std::vector<CornerReceiver>& corners, size_t first, const Smoot
 }
 
 }  // namespace
-
-bool gathersSparseResults(const Settings& settings) {
-    return settings.reconstruction != Reconstruction::AREA_AVERAGE && settings.finalGather &&
-           settings.countsLines() && settings.gathersFirstShot();
-}
 
 std::vector<bool> gatheringInstances(const Scene& scene, const Settings& settings) {
     std::vector<bool> gathers;
@@ -80,15 +53,6 @@ CornerGather::CornerGather(const ReconstructionInput& input,
 void CornerGather::findCorners(const ReconstructionInput& input, const std::vector<bool>& gathers) {
     const Patches& patches = input.patches;
     const Visibility& visibility = input.visibility;
-    // Returns whether another surface touches the side at the receiver's point. The surface may
-    // touch the patch at the corner although most of the patch is exposed.
-    auto isTouched = [&](const Receiver& receiver) {
-        const glm::vec3 normal = patches.normal(receiver.side);
-        float distance = 0;
-        const auto met = visibility.firstHit(receiver.side, *receiver.point, normal, &distance,
-                                             2 * patches.islandAt(receiver.side).touchDistance);
-        return met && isCovered(patches, receiver.side, *met, normal, distance);
-    };
     for (size_t i = 0; i < ranges.size(); ++i) {
         first.push_back(corners.size());
         if (!gathers[i]) continue;
@@ -101,7 +65,8 @@ void CornerGather::findCorners(const ReconstructionInput& input, const std::vect
             if (!scene.instances[i].hasResultAtVertex(size_t(vertices[size_t(all[c].corner)])))
                 return;
             leaveGap(all[c], patches, visibility);
-            isFree[c] = surfaces.exposed[receiver.side] > kHalfCovered && !isTouched(receiver);
+            isFree[c] = surfaces.exposed[receiver.side] > kHalfCovered &&
+                        !isTouched(receiver, patches, visibility);
         });
         for (size_t c = 0; c < all.size(); ++c)
             if (isFree[c]) corners.push_back(all[c]);
@@ -145,9 +110,9 @@ void CornerGather::gatherSources(const ReconstructionInput& input, const Progres
         for (const Gathered& one : gathered) rays += one.rays;
         const double mean = meanLight(scene, surfaces, ranges, lights[k].irradiance);
         others.push_back(settings.finalGather && mean > 0
-                             ? std::make_unique<const FinalGather>(surfaces, input.visibility,
-                                                                   lights[k], float(mean),
-                                                                   settings.targetError)
+                             ? std::make_unique<const FinalGather>(
+                                   surfaces, input.visibility, lights[k], lights[k].irradiance,
+                                   float(mean), settings.targetError)
                              : nullptr);
     }
 }
@@ -192,7 +157,8 @@ CornerGather::Outcome CornerGather::improve(size_t instance, size_t k,
             for (const FinalGather::Share& share : receivers[node]) sum += share.share;
             for (FinalGather::Share& share : receivers[node]) share.share /= sum;
             const FinalGather::Light found = gather.gather(
-                receivers[node], brightest(light.direct[node] + light.indirect[node]));
+                receivers[node],
+                std::max(gather.meanLight(), brightest(light.direct[node] + light.indirect[node])));
             gathered[node] = found.variance;
             light.carried[node] = found.carried;
             light.indirect[node] = found.reflected;

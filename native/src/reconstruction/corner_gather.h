@@ -25,10 +25,6 @@
 
 namespace raybundle {
 
-// Returns whether, with these settings, corners gather sparse results (Instance::hasSparseResults)
-// instead of taking the light of patches.
-bool gathersSparseResults(const Settings& settings);
-
 // Returns per instance whether its corners gather light.
 std::vector<bool> gatheringInstances(const Scene& scene, const Settings& settings);
 

@@ -7,6 +7,7 @@
 #include "job/cancellation.h"
 #include "patches/side.h"
 #include "sampling/sobol.h"
+#include "visibility/local_lines.h"
 
 namespace raybundle {
 namespace {
@@ -83,6 +84,14 @@ void leaveGap(CornerReceiver& corner, const Patches& patches, const Visibility& 
                               std::min(1.0f, kInsideGap * gap / std::max(inside, 1e-30f)));
     receiver.side = 2 * patches.patchAt(patches.parentOf[patchOf(receiver.side)], *receiver.point) +
                     isBack(receiver.side);
+}
+
+bool isTouched(const Receiver& receiver, const Patches& patches, const Visibility& visibility) {
+    const glm::vec3 normal = patches.normal(receiver.side);
+    float distance = 0;
+    const auto met = visibility.firstHit(receiver.side, *receiver.point, normal, &distance,
+                                         2 * patches.islandAt(receiver.side).touchDistance);
+    return met && isCovered(patches, receiver.side, *met, normal, distance);
 }
 
 }  // namespace raybundle

@@ -32,4 +32,8 @@ std::vector<CornerReceiver> cornerReceivers(const Scene& scene, const Patches& p
 // `isBesideGap` if the receiver was moved.
 void leaveGap(CornerReceiver& corner, const Patches& patches, const Visibility& visibility);
 
+// Returns whether another surface touches the side at the receiver's point. The surface may touch
+// the patch there although most of the patch is exposed.
+bool isTouched(const Receiver& receiver, const Patches& patches, const Visibility& visibility);
+
 }  // namespace raybundle

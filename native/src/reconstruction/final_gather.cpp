@@ -25,6 +25,11 @@ constexpr float kFewestTimesTarget = 5;
 // Minimum number of patches in a parent for which the light of the patches shows whether the
 // interpolation follows it.
 constexpr uint32_t kTellingPatches = 4;
+// Mean number of sources that are sampled at the end of a ray that meets a surface nearby.
+constexpr float kSourcesOfRay = 4;
+// Number of rays of a probe, and of standard deviations by which it contradicts.
+constexpr uint32_t kProbeRays = 16;
+constexpr double kContradiction = 2.5;
 // Number of rays that look for surfaces nearer than patches are wide.
 constexpr uint32_t kNearRays = 8;
 // A surface nearer than this many times the length of the receiver's patch may light the ends of
@@ -48,23 +53,50 @@ double square(const glm::vec3& v) { return double(glm::dot(v, v)) / 3; }
 
 }  // namespace
 
+double meanLight(const Scene& scene, const LitSurfaces& surfaces,
+                 const std::vector<InstanceRange>& ranges, const Irradiance& light) {
+    double squares = 0, area = 0;
+    for (size_t i = 0; i < ranges.size(); ++i) {
+        if (scene.instances[i].role != RB_ROLE_BAKE) continue;
+        for (uint32_t p = ranges[i].firstParent; p < ranges[i].lastParent; ++p) {
+            const Parent& parent = surfaces.patches.parents[p];
+            for (uint32_t k = 0; k < parent.patchCount(); ++k) {
+                const uint32_t side =
+                    2 * (parent.firstPatch + k) + uint32_t(scene.instances[i].side);
+                const glm::dvec3 h(light.direct[side] + light.indirect[side]);
+                const double weight = surfaces.exposedArea(side);
+                squares += weight * glm::dot(h, h) / 3;
+                area += weight;
+            }
+        }
+    }
+    return area > 0 ? std::sqrt(squares / area) : 0;
+}
+
 FinalGather::FinalGather(const LitSurfaces& surfaces, const Visibility& visibility,
-                         const SetLight& light, float meanLight, float targetError)
+                         const SetLight& light, const Irradiance& irradiance, float meanLight,
+                         float targetError)
     : surfaces(surfaces),
       visibility(visibility),
       light(light),
+      irradiance(irradiance),
       emission(light.direct.bundledEmission()),
-      sent(surfaces, light.shot, light.irradiance, SentLight::Of::ALL),
+      sent(surfaces, light.shot, irradiance, SentLight::Of::ALL),
+      nearShare(std::min(
+          1.0f, kSourcesOfRay / float(std::max<size_t>(1, light.direct.lightSources().size())))),
       world(glm::pi<float>() * light.worldRadiance),
-      targetError(targetError),
-      error(targetError * meanLight) {}
+      mean(meanLight),
+      targetError(targetError) {}
 
-FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
-                                       float brightness) const {
-    const float factor = receivers[0].receiver->targetFactor;
+float FinalGather::allowedError(const Receiver& receiver, float brightness) const {
+    return kNoiseShare * receiver.targetFactor * targetError * brightness;
+}
+
+FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers, float brightness,
+                                       float laxity) const {
+    const float factor = laxity * receivers[0].receiver->targetFactor;
     const double tolerance = std::pow(
-        double(kSpreadOverError * kNoiseShare * factor * std::max(error, targetError * brightness)),
-        2);
+        double(kSpreadOverError * laxity * allowedError(*receivers[0].receiver, brightness)), 2);
     const uint32_t parts = std::max(kFewestParts, kParts / uint32_t(receivers.size()));
     std::vector<Light> sums(receivers.size() * parts);
     const uint32_t count = uint32_t(sums.size());
@@ -87,6 +119,8 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
             const float share = one.share / float(parts * wanted);
             mean.carried += share * sums[k].carried;
             mean.reflected += share * sums[k].reflected;
+            mean.nearness += share * sums[k].nearness;
+            mean.open += share * sums[k].open;
         }
         // The spread is taken about the mean of all receivers: one receiver has so few parts that
         // they may agree by chance.
@@ -104,6 +138,32 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers,
         done = wanted;
     }
     return mean;
+}
+
+FinalGather::Probe FinalGather::probe(const Receiver& receiver) const {
+    const SobolPoints points(hash(receiver.seed, kParts + 1));
+    Probe probe;
+    for (uint32_t i = 0; i < kProbeRays; ++i) {
+        Light one;
+        addRays(receiver, points, i, 1, one);
+        probe.light += one.total() / float(kProbeRays);
+        probe.square += square(one.total()) / kProbeRays;
+        probe.nearness += one.nearness / float(kProbeRays);
+        probe.open += one.open / float(kProbeRays);
+    }
+    return probe;
+}
+
+bool FinalGather::Probe::contradicts(const glm::vec3& expected, float expectedOpen,
+                                     double allowed) const {
+    // The rays spread about what is expected, not about their mean: all of them may miss the light.
+    const double spread =
+        raybundle::square(expected) - 2 * double(glm::dot(expected, light)) / 3 + square;
+    const float rare = expectedOpen * (1 - expectedOpen) + 0.5f / float(kProbeRays);
+    return raybundle::square(light - expected) >
+               kContradiction * kContradiction * (spread / kProbeRays + allowed) ||
+           std::abs(open - expectedOpen) >
+               float(kContradiction) * std::sqrt(rare / float(kProbeRays));
 }
 
 // Adds to `sum` the light that rays bring to a receiver. The rays use `count` points of the
@@ -124,13 +184,19 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
         float distance = 0;
         const auto hit = visibility.firstHit(receiver.side, *receiver.point, direction, &distance);
         sum.carried += hit ? emission[*hit] : world;
-        if (!hit) continue;
+        if (!hit) {
+            ++sum.open;
+            continue;
+        }
+        sum.nearness += 1 / std::max(distance, surfaces.patches.touchDistance);
         sum.reflected += sent.towards(*hit, -direction);
         if (distance >= width(*hit)) continue;
+        // With many sources, few of the rays sample them, and count for the others.
+        if (nearShare < 1 && float(hash(receiver.seed, i) >> 8) * 0x1p-24f >= nearShare) continue;
         const Receiver met{*hit, surfaces.patches.normal(*hit),
                            *receiver.point + distance * direction, hash(receiver.seed, kParts)};
-        sum.reflected += shotReflectance(surfaces.patches, light.shot, *hit) *
-                         (light.direct.sample(met, i) - light.irradiance.ofSources[*hit]);
+        sum.reflected += shotReflectance(surfaces.patches, light.shot, *hit) / nearShare *
+                         (light.direct.sample(met, i) - irradiance.ofSources[*hit]);
     }
 }
 
@@ -171,7 +237,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
         for (uint32_t k = 0; k < parent.patchCount(); ++k) {
             const uint32_t at = 2 * (parent.firstPatch + k) + uint32_t(side);
             const std::array<float, 4> shares = cornerWeights.of(p, k).corner;
-            const Irradiance& h = light.irradiance;
+            const Irradiance& h = irradiance;
             glm::vec3 difference = -(h.direct[at] - h.ofSources[at] + h.indirect[at]);
             for (size_t a = 0; a < 4; ++a) {
                 if (cell.corner[a] < 0) continue;
@@ -188,7 +254,7 @@ std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const Smooth
         }
     }
     std::vector<bool> result(regions.nodeCount);
-    const double most = std::pow(double(kInterpolationShare * error), 2);
+    const double most = std::pow(double(kInterpolationShare * targetError * mean), 2);
     for (size_t node = 0; node < result.size(); ++node)
         result[node] = squares[node] > most * weights[node];
     return result;

@@ -35,33 +35,60 @@
 
 namespace raybundle {
 
+// Returns the RMS of the light of all baked sides, over the channels and the exposed area, W/m^2.
+// `ranges` is per instance.
+double meanLight(const Scene& scene, const LitSurfaces& surfaces,
+                 const std::vector<InstanceRange>& ranges, const Irradiance& light);
+
 // Gathers the light of one light set from other surfaces and from the world. All functions are
 // const and may be called from several threads at once.
 class FinalGather {
   public:
     // Prepares the final gather for `light`, the light of one light set or of what belongs to no
-    // set. `meanLight` is the RMS of this light over all baked sides, W/m^2. `targetError` is the
-    // allowed error relative to `meanLight`, or at brighter points relative to the light there.
+    // set. `irradiance` is that of `light`, or a sharper version of it. `meanLight` is the RMS of
+    // this light over all baked sides, W/m^2. `targetError` is the relative error that is allowed.
     // References must outlive the object.
     FinalGather(const LitSurfaces& surfaces, const Visibility& visibility, const SetLight& light,
-                float meanLight, float targetError);
+                const Irradiance& irradiance, float meanLight, float targetError);
+
+    // Returns the argument of the constructor.
+    float meanLight() const { return mean; }
 
     // Irradiance that arrives at a point, W/m^2, in two parts.
     struct Light {
         glm::vec3 carried{0.0f};  // from the world, and from emission that is not a source
         glm::vec3 reflected{0.0f};
         double variance = 0;  // of total(), mean over the channels, (W/m^2)^2; set only by gather()
+        // Mean of the inverse distances of what the rays have met, 1/m; 0 for rays that meet
+        // nothing.
+        float nearness = 0;
+        float open = 0;  // share of the rays that have met nothing, 0 to 1
         glm::vec3 total() const { return carried + reflected; }
+    };
+    // What few rays find.
+    struct Probe {
+        glm::vec3 light{0.0f};  // mean, W/m^2
+        double square = 0;      // mean of the squares of single rays and of the channels, (W/m^2)^2
+        float nearness = 0, open = 0;  // as in Light
+
+        // Returns whether the rays contradict the light `expected`, W/m^2, of which the share `open`
+        // of the surroundings is without surfaces. `allowed` is the squared error that is allowed.
+        bool contradicts(const glm::vec3& expected, float expectedOpen, double allowed) const;
     };
     // A receiver and its share in a mean. The receiver is not owned.
     struct Share {
         const Receiver* receiver;
         float share;
     };
-    // Returns the mean light of the receivers, whose shares must sum to 1. `brightness` is an
-    // approximation of all light there, brightest channel, W/m^2. It sets the error that is
-    // allowed.
-    Light gather(const std::vector<Share>& receivers, float brightness) const;
+    // Returns the mean light of the receivers, whose shares must sum to 1. `brightness` is the light
+    // that the error is relative to, brightest channel, W/m^2: about all light there, or more where
+    // that is dark. The error that is allowed is `laxity` times as large as usual.
+    Light gather(const std::vector<Share>& receivers, float brightness, float laxity = 1) const;
+    // Returns what few rays from a receiver find. The estimate has much noise. It tells whether
+    // other light arrives than is expected, and how near other surfaces are.
+    Probe probe(const Receiver& receiver) const;
+    // Returns the standard error that gather() allows with this brightness and a laxity of 1, W/m^2.
+    float allowedError(const Receiver& receiver, float brightness) const;
 
     // Returns whether a surface is so near that the interpolation may not follow its light, while
     // the receiver's parent has too few patches to show it. A surface is near if its distance is
@@ -84,12 +111,13 @@ class FinalGather {
     const LitSurfaces surfaces;
     const Visibility& visibility;
     const SetLight& light;
+    const Irradiance& irradiance;
     const std::vector<glm::vec3>& emission;  // per side, without sources, W/m^2
     const SentLight sent;
+    const float nearShare;  // share of the rays that sample sources where they meet a near surface
     const glm::vec3 world;  // exitance of the world, W/m^2
-    // The error that is allowed, relative and absolute (W/m^2).
+    const float mean;       // see meanLight()
     const float targetError;
-    const float error;
 };
 
 }  // namespace raybundle

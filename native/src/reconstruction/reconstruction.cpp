@@ -14,6 +14,7 @@
 #include "reconstruction/face_slopes.h"
 #include "reconstruction/instance_side.h"
 #include "reconstruction/least_squares.h"
+#include "reconstruction/node_gather.h"
 #include "reconstruction/node_light.h"
 #include "reconstruction/shown_light.h"
 #include "reconstruction/smooth_regions.h"
@@ -170,19 +171,27 @@ class InstanceReconstruction {
           ranges(instanceRanges(input.scene, input.patches)),
           outside(exposedOutside(input, input.visibility)),
           gathers(gatheringInstances(input.scene, input.settings)),
+          isDense(denseInstances(input.scene, input.patches, input.shown)),
           onSides(sideLights(input, anyGathers())),
           regionsOf(input.scene.instances.size()),
           warnings(input.scene.instances.size()) {
+        for (size_t i = 0; i < isDense.size(); ++i) isDense[i] = isDense[i] && !gathers[i];
         parallelFor(size_t(0), regionsOf.size(), [&](size_t i) {
-            if (gathers[i]) regionsOf[i] = findRegions(i);
+            if (gathers[i] || isDense[i]) regionsOf[i] = findRegions(i);
         });
         if (anyGathers())
             atCorners.emplace(input, ranges, gathers, regionsOf,
                               LitSurfaces{input.patches, outside}, progress.part(0, 2));
+        if (anyDense())
+            atNodes.emplace(input, ranges, isDense, regionsOf, LitSurfaces{input.patches, outside},
+                            progress.part(0, 2));
     }
 
     bool anyGathers() const {
         return std::find(gathers.begin(), gathers.end(), true) != gathers.end();
+    }
+    bool anyDense() const {
+        return std::find(isDense.begin(), isDense.end(), true) != isDense.end();
     }
 
     // Reconstructs instance `i`, and sets its entry `said` of the report. Different instances may
@@ -201,10 +210,10 @@ class InstanceReconstruction {
         out.cornerVertices = mesh.cornerVertices;
         out.vertexCount = mesh.vertices.size();
         out.cornerAngles = cornerAngles(mesh);
-        if (!gathers[i]) regionsOf[i] = findRegions(i);
+        if (!gathers[i] && !isDense[i]) regionsOf[i] = findRegions(i);
         const double noise = addLight(i, out);
         regionsOf[i] = {};
-        if (isSparse(i))
+        if (isSparse(i) || isDense[i])
             if (const double signal = meanSquare(instance, out); signal > 0)
                 out.gatheredNoise = float(std::sqrt(noise / signal));
         if (out.isBaked && isInsideOut(input.patches, ranges[i], instance.side, onSides)) {
@@ -224,6 +233,10 @@ class InstanceReconstruction {
             report.shadowRays += atCorners->shadowRays();
             report.skip(SkippedWork::SMOOTH_CORNERS, smooth.load());
             report.skip(SkippedWork::SPARSE_CORNERS, atCorners->sparseCorners());
+        }
+        if (atNodes) {
+            report.shadowRays += atNodes->shadowRays();
+            report.skip(SkippedWork::DENSE_NODES, interpolated.load());
         }
         if (occluders) report.skip(SkippedWork::OCCLUDERS, occluders.load());
     }
@@ -256,6 +269,12 @@ class InstanceReconstruction {
             else if (kind.addsSlopes)
                 addFaceSlopes(input.patches, surface, input.shown, input.lights[k],
                               input.settings.targetError, light);
+            if (isDense[i]) {
+                const NodeGather::Outcome outcome =
+                    atNodes->replace(i, k, out.cornerAngles, onSides[k].emission, light);
+                if (outcome.nodes > 0) noise += outcome.noise / double(outcome.nodes);
+                interpolated += outcome.nodes - std::min(outcome.nodes, outcome.records);
+            }
             CornerLight atCorner = cornerLight(regionsOf[i], light);
             if (k == 0)
                 static_cast<CornerLight&>(out) = std::move(atCorner);
@@ -288,7 +307,8 @@ class InstanceReconstruction {
         if (gathers[i] && !input.shown.everywhere().empty())
             fields.add(input.shown.everywhere(), nodes.shownShare);
         // With sparse results, only the few corners that cannot gather show the light of patches.
-        const auto fit = isSparse(i) ? byAreaAverage : kind.fit;
+        const auto fit =
+            isSparse(i) || (isDense[i] && atNodes->gathersAll(i)) ? byAreaAverage : kind.fit;
         LeastSquaresFit result =
             fit({input.patches, outside}, surface, input.settings, fields.ofSides());
         fields.put(std::move(result.fields));
@@ -321,11 +341,13 @@ class InstanceReconstruction {
     const std::vector<InstanceRange> ranges;
     const std::vector<float> outside;  // per side: the share that counts, see exposedOutside()
     const std::vector<bool> gathers;   // per instance
+    std::vector<bool> isDense;         // per instance: whether nodes gather, see NodeGather
     const std::vector<SideLight> onSides;
     // Per instance: set if the instance gathers, or while it is reconstructed.
     std::vector<SmoothRegions> regionsOf;
     std::optional<CornerGather> atCorners;
-    std::atomic<size_t> occluders = 0, smooth = 0;
+    std::optional<NodeGather> atNodes;
+    std::atomic<size_t> occluders = 0, smooth = 0, interpolated = 0;
     std::vector<std::optional<Warning>> warnings;  // per instance
 };
 

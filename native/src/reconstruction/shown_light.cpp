@@ -24,24 +24,38 @@ std::vector<bool> resultSides(const Scene& scene, const Patches& patches) {
 
 }  // namespace
 
-std::vector<bool> shownSides(const Scene& scene, const Patches& patches, bool gathersAtCorners) {
+bool gathersSparseResults(const Settings& settings) {
+    return settings.reconstruction != Reconstruction::AREA_AVERAGE && settings.finalGather &&
+           settings.countsLines() && settings.gathersFirstShot();
+}
+
+bool gathersDenseSurfaces(const Settings& settings) {
+    return gathersSparseResults(settings) && settings.skipClusters &&
+           settings.reconstruction == Reconstruction::LEAST_SQUARES && !settings.adaptMeshes &&
+           !settings.countAdaptive;
+}
+
+std::vector<bool> shownSides(const Scene& scene, const Patches& patches, const Settings& settings) {
     const std::vector<bool> results = resultSides(scene, patches);
     std::vector<bool> shown = results;
     auto isOwnAlone = [&](size_t side) { return patches.translucenceOf(side) == glm::vec3(0.0f); };
-    for (size_t side = 0; gathersAtCorners && side < shown.size(); ++side)
-        if (isOwnAlone(side) &&
-            scene.instances[patches.parentAt(uint32_t(side)).instance].hasSparseResults)
-            shown[side] = false;
+    const bool sparse = gathersSparseResults(settings), dense = gathersDenseSurfaces(settings);
+    for (size_t side = 0; (sparse || dense) && side < shown.size(); ++side) {
+        const bool isSparse =
+            sparse && scene.instances[patches.parentAt(uint32_t(side)).instance].hasSparseResults;
+        const bool isDense = dense && patches.isDense[patchOf(side)];
+        if (isOwnAlone(side) && (isSparse || isDense)) shown[side] = false;
+    }
     for (size_t side = 0; !patches.translucence.empty() && side < shown.size(); ++side)
         if (results[opposite(side)] && !isOwnAlone(opposite(side))) shown[side] = true;
     return shown;
 }
 
-ShownLight::ShownLight(const Scene& scene, const Patches& patches, bool gathersAtCorners)
+ShownLight::ShownLight(const Scene& scene, const Patches& patches, const Settings& settings)
     : scene(scene),
       patches(patches),
       results(resultSides(scene, patches)),
-      shown(shownSides(scene, patches, gathersAtCorners)),
+      shown(shownSides(scene, patches, settings)),
       colors(diffuseReflectances(scene, patches)) {
     if (std::any_of(scene.materials.begin(), scene.materials.end(),
                     [](const Material& material) { return material.showsByAngle(); }))
@@ -68,6 +82,23 @@ std::vector<float> ShownLight::resultArea() const {
     for (size_t side = 0; side < area.size(); ++side)
         if (!isResult(side)) area[side] = 0;
     return area;
+}
+
+bool ShownLight::isGatheredAtNodes(size_t side) const {
+    return isGathered(side) && patches.isDense[patchOf(side)] &&
+           !scene.instances[patches.parentAt(uint32_t(side)).instance].hasSparseResults;
+}
+
+std::vector<bool> ShownLight::instancesAllGathered() const {
+    std::vector<bool> any(scene.instances.size(), false), all(any.size(), true);
+    for (size_t side = 0; side < results.size(); ++side) {
+        if (!results[side]) continue;
+        const uint32_t instance = patches.parentAt(uint32_t(side)).instance;
+        any[instance] = true;
+        if (shown[side]) all[instance] = false;
+    }
+    for (size_t i = 0; i < all.size(); ++i) all[i] = all[i] && any[i];
+    return all;
 }
 
 glm::vec3 ShownLight::byAngle(size_t side, const glm::vec4& angles) const {

@@ -15,23 +15,31 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "job/settings.h"
 #include "patches/patches.h"
 #include "scene/scene.h"
 #include "transport/set_light.h"
 
 namespace raybundle {
 
+// Returns whether, with these settings, corners gather sparse results (Instance::hasSparseResults)
+// instead of taking the light of patches (reconstruction/corner_gather.h).
+bool gathersSparseResults(const Settings& settings);
+// Returns whether, with these settings, the nodes of dense surfaces (Patches::isDense) gather
+// (reconstruction/node_gather.h). They do not if meshes are adapted to the light of their patches.
+bool gathersDenseSurfaces(const Settings& settings);
+
 // Returns for each patch side whether its light is shown, on the side itself or through a
-// translucent patch on the other side. `gathersAtCorners` is true if corners gather sparse results
-// (reconstruction/corner_gather.h); opaque sides with sparse results are then not shown.
-std::vector<bool> shownSides(const Scene& scene, const Patches& patches, bool gathersAtCorners);
+// translucent patch on the other side. Opaque sides are not shown if the corners or nodes there
+// gather their light.
+std::vector<bool> shownSides(const Scene& scene, const Patches& patches, const Settings& settings);
 
 // The shown light of all patch sides. If no instance is baked, all sides count as results.
 class ShownLight {
   public:
-    // Prepares the sides and their shown reflectances. See shownSides() for `gathersAtCorners`. The
-    // other arguments must outlive the object.
-    ShownLight(const Scene& scene, const Patches& patches, bool gathersAtCorners);
+    // Prepares the sides and their shown reflectances. `scene` and `patches` must outlive the
+    // object.
+    ShownLight(const Scene& scene, const Patches& patches, const Settings& settings);
 
     // Returns the shown reflectance per side: the sum of the diffuse reflectance and the
     // translucence, relative to the whole patch, including the share of the patch that lets light
@@ -47,6 +55,12 @@ class ShownLight {
     // Returns whether a side has a result that is not the light of the side itself, but the light
     // that its corners gather.
     bool isGathered(size_t side) const { return results[side] && !shown[side]; }
+
+    // Returns whether isGathered() holds because the side lies on a dense surface, whose nodes
+    // gather (reconstruction/node_gather.h).
+    bool isGatheredAtNodes(size_t side) const;
+    // Returns per instance whether all of its results are gathered, and it has any.
+    std::vector<bool> instancesAllGathered() const;
 
     // Return whether every side, or the given side, shows only light that arrives at itself.
     bool isOwnAlone() const { return patches.translucence.empty(); }

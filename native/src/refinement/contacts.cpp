@@ -101,7 +101,8 @@ class Gaps {
 
 }  // namespace
 
-Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t maxPatches) {
+Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t maxPatches,
+                 bool cutsDense) {
     const size_t tiles = patches.count();
     if (maxPatches <= tiles) return {};
     Gaps gaps(patches, visibility);
@@ -109,6 +110,7 @@ Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t ma
     Cuts cuts;
     cuts.levels.assign(tiles, 0);
     parallelFor(uint32_t(0), uint32_t(tiles), [&](uint32_t tile) {
+        if (!cutsDense && patches.isDense[tile]) return;
         if (gaps.isContact(2 * tile) || gaps.isContact(2 * tile + 1))
             cuts.levels[tile] = kContactLevel;
     });

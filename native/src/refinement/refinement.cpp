@@ -71,8 +71,8 @@ bool mayGain(const Patches& patches, const CoarseShot& shot, double light, doubl
 }
 
 // Marks the tiles whose cuts pay for the light of one set.
-void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, double targetError,
-          std::vector<Mark>& marks) {
+void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, bool cutsDense,
+          double targetError, std::vector<Mark>& marks) {
     const double light = meanSquareLight(patches, shot);
     if (!(light > 0) || !mayGain(patches, shot, light, targetError)) return;
     const double least = std::pow(kWorth * targetError, 2);
@@ -101,6 +101,7 @@ void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, do
             const uint32_t side = 2 * tile + back;
             const Surplus& found = surplus[tile - first];
             if (!found.isKnown || !isWanted(scene, patches, side)) continue;
+            if (!cutsDense && patches.isDense[tile]) continue;
             const double step = shot.gathered[side].contrast > 0
                                     ? kStepGain * std::max(0.0, double(found.step))
                                     : 0;
@@ -115,11 +116,13 @@ void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, do
 }  // namespace
 
 Cuts worthwhileCuts(const Scene& scene, const Patches& patches,
-                    const std::vector<CoarseShot>& shots, size_t maxPatches, float targetError) {
+                    const std::vector<CoarseShot>& shots, size_t maxPatches, float targetError,
+                    bool cutsDense) {
     const size_t tiles = patches.count();
     if (maxPatches <= tiles) return {};
     std::vector<Mark> marks(tiles);
-    for (const CoarseShot& shot : shots) mark(scene, patches, shot, double(targetError), marks);
+    for (const CoarseShot& shot : shots)
+        mark(scene, patches, shot, cutsDense, double(targetError), marks);
 
     std::vector<uint32_t> order;
     for (uint32_t tile = 0; tile < tiles; ++tile)

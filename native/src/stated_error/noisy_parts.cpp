@@ -81,17 +81,20 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
         if (weight[side] > 0) sides.push_back(side);
     const Parts found = partsOf(patches, sides, true);
     std::vector<uint32_t> cellNumbers(2 * patches.cells.size(), kNone);
-    std::vector<uint32_t> partNumbers(found.count, kNone);
+    // Per part that was found: its number for sides that show their light, and for those whose
+    // light is gathered, which rays cannot clean.
+    std::vector<std::array<uint32_t, 2>> partNumbers(found.count, {kNone, kNone});
     for (size_t k = 0; k < sides.size(); ++k) {
         const uint32_t side = sides[k];
         const Parent& parent = patches.parentAt(side);
         uint32_t& cell = cellNumbers[2 * parent.cell + isBack(side)];
         if (cell == kNone) {
             // A cell belongs to the part of its first side.
-            uint32_t& part = partNumbers[found.of[k]];
+            const bool isGathered = input.shown.isGathered(tiles.firstSide(side));
+            uint32_t& part = partNumbers[found.of[k]][isGathered];
             if (part == kNone) {
                 part = uint32_t(parts.size());
-                parts.emplace_back();
+                parts.emplace_back().isGathered = isGathered;
             }
             cell = uint32_t(cells.size());
             cells.push_back({2 * parent.cell + isBack(side), part, parent.island,
@@ -100,9 +103,9 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
         partOf[side] = cells[cell].part;
         Part& part = parts[cells[cell].part];
         part.instance = parent.instance;
+        part.isGatheredAtNodes = input.shown.isGatheredAtNodes(tiles.firstSide(side));
         part.strictness = std::pow(input.scene.instances[parent.instance].noiseFactor, -2.0);
         ++part.sides;
-        if (input.shown.isGathered(tiles.firstSide(side))) part.isGathered = true;
     }
 }
 
@@ -266,7 +269,9 @@ double NoisyParts::excess() const {
     double lines = 0;
     for (const Part* part : noisiest) {
         lines += part->lines;
-        if (part->isGathered || lines > most) return std::sqrt(part->squares) / target;
+        // The rays by which nodes gather clean their light as extra rays clean other sides.
+        if ((part->isGathered && !part->isGatheredAtNodes) || lines > most)
+            return std::sqrt(part->squares) / target;
     }
     return 0;
 }

@@ -78,7 +78,7 @@ class NoisyParts {
     // A part of an object.
     struct Part {
         uint32_t instance = 0;
-        bool isGathered = false;
+        bool isGathered = false, isGatheredAtNodes = false;
         double strictness = 1;  // factor on its squared noise: that of the object's target
         // Sides, and lines that have met them.
         double sides = 0, lines = 0;

@@ -28,11 +28,16 @@ constexpr double kStatedOverMeasured = 1.1;
 
 }  // namespace
 
-std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches) {
+std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches,
+                                 const std::vector<bool>& isGathered) {
     std::vector<double> growth(scene.instances.size(), kGrowthOfGrid);
     const std::vector<InstanceRange> ranges = instanceRanges(scene, patches);
     parallelFor(size_t(0), growth.size(), [&](size_t i) {
         const InstanceRange& range = ranges[i];
+        if (isGathered[i]) {
+            growth[i] = 1;
+            return;
+        }
         if (scene.instances[i].role != RB_ROLE_BAKE || range.firstCell == range.lastCell) return;
         const uint32_t corners = smoothRegions(scene.meshes[scene.instances[i].mesh], patches.cells,
                                                range.firstCell, range.lastCell)
@@ -44,7 +49,7 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches) {
 
 ShownNoise shownNoise(const Scene& scene, const LitSurfaces& surfaces, const Noise& noise,
                       const std::array<Irradiance, 2>& halves, float regularization,
-                      const std::vector<double>& growth) {
+                      const std::vector<double>& growth, const std::vector<bool>& isGathered) {
     const Patches& tiles = surfaces.patches;
     const std::vector<InstanceRange> ranges = instanceRanges(scene, tiles);
     const std::vector<Noise::OfCell>& cells = noise.cells();
@@ -60,6 +65,10 @@ ShownNoise shownNoise(const Scene& scene, const LitSurfaces& surfaces, const Noi
         const Instance& instance = scene.instances[i];
         const InstanceRange& range = ranges[i];
         if (instance.role != RB_ROLE_BAKE || range.firstCell == range.lastCell) return;
+        if (isGathered[i]) {
+            result.overForetold[i] = 1;
+            return;
+        }
         const SmoothRegions regions = smoothRegions(scene.meshes[instance.mesh], tiles.cells,
                                                     range.firstCell, range.lastCell);
         const LeastSquaresFit fit = leastSquares(surfaces, {range, regions, instance.side},

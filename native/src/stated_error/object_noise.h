@@ -32,7 +32,8 @@ constexpr double kNearlyBlack = 0.01;
 // Returns per instance the ratio of the variance at corners to that of the means over cells, for
 // noise that is random within cells. It is larger the more corners a cell has. Instances that are
 // not baked have the ratio of a grid, 3.
-std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches);
+std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches,
+                                 const std::vector<bool>& isGathered);
 
 // Returns the squared noise of bundles at the corners of a cell, as predicted from the noise of the
 // cell's mean at the last look, summed over RGB, (W/m^2)^2. `growth` is the value of cornerGrowth()
@@ -55,10 +56,12 @@ struct ShownNoise {
 
 // Measures the noise at corners. `tiles` are the tiles and their exposed shares. `halves` are those
 // of the last look of `noise`, per side of the tiles, W/m^2. For `regularization` see
-// leastSquares(); `growth` is the result of cornerGrowth().
+// leastSquares(); `growth` is the result of cornerGrowth(). Instances for which `isGathered` is true
+// (ShownLight::instancesAllGathered) are not measured, because their corners show other light than
+// that of the patches.
 ShownNoise shownNoise(const Scene& scene, const LitSurfaces& tiles, const Noise& noise,
                       const std::array<Irradiance, 2>& halves, float regularization,
-                      const std::vector<double>& growth);
+                      const std::vector<double>& growth, const std::vector<bool>& isGathered);
 
 // The noise at corners relative to the RMS of the light, with the noise of the first shot.
 struct CornerNoise {

@@ -94,11 +94,11 @@ class InstanceErrors {
           range(range),
           side(uint32_t(instance.side)),
           sides(sides),
-          isGathered(light.gatheredNoise.has_value()),
           light(light),
           surplus(surplusOf({patches, sides.exposed}, range.firstParent, range.lastParent,
                             instance.side, sides.irradiance, sides.directError)) {
         std::vector<double> exposed(range.lastCell - range.firstCell, 0.0);  // per cell, m^2
+        double gatheredArea = 0;
         forEachPatch([&](uint32_t at, double weight, const Cell& cell, const auto&, double residual,
                          const Surplus& s) {
             exposed[size_t(&cell - &patches.cells[range.firstCell])] += weight;
@@ -106,6 +106,10 @@ class InstanceErrors {
             sum.area += weight;
             sum.signal += signal;
             sum.noise += weight * noiseAt(at);
+            if (isGathered(at))
+                gatheredArea += weight;
+            else
+                sum.ripple += weight * noiseAt(at);
             sum.residual += weight * residual;
             ++sum.patches;
             if (!s.isKnown) return;
@@ -129,13 +133,15 @@ class InstanceErrors {
             sum.cellArea += double(glm::length(glm::cross(cell.a, cell.b)));
             corners += cell.isTriangle() ? 0.5 : 1.0;
         }
-        if (isGathered)
-            sum.gathered = std::pow(double(*light.gatheredNoise), 2) * sum.shown;
-        else
-            sum.ripple = sum.noise * rippleShare();
+        if (sum.area > 0) gatheredShare = gatheredArea / sum.area;
+        if (gatheredShare > 0)
+            sum.gathered = std::pow(double(*light.gatheredNoise), 2) * gatheredShare * sum.shown;
+        sum.ripple *= rippleShare();
     }
 
     const Squares& squares() const { return sum; }
+    // Returns the share of the area whose light the corners gather, 0 to 1.
+    double shareGathered() const { return gatheredShare; }
 
     // Returns the RMS error around each corner as radiance, W/(m^2 sr). `corners` is the number of
     // corners of the mesh, and `noiseScale` the factor on the squared noise. `unknownShare` is the
@@ -147,10 +153,10 @@ class InstanceErrors {
                          const std::array<float, 4>& w, double residual, const Surplus& s) {
             const double beyond = s.isKnown ? double(s.smooth + std::max(s.step, 0.0f))
                                             : unknownShare * square(lightAt(at));
-            const double noise =
-                noiseScale * noiseAt(at) +
-                (isGathered ? std::pow(double(*this->light.gatheredNoise), 2) * square(lightAt(at))
-                            : 0.0);
+            const double noise = noiseScale * noiseAt(at) +
+                                 (isGathered(at) ? std::pow(double(*this->light.gatheredNoise), 2) *
+                                                       square(lightAt(at))
+                                                 : 0.0);
             const double mesh = std::max(0.0, residual - ripple * noise);
             const double error = mesh + noise + beyond;
             for (int k = 0; k < 4; ++k)
@@ -169,6 +175,7 @@ class InstanceErrors {
   private:
     static double square(const glm::vec3& v) { return double(glm::dot(v, v)); }
     glm::vec3 lightAt(uint32_t at) const { return sides.irradiance.all(at); }
+    bool isGathered(uint32_t at) const { return light.gatheredNoise && sides.isGathered[at]; }
     bool hasResult(uint32_t at) const {
         return instance.hasResultOnFace(size_t(patches.parentAt(at).face));
     }
@@ -186,7 +193,7 @@ class InstanceErrors {
         for (const TilePair& pair :
              neighbouringTiles(patches, range.firstParent, range.lastParent)) {
             const uint32_t a = 2 * pair.first + side, b = 2 * pair.second + side;
-            if (!hasResult(a) || !hasResult(b)) continue;
+            if (!hasResult(a) || !hasResult(b) || isGathered(a) || isGathered(b)) continue;
             const double direct =
                 noiseAt(a) - square(sides.noise[a]) + noiseAt(b) - square(sides.noise[b]);
             rough += 0.5 * (square(sides.noise[a] - sides.noise[b]) + direct);
@@ -228,7 +235,7 @@ class InstanceErrors {
                 const Surplus& whole = surplus[patch - first];
                 const double known = double(whole.smooth - beyond.smooth) +
                                      std::max(0.0, double(whole.step - beyond.step));
-                if (isGathered)
+                if (isGathered(at))
                     body(at, weight, cell, w, 0.0, Surplus{true, 0, 0});
                 else
                     body(at, weight, cell, w, square(shown - lightAt(at)) + known, beyond);
@@ -242,10 +249,10 @@ class InstanceErrors {
     const InstanceRange& range;
     const uint32_t side;
     const SideErrors& sides;
-    const bool isGathered;
     const InstanceLight& light;
     const std::vector<Surplus> surplus;
     Squares sum;
+    double gatheredShare = 0;
     double corners = 0;  // about the number of corners of the cells with a result
 };
 
@@ -370,8 +377,9 @@ void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<Insta
         discretisation += (smooth + step) * own.signal / all.signal;
         // The light that corners gather comes from many patches of the whole scene, so the noise of
         // the whole scene counts.
-        const double ofPatches =
-            light[i].gatheredNoise ? shown : std::max(sides.ofObjects[i], errsAlike ? shown : 0);
+        const double ofPatches = errors[i]->shareGathered() > 0.5
+                                     ? shown
+                                     : std::max(sides.ofObjects[i], errsAlike ? shown : 0);
         report.objects[i].error = relative(own, noiseScale, ofPatches, smooth + step);
         light[i].error = errors[i]->perCorner(light[i].direct.size(), noiseScale, smooth + step);
         const double noise = report.objects[i].error.noise;

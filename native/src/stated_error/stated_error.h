@@ -31,6 +31,7 @@ struct SideErrors {
     const std::vector<glm::vec3>& noise;    // sample of that of bundles, W/m^2; empty if none
     const std::vector<float>& directError;  // standard error of the sources' light, W/m^2
     const std::vector<double>& ofObjects;   // relative noise at corners, per instance
+    const std::vector<bool>& isGathered;    // see ShownLight::isGathered
     bool isOutOfReach = false;              // see SideNoise
 };
 

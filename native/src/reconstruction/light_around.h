@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The light that the dense nodes of one object get from around: from other surfaces, from an even
+// world, and from sources that surround the scene, such as a sky. It is gathered at few receivers,
+// which become the records of an IrradianceCache, and interpolated at all others.
+//
+// Source: Ward, Rubinstein and Clear (1988), see reconstruction/irradiance_cache.h.
+// Differs:
+// - Records are not added in the order in which places are looked at. Receivers are looked at in
+//   random order, in rounds of which each looks at as many as all rounds before. The receivers of a
+//   round are independent of each other, and the result does not depend on the number of threads.
+// - Every receiver casts a few rays of its own. They tell how near other surfaces are, and they
+//   contradict interpolated light that is far from what arrives, as in a hollow that no record has
+//   been in.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "reconstruction/dense_nodes.h"
+#include "reconstruction/final_gather.h"
+#include "reconstruction/irradiance_cache.h"
+
+namespace raybundle {
+
+class LightAround {
+  public:
+    // Prepares the receivers of an instance. `gather` finds the light of surfaces and of an even
+    // world. `lampLight` is per receiver of `nodes` the irradiance by sources that do not surround
+    // the scene, W/m^2. References must outlive the object.
+    LightAround(const ReconstructionInput& input, const SetLight& light, const FinalGather& gather,
+                const DenseNodes& nodes, size_t instance, const std::vector<glm::vec3>& lampLight);
+
+    // Returns the light at each receiver of the instance, the first of which is that of
+    // DenseNodes::OfInstance::first.
+    std::vector<CachedLight> atReceivers();
+
+    size_t recordCount() const { return cache.count(); }
+    uint64_t shadowRays() const { return rays; }  // cast so far
+
+  private:
+    // Receivers are counted from the first one of the instance.
+    using Receivers = std::vector<uint32_t>;
+    const Receiver& receiver(uint32_t r) const { return nodes.receivers()[own.first + r]; }
+    CachePlace placeOf(uint32_t r) const;
+    float lightAt(uint32_t r) const;
+    float darkestLight() const;
+    // Makes records of these receivers, with `laxity` times the usual error.
+    void addRecords(const Receivers& these, float laxity);
+    std::vector<Gathered> gatherSurrounding(const Receivers& these, float laxity);
+    CachedLight gatherAt(uint32_t r, const Gathered& surrounding, float laxity) const;
+    // Returns those of order[begin] to order[end - 1] that are no records and whose interpolated
+    // light is not good enough.
+    Receivers wanting(const Receivers& order, size_t begin, size_t end) const;
+
+    const ReconstructionInput& input;
+    const SetLight& light;
+    const FinalGather& finalGather;
+    const DenseNodes& nodes;
+    const DenseNodes::OfInstance& own;
+    const std::vector<glm::vec3>& lampLight;
+    const uint32_t count;                    // number of receivers
+    const bool isSurrounded;                 // whether a source surrounds the scene
+    const float least;                       // see darkestLight()
+    std::vector<FinalGather::Probe> probes;  // per receiver
+    std::vector<bool> isRecord;              // per receiver
+    IrradianceCache cache;
+    uint64_t rays = 0;
+};
+
+}  // namespace raybundle

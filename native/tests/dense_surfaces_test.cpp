@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Dense surfaces, whose nodes gather their light (reconstruction/node_gather.h).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/gtc/matrix_transform.hpp>
+#include <memory>
+
+#include "bake/bake.h"
+#include "reconstruction/shown_light.h"
+#include "test_bakes.h"
+#include "test_scenes.h"
+
+namespace raybundle {
+namespace {
+
+using namespace test;
+
+constexpr int32_t kBall = 3;  // instance of the ball in the scenes below
+
+// Gives a ball around the origin the shading normals of a sphere.
+Mesh smooth(Mesh ball, float sign) {
+    for (const int32_t v : ball.cornerVertices)
+        ball.cornerNormals.push_back(sign * glm::normalize(ball.vertices[size_t(v)]));
+    return ball;
+}
+
+// A room with boxes, lamps and a ball of 5,120 faces.
+Scene roomWithDenseBall(bool isSmooth, const glm::dmat4& pose = glm::dmat4(1)) {
+    Scene scene = roomWithBoxes(0.5f);
+    for (const glm::dvec3& at : {glm::dvec3(1, 1, 2.4), glm::dvec3(3.4, 1.2, 1.2)})
+        scene.addLight(pointLight(glm::dvec3(pose * glm::dvec4(at, 1)), glm::dvec3(2, 1.6, 1.2)));
+    const Mesh ball = icosphere("ball", 0.4f, 4, false);
+    place(scene, isSmooth ? smooth(ball, 1) : ball, grey("ball", 0.5f),
+          glm::translate(glm::dmat4(1), {3.1, 2.3, 1.9}));
+    for (Instance& instance : scene.instances) instance.transform = pose * instance.transform;
+    return scene;
+}
+
+// Bakes with tiles of 0.2 m and the settings that `set` makes.
+std::unique_ptr<const Bake> bakeOf(const Scene& scene,
+                                   const std::function<void(Settings&)>& set = {}) {
+    auto bake = std::make_unique<Bake>();
+    bake->settings.patchSize = 0.2f;
+    if (set) set(bake->settings);
+    bake->run(scene);
+    return bake;
+}
+
+TEST(DenseSurfaces, AreThoseWithManyFacesSmallerThanTiles) {
+    Scene scene = roomWithDenseBall(true);
+    const Patches patches = subdivide(scene, 0.2f, 100000);
+    for (uint32_t patch = 0; patch < patches.count(); ++patch)
+        EXPECT_EQ(patches.isDense[patch], patches.parentAt(2 * patch).instance == kBall);
+    // The faces of the ball are not smaller than tiles.
+    const Patches fine = subdivide(scene, 0.02f, 1000000);
+    EXPECT_EQ(std::count(fine.isDense.begin(), fine.isDense.end(), true), 0);
+}
+
+TEST(DenseSurfaces, OfAFurnaceAreExact) {
+    for (bool isSmooth : {false, true}) {
+        Scene scene;
+        Mesh ball = icosphere("ball", 1, kFewBakes ? 4 : 5, true);
+        place(scene, isSmooth ? smooth(ball, -1) : ball, grey("", 0.5f, 0.5f));
+        Bake bake;
+        bake.settings.patchSize = 0.25f;
+        bake.run(scene);
+        EXPECT_TRUE(skips(reportOf(bake), SkippedWork::DENSE_NODES));
+        for (rb_output output : {RB_OUTPUT_LIGHTING, RB_OUTPUT_COMBINED}) {
+            double worst = 0, sum = 0;
+            const std::vector<glm::vec3> light = cornerLight(bake, 0, output);
+            for (const glm::vec3& value : light) {
+                const double off = double(value.x) * kPi - 1;
+                worst = std::max(worst, std::abs(off));
+                sum += off / double(light.size());
+            }
+            EXPECT_NEAR(sum, 0, 1e-4) << isSmooth << output;
+            // A ray that leaves a face so flat that it meets the next ones within the touch
+            // distance passes them. In this ball, that is about one ray in 100,000, and one of the
+            // 128 rays of a record.
+            EXPECT_LT(worst, 1.5 / 128) << isSmooth << output;
+        }
+    }
+}
+
+TEST(DenseSurfaces, HaveTheLightOfTheirPatches) {
+    if (kFewBakes) return;
+    const Scene scene = roomWithDenseBall(false);
+    const auto dense = bakeOf(scene);
+    const auto single = bakeOf(scene, [](Settings& settings) {
+        settings.targetError = 0.008f;
+        settings.finalGather = 0;
+        settings.seed = 1;
+    });
+    const Json report = reportOf(*dense);
+    EXPECT_TRUE(skips(report, SkippedWork::DENSE_NODES));
+    EXPECT_FALSE(skips(reportOf(*single), SkippedWork::DENSE_NODES));
+    EXPECT_LT(4 * report["patches"].get<int>(), 3 * reportOf(*single)["patches"].get<int>());
+    for (rb_output output : {RB_OUTPUT_LIGHTING, RB_OUTPUT_COMBINED, RB_OUTPUT_INDIRECT}) {
+        const double off =
+            noise(cornerLight(*dense, kBall, output), cornerLight(*single, kBall, output));
+        // The target, plus the difference between the light at the middle of a face and at its
+        // corners, which lie 0.5 % of the ball's radius further out. Indirect light is a third of
+        // all, and errors are relative to all.
+        EXPECT_LT(off, output == RB_OUTPUT_INDIRECT ? 0.06 : 0.03) << output;
+    }
+    const double stated = report["objects"][kBall]["error"]["noise"];
+    EXPECT_GT(stated, 0.003);
+    EXPECT_LT(stated, 0.04);
+}
+
+TEST(DenseSurfaces, HaveTheSameLightInEveryPose) {
+    const glm::dmat4 pose = glm::translate(glm::dmat4(1), glm::dvec3(30, -20, 10)) *
+                            glm::rotate(glm::dmat4(1), 0.7, glm::normalize(glm::dvec3(1, 2, 3)));
+    const auto here = bakeOf(roomWithDenseBall(true));
+    const auto there = bakeOf(roomWithDenseBall(true, pose));
+    // The seeds are the same and the directions are not: two bakes with a target of 2 % each.
+    EXPECT_LT(noise(cornerLight(*here, kBall, RB_OUTPUT_LIGHTING),
+                    cornerLight(*there, kBall, RB_OUTPUT_LIGHTING)),
+              0.03);
+}
+
+TEST(DenseSurfaces, HaveTheSameLightWithAnyNumberOfThreads) {
+    const Scene scene = roomWithDenseBall(true);
+    std::vector<glm::vec3> light[2];
+    for (int threads : {1, 2}) {
+        const auto bake = bakeOf(scene, [&](Settings& settings) {
+            settings.threads = threads;
+            settings.minBundles = settings.maxBundles = 32;
+        });
+        light[threads - 1] = cornerLight(*bake, kBall, RB_OUTPUT_COMBINED);
+    }
+    EXPECT_EQ(light[0], light[1]);
+}
+
+TEST(DenseSurfaces, AreDarkInsideAClosedShell) {
+    Scene scene = roomWithDenseBall(true);
+    place(scene, smooth(icosphere("core", 0.3f, 4, false), 1), grey("core", 0.5f),
+          scene.instances[kBall].transform);
+    const auto bake = bakeOf(scene);
+    const std::vector<glm::vec3> shell = cornerLight(*bake, kBall, RB_OUTPUT_LIGHTING);
+    double bright = 0, inside = 0;
+    for (const glm::vec3& value : shell) bright = std::max(bright, double(value.x));
+    for (const glm::vec3& value : cornerLight(*bake, kBall + 1, RB_OUTPUT_LIGHTING))
+        inside = std::max(inside, double(value.x));
+    EXPECT_GT(bright, 0.1);
+    EXPECT_LT(inside, 1e-3 * bright);
+}
+
+TEST(DenseSurfaces, ShowTheSumOfTheirLightSets) {
+    Scene scene = roomWithDenseBall(true);
+    scene.addLightSet("lamp");
+    scene.lights.back().lightSet = 0;
+    const auto bake =
+        bakeOf(scene, [](Settings& settings) { settings.minBundles = settings.maxBundles = 32; });
+    const CornerLight& set = bake->setLight(0, kBall);
+    Scene alone = roomWithDenseBall(true);
+    alone.lights.pop_back();
+    const auto rest =
+        bakeOf(alone, [](Settings& settings) { settings.minBundles = settings.maxBundles = 32; });
+    std::vector<glm::vec3> sum = rest->instanceLight(kBall).direct;
+    for (size_t c = 0; c < sum.size(); ++c) sum[c] += set.direct[c];
+    EXPECT_LT(noise(sum, bake->instanceLight(kBall).direct), 1e-5);
+}
+
+TEST(DenseSurfaces, AreNotWhereMeshesAreAdapted) {
+    Settings settings;
+    EXPECT_TRUE(gathersDenseSurfaces(settings));
+    for (const auto& change :
+         {+[](Settings& s) { s.adaptMeshes = 1; }, +[](Settings& s) { s.countAdaptive = 1; },
+          +[](Settings& s) { s.finalGather = 0; }, +[](Settings& s) { s.skipClusters = 0; },
+          +[](Settings& s) { s.reconstruction = Reconstruction::POINT; }}) {
+        Settings other;
+        change(other);
+        EXPECT_FALSE(gathersDenseSurfaces(other));
+    }
+}
+
+}  // namespace
+}  // namespace raybundle
