@@ -103,6 +103,16 @@ TEST(IrradianceCache, DoesNotReachAnotherLayerOrTheOtherSide) {
     EXPECT_TRUE(std::isinf(cache.at(back).variance));
 }
 
+TEST(IrradianceCache, FindsRecordsFarFromTheOriginAndInNarrowGaps) {
+    for (float nearness : {0.0f, 1.0f, 1e6f, 1e30f}) {
+        IrradianceCache cache(0.01f);
+        CachePlace far = onPlane(3e4f, -2e4f, nearness);
+        cache.add(far, lightOf(0.5f));
+        for (int k = 0; k < 50; ++k) cache.update(true);
+        EXPECT_NEAR(double(cache.at(far).total().x), 0.5, 1e-6) << nearness;
+    }
+}
+
 TEST(IrradianceCache, ReachesLessFarWhereLightHasAStep) {
     auto step = [](float x, float) { return x < 0.01f ? 1.0f : 0.0f; };
     IrradianceCache cache = planeOf(0.05f, step, 1e-6);

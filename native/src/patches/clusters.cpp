@@ -27,7 +27,7 @@ constexpr float kSmall = 0.25f;
 // Largest width of the patches of a dense surface, relative to the target edge of a tile, and the
 // smallest number of such patches.
 constexpr float kDense = 0.5f;
-constexpr double kFewestOfDense = 1000;
+constexpr size_t kFewestOfDense = 1000;
 
 // Returns the cell of a unit normal, by the octahedral map.
 int cellOf(const glm::vec3& normal) {
@@ -154,29 +154,23 @@ std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<boo
 }
 
 std::vector<bool> findDense(const Patches& patches) {
-    struct Surface {
-        double area = 0, count = 0;
-    };
-    std::vector<Surface> surfaces;
-    auto isSmall = [&](uint32_t patch, double area) {
-        const double edge = double(kDense * patches.islandAt(2 * patch).size);
-        return area <= edge * edge;
+    std::vector<size_t> counts;  // per connected surface: number of its small patches
+    auto isSmall = [&](uint32_t patch) {
+        const float edge = kDense * patches.islandAt(2 * patch).size;
+        return patches.area[patch] <= edge * edge;
     };
     const std::vector<uint32_t> pieces = piecesOfCells(patches);
     std::vector<bool> isDense(patches.count());
     for (uint32_t patch = 0; patch < isDense.size(); ++patch) {
         throwIfCancelledAt(patch);
         isDense[patch] = canJoin(patches, patch) && pieces[patches.parentAt(2 * patch).cell] == 1 &&
-                         isSmall(patch, double(patches.area[patch]));
-        const size_t number = patches.parentAt(2 * patch).surface;
-        surfaces.resize(std::max(surfaces.size(), number + 1));
-        surfaces[number].area += isDense[patch] * double(patches.area[patch]);
-        surfaces[number].count += isDense[patch];
+                         isSmall(patch);
+        const size_t surface = patches.parentAt(2 * patch).surface;
+        counts.resize(std::max(counts.size(), surface + 1));
+        counts[surface] += isDense[patch];
     }
-    for (uint32_t patch = 0; patch < isDense.size(); ++patch) {
-        const Surface& surface = surfaces[patches.parentAt(2 * patch).surface];
-        isDense[patch] = isDense[patch] && surface.count >= kFewestOfDense;
-    }
+    for (uint32_t patch = 0; patch < isDense.size(); ++patch)
+        if (counts[patches.parentAt(2 * patch).surface] < kFewestOfDense) isDense[patch] = false;
     return isDense;
 }
 

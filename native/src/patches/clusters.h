@@ -33,9 +33,9 @@ constexpr uint32_t kNoCluster = UINT32_MAX;
 // begin at 0, in the order in which the patches first use them.
 std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn);
 
-// Returns for each patch whether it lies on a dense surface: one whose faces are so much smaller
-// than tiles that a cluster holds at least several of them. The patches of such a surface that are
-// in no cluster, because they are too large, are not dense.
+// Returns for each patch whether it lies on a dense surface and is small: a dense surface is
+// connected and has many patches that are whole faces, much smaller than tiles, opaque and not
+// translucent. Pieces of faces that walls have cut are not among them.
 std::vector<bool> findDense(const Patches& patches);
 
 // The units between which light is exchanged: clusters, and the patches in no cluster. Each of them

@@ -118,7 +118,6 @@ void DenseNodes::addReceivers(size_t instance) {
     const std::vector<std::optional<CornerReceiver>> chosen = chooseCorners(instance, faces);
     OfInstance& own = ofInstances[instance];
     own.receiverOf.assign(region.nodeCount, kNone);
-    own.gathersAll = true;
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
         throwIfCancelledAt(c);
         const uint32_t parents = faces.parentCount[c - range.firstCell];
@@ -139,13 +138,14 @@ void DenseNodes::addReceivers(size_t instance) {
             for (const uint32_t node : nodes) own.receiverOf[node] = shared;
             continue;
         }
-        for (const uint32_t node : nodes) {
-            if (!chosen[node])
-                own.gathersAll = false;
-            else if (own.receiverOf[node] == kNone)
+        for (const uint32_t node : nodes)
+            if (chosen[node] && own.receiverOf[node] == kNone)
                 own.receiverOf[node] = add(chosen[node]->receiver, chosen[node]->vertex, false);
-        }
     }
+    own.gathersAll = true;
+    for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
+        for (const int32_t corner : input.patches.cells[c].corner)
+            if (corner >= 0 && receiverAt(instance, corner) == kNone) own.gathersAll = false;
 }
 
 std::vector<ReceiverPair> DenseNodes::neighbours(size_t instance) const {

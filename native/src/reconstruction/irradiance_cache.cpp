@@ -15,6 +15,8 @@ namespace {
 // Reach of a record as a share of the harmonic mean distance of the surfaces around, and the
 // largest distance between the unit normals of a record and of a place that it is used at.
 constexpr float kReach = 0.35f, kAngle = 0.4f;
+// Smallest reach, relative to the largest. It keeps the numbers of cells within the range of int.
+constexpr float kLeastReach = 0x1p-14f;
 // Distances along the normal count this many times: records on another layer of a surface are not
 // used.
 constexpr float kAlongNormal = 4;
@@ -40,7 +42,8 @@ size_t IrradianceCache::CellHash::operator()(const Cell& cell) const {
 }
 
 float IrradianceCache::reachOf(const CachePlace& place) const {
-    return std::min(largestReach, kReach / std::max(place.nearness, 1e-30f));
+    return std::clamp(kReach / std::max(place.nearness, 1e-30f), kLeastReach * largestReach,
+                      largestReach);
 }
 
 void IrradianceCache::add(const CachePlace& place, const CachedLight& light) {
@@ -56,6 +59,11 @@ float IrradianceCache::weightOf(const Record& record, const CachePlace& place) c
            std::max(0.0f, 1 - turn / record.angle);
 }
 
+// Returns the cell of a grid of this width, counted from that of the first record.
+glm::ivec3 IrradianceCache::cellAt(const glm::vec3& position, float width) const {
+    return glm::ivec3(glm::floor((position - records.front().place.position) / width));
+}
+
 void IrradianceCache::buildIndex() {
     cells.clear();
     hasLevel.fill(false);
@@ -66,8 +74,8 @@ void IrradianceCache::buildIndex() {
         const int level = std::clamp(int(std::ceil(std::log2(2 * record.reach))), -32, 31);
         const float width = std::ldexp(1.0f, level);
         hasLevel[size_t(level + 32)] = true;
-        const glm::ivec3 low(glm::floor((record.place.position - record.reach) / width)),
-            high(glm::floor((record.place.position + record.reach) / width));
+        const glm::ivec3 low = cellAt(record.place.position - record.reach, width),
+                         high = cellAt(record.place.position + record.reach, width);
         for (int x = low.x; x <= high.x; ++x)
             for (int y = low.y; y <= high.y; ++y)
                 for (int z = low.z; z <= high.z; ++z) cells[{level, {x, y, z}}].push_back(k);
@@ -78,8 +86,7 @@ template <class Visit>
 void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit) const {
     for (int level = -32; level < 32; ++level) {
         if (!hasLevel[size_t(level + 32)]) continue;
-        const auto found =
-            cells.find({level, glm::ivec3(glm::floor(place.position / std::ldexp(1.0f, level)))});
+        const auto found = cells.find({level, cellAt(place.position, std::ldexp(1.0f, level))});
         if (found == cells.end()) continue;
         for (const uint32_t k : found->second)
             if (const float weight = weightOf(records[k], place); weight > 0) visit(k, weight);
@@ -173,7 +180,8 @@ void IrradianceCache::update(bool compares) {
             surplus / sum > kMostSurplus * records[k].light.allowed + kCertain * deviation;
     });
     for (size_t k = 0; k < records.size(); ++k) {
-        records[k].reach *= isShortened[k] ? std::min(factor[k], kShorter) : factor[k];
+        const float shorter = isShortened[k] ? std::min(factor[k], kShorter) : factor[k];
+        records[k].reach = std::max(shorter * records[k].reach, kLeastReach * largestReach);
         if (isShortened[k]) records[k].angle *= kShorter;
     }
     buildIndex();

@@ -90,6 +90,7 @@ class IrradianceCache {
     // Calls visit(index, weight) for each record that reaches a place.
     template <class Visit>
     void forEachAround(const CachePlace& place, const Visit& visit) const;
+    glm::ivec3 cellAt(const glm::vec3& position, float width) const;
     void buildIndex();
 
     const float largestReach;
