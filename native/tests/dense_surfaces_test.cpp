@@ -63,7 +63,7 @@ TEST(DenseSurfaces, AreThoseWithManyFacesSmallerThanTiles) {
 TEST(DenseSurfaces, OfAFurnaceAreExact) {
     for (bool isSmooth : {false, true}) {
         Scene scene;
-        Mesh ball = icosphere("ball", 1, kFewBakes ? 4 : 5, true);
+        Mesh ball = icosphere("ball", 1, 5, true);
         place(scene, isSmooth ? smooth(ball, -1) : ball, grey("", 0.5f, 0.5f));
         Bake bake;
         bake.settings.patchSize = 0.25f;
