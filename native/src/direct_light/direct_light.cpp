@@ -279,6 +279,11 @@ void DirectLight::addFresh(std::vector<Gathered>& results, const std::vector<siz
     refine(results, std::move(further), passes, gatherAt);
 }
 
+bool DirectLight::isSurrounding() const {
+    return std::any_of(sources.begin(), sources.end(),
+                       [](const auto& source) { return source->surrounds(); });
+}
+
 const LightSource* DirectLight::surrounding() const {
     for (const auto& source : sources)
         if (!source->parts().empty()) return source.get();

@@ -81,6 +81,8 @@ class DirectLight {
     // Returns the emission per side that is no source here and is left to the bundles, W/m^2.
     const std::vector<glm::vec3>& bundledEmission() const { return split->bundled; }
     const LightSources& lightSources() const { return sources; }
+    // Returns whether any source surrounds the receivers (Receiver::Of::SURROUNDING).
+    bool isSurrounding() const;
 
     // Gathers the light at `count` receivers with a relative standard error of about `targetError`
     // each. A coarse pass samples all receivers. Further passes sample those whose error is too

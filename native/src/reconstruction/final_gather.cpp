@@ -119,7 +119,6 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers, floa
             const float share = one.share / float(parts * wanted);
             mean.carried += share * sums[k].carried;
             mean.reflected += share * sums[k].reflected;
-            mean.nearness += share * sums[k].nearness;
             mean.open += share * sums[k].open;
         }
         // The spread is taken about the mean of all receivers: one receiver has so few parts that

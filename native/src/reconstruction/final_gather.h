@@ -16,7 +16,8 @@
 //   from point to point.
 // - If the distance of the surface that a ray meets is less than the width of the patch there, the
 //   light of the sources is sampled at the end of the ray. The mean over the patch is not the light
-//   that shines into a narrow gap.
+//   that shines into a narrow gap. With more than four sources, only some of these rays sample
+//   them, and count for the others.
 // - The number of rays depends on the error. The receivers of a vertex share one sequence of Sobol
 //   points, so that receivers with the same normal are stratified together. The spread of the parts
 //   of this sequence gives the error.
@@ -59,20 +60,21 @@ class FinalGather {
         glm::vec3 carried{0.0f};  // from the world, and from emission that is not a source
         glm::vec3 reflected{0.0f};
         double variance = 0;  // of total(), mean over the channels, (W/m^2)^2; set only by gather()
+        float open = 0;       // share of the rays that have met nothing, 0 to 1
         // Mean of the inverse distances of what the rays have met, 1/m; 0 for rays that meet
-        // nothing.
+        // nothing. Not set by gather().
         float nearness = 0;
-        float open = 0;  // share of the rays that have met nothing, 0 to 1
         glm::vec3 total() const { return carried + reflected; }
     };
     // What few rays find.
     struct Probe {
         glm::vec3 light{0.0f};  // mean, W/m^2
         double square = 0;      // mean of the squares of single rays and of the channels, (W/m^2)^2
-        float nearness = 0, open = 0;  // as in Light
+        float open = 0, nearness = 0;  // as in Light
 
-        // Returns whether the rays contradict the light `expected`, W/m^2, of which the share `open`
-        // of the surroundings is without surfaces. `allowed` is the squared error that is allowed.
+        // Returns whether the rays contradict the light `expected`, W/m^2, or the share
+        // `expectedOpen` of the surroundings without surfaces. `allowed` is the squared error that
+        // is allowed.
         bool contradicts(const glm::vec3& expected, float expectedOpen, double allowed) const;
     };
     // A receiver and its share in a mean. The receiver is not owned.
@@ -80,14 +82,15 @@ class FinalGather {
         const Receiver* receiver;
         float share;
     };
-    // Returns the mean light of the receivers, whose shares must sum to 1. `brightness` is the light
-    // that the error is relative to, brightest channel, W/m^2: about all light there, or more where
-    // that is dark. The error that is allowed is `laxity` times as large as usual.
+    // Returns the mean light of the receivers, whose shares must sum to 1. `brightness` is the
+    // light that the error is relative to, brightest channel, W/m^2: about all light there, or more
+    // where that is dark. The error that is allowed is `laxity` times as large as usual.
     Light gather(const std::vector<Share>& receivers, float brightness, float laxity = 1) const;
     // Returns what few rays from a receiver find. The estimate has much noise. It tells whether
     // other light arrives than is expected, and how near other surfaces are.
     Probe probe(const Receiver& receiver) const;
-    // Returns the standard error that gather() allows with this brightness and a laxity of 1, W/m^2.
+    // Returns the standard error that gather() allows with this brightness and a laxity of 1,
+    // W/m^2.
     float allowedError(const Receiver& receiver, float brightness) const;
 
     // Returns whether a surface is so near that the interpolation may not follow its light, while

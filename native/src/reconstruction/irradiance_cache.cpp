@@ -96,8 +96,7 @@ void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit)
 // The light at a place is the constant part of a linear function of position and normal in the
 // plane of the place, fitted to the records around it. The light is therefore a sum of the light of
 // the records, with factors that add up to 1.
-IrradianceCache::Interpolated IrradianceCache::interpolate(const CachePlace& place,
-                                                           uint32_t without) const {
+CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t without) const {
     constexpr int kTerms = 5;
     using Terms = Eigen::Matrix<double, kTerms, 1>;
     const auto [x, y] = frame(place.normal);
@@ -117,14 +116,12 @@ IrradianceCache::Interpolated IrradianceCache::interpolate(const CachePlace& pla
         matrix += double(weight) * terms * terms.transpose();
         sum += double(weight);
     });
-    Interpolated result;
-    result.light.variance = INFINITY;
-    if (!(sum > 0)) return result;
+    CachedLight light;
+    light.variance = INFINITY;
+    if (!(sum > 0)) return light;
     for (int k = 1; k < kTerms; ++k) matrix(k, k) += kEven * sum;
     const Terms solution = matrix.ldlt().solve(Terms::Unit(0));
-    CachedLight& light = result.light;
     light.variance = 0;
-    double squares = 0;
     forEachAround(place, [&](uint32_t k, float weight) {
         if (k == without) return;
         const double factor = double(weight) * solution.dot(termsOf(records[k]));
@@ -135,12 +132,10 @@ IrradianceCache::Interpolated IrradianceCache::interpolate(const CachePlace& pla
         light.open += float(factor) * own.open;
         light.variance += factor * factor * own.variance;
         light.allowed += double(weight) / sum * own.allowed;
-        squares += factor * factor;
     });
     for (glm::vec3* part : {&light.carried, &light.reflected, &light.surrounding})
         *part = glm::max(*part, 0.0f);
-    result.records = 1 / squares;
-    return result;
+    return light;
 }
 
 void IrradianceCache::update(bool compares) {
@@ -154,7 +149,7 @@ void IrradianceCache::update(bool compares) {
     std::vector<Test> tests(records.size());
     parallelFor(size_t(0), records.size(), [&](size_t k) {
         const Record& own = records[k];
-        const CachedLight others = interpolate(own.place, uint32_t(k)).light;
+        const CachedLight others = interpolate(own.place, uint32_t(k));
         if (std::isinf(others.variance)) return;
         tests[k].noise = own.light.variance + others.variance;
         tests[k].surplus = powerOf(own.light.total() - others.total()) - tests[k].noise;
@@ -179,12 +174,14 @@ void IrradianceCache::update(bool compares) {
         isShortened[k] =
             surplus / sum > kMostSurplus * records[k].light.allowed + kCertain * deviation;
     });
+    bool isAnyShorter = false;
     for (size_t k = 0; k < records.size(); ++k) {
         const float shorter = isShortened[k] ? std::min(factor[k], kShorter) : factor[k];
+        isAnyShorter |= shorter < 1;
         records[k].reach = std::max(shorter * records[k].reach, kLeastReach * largestReach);
         if (isShortened[k]) records[k].angle *= kShorter;
     }
-    buildIndex();
+    if (isAnyShorter) buildIndex();
 }
 
 }  // namespace raybundle

@@ -59,7 +59,7 @@ class IrradianceCache {
     void update(bool compares);
 
     // Returns the light at a place. Its variance is infinite if no record reaches the place.
-    CachedLight at(const CachePlace& place) const { return interpolate(place, kNone).light; }
+    CachedLight at(const CachePlace& place) const { return interpolate(place, kNone); }
 
     size_t count() const { return records.size(); }
 
@@ -79,11 +79,8 @@ class IrradianceCache {
     struct CellHash {
         size_t operator()(const Cell& cell) const;
     };
-    struct Interpolated {
-        CachedLight light;
-        double records = 0;  // number of records that an equally precise mean would have
-    };
-    Interpolated interpolate(const CachePlace& place, uint32_t without) const;
+    // Returns the light at a place from all records but one, or from all (kNone).
+    CachedLight interpolate(const CachePlace& place, uint32_t without) const;
     // Returns the weight of a record at a place, 0 to 1.
     float weightOf(const Record& record, const CachePlace& place) const;
     float reachOf(const CachePlace& place) const;

@@ -22,11 +22,6 @@ constexpr float kReachOfTile = 4;
 // An object whose light is below this share of that of the scene is judged as if it had that much.
 constexpr float kLeastLight = 0.01f;
 
-bool isAnySurrounding(const LightSources& sources) {
-    return std::any_of(sources.begin(), sources.end(),
-                       [](const auto& source) { return source->surrounds(); });
-}
-
 }  // namespace
 
 LightAround::LightAround(const ReconstructionInput& input, const SetLight& light,
@@ -39,14 +34,14 @@ LightAround::LightAround(const ReconstructionInput& input, const SetLight& light
       own(nodes[instance]),
       lampLight(lampLight),
       count(own.last - own.first),
-      isSurrounded(isAnySurrounding(light.direct.lightSources())),
+      isSurrounded(light.direct.isSurrounding()),
       least(darkestLight()),
       probes(count),
       isRecord(count),
       cache(kReachOfTile * input.patches.islandAt(receiver(0).side).size) {}
 
-// Returns the light that errors are relative to at dark places, W/m^2: the RMS of the object, unless
-// it is nearly black or brighter than the scene.
+// Returns the light that errors are relative to at dark places, W/m^2: the RMS of the object,
+// unless it is nearly black or brighter than the scene.
 float LightAround::darkestLight() const {
     double squares = 0;
     for (uint32_t r = 0; r < count; ++r) squares += std::pow(double(lightAt(r)), 2);

@@ -74,10 +74,7 @@ void NodeGather::gatherLamps(size_t instance, size_t k,
 // that of a source that surrounds the scene.
 std::unique_ptr<const Irradiance> NodeGather::sharpened(size_t k) const {
     const SetLight& light = input.lights[k];
-    const LightSources& sources = light.direct.lightSources();
-    if (sources.empty() || std::any_of(sources.begin(), sources.end(),
-                                       [](const auto& source) { return source->surrounds(); }))
-        return nullptr;
+    if (light.direct.lightSources().empty() || light.direct.isSurrounding()) return nullptr;
     auto result = std::make_unique<Irradiance>(light.irradiance);
     std::vector<glm::vec3> sums(input.patches.sideCount(), glm::vec3(0.0f));
     std::vector<float> counts(sums.size(), 0.0f);
@@ -108,7 +105,7 @@ NodeGather::Outcome NodeGather::replace(size_t instance, size_t k,
     if (others[k]) {
         LightAround gather(input, input.lights[k], *others[k], nodes, instance, lamps[k].arriving);
         around = gather.atReceivers();
-        outcome.records = gather.recordCount();
+        outcome.interpolated = around.size() - gather.recordCount();
         rays += gather.shadowRays();
     }
     // The colour and the emission of the faces around each node, weighted by angle.

@@ -5,10 +5,10 @@
 // (patches/clusters.h), and what is shown is gathered at the nodes: the light of lamps at each of
 // them, the light from around at few (reconstruction/light_around.h).
 //
-// Sources: Willmott, Heckbert and Garland, "Face Cluster Radiosity" (1999), for the exchange between
-// clusters; Reichert (1992), see reconstruction/final_gather.h, for the gather.
-// Differs: no light by direction is kept for clusters. The gather finds what each node gets with its
-// own normal.
+// Sources: Willmott, Heckbert and Garland, "Face Cluster Radiosity" (1999), for the exchange
+// between clusters; Reichert (1992), see reconstruction/final_gather.h, for the gather.
+// Differs: no light by direction is kept for clusters. The gather finds what each node gets with
+// its own normal.
 #pragma once
 
 #include <atomic>
@@ -40,8 +40,8 @@ class NodeGather {
 
     // What replace() has done.
     struct Outcome {
-        size_t nodes = 0;    // nodes that got gathered light
-        size_t records = 0;  // places at which the light from around was gathered
+        size_t nodes = 0;         // nodes that got gathered light
+        size_t interpolated = 0;  // places whose light from around was interpolated
         double noise = 0;  // sum over these nodes of the variance of their light, summed over RGB,
                            // (W/m^2)^2
     };

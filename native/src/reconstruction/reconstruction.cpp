@@ -175,16 +175,15 @@ class InstanceReconstruction {
           onSides(sideLights(input, anyGathers())),
           regionsOf(input.scene.instances.size()),
           warnings(input.scene.instances.size()) {
-        for (size_t i = 0; i < isDense.size(); ++i) isDense[i] = isDense[i] && !gathers[i];
         parallelFor(size_t(0), regionsOf.size(), [&](size_t i) {
             if (gathers[i] || isDense[i]) regionsOf[i] = findRegions(i);
         });
         if (anyGathers())
             atCorners.emplace(input, ranges, gathers, regionsOf,
-                              LitSurfaces{input.patches, outside}, progress.part(0, 2));
+                              LitSurfaces{input.patches, outside}, progress.part(0, 4));
         if (anyDense())
             atNodes.emplace(input, ranges, isDense, regionsOf, LitSurfaces{input.patches, outside},
-                            progress.part(0, 2));
+                            progress.part(1, 4));
     }
 
     bool anyGathers() const {
@@ -273,7 +272,7 @@ class InstanceReconstruction {
                 const NodeGather::Outcome outcome =
                     atNodes->replace(i, k, out.cornerAngles, onSides[k].emission, light);
                 if (outcome.nodes > 0) noise += outcome.noise / double(outcome.nodes);
-                interpolated += outcome.nodes - std::min(outcome.nodes, outcome.records);
+                interpolated += outcome.interpolated;
             }
             CornerLight atCorner = cornerLight(regionsOf[i], light);
             if (k == 0)
@@ -341,7 +340,7 @@ class InstanceReconstruction {
     const std::vector<InstanceRange> ranges;
     const std::vector<float> outside;  // per side: the share that counts, see exposedOutside()
     const std::vector<bool> gathers;   // per instance
-    std::vector<bool> isDense;         // per instance: whether nodes gather, see NodeGather
+    const std::vector<bool> isDense;   // per instance: whether nodes gather, see NodeGather
     const std::vector<SideLight> onSides;
     // Per instance: set if the instance gathers, or while it is reconstructed.
     std::vector<SmoothRegions> regionsOf;
@@ -379,8 +378,9 @@ std::vector<InstanceLight> reconstruct(const ReconstructionInput& input, const P
     // A few instances at a time, so that this thread can report progress and cancel in between.
     for (size_t i = 0; i < count; i += kTogether) {
         const double share = double(i) / double(count);
-        progress.report(RB_STAGE_RECONSTRUCTION,
-                        reconstruction.anyGathers() ? 0.5 + 0.5 * share : share);
+        progress.report(
+            RB_STAGE_RECONSTRUCTION,
+            reconstruction.anyGathers() || reconstruction.anyDense() ? 0.5 + 0.5 * share : share);
         parallelFor(i, std::min(i + kTogether, count),
                     [&](size_t k) { reconstruction.reconstruct(k, result[k], report.objects[k]); });
     }

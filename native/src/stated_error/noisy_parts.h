@@ -78,8 +78,9 @@ class NoisyParts {
     // A part of an object.
     struct Part {
         uint32_t instance = 0;
-        bool isGathered = false, isGatheredAtNodes = false;
-        double strictness = 1;  // factor on its squared noise: that of the object's target
+        bool isGathered = false;         // see ShownLight::isGathered
+        bool isGatheredAtNodes = false;  // see ShownLight::isGatheredAtNodes
+        double strictness = 1;           // factor on its squared noise: that of the object's target
         // Sides, and lines that have met them.
         double sides = 0, lines = 0;
         // Squared noise at the corners divided by the squared light there: at the last look, and

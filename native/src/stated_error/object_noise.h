@@ -31,7 +31,8 @@ constexpr double kNearlyBlack = 0.01;
 
 // Returns per instance the ratio of the variance at corners to that of the means over cells, for
 // noise that is random within cells. It is larger the more corners a cell has. Instances that are
-// not baked have the ratio of a grid, 3.
+// not baked have the ratio of a grid, 3, and those for which `isGathered` is true
+// (ShownLight::instancesAllGathered) a ratio of 1.
 std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches,
                                  const std::vector<bool>& isGathered);
 
@@ -56,9 +57,9 @@ struct ShownNoise {
 
 // Measures the noise at corners. `tiles` are the tiles and their exposed shares. `halves` are those
 // of the last look of `noise`, per side of the tiles, W/m^2. For `regularization` see
-// leastSquares(); `growth` is the result of cornerGrowth(). Instances for which `isGathered` is true
-// (ShownLight::instancesAllGathered) are not measured, because their corners show other light than
-// that of the patches.
+// leastSquares(); `growth` is the result of cornerGrowth(). Instances for which `isGathered` is
+// true are not measured, because their corners show other light than that of the patches; they have
+// the noise that is foretold.
 ShownNoise shownNoise(const Scene& scene, const LitSurfaces& tiles, const Noise& noise,
                       const std::array<Irradiance, 2>& halves, float regularization,
                       const std::vector<double>& growth, const std::vector<bool>& isGathered);
