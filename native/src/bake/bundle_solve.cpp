@@ -27,12 +27,14 @@ constexpr float kDraftTolerance = 2e-3f;
 // largest number of passes.
 constexpr uint32_t kRaysOfFirstPass = 512, kMostPasses = 5;
 
-// Returns the number of sheets and loose parents that each bundle projects if there are windows of
-// finer pixels, else 0. Each window projects the surfaces that lie in it once more, which takes
-// time.
-double projectionsOfFaces(const Trace& trace) {
+// Returns the number of faces that bundles have looked at and drawn, if there are windows of finer
+// pixels, else 0. Each bundle looks for all sheets and loose parents in its windows, and draws them
+// in each window that they lie in.
+double facesOfBundles(const Trace& trace) {
     const Sheets& sheets = trace.patches.sheets;
-    return trace.density.windows.empty() ? 0.0 : double(sheets.loose.size() + sheets.sheets.size());
+    if (trace.density.windows.empty()) return 0;
+    return double(sheets.loose.size() + sheets.sheets.size()) * trace.tracer->bundleCount() +
+           double(trace.tracer->drawnCount());
 }
 
 // Returns the mean of two estimates of the light.
@@ -69,8 +71,7 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       halves(lights.size()) {
     if (input.settings.countsLines())
         noisyParts.emplace(NoisyPartsInput{in.scene, in.tiles, in.trace.looks, in.tiles.sum(area),
-                                           in.shown, growth, shown, projectionsOfFaces(in.trace),
-                                           in.settings.targetError});
+                                           in.shown, growth, shown, in.settings.targetError});
 }
 
 SideNoise BundleSolve::run(Report& report) {
@@ -113,7 +114,8 @@ void BundleSolve::look() {
     in.trace.looks = noise.looks();
     throwIfCancelled();
     if (!noisyParts) return;
-    noisyParts->look(noise, bundles, in.tiles.sum(in.trace.linesMet()), in.trace.linesMetByAll());
+    noisyParts->look(noise, bundles, in.tiles.sum(in.trace.linesMet()), in.trace.linesMetByAll(),
+                     facesOfBundles(in.trace));
     in.trace.looks.shareOfParts = noisyParts->shares();
 }
 

@@ -39,6 +39,7 @@ std::vector<TracedBundle> BundleTracer::trace(uint32_t count) {
     exchanges = std::accumulate(joined.begin(), joined.end(), exchanges);
     for (const TracedBundle& t : traced) {
         lines += t.lines.lines;
+        drawn += t.lines.drawn;
         disordered += t.lines.disordered;
         cycles += t.lines.cycles;
     }

@@ -38,6 +38,8 @@ class BundleTracer {
 
     uint32_t bundleCount() const { return bundles; }
     uint64_t lineCount() const { return lines; }  // lines that met the scene
+    // Returns the number of sheets and single faces that were rasterised (BundleLines::drawn).
+    uint64_t drawnCount() const { return drawn; }
     // Returns the share of all exchanges that join sides in the wrong order of depth (painters) or
     // through a surface (ROULETTE).
     double disorderedShare() const {
@@ -56,7 +58,7 @@ class BundleTracer {
     tbb::enumerable_thread_specific<std::unique_ptr<Projector>> projectors;
     uint32_t bundles = 0;
     // Exchanges and disordered exchanges are counted line by line.
-    uint64_t lines = 0, exchanges = 0, disordered = 0, cycles = 0;
+    uint64_t lines = 0, drawn = 0, exchanges = 0, disordered = 0, cycles = 0;
 };
 
 // Properties of each patch side, measured by lines of the exact projector.

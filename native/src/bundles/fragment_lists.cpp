@@ -63,6 +63,7 @@ std::unique_ptr<Projector> fragmentLists(const ProjectorInput& input) {
 }
 
 void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
+    const uint64_t drawnBefore = rasteriser.drawnCount();
     rasteriser.begin(bundle);
     depthOrder.begin(bundle.direction);
     // ROULETTE draws patches by chance per pixel of the whole view, so it cannot be split into
@@ -76,6 +77,7 @@ void FragmentLists::project(const Bundle& bundle, BundleLines& out) {
         }
     for (size_t window = 0; window < rasteriser.windowCount(); ++window)
         if (rasteriser.lookThrough(window)) projectView(out);
+    out.drawn += rasteriser.drawnCount() - drawnBefore;
 }
 
 void FragmentLists::projectView(BundleLines& out) {

@@ -42,6 +42,9 @@ struct BundleLines {
     };
     std::vector<Density> densities;
     uint64_t lines = 0;  // number of lines that meet the scene
+    // Number of sheets and single faces that were rasterised, once for each view (rasteriser.h).
+    // Only FRAGMENT_LISTS counts them.
+    uint64_t drawn = 0;
     // Number of exchanges in the wrong order of depth (painters) or through a solid (ROULETTE).
     uint64_t disordered = 0;
     uint64_t cycles = 0;  // number of broken cycles of patches that cover each other (Newell)

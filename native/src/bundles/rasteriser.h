@@ -89,6 +89,8 @@ class Rasteriser {
     // Return the range of depths along the direction in the view, metres.
     double depthLow() const { return lowest; }
     double depthHigh() const { return highest; }
+    // Returns the number of sheets and single parents that were rasterised in all views so far.
+    uint64_t drawnCount() const { return drawn; }
     // Returns the indices of the islands in the view, ascending.
     const std::vector<uint32_t>& islandsInView() const { return inSight; }
 
@@ -110,10 +112,14 @@ class Rasteriser {
         for (uint32_t island : inSight) {
             const Island& own = islands[island];
             for (size_t k = 0; k < own.sheets.size(); ++k)
-                if (windows.empty() || mayHavePixels(own.sheetBounds[k]))
+                if (windows.empty() || mayHavePixels(own.sheetBounds[k])) {
                     sampleSheet(sheets[own.sheets[k]], visit);
-            forEachLooseInView(
-                own, [&](size_t k) { sampleParent(patches.parents[own.loose[k]], visit); });
+                    ++drawn;
+                }
+            forEachLooseInView(own, [&](size_t k) {
+                sampleParent(patches.parents[own.loose[k]], visit);
+                ++drawn;
+            });
         }
     }
     template <class Visit>
@@ -244,6 +250,7 @@ class Rasteriser {
     std::vector<double> spanLeft, spanRight;  // per row of a parent, pixels
     Roulette roulette;
     PolygonFiller filler;
+    uint64_t drawn = 0;  // see drawnCount()
 };
 
 template <class Visit>

@@ -35,10 +35,10 @@ constexpr double kByChance = 2;
 // Time of a line, which is projected, stored and solved with, divided by the time of the local rays
 // that give as much information (30 ns a line and 400 ns a ray, measured in cornell_box).
 constexpr double kLineOverRays = 0.15;
-// If there are windows of finer lines, a face takes the time of this many lines in each bundle,
-// because it is projected in several windows (1.8 us, measured on 24,000 leaves, most of which lie
-// in some windows).
-constexpr double kLinesOfFace = 30;
+// Number of lines whose time it takes to look for a face in the windows of finer lines, or to draw
+// it in one of them (60 ns each and 80 ns a line, measured in a room with 200,000 and with 500,000
+// triangles).
+constexpr double kLinesOfFace = 0.75;
 // The noise of rays adds or removes power, while lines conserve it. Parts that get more than this
 // share of all lines are therefore left to bundles.
 constexpr double kMostByRays = 0.4;
@@ -72,7 +72,6 @@ NoisyParts::NoisyParts(const NoisyPartsInput& input)
       partOf(tiles.sideCount(), kNone),
       growth(input.growth),
       shownNoise(input.shownNoise),
-      projections(input.projections),
       target(input.target) {
     const std::vector<float>& weight = input.weight;
     const Patches& patches = tiles.patches();
@@ -226,7 +225,7 @@ std::vector<double> NoisyParts::squaresOf(const SetNoise& noise) const {
 }
 
 void NoisyParts::look(const SetNoise& noise, uint32_t count, const std::vector<float>& lines,
-                      double all) {
+                      double all, double faces) {
     const std::vector<double> squares = squaresOf(noise);
     for (Part& part : parts) part.lines = 0;
     for (size_t side = 0; side < partOf.size(); ++side) {
@@ -250,6 +249,7 @@ void NoisyParts::look(const SetNoise& noise, uint32_t count, const std::vector<f
     }
     ofObjects = squaresOfObjects(squares, true);
     allLines = all;
+    allFaces = faces;
     bundles = count;
 }
 
@@ -264,7 +264,7 @@ double NoisyParts::excess() const {
     for (const Part& part : parts) noisiest.push_back(&part);
     std::stable_sort(noisiest.begin(), noisiest.end(),
                      [](const Part* a, const Part* b) { return a->squares > b->squares; });
-    const double timeOfBundles = allLines + kLinesOfFace * projections * bundles;  // in lines
+    const double timeOfBundles = allLines + kLinesOfFace * allFaces;  // in lines
     const double most = std::min(kLineOverRays * timeOfBundles, kMostByRays * allLines);
     double lines = 0;
     for (const Part* part : noisiest) {

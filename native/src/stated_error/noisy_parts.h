@@ -37,10 +37,7 @@ struct NoisyPartsInput {
     const ShownLight& shown;
     const std::vector<double>& growth;  // per instance, see cornerGrowth()
     const ShownNoise& shownNoise;       // of the halves of the last look
-    // Number of sheets and single faces that are projected in each bundle if there are windows of
-    // finer lines, otherwise 0.
-    const double projections;
-    const double target;  // relative
+    const double target;                // relative
 };
 
 // The noise of the parts of all objects with a result. A part is a piece of an object that faces
@@ -52,8 +49,10 @@ class NoisyParts {
 
     // Takes over the last look of `noise` after `bundles` bundles. `lines` is per side of the tiles
     // the number of lines that have met it, and `all` the number of lines over all sides, including
-    // sides that are not shown.
-    void look(const SetNoise& noise, uint32_t bundles, const std::vector<float>& lines, double all);
+    // sides that are not shown. `faces` is the number of faces that bundles have looked at and
+    // drawn for these lines, as far as it counts.
+    void look(const SetNoise& noise, uint32_t bundles, const std::vector<float>& lines, double all,
+              double faces);
 
     // Returns per part the value of Looks::shareOfParts for the next bake with these lines.
     std::vector<double> shares() const;
@@ -136,9 +135,9 @@ class NoisyParts {
     // Per instance: squared relative noise with the rays cast so far, over the parts that want more
     // rays, see squaresOfObjects().
     std::vector<double> ofObjects;
-    const double projections, target;
-    // At the last look: the number of lines over all sides, and the number of bundles.
-    double allLines = 0;
+    const double target;
+    // At the last look: the numbers of lines over all sides, of faces and of bundles.
+    double allLines = 0, allFaces = 0;
     uint32_t bundles = 0;
 };
 
