@@ -13,13 +13,18 @@ namespace {
 // Two receivers at one vertex compare their shadows if the cosine of their normals is at least
 // this.
 constexpr float kAlike = 0.8f;
+// A face has one receiver only if its cells are smaller than squares of this share of a tile's
+// edge, and the cosine between their normals is at least kOneFlat.
+constexpr double kWholeFace = 0.5, kOneFlat = 0.98;
 
 }  // namespace
 
 struct DenseNodes::Faces {
-    // Per node: whether it lies on a dense face, whether on another one, and its number of cells.
+    // Per node: whether it lies on a dense face, whether on another one, the number of faces, and
+    // the last of them.
     std::vector<uint8_t> isDense, isOther;
-    std::vector<uint32_t> cells;
+    std::vector<uint32_t> count;
+    std::vector<int32_t> last;
     // Per cell of the instance: the number of its parents, and the last of them.
     std::vector<uint32_t> parentCount, parent;
 };
@@ -51,20 +56,22 @@ DenseNodes::Faces DenseNodes::facesOf(size_t instance) const {
     const InstanceRange& range = ranges[instance];
     const SmoothRegions& region = regions[instance];
     const size_t cellCount = range.lastCell - range.firstCell;
-    Faces faces{std::vector<uint8_t>(region.nodeCount), std::vector<uint8_t>(region.nodeCount),
-                std::vector<uint32_t>(region.nodeCount), std::vector<uint32_t>(cellCount),
-                std::vector<uint32_t>(cellCount)};
+    Faces faces{std::vector<uint8_t>(region.nodeCount),  std::vector<uint8_t>(region.nodeCount),
+                std::vector<uint32_t>(region.nodeCount), std::vector<int32_t>(region.nodeCount, -1),
+                std::vector<uint32_t>(cellCount),        std::vector<uint32_t>(cellCount)};
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         throwIfCancelledAt(p);
         const uint32_t cell = input.patches.parents[p].cell;
         faces.parent[cell - range.firstCell] = p;
-        const bool isFirst = ++faces.parentCount[cell - range.firstCell] == 1;
+        ++faces.parentCount[cell - range.firstCell];
         const bool isOfDense = input.shown.isGatheredAtNodes(sideOfParent(instance, p));
         for (const int32_t corner : input.patches.cells[cell].corner) {
             if (corner < 0) continue;
             const uint32_t node = region.nodeOf[size_t(corner)];
             (isOfDense ? faces.isDense : faces.isOther)[node] = true;
-            faces.cells[node] += isFirst;
+            const int32_t face = input.patches.cells[cell].face;
+            faces.count[node] += faces.last[node] != face;
+            faces.last[node] = face;
         }
     }
     return faces;
@@ -111,6 +118,35 @@ uint32_t DenseNodes::add(const Receiver& receiver, const glm::vec3& position, bo
     return uint32_t(all.size() - 1);
 }
 
+// Adds a receiver in the middle of the largest cell of a face, if the face is a small triangle or
+// quad that is nearly flat, shares no node with other faces, and all of its nodes gather. Its cells
+// are `first` to `end` - 1.
+std::optional<uint32_t> DenseNodes::addWholeFace(
+    size_t instance, const Faces& faces, const std::vector<std::optional<CornerReceiver>>& chosen,
+    uint32_t first, uint32_t end) {
+    const std::vector<Cell>& cells = input.patches.cells;
+    uint32_t largest = first;
+    if (end - first > 2) return std::nullopt;
+    for (uint32_t c = first; c < end; ++c) {
+        if (glm::dot(cells[c].normal(), cells[first].normal()) < kOneFlat) return std::nullopt;
+        if (faces.parentCount[c - ranges[instance].firstCell] != 1) return std::nullopt;
+        for (const int32_t corner : cells[c].corner) {
+            if (corner < 0) continue;
+            const uint32_t node = regions[instance].nodeOf[size_t(corner)];
+            if (faces.count[node] != 1 || !chosen[node]) return std::nullopt;
+        }
+        if (cells[c].area() > cells[largest].area()) largest = c;
+    }
+    const uint32_t node = regions[instance].nodeOf[size_t(cells[largest].corner[0])];
+    Receiver receiver = chosen[node]->receiver;
+    receiver.side = sideOfParent(instance, faces.parent[largest - ranges[instance].firstCell]);
+    const double most = kWholeFace * double(input.patches.islandAt(receiver.side).size);
+    if (cells[largest].area() > most * most) return std::nullopt;
+    receiver.normal = input.patches.normal(receiver.side);
+    receiver.point = input.patches.point(patchOf(receiver.side), glm::vec2(0.5f));
+    return add(receiver, *receiver.point, true);
+}
+
 void DenseNodes::addReceivers(size_t instance) {
     const InstanceRange& range = ranges[instance];
     const SmoothRegions& region = regions[instance];
@@ -118,29 +154,25 @@ void DenseNodes::addReceivers(size_t instance) {
     const std::vector<std::optional<CornerReceiver>> chosen = chooseCorners(instance, faces);
     OfInstance& own = ofInstances[instance];
     own.receiverOf.assign(region.nodeCount, kNone);
-    for (uint32_t c = range.firstCell; c < range.lastCell; ++c) {
+    const std::vector<Cell>& cells = input.patches.cells;
+    for (uint32_t c = range.firstCell, end = c; c < range.lastCell; c = end) {
         throwIfCancelledAt(c);
-        const uint32_t parents = faces.parentCount[c - range.firstCell];
-        if (parents == 0) continue;
-        std::vector<uint32_t> nodes;
-        for (const int32_t corner : input.patches.cells[c].corner)
-            if (corner >= 0) nodes.push_back(region.nodeOf[size_t(corner)]);
-        const bool isAlone =
-            parents == 1 && std::all_of(nodes.begin(), nodes.end(), [&](uint32_t node) {
-                return faces.cells[node] == 1 && chosen[node];
-            });
-        if (isAlone) {
-            Receiver receiver = chosen[nodes.front()]->receiver;
-            receiver.side = sideOfParent(instance, faces.parent[c - range.firstCell]);
-            receiver.normal = input.patches.normal(receiver.side);
-            receiver.point = input.patches.point(patchOf(receiver.side), glm::vec2(0.5f));
-            const uint32_t shared = add(receiver, *receiver.point, true);
-            for (const uint32_t node : nodes) own.receiverOf[node] = shared;
+        while (end < range.lastCell && cells[end].face == cells[c].face) ++end;
+        if (const std::optional<uint32_t> shared = addWholeFace(instance, faces, chosen, c, end)) {
+            for (uint32_t k = c; k < end; ++k)
+                for (const int32_t corner : cells[k].corner)
+                    if (corner >= 0) own.receiverOf[region.nodeOf[size_t(corner)]] = *shared;
             continue;
         }
-        for (const uint32_t node : nodes)
-            if (chosen[node] && own.receiverOf[node] == kNone)
-                own.receiverOf[node] = add(chosen[node]->receiver, chosen[node]->vertex, false);
+        for (uint32_t k = c; k < end; ++k) {
+            if (faces.parentCount[k - range.firstCell] == 0) continue;
+            for (const int32_t corner : cells[k].corner) {
+                if (corner < 0) continue;
+                const uint32_t node = region.nodeOf[size_t(corner)];
+                if (chosen[node] && own.receiverOf[node] == kNone)
+                    own.receiverOf[node] = add(chosen[node]->receiver, chosen[node]->vertex, false);
+            }
+        }
     }
     own.gathersAll = true;
     for (uint32_t c = range.firstCell; c < range.lastCell; ++c)

@@ -72,6 +72,9 @@ class DenseNodes {
     std::vector<std::optional<CornerReceiver>> chooseCorners(size_t instance,
                                                              const Faces& faces) const;
     void addReceivers(size_t instance);
+    std::optional<uint32_t> addWholeFace(size_t instance, const Faces& faces,
+                                         const std::vector<std::optional<CornerReceiver>>& chosen,
+                                         uint32_t first, uint32_t end);
     uint32_t add(const Receiver& receiver, const glm::vec3& position, bool isWholeFace);
     uint32_t sideOfParent(size_t instance, uint32_t parent) const;
     uint32_t receiverAt(size_t instance, int32_t corner) const {

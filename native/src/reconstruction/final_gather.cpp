@@ -94,7 +94,8 @@ float FinalGather::allowedError(const Receiver& receiver, float brightness) cons
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers, float brightness,
                                        float laxity) const {
-    const float factor = laxity * receivers[0].receiver->targetFactor;
+    // What is `laxity` times as noisy counts only together with laxity^2 others.
+    const float factor = laxity * laxity * receivers[0].receiver->targetFactor;
     const double tolerance = std::pow(
         double(kSpreadOverError * laxity * allowedError(*receivers[0].receiver, brightness)), 2);
     const uint32_t parts = std::max(kFewestParts, kParts / uint32_t(receivers.size()));

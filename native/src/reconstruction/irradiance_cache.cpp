@@ -50,13 +50,17 @@ void IrradianceCache::add(const CachePlace& place, const CachedLight& light) {
     records.push_back({place, light, reachOf(place), kAngle});
 }
 
-float IrradianceCache::weightOf(const Record& record, const CachePlace& place) const {
+float IrradianceCache::weightOf(const Record& record, const CachePlace& place,
+                                float ownReach) const {
     const glm::vec3 off = place.position - record.place.position;
+    const float reach = std::min(record.reach, ownReach);
+    const float apart = glm::dot(off, off);
+    if (apart >= reach * reach) return 0;
     const float along = kAlongNormal * glm::dot(off, record.place.normal + place.normal) / 2;
-    const float distance = std::sqrt(glm::dot(off, off) + along * along);
+    const float distance = std::sqrt(apart + along * along);
+    if (distance >= reach) return 0;
     const float turn = glm::distance(record.place.normal, place.normal);
-    return std::max(0.0f, 1 - distance / std::min(record.reach, reachOf(place))) *
-           std::max(0.0f, 1 - turn / record.angle);
+    return (1 - distance / reach) * std::max(0.0f, 1 - turn / record.angle);
 }
 
 // Returns the cell of a grid of this width, counted from that of the first record.
@@ -84,12 +88,14 @@ void IrradianceCache::buildIndex() {
 
 template <class Visit>
 void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit) const {
+    const float ownReach = reachOf(place);
     for (int level = -32; level < 32; ++level) {
         if (!hasLevel[size_t(level + 32)]) continue;
         const auto found = cells.find({level, cellAt(place.position, std::ldexp(1.0f, level))});
         if (found == cells.end()) continue;
         for (const uint32_t k : found->second)
-            if (const float weight = weightOf(records[k], place); weight > 0) visit(k, weight);
+            if (const float weight = weightOf(records[k], place, ownReach); weight > 0)
+                visit(k, weight);
     }
 }
 
@@ -110,8 +116,14 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
     };
     Eigen::Matrix<double, kTerms, kTerms> matrix = Eigen::Matrix<double, kTerms, kTerms>::Zero();
     double sum = 0;
+    struct Around {
+        uint32_t record;
+        float weight;
+    };
+    std::vector<Around> around;
     forEachAround(place, [&](uint32_t k, float weight) {
         if (k == without) return;
+        around.push_back({k, weight});
         const Terms terms = termsOf(records[k]);
         matrix += double(weight) * terms * terms.transpose();
         sum += double(weight);
@@ -122,8 +134,7 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
     for (int k = 1; k < kTerms; ++k) matrix(k, k) += kEven * sum;
     const Terms solution = matrix.ldlt().solve(Terms::Unit(0));
     light.variance = 0;
-    forEachAround(place, [&](uint32_t k, float weight) {
-        if (k == without) return;
+    for (const auto [k, weight] : around) {
         const double factor = double(weight) * solution.dot(termsOf(records[k]));
         const CachedLight& own = records[k].light;
         light.carried += float(factor) * own.carried;
@@ -132,7 +143,7 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
         light.open += float(factor) * own.open;
         light.variance += factor * factor * own.variance;
         light.allowed += double(weight) / sum * own.allowed;
-    });
+    }
     for (glm::vec3* part : {&light.carried, &light.reflected, &light.surrounding})
         *part = glm::max(*part, 0.0f);
     return light;

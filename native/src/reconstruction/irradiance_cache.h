@@ -81,8 +81,8 @@ class IrradianceCache {
     };
     // Returns the light at a place from all records but one, or from all (kNone).
     CachedLight interpolate(const CachePlace& place, uint32_t without) const;
-    // Returns the weight of a record at a place, 0 to 1.
-    float weightOf(const Record& record, const CachePlace& place) const;
+    // Returns the weight of a record at a place, 0 to 1. `ownReach` is reachOf(place).
+    float weightOf(const Record& record, const CachePlace& place, float ownReach) const;
     float reachOf(const CachePlace& place) const;
     // Calls visit(index, weight) for each record that reaches a place.
     template <class Visit>

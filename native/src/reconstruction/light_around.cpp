@@ -80,9 +80,12 @@ std::vector<CachedLight> LightAround::atReceivers() {
     addRecords(wanting(order, 0, count), kRecordError);
     cache.update(false);
     // Records without others around them have too much noise.
+    std::vector<uint8_t> isNoisy(count);
+    parallelFor(size_t(0), size_t(count),
+                [&](size_t n) { isNoisy[n] = !cache.at(placeOf(order[n])).isGood(); });
     Receivers noisy;
-    for (const uint32_t r : order)
-        if (!cache.at(placeOf(r)).isGood()) noisy.push_back(r);
+    for (size_t n = 0; n < count; ++n)
+        if (isNoisy[n]) noisy.push_back(order[n]);
     addRecords(noisy, 1);
     cache.update(false);
     std::vector<CachedLight> result(count);
