@@ -45,6 +45,9 @@ WARNINGS = (
     "{method} ignores the angle at which light arrives. Materials whose reflectance depends on "
     "this angle, such as Principled and rough materials, reflect as if light arrived equally from "
     "all directions, an error of up to some percent; choose {remedy}",
+    "the scene needs {patches} patches, more than max_patches ({most}), so that the bake takes more "
+    "time and memory. Small faces share patches if they are opaque and not translucent, and with "
+    "the default methods and the topology KEEP; simplify the meshes, or increase max_patches",
     "{count} patches lie beside gaps that are much narrower than a patch, such as below cutlery on "
     "a table. The light in these gaps is too bright; choose solver LINE_REUSE and first_shot "
     "GATHER, with which such patches are cut",

@@ -329,8 +329,8 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         unit='LENGTH')
     max_patches: IntProperty(
         name="Maximum Patches",
-        description="Maximum number of patches; patches become larger to stay below it, but each "
-                    "face has at least one",
+        description="Maximum number of patches; patches become larger to stay below it, and small "
+                    "faces share patches",
         default=100_000, min=1, max=2 ** 23, soft_min=1_000, soft_max=1_000_000)
     refine: BoolProperty(
         name="Refine",

@@ -82,6 +82,44 @@ TEST(Clusters, AreOfNearPatchesThatFaceAlike) {
     EXPECT_EQ(clusters.memberCount(), inClusters);
 }
 
+// The sphere is cut by the same cells however fine its faces are. Without remnants, cells that only
+// a few fine faces reach into have no clusters of their own.
+TEST(Clusters, HaveNoRemnants) {
+    size_t counts[2];
+    for (int k : {0, 1}) {
+        const Patches patches = subdivide(roomWithBall(5 + k, 0.5f), 0.4f, kMany);
+        const Clusters clusters(patches, shownBut(patches, 3));
+        const Patches& joined = clusters.patches();
+        counts[k] = 0;
+        for (uint32_t c = 0; c < joined.count(); ++c) {
+            if (joined.parentAt(2 * c).instance != 3) continue;
+            ++counts[k];
+            // The share of a cell below which clusters are joined with others, and the area of the
+            // cells, which are half as wide as tiles.
+            EXPECT_GT(joined.area[c], 0.25f * 0.2f * 0.2f) << k;
+        }
+    }
+    EXPECT_NEAR(double(counts[1]), double(counts[0]), 0.1 * double(counts[0]));
+}
+
+TEST(Clusters, AreCoarsenedToTheNumberAllowed) {
+    const Patches patches = subdivide(roomWithBall(5, 0.5f), 0.4f, kMany);
+    const std::vector<bool> isShown = shownBut(patches, 3);
+    const size_t ofRoom = patches.count() - 20 * 1024;
+    const size_t usual = Clusters(patches, isShown).patches().count() - ofRoom;
+    for (const size_t share : {1, 2, 4}) {
+        const Clusters clusters(patches, isShown, ofRoom + usual / share);
+        EXPECT_LE(clusters.patches().count(), ofRoom + usual / share);
+        EXPECT_GT(clusters.patches().count(), ofRoom + usual / share / 5);
+        EXPECT_EQ(clusters.coarseness() > 1, share > 1);
+        double area = 0;
+        for (const float own : clusters.patches().area) area += double(own);
+        EXPECT_NEAR(area, patches.totalArea, 1e-4 * patches.totalArea);
+    }
+    // What cannot be kept ends with the coarsest clusters.
+    EXPECT_GT(Clusters(patches, isShown, 1).patches().count(), ofRoom);
+}
+
 TEST(Clusters, HaveTheMeansOfTheirPatches) {
     const Patches patches = subdivide(roomWithBall(5, 0.5f), 0.4f, kMany);
     const Clusters clusters(patches, shownBut(patches, 3));
@@ -137,6 +175,29 @@ TEST(Clusters, LeaveAFurnaceExact) {
     bake.settings.minBundles = bake.settings.maxBundles = 2;
     bake.run(roomWithBall(5, 0.5f, 0.5f));
     expectFurnace(bake);
+}
+
+// A coarse shot before cuts samples the stand-ins alone, and the first shot goes on from it.
+TEST(Clusters, LightTheRoomAlsoAfterCuts) {
+    if (kFewBakes) return;
+    Scene scene = roomWithBall(4, 0.6f);
+    scene.addLight(pointLight({2.2, 1.2, 2.2}, glm::dvec3(5)));
+    std::vector<glm::vec3> light[2];
+    double stated[2];
+    for (int on : {0, 1}) {
+        Bake bake;
+        bake.settings.targetError = 0.01f;
+        bake.settings.refine = true;
+        bake.settings.skipClusters = on;
+        bake.run(scene);
+        const Json report = reportOf(bake);
+        EXPECT_EQ(skips(report, SkippedWork::CLUSTERED_PATCHES), on == 1);
+        EXPECT_FALSE(report["refined"].empty());
+        light[on] = everything(bake);
+        stated[on] = report["error"]["noise"];
+    }
+    // Twice the noise of both bakes. The noise differs from object to object.
+    EXPECT_LT(noise(light[1], light[0]), 2 * std::hypot(stated[0], stated[1]));
 }
 
 // With the light of a lamp, gloss that depends on the direction, lines beyond the memory limit, and

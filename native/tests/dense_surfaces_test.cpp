@@ -60,6 +60,55 @@ TEST(DenseSurfaces, AreThoseWithManyFacesSmallerThanTiles) {
     EXPECT_EQ(std::count(fine.isDense.begin(), fine.isDense.end(), true), 0);
 }
 
+// A room with 60 balls of 320 faces, which are too few for a dense surface without need.
+Scene roomWithManyBalls() {
+    Scene scene = roomWithBoxes(0.5f);
+    scene.addLight(pointLight({1, 1, 2.4}, glm::dvec3(4)));
+    const Mesh ball = smooth(icosphere("ball", 0.1f, 2, false), 1);
+    for (int k = 0; k < 60; ++k)
+        place(scene, ball, grey("ball", 0.5f),
+              glm::translate(glm::dmat4(1), {0.4 + 0.3 * (k % 10), 2.6, 0.3 + 0.3 * (k / 10)}));
+    return scene;
+}
+
+TEST(DenseSurfaces, AreAlsoSmallOnesIfThereAreTooManyPatches) {
+    const Scene scene = roomWithManyBalls();
+    const auto countDense = [&](size_t maxPatches) {
+        const Patches patches = subdivide(scene, 0.2f, maxPatches);
+        return std::count(patches.isDense.begin(), patches.isDense.end(), true);
+    };
+    EXPECT_EQ(countDense(100000), 0);
+    EXPECT_EQ(countDense(10000), 60 * 320);
+    if (kFewBakes) return;
+    const auto few = bakeOf(scene, [](Settings& settings) { settings.maxPatches = 10000; });
+    const auto many = bakeOf(scene);
+    const Json report = reportOf(*few);
+    EXPECT_LE(report["patches"].get<int>(), 10000);
+    EXPECT_GT(reportOf(*many)["patches"].get<int>(), 60 * 320);
+    EXPECT_FALSE(warns(report, WarningId::MAX_PATCHES));
+    EXPECT_TRUE(skips(report, SkippedWork::DENSE_NODES));
+    std::vector<glm::vec3> light[2];
+    for (int32_t ball = kBall; ball < kBall + 60; ++ball)
+        for (int k : {0, 1})
+            for (const glm::vec3& value :
+                 cornerLight(k == 0 ? *few : *many, ball, RB_OUTPUT_LIGHTING))
+                light[k].push_back(value);
+    // Twice the target of two bakes, plus what the fit to the light of single faces smooths: these
+    // balls have shadow edges, and faces 30 degrees apart.
+    EXPECT_LT(noise(light[0], light[1]), 0.1);
+}
+
+TEST(DenseSurfaces, TooManyPatchesAreSaid) {
+    const Scene scene = roomWithManyBalls();
+    const auto bake = bakeOf(scene, [](Settings& settings) {
+        settings.maxPatches = 10000;
+        settings.skipClusters = 0;
+        settings.maxBundles = settings.minBundles = 2;
+    });
+    EXPECT_GT(reportOf(*bake)["patches"].get<int>(), 10000);
+    EXPECT_TRUE(warns(reportOf(*bake), WarningId::MAX_PATCHES));
+}
+
 TEST(DenseSurfaces, OfAFurnaceAreExact) {
     for (bool isSmooth : {false, true}) {
         Scene scene;

@@ -272,6 +272,7 @@ void Bake::noteWhatIsGiven(const Scene& scene, size_t reportedSets, const Thread
 
 void Bake::noteWhatWasTraced(Report& report) const {
     report.patches = trace->clusters.patches().count();
+    warnOfPatches(report.patches, settings, report);
     report.skip(SkippedWork::CLUSTERED_PATCHES, trace->clusters.memberCount());
     report.cuts = trace->cuts;
     report.lines = trace->tracer->lineCount();

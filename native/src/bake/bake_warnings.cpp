@@ -77,6 +77,16 @@ void warnOfAngles(const Patches& patches, const Settings& settings, Report& repo
         warn(std::string("solver ") + choiceName(settings.solver), "solver LINE_REUSE");
 }
 
+void warnOfPatches(size_t patches, const Settings& settings, Report& report) {
+    if (patches <= size_t(settings.maxPatches)) return;
+    report.warn(WarningId::MAX_PATCHES,
+                "the scene needs " + std::to_string(patches) + " patches, more than max_patches (" +
+                    std::to_string(settings.maxPatches) +
+                    "), so that the bake takes more time and memory. Small faces share patches if "
+                    "they are opaque and not translucent, and with the default methods and the "
+                    "topology KEEP; simplify the meshes, or increase max_patches");
+}
+
 void warnOfGaps(size_t patches, Report& report) {
     if (patches == 0) return;
     report.warn(

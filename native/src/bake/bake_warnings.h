@@ -27,6 +27,9 @@ void warnOfTranslucence(const Scene& scene, const Settings& settings, Report& re
 // ignore the angle.
 void warnOfAngles(const Patches& patches, const Settings& settings, Report& report);
 
+// Warns that the scene has more patches than allowed, because each face has at least one.
+void warnOfPatches(size_t patches, const Settings& settings, Report& report);
+
 // Warns of patches beside narrow gaps that were not cut. `patches` is their number.
 void warnOfGaps(size_t patches, Report& report);
 

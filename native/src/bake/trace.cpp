@@ -57,7 +57,7 @@ LineDensity densityOf(const Patches& patches) {
 Clusters clustersOf(const Scene& scene, const Patches& patches, const Settings& settings) {
     if (!settings.skipClusters || !settings.hasLineWindows() || !settings.gathersFirstShot())
         return Clusters(patches);
-    return Clusters(patches, shownSides(scene, patches, settings));
+    return Clusters(patches, shownSides(scene, patches, settings), size_t(settings.maxPatches));
 }
 
 Trace::Trace(uint64_t hash, uint64_t likeness, Patches made, const Scene& scene,
@@ -130,7 +130,7 @@ ProjectorInput Trace::exactInput(const Settings& settings) const {
 
 const StandIns& Trace::standInsFor(const std::vector<bool>* isShown, uint64_t aims) {
     if (!standIns || standIns->aims != aims)
-        standIns.emplace(AimedStandIns{aims, StandIns(patches, isShown)});
+        standIns.emplace(AimedStandIns{aims, StandIns(patches, isShown, clusters.coarseness())});
     return standIns->standIns;
 }
 

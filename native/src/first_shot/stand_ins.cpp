@@ -37,14 +37,15 @@ std::vector<ReceiverPair> neighbouringSides(const Patches& patches) {
 
 }  // namespace
 
-StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) : patches(patches) {
+StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown, float coarseness)
+    : patches(patches) {
     const uint32_t count = uint32_t(patches.sideCount());
     std::vector<uint32_t> clusters;  // per patch
     if (isShown) {
         std::vector<bool> isIn(patches.count());
         for (size_t patch = 0; patch < isIn.size(); ++patch)
             isIn[patch] = !(*isShown)[2 * patch] || !(*isShown)[2 * patch + 1];
-        clusters = findClusters(patches, isIn);
+        clusters = findClusters(patches, isIn, coarseness);
     }
     // Returns the cluster of a side: 2 * (cluster of its patch) for fronts, plus 1 for backs;
     // kNoCluster if the side gathers for itself.
@@ -67,8 +68,13 @@ StandIns::StandIns(const Patches& patches, const std::vector<bool>* isShown) : p
         StandIn& standIn = standIns[cluster];
         isAnyForOthers |= ++standIn.sides > 1;
         // Draw exponential waiting times with a rate proportional to the area. The smallest one
-        // selects each side with a probability proportional to its area.
-        const float random = (float(hash(side, 0) >> 8) + 0.5f) * 0x1p-24f;
+        // selects each side with a probability proportional to its area. Cuts of other tiles do
+        // not change the choice.
+        const Parent& parent = patches.parentAt(side);
+        const uint32_t patch = patchOf(side) - parent.firstPatch, tile = parent.tileOf(patch);
+        const uint32_t bits =
+            hash(sideOf(parent.firstTile + tile, isBack(side)), patch - parent.firstOf(tile));
+        const float random = (float(bits >> 8) + 0.5f) * 0x1p-24f;
         const float wait = -std::log(random) / patches.area[patchOf(side)];
         if (wait >= standIn.wait) continue;
         standIn.wait = wait;

@@ -23,8 +23,9 @@ namespace raybundle {
 class StandIns {
   public:
     // `isShown`, per side, says whether the light of the side is shown. Null: all sides are shown,
-    // and each gathers for itself. `patches` must outlive the object.
-    StandIns(const Patches& patches, const std::vector<bool>* isShown);
+    // and each gathers for itself. `coarseness` is that of the clusters (findClusters()). `patches`
+    // must outlive the object.
+    StandIns(const Patches& patches, const std::vector<bool>* isShown, float coarseness = 1);
 
     // Returns the sides that gather, in ascending order.
     const std::vector<uint32_t>& gatherers() const { return sides; }

@@ -67,8 +67,8 @@ inline constexpr Setting kSettings[] = {
      "Edge length of the patches on which the light is computed; 0 chooses it automatically",
      &Settings::patchSize, 0, 1e9, "m"},
     {"max_patches",
-     "Maximum number of patches; patches become larger to stay below it, but each face has at "
-     "least one",
+     "Maximum number of patches; patches become larger to stay below it, and small faces share "
+     "patches",
      &Settings::maxPatches, 1, double(kMostPatches)},
     {"refine",
      "Use smaller patches at the edges of shadows and close to lamps, if the gain is worth the "

@@ -15,8 +15,8 @@ constexpr const char* kNames[] = {
     "MAX_BUNDLES",         "UNCOUNTABLE_LINES",   "MEMORY_LIMIT",     "BROKEN_CYCLES",
     "WRONG_EXCHANGES",     "UNSETTLED_EXCHANGE",  "ENERGY_BALANCE",   "UNSOLVED_FIT",
     "NO_LIGHT_ON_SIDE",    "NOISY_OBJECTS",       "COARSE_MESH",
-    "MAX_VERTICES"};
-static_assert(std::size(kNames) == size_t(WarningId::MAX_VERTICES) + 1);
+    "MAX_VERTICES",        "MAX_PATCHES"};
+static_assert(std::size(kNames) == size_t(WarningId::MAX_PATCHES) + 1);
 
 }  // namespace
 

@@ -39,7 +39,8 @@ enum class WarningId {
     NO_LIGHT_ON_SIDE,
     NOISY_OBJECTS,
     COARSE_MESH,
-    MAX_VERTICES
+    MAX_VERTICES,
+    MAX_PATCHES
 };
 
 // Returns the identifier as it is in the report, such as "CLAMPED_REFLECTANCE". The string is

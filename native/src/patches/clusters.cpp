@@ -18,38 +18,100 @@ namespace raybundle {
 namespace {
 
 // Cells of normals along each edge of the square to which the octahedral map takes the sphere. A
-// cell is some 25 degrees wide.
-constexpr int kNormalCells = 8;
+// cell is some 25 degrees wide, or some 70 in the coarsest clusters.
+constexpr int kNormalCells = 8, kFewestNormalCells = 3;
 // Width of a cell of positions, relative to the target edge of a tile.
 constexpr float kWidth = 0.5f;
 // Patches larger than this share of a cell's area are in no cluster.
 constexpr float kSmall = 0.25f;
-// Largest width of the patches of a dense surface, relative to the target edge of a tile, and the
-// smallest number of such patches.
-constexpr float kDense = 0.5f;
-constexpr size_t kFewestOfDense = 1000;
+// Clusters below this share of a cell's area are remnants, which become part of others. A remnant
+// would need denser lines than others, and its light is hardly seen.
+constexpr float kRemnant = 0.25f;
+// Clusters are coarsened by steps of this factor, and at most to kCoarsest times their usual width.
+constexpr float kCoarser = 1.5f, kCoarsest = 64;
+// Steps by which more surfaces count as dense. Small surfaces come first, larger patches later.
+constexpr Density kDensities[] = {{0.5f, 1000}, {0.5f, 64}, {0.5f, 1}, {1, 1},
+                                  {2, 1},       {4, 1},     {8, 1},    {16, 1}};
 
-// Returns the cell of a unit normal, by the octahedral map.
-int cellOf(const glm::vec3& normal) {
+// Returns the cell of a unit normal, by the octahedral map with `cells` cells along each edge.
+glm::ivec2 cellOf(const glm::vec3& normal, int cells) {
     const glm::vec3 a = glm::abs(normal);
     glm::vec2 p = glm::vec2(normal) / (a.x + a.y + a.z);
     if (normal.z < 0)
         p = (1.0f - glm::abs(glm::vec2(p.y, p.x))) *
             glm::vec2(p.x < 0 ? -1.0f : 1.0f, p.y < 0 ? -1.0f : 1.0f);
-    const auto cell = [](float x) {
-        return std::clamp(int(0.5f * (x + 1) * kNormalCells), 0, kNormalCells - 1);
+    const auto cell = [cells](float x) {
+        return std::clamp(int(0.5f * (x + 1) * float(cells)), 0, cells - 1);
     };
-    return cell(p.x) * kNormalCells + cell(p.y);
+    return {cell(p.x), cell(p.y)};
 }
 
-// Surface, object, material, cell of the normal, and cell of the position (3 numbers).
-using Key = std::array<uint32_t, 7>;
+// Surface, object, material, cell of the normal (2 numbers), and cell of the position (3 numbers).
+using Key = std::array<uint32_t, 8>;
 struct HashOf {
     size_t operator()(const Key& key) const {
         uint64_t mixed = 0;
         for (const uint32_t part : key) mixed = mixBits(mixed ^ part);
         return size_t(mixed);
     }
+};
+
+// The clusters that cells form, by their keys.
+class Clustering {
+  public:
+    // Adds a patch of the given area to the cluster of a key, whose number is returned. A cluster
+    // is a remnant if its area ends below `least`. Areas are in m^2.
+    uint32_t add(const Key& key, float area, float least) {
+        const auto [it, isNew] = numbers.try_emplace(key, uint32_t(clusters.size()));
+        if (isNew) clusters.push_back({key, 0, least});
+        clusters[it->second].area += area;
+        return it->second;
+    }
+
+    // Returns per cluster the number of the cluster that it becomes part of: itself, or for
+    // remnants the largest cluster in a neighbouring cell of positions or of normals. Numbers begin
+    // at 0, in the order of add().
+    std::vector<uint32_t> withoutRemnants() const {
+        std::vector<uint32_t> host(clusters.size());
+        for (uint32_t c = 0; c < host.size(); ++c) {
+            throwIfCancelledAt(c);
+            host[c] = isRemnant(c) ? largestBeside(c) : c;
+        }
+        std::vector<uint32_t> merged(host.size()), numberOf(host.size(), kNoCluster);
+        uint32_t count = 0;
+        for (uint32_t c = 0; c < host.size(); ++c) {
+            // Each host is larger than its guest, so that this ends.
+            uint32_t last = c;
+            while (host[last] != last) last = host[last];
+            if (numberOf[last] == kNoCluster) numberOf[last] = count++;
+            merged[c] = numberOf[last];
+        }
+        return merged;
+    }
+
+  private:
+    struct OfCell {
+        Key key;
+        float area, least;  // m^2
+    };
+    bool isRemnant(uint32_t c) const { return clusters[c].area < clusters[c].least; }
+    // Returns the largest cluster beside a cluster that is larger than this, or else itself.
+    uint32_t largestBeside(uint32_t c) const {
+        uint32_t best = c;
+        for (size_t part = kFirstOfCells; part < clusters[c].key.size(); ++part)
+            for (const uint32_t step : {1u, UINT32_MAX}) {
+                Key key = clusters[c].key;
+                key[part] += step;
+                if (const auto found = numbers.find(key);
+                    found != numbers.end() && clusters[found->second].area > clusters[best].area)
+                    best = found->second;
+            }
+        return best;
+    }
+
+    static constexpr size_t kFirstOfCells = 3;  // parts of a key from here on number cells
+    std::unordered_map<Key, uint32_t, HashOf> numbers;
+    std::vector<OfCell> clusters;
 };
 
 // Returns whether a patch may be in a cluster: it is a whole face that is opaque and not
@@ -129,34 +191,50 @@ void partAtWalls(const Patches& patches, std::vector<uint32_t>& cluster) {
     }
 }
 
+// Returns the number of clusters, and of patches in none.
+size_t countOf(const std::vector<uint32_t>& cluster) {
+    size_t count = 0, clusters = 0;
+    for (const uint32_t c : cluster)
+        if (c == kNoCluster)
+            ++count;
+        else
+            clusters = std::max(clusters, size_t(c) + 1);
+    return count + clusters;
+}
+
 }  // namespace
 
-std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn) {
+std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn,
+                                   float coarseness) {
+    const int cells = std::max(kFewestNormalCells, int(std::lround(kNormalCells / coarseness)));
     std::vector<uint32_t> cluster(patches.count(), kNoCluster);
-    std::unordered_map<Key, uint32_t, HashOf> clusters;
+    Clustering found;
     for (uint32_t patch = 0; patch < cluster.size(); ++patch) {
         throwIfCancelledAt(patch);
         if (!isIn[patch]) continue;
         const Parent& parent = patches.parentAt(2 * patch);
         const Island& island = patches.islands[parent.island];
-        const float width = kWidth * island.size;
+        const float width = coarseness * kWidth * island.size;
         if (!(patches.area[patch] <= kSmall * width * width)) continue;
         const glm::vec3 at = patches.point(patch, glm::vec2(0.5f)) - island.centre;
         const glm::ivec3 place(glm::floor(patches.axes * at / width));
-        const Key key{parent.surface,    parent.instance,
-                      parent.scattering, uint32_t(cellOf(patches.axes * parent.normal)),
-                      uint32_t(place.x), uint32_t(place.y),
-                      uint32_t(place.z)};
-        cluster[patch] = clusters.emplace(key, uint32_t(clusters.size())).first->second;
+        const glm::ivec2 facing = cellOf(patches.axes * parent.normal, cells);
+        cluster[patch] =
+            found.add({parent.surface, parent.instance, parent.scattering, uint32_t(facing.x),
+                       uint32_t(facing.y), uint32_t(place.x), uint32_t(place.y), uint32_t(place.z)},
+                      patches.area[patch], kRemnant * width * width);
     }
+    const std::vector<uint32_t> merged = found.withoutRemnants();
+    for (uint32_t& c : cluster)
+        if (c != kNoCluster) c = merged[c];
     partAtWalls(patches, cluster);
     return cluster;
 }
 
-std::vector<bool> findDense(const Patches& patches) {
+std::vector<bool> findDense(const Patches& patches, const Density& density) {
     std::vector<size_t> counts;  // per connected surface: number of its small patches
     auto isSmall = [&](uint32_t patch) {
-        const float edge = kDense * patches.islandAt(2 * patch).size;
+        const float edge = density.edge * patches.islandAt(2 * patch).size;
         return patches.area[patch] <= edge * edge;
     };
     const std::vector<uint32_t> pieces = piecesOfCells(patches);
@@ -170,15 +248,32 @@ std::vector<bool> findDense(const Patches& patches) {
         counts[surface] += isDense[patch];
     }
     for (uint32_t patch = 0; patch < isDense.size(); ++patch)
-        if (counts[patches.parentAt(2 * patch).surface] < kFewestOfDense) isDense[patch] = false;
+        if (counts[patches.parentAt(2 * patch).surface] < density.fewest) isDense[patch] = false;
     return isDense;
 }
 
-Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown) : all(&all) {
+void findDense(const std::vector<bool>& isBaked, size_t most, Patches& patches) {
+    for (const Density& density : kDensities) {
+        patches.density = density;
+        patches.isDense = findDense(patches, density);
+        size_t others = 0;
+        for (uint32_t patch = 0; patch < patches.count(); ++patch)
+            others += !patches.isDense[patch] && isBaked[patches.parentAt(2 * patch).instance];
+        if (others <= most) break;
+    }
+}
+
+Clusters::Clusters(const Patches& all, const std::vector<bool>& isShown, size_t most) : all(&all) {
     std::vector<bool> isIn(all.count());
     for (uint32_t patch = 0; patch < isIn.size(); ++patch)
         isIn[patch] = !isShown[2 * patch] && !isShown[2 * patch + 1] && canJoin(all, patch);
-    const std::vector<uint32_t> cluster = findClusters(all, isIn);
+    std::vector<uint32_t> cluster = findClusters(all, isIn);
+    for (size_t last = SIZE_MAX, now = countOf(cluster);
+         now > most && now < last && width < kCoarsest; now = countOf(cluster)) {
+        last = now;
+        width *= kCoarser;
+        cluster = findClusters(all, isIn, width);
+    }
     std::vector<uint32_t> numberOf;  // per cluster with patches so far, its patch of `joined`
     std::vector<uint32_t> number(all.count()), size;
     for (uint32_t patch = 0; patch < number.size(); ++patch) {

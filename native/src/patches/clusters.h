@@ -30,13 +30,18 @@ constexpr uint32_t kNoCluster = UINT32_MAX;
 // Returns for each patch the number of the cluster that it belongs to. The patches of a cluster
 // belong to one surface, object and material, are near each other and face in similar directions. A
 // patch is in no cluster (kNoCluster) if it is too large or `isIn` (per patch) is false. Numbers
-// begin at 0, in the order in which the patches first use them.
-std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn);
+// begin at 0, in the order in which the patches first use them. Clusters are `coarseness` times as
+// wide as usual.
+std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<bool>& isIn,
+                                   float coarseness = 1);
 
 // Returns for each patch whether it lies on a dense surface and is small: a dense surface is
 // connected and has many patches that are whole faces, much smaller than tiles, opaque and not
 // translucent. Pieces of faces that walls have cut are not among them.
-std::vector<bool> findDense(const Patches& patches);
+std::vector<bool> findDense(const Patches& patches, const Density& density);
+// Sets the density and the dense patches such that at most `most` patches of baked instances are
+// not dense, if possible. `isBaked` is per instance. Without need only large surfaces count.
+void findDense(const std::vector<bool>& isBaked, size_t most, Patches& patches);
 
 // The units between which light is exchanged: clusters, and the patches in no cluster. Each of them
 // is represented as one patch of patches().
@@ -45,14 +50,17 @@ class Clusters {
     // Makes an object without clusters, where patches() is `all`. Keeps a reference to `all`.
     explicit Clusters(const Patches& all) : all(&all) {}
     // Forms clusters of opaque patches that are not translucent and none of whose sides is shown.
-    // `isShown` is per side. Keeps a reference to `all`.
-    Clusters(const Patches& all, const std::vector<bool>& isShown);
+    // `isShown` is per side. Clusters are coarsened until patches() has at most `most` patches, as
+    // far as that is possible. Keeps a reference to `all`.
+    Clusters(const Patches& all, const std::vector<bool>& isShown, size_t most = SIZE_MAX);
 
     // Returns whether there are no clusters, so that patches() is members().
     bool isNone() const { return !joined; }
     // Returns whether both objects have equal clusters of equal patches, whatever the patches
     // reflect and emit.
     bool areThoseOf(const Clusters& other) const { return numbers == other.numbers; }
+    // Returns how many times as wide as usual the clusters are (findClusters()).
+    float coarseness() const { return width; }
     // Returns the number of patches that share their cluster with other patches.
     size_t memberCount() const;
 
@@ -111,6 +119,7 @@ class Clusters {
     void takeMaterials();
 
     const Patches* all;
+    float width = 1;  // see coarseness()
     std::optional<Patches> joined;
     // Per patch of `all`, its patch of `joined`. Empty if there are no clusters.
     std::vector<uint32_t> numbers;

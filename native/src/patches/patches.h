@@ -174,6 +174,12 @@ struct Island {
     float touchDistance = 0;  // surfaces within this distance touch, m
 };
 
+// Which surfaces are dense (findDense() in patches/clusters.h).
+struct Density {
+    float edge;     // largest width of their patches, relative to the target edge of a tile
+    size_t fewest;  // smallest number of such patches
+};
+
 // All patches of a scene, as flat arrays. A patch p has two sides: side 2 * p is the front, 2 * p +
 // 1 the back.
 struct Patches {
@@ -218,7 +224,8 @@ struct Patches {
     size_t degenerateFaces = 0;  // faces that were left out because they have no area
     // Corners of faces that were left out because another face in the same place stands for them.
     std::vector<DoubledCorner> doubledCorners;
-    // Per patch, see findDense() in patches/clusters.h.
+    // See findDense() in patches/clusters.h. `isDense` is per patch.
+    Density density{};
     std::vector<bool> isDense;
     // Whether any faces coincide, also those that could not be left out.
     bool anyCoincide = false;

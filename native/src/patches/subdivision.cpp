@@ -59,7 +59,16 @@ void fillPatches(const Scene& scene, Patches& patches) {
     patches.sheets = findSheets(patches);
     assignOpacity(scene, patches);
     assignMaterials(scene, patches);
-    patches.isDense = findDense(patches);
+}
+
+// Returns per instance whether its light is a result.
+std::vector<bool> bakedInstances(const Scene& scene) {
+    std::vector<bool> isBaked;
+    for (const Instance& instance : scene.instances)
+        isBaked.push_back(instance.role == RB_ROLE_BAKE);
+    if (std::find(isBaked.begin(), isBaked.end(), true) == isBaked.end())
+        isBaked.assign(isBaked.size(), true);
+    return isBaked;
 }
 
 }  // namespace
@@ -99,6 +108,7 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     patches.tileCount = count;
     for (const Parent& parent : patches.parents) patches.totalArea += parent.area();
     fillPatches(scene, patches);
+    findDense(bakedInstances(scene), maxPatches, patches);
     return patches;
 }
 
@@ -117,6 +127,7 @@ void cutTiles(const Scene& scene, Patches& patches, const std::vector<uint8_t>& 
         parent.cut = isCut ? std::make_shared<const CutTiles>(std::move(cut)) : nullptr;
     }
     fillPatches(scene, patches);
+    patches.isDense = findDense(patches, patches.density);
 }
 
 }  // namespace raybundle
