@@ -336,9 +336,11 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
     Cuts cuts;
     // The nodes of dense surfaces gather their light, which no cut would sharpen.
     const bool cutsDense = !gathersDenseSurfaces(settings);
+    const size_t most = size_t(settings.maxPatches), now = trace->clusters.patches().count();
+    const size_t room = most - std::min(most, now);
     if (settings.contacts) {
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
-        cuts = contactCuts(patches, trace->visibility, size_t(settings.maxPatches), cutsDense);
+        cuts = contactCuts(patches, trace->visibility, room, cutsDense);
     }
     // With other methods, cut patches are noisier: other solvers follow the lines of single
     // patches, and other first shots send rays from the sources to patches. Smaller patches get
@@ -348,12 +350,11 @@ std::vector<CoarseShot> Bake::cutPatches(const Scene& scene, Report& report) {
         return {};
     }
     std::vector<CoarseShot> shots;
-    if (settings.refine) {
+    if (settings.refine && room > cuts.morePatches()) {
         shots = shootCoarsely({scene, settings, progress, *trace, interim}, report);
         Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
-        const size_t most =
-            size_t(settings.maxPatches) - std::min(size_t(settings.maxPatches), cuts.morePatches());
-        cuts.add(worthwhileCuts(scene, patches, shots, most, settings.targetError, cutsDense));
+        cuts.add(worthwhileCuts(scene, patches, shots, room - cuts.morePatches(),
+                                settings.targetError, cutsDense));
     }
     Stopwatch stage(report.seconds[RB_STAGE_PATCHES]);
     if (cuts.count() > 0) {

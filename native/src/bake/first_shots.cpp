@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bake/first_shots.h"
 
-#include <numeric>
 #include <optional>
 
 #include "bake/interim.h"
 #include "bake/light_hash.h"
 #include "bake/stopwatch.h"
 #include "first_shot/bright_spots.h"
+#include "first_shot/stand_ins.h"
 
 namespace raybundle {
 namespace {
@@ -43,25 +43,41 @@ FirstShot shootOrKeep(const StageInput& in, const FirstShotInput& input, uint64_
     return shot;
 }
 
+// Gives all sides that have not gathered the light of their stand-ins. What a stand-in tells about
+// the edge of a shadow holds for itself alone.
+void copyFromStandIns(const StandIns& standIns, CoarseShot& shot) {
+    const std::vector<uint32_t>& gatherers = standIns.gatherers();
+    if (gatherers.size() == shot.gathered.size()) return;
+    shot.isOwn.resize(shot.gathered.size());
+    for (const uint32_t side : gatherers) shot.isOwn[side] = true;
+    for (uint32_t side = 0; side < shot.gathered.size(); ++side) {
+        if (shot.isOwn[side]) continue;
+        shot.gathered[side] = shot.gathered[gatherers[standIns.numberOf(side)]];
+        shot.gathered[side].contrast = 0;
+    }
+}
+
 }  // namespace
 
 std::vector<CoarseShot> shootCoarsely(const StageInput& in, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
     const Patches& patches = in.trace.patches;
-    std::vector<uint32_t> all(patches.sideCount());
-    std::iota(all.begin(), all.end(), 0u);
+    const std::vector<bool> isShown = shownSides(in.scene, patches, in.settings);
+    const StandIns standIns(patches, in.settings.skipClusters ? &isShown : nullptr,
+                            in.trace.clusters.coarseness());
     std::vector<CoarseShot> shots;
     for (int32_t set = kNoLightSet; set < int32_t(in.scene.lightSets.size()); ++set) {
         const DirectLight direct(in.scene, patches, in.trace.visibilityOfLights(),
                                  uint32_t(in.settings.seed), set, in.settings);
-        CoarseShot shot{std::vector<Gathered>(all.size()), {}};
+        CoarseShot shot{std::vector<Gathered>(patches.sideCount()), {}};
         direct.shootCoarsely(
-            shot, all,
+            shot, standIns.gatherers(),
             [&](size_t side) {
                 return Receiver{uint32_t(side), patches.normal(uint32_t(side)), std::nullopt,
                                 uint32_t(side)};
             },
             [&](double done) { in.progress.report(RB_STAGE_FIRST_SHOT, done); });
+        copyFromStandIns(standIns, shot);
         shots.push_back(std::move(shot));
     }
     return shots;

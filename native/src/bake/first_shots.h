@@ -15,8 +15,9 @@
 namespace raybundle {
 
 // Gathers light with a few shadow rays from each tile, from which worthwhileCuts() decides which
-// tiles are worth cutting. Returns the light of the sources that belong to no light set, then that
-// of each light set. Adds its time to the report.
+// tiles are worth cutting. Sides whose light is not shown get that of a stand-in. Returns the light
+// of the sources that belong to no light set, then that of each light set. Adds its time to the
+// report.
 std::vector<CoarseShot> shootCoarsely(const StageInput& in, Report& report);
 
 // Returns the first shot of the sources that belong to no light set, then that of each light set.

@@ -44,6 +44,8 @@ struct CoarseShot {
     double bundled = 0;  // estimated irradiance by emission left to the bundles, W/m^2
     // Per receiver: where the samples of a source that surrounds it went. Empty: not kept.
     std::vector<Sightings> sightings = {};
+    // Per receiver, whether `gathered` is its own light and not that of a stand-in. Empty: all.
+    std::vector<bool> isOwn = {};
 };
 
 // Number of sources up to which each may have the whole error that a receiver may have, and no

@@ -22,6 +22,9 @@ namespace {
 // Factor of the error allowed on sides whose light is not shown. Their light reaches shown surfaces
 // only as the mean over many sides.
 constexpr float kOthersError = 2;
+// The same for a side that stands for a whole cluster, within which the light differs by more than
+// this anyway.
+constexpr float kStandInError = 4;
 // Largest factor of the error. It applies to sides that reflect nothing, whose light only counts in
 // the energy balance.
 constexpr float kMostError = 10;
@@ -33,14 +36,14 @@ float othersError(const Patches& patches, const StandIns& standIns, uint32_t sid
     if (patches.reflectance[side] == glm::vec3(0.0f) &&
         patches.translucenceOf(opposite(side)) == glm::vec3(0.0f))
         return kMostError;
-    if (standIns.isForOthers(standIns.numberOf(side))) return kOthersError;
+    if (standIns.isForOthers(standIns.numberOf(side))) return kStandInError;
     const float edge = patches.islandAt(side).size;
     return kOthersError *
            std::max(1.0f, edge / std::sqrt(std::max(patches.area[patchOf(side)], 1e-30f)));
 }
 
 // Returns the coarse shot of the tiles, extended to the patches of cut tiles. Only these are
-// sampled here.
+// sampled here, and sides that had the light of a stand-in.
 CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32_t>& gatherers,
                            const std::function<Receiver(size_t)>& receiverAt,
                            const std::function<void(double)>& report) {
@@ -48,17 +51,18 @@ CoarseShot coarseOfPatches(const FirstShotInput& input, const std::vector<uint32
     const Patches& patches = input.patches;
     coarse.seen = input.fromTiles->seen;
     coarse.gathered.resize(gatherers.size());
-    std::vector<uint32_t> cut;
+    std::vector<uint32_t> others;
     for (uint32_t k = 0; k < gatherers.size(); ++k) {
         throwIfCancelledAt(k);
         const uint32_t side = gatherers[k];
-        if (patches.level(patchOf(side)) > 0)
-            cut.push_back(k);
+        const uint32_t ofTile = sideOf(patches.tileOf(patchOf(side)), isBack(side));
+        const std::vector<bool>& isOwn = input.fromTiles->isOwn;
+        if (patches.level(patchOf(side)) > 0 || (!isOwn.empty() && !isOwn[ofTile]))
+            others.push_back(k);
         else
-            coarse.gathered[k] =
-                input.fromTiles->gathered[sideOf(patches.tileOf(patchOf(side)), isBack(side))];
+            coarse.gathered[k] = input.fromTiles->gathered[ofTile];
     }
-    input.light.shootCoarsely(coarse, cut, receiverAt, report);
+    input.light.shootCoarsely(coarse, others, receiverAt, report);
     return coarse;
 }
 

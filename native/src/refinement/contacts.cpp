@@ -101,10 +101,10 @@ class Gaps {
 
 }  // namespace
 
-Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t maxPatches,
+Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t most,
                  bool cutsDense) {
     const size_t tiles = patches.count();
-    if (maxPatches <= tiles) return {};
+    if (most == 0) return {};
     Gaps gaps(patches, visibility);
     gaps.find();
     Cuts cuts;
@@ -114,7 +114,7 @@ Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t ma
         if (gaps.isContact(2 * tile) || gaps.isContact(2 * tile + 1))
             cuts.levels[tile] = kContactLevel;
     });
-    const size_t most = std::min(maxPatches - tiles, std::max(tiles, kMostMore));
+    most = std::min(most, std::max(tiles, kMostMore));
     while (cuts.morePatches() > most)
         for (uint8_t& level : cuts.levels) level = uint8_t(std::max(0, level - 1));
     for (uint8_t level : cuts.levels) cuts.contacts += level > 0;

@@ -24,9 +24,9 @@
 namespace raybundle {
 
 // Returns the cuts at contacts of a subdivision without cuts. Tiles of dense surfaces
-// (Patches::isDense) are cut only if `cutsDense` is true. The result has at most `maxPatches`
-// patches; if this does not suffice, all cuts are coarser.
-Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t maxPatches,
+// (Patches::isDense) are cut only if `cutsDense` is true. The cuts add at most `most` patches; if
+// this does not suffice, all cuts are coarser.
+Cuts contactCuts(const Patches& patches, const Visibility& visibility, size_t most,
                  bool cutsDense = true);
 
 }  // namespace raybundle

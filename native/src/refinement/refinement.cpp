@@ -116,10 +116,9 @@ void mark(const Scene& scene, const Patches& patches, const CoarseShot& shot, bo
 }  // namespace
 
 Cuts worthwhileCuts(const Scene& scene, const Patches& patches,
-                    const std::vector<CoarseShot>& shots, size_t maxPatches, float targetError,
+                    const std::vector<CoarseShot>& shots, size_t most, float targetError,
                     bool cutsDense) {
     const size_t tiles = patches.count();
-    if (maxPatches <= tiles) return {};
     std::vector<Mark> marks(tiles);
     for (const CoarseShot& shot : shots)
         mark(scene, patches, shot, cutsDense, double(targetError), marks);
@@ -129,7 +128,7 @@ Cuts worthwhileCuts(const Scene& scene, const Patches& patches,
         if (marks[tile].gain > 0) order.push_back(tile);
     std::stable_sort(order.begin(), order.end(),
                      [&](uint32_t a, uint32_t b) { return marks[a].gain > marks[b].gain; });
-    order.resize(std::min(order.size(), (maxPatches - tiles) / kMorePatches));
+    order.resize(std::min(order.size(), most / kMorePatches));
     Cuts cuts;
     cuts.levels.assign(tiles, 0);
     double gain = 0;

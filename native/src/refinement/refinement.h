@@ -37,11 +37,11 @@
 namespace raybundle {
 
 // Returns the cuts of a subdivision without cuts that pay. `shots` holds the coarse shot of all
-// sides for each light set. The result has at most `maxPatches` patches; the most worthwhile cuts
-// come first. Tiles of dense surfaces (Patches::isDense) are cut only if
-// `cutsDense` is true. `targetError` is relative.
+// sides for each light set. They add at most `most` patches; the most worthwhile cuts come first.
+// Tiles of dense surfaces (Patches::isDense) are cut only if `cutsDense` is true. `targetError` is
+// relative.
 Cuts worthwhileCuts(const Scene& scene, const Patches& patches,
-                    const std::vector<CoarseShot>& shots, size_t maxPatches, float targetError,
+                    const std::vector<CoarseShot>& shots, size_t most, float targetError,
                     bool cutsDense = true);
 
 }  // namespace raybundle
