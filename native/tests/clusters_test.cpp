@@ -196,8 +196,8 @@ TEST(Clusters, LightTheRoomAlsoAfterCuts) {
         light[on] = everything(bake);
         stated[on] = report["error"]["noise"];
     }
-    // Twice the noise of both bakes. The noise differs from object to object.
-    EXPECT_LT(noise(light[1], light[0]), 2 * std::hypot(stated[0], stated[1]));
+    // The noise of both bakes, which have the same directions. 0.4 times as much was measured.
+    EXPECT_LT(noise(light[1], light[0]), std::hypot(stated[0], stated[1]));
 }
 
 // With the light of a lamp, gloss that depends on the direction, lines beyond the memory limit, and

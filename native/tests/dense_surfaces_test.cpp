@@ -93,9 +93,9 @@ TEST(DenseSurfaces, AreAlsoSmallOnesIfThereAreTooManyPatches) {
             for (const glm::vec3& value :
                  cornerLight(k == 0 ? *few : *many, ball, RB_OUTPUT_LIGHTING))
                 light[k].push_back(value);
-    // Twice the target of two bakes, plus what the fit to the light of single faces smooths: these
-    // balls have shadow edges, and faces 30 degrees apart.
-    EXPECT_LT(noise(light[0], light[1]), 0.1);
+    // The noise of two bakes with a target of 2 % each, 2.8 %, and what the fit to the light of
+    // single faces smooths: these balls have shadow edges. 3.4 % was measured.
+    EXPECT_LT(noise(light[0], light[1]), 0.05);
 }
 
 TEST(DenseSurfaces, TooManyPatchesAreSaid) {

@@ -43,6 +43,17 @@ FirstShot shootOrKeep(const StageInput& in, const FirstShotInput& input, uint64_
     return shot;
 }
 
+// Returns the result of shotHash(). `isShown` is per side.
+uint64_t aimsOf(const StageInput& in, const std::vector<bool>& isShown) {
+    return shotHash(in.scene, in.settings, isShown, !in.trace.patches.scattering.empty());
+}
+
+// Returns the stand-ins for these shown sides. `aims` is the result of aimsOf() for them. The
+// reference is valid until the next call.
+const StandIns& standInsOf(const StageInput& in, const std::vector<bool>& isShown, uint64_t aims) {
+    return in.trace.standInsFor(in.settings.skipClusters ? &isShown : nullptr, aims);
+}
+
 // Gives all sides that have not gathered the light of their stand-ins. What a stand-in tells about
 // the edge of a shadow holds for itself alone.
 void copyFromStandIns(const StandIns& standIns, CoarseShot& shot) {
@@ -63,8 +74,8 @@ std::vector<CoarseShot> shootCoarsely(const StageInput& in, Report& report) {
     Stopwatch stage(report.seconds[RB_STAGE_FIRST_SHOT]);
     const Patches& patches = in.trace.patches;
     const std::vector<bool> isShown = shownSides(in.scene, patches, in.settings);
-    const StandIns standIns(patches, in.settings.skipClusters ? &isShown : nullptr,
-                            in.trace.clusters.coarseness());
+    // The first shot uses the same stand-ins if no patch is cut.
+    const StandIns& standIns = standInsOf(in, isShown, aimsOf(in, isShown));
     std::vector<CoarseShot> shots;
     for (int32_t set = kNoLightSet; set < int32_t(in.scene.lightSets.size()); ++set) {
         const DirectLight direct(in.scene, patches, in.trace.visibilityOfLights(),
@@ -90,9 +101,8 @@ SetLights shootSources(const StageInput& in, const ShownLight& shown,
     const Settings& settings = in.settings;
     const Patches& patches = trace.patches;
     const Visibility& visibility = trace.visibilityOfLights();
-    const uint64_t aims = shotHash(in.scene, settings, shown.sides(), !patches.scattering.empty());
-    const StandIns& standIns =
-        trace.standInsFor(settings.skipClusters ? &shown.sides() : nullptr, aims);
+    const uint64_t aims = aimsOf(in, shown.sides());
+    const StandIns& standIns = standInsOf(in, shown.sides(), aims);
     const bool isGather = settings.gathersFirstShot();
     SetLights lights;
     const int32_t count = int32_t(in.scene.lightSets.size());

@@ -252,7 +252,7 @@ std::vector<bool> findDense(const Patches& patches, const Density& density) {
     return isDense;
 }
 
-void findDense(const std::vector<bool>& isBaked, size_t most, Patches& patches) {
+void chooseDensity(const std::vector<bool>& isBaked, size_t most, Patches& patches) {
     for (const Density& density : kDensities) {
         patches.density = density;
         patches.isDense = findDense(patches, density);

@@ -9,9 +9,10 @@
 // Sources: Willmott, Heckbert and Garland, "Face Cluster Radiosity" (1999). Lines can be counted
 // for a patch of any shape: c_ij / m_i is its form factor however many faces it consists of, lines
 // between two of its own faces included.
-// Differs: clusters are cells of a grid and not a hierarchy. Only patches whose light is not shown
-// are in clusters. Their light is needed only on other surfaces, each of which receives light of
-// many clusters.
+// Differs: clusters are cells of a grid and not a hierarchy. What lies in a cell that the surface
+// hardly reaches into belongs to a cluster beside it. All cells become coarser if there are too
+// many patches. Only patches whose light is not shown are in clusters. Their light is needed only
+// on other surfaces, each of which receives light of many clusters.
 #pragma once
 
 #include <cstdint>
@@ -39,9 +40,10 @@ std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<boo
 // connected and has many patches that are whole faces, much smaller than tiles, opaque and not
 // translucent. Pieces of faces that walls have cut are not among them.
 std::vector<bool> findDense(const Patches& patches, const Density& density);
-// Sets the density and the dense patches such that at most `most` patches of baked instances are
+
+// Sets the density and the dense patches (Patches::isDense) such that at most `most` patches of baked instances are
 // not dense, if possible. `isBaked` is per instance. Without need only large surfaces count.
-void findDense(const std::vector<bool>& isBaked, size_t most, Patches& patches);
+void chooseDensity(const std::vector<bool>& isBaked, size_t most, Patches& patches);
 
 // The units between which light is exchanged: clusters, and the patches in no cluster. Each of them
 // is represented as one patch of patches().

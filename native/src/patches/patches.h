@@ -224,7 +224,7 @@ struct Patches {
     size_t degenerateFaces = 0;  // faces that were left out because they have no area
     // Corners of faces that were left out because another face in the same place stands for them.
     std::vector<DoubledCorner> doubledCorners;
-    // See findDense() in patches/clusters.h. `isDense` is per patch.
+    // See chooseDensity() in patches/clusters.h. `isDense` is per patch.
     Density density{};
     std::vector<bool> isDense;
     // Whether any faces coincide, also those that could not be left out.

@@ -108,7 +108,7 @@ Patches subdivide(const Scene& scene, float patchSize, size_t maxPatches) {
     patches.tileCount = count;
     for (const Parent& parent : patches.parents) patches.totalArea += parent.area();
     fillPatches(scene, patches);
-    findDense(bakedInstances(scene), maxPatches, patches);
+    chooseDensity(bakedInstances(scene), maxPatches, patches);
     return patches;
 }
 

@@ -14,17 +14,15 @@ namespace {
 // this.
 constexpr float kAlike = 0.8f;
 // A face has one receiver only if its cells are smaller than squares of this share of a tile's
-// edge, and the cosine between their normals is at least kOneFlat.
-constexpr double kWholeFace = 0.5, kOneFlat = 0.98;
+// edge, and the cosine between their normals is at least kFlatQuad.
+constexpr double kWholeFace = 0.5, kFlatQuad = 0.98;
 
 }  // namespace
 
 struct DenseNodes::Faces {
-    // Per node: whether it lies on a dense face, whether on another one, the number of faces, and
-    // the last of them.
+    // Per node: whether it lies on a dense face, whether on another one, and the number of faces.
     std::vector<uint8_t> isDense, isOther;
     std::vector<uint32_t> count;
-    std::vector<int32_t> last;
     // Per cell of the instance: the number of its parents, and the last of them.
     std::vector<uint32_t> parentCount, parent;
 };
@@ -56,9 +54,10 @@ DenseNodes::Faces DenseNodes::facesOf(size_t instance) const {
     const InstanceRange& range = ranges[instance];
     const SmoothRegions& region = regions[instance];
     const size_t cellCount = range.lastCell - range.firstCell;
-    Faces faces{std::vector<uint8_t>(region.nodeCount),  std::vector<uint8_t>(region.nodeCount),
-                std::vector<uint32_t>(region.nodeCount), std::vector<int32_t>(region.nodeCount, -1),
-                std::vector<uint32_t>(cellCount),        std::vector<uint32_t>(cellCount)};
+    Faces faces{std::vector<uint8_t>(region.nodeCount), std::vector<uint8_t>(region.nodeCount),
+                std::vector<uint32_t>(region.nodeCount), std::vector<uint32_t>(cellCount),
+                std::vector<uint32_t>(cellCount)};
+    std::vector<int32_t> last(region.nodeCount, -1);  // per node: its last face so far
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         throwIfCancelledAt(p);
         const uint32_t cell = input.patches.parents[p].cell;
@@ -70,8 +69,8 @@ DenseNodes::Faces DenseNodes::facesOf(size_t instance) const {
             const uint32_t node = region.nodeOf[size_t(corner)];
             (isOfDense ? faces.isDense : faces.isOther)[node] = true;
             const int32_t face = input.patches.cells[cell].face;
-            faces.count[node] += faces.last[node] != face;
-            faces.last[node] = face;
+            faces.count[node] += last[node] != face;
+            last[node] = face;
         }
     }
     return faces;
@@ -128,7 +127,7 @@ std::optional<uint32_t> DenseNodes::addWholeFace(
     uint32_t largest = first;
     if (end - first > 2) return std::nullopt;
     for (uint32_t c = first; c < end; ++c) {
-        if (glm::dot(cells[c].normal(), cells[first].normal()) < kOneFlat) return std::nullopt;
+        if (glm::dot(cells[c].normal(), cells[first].normal()) < kFlatQuad) return std::nullopt;
         if (faces.parentCount[c - ranges[instance].firstCell] != 1) return std::nullopt;
         for (const int32_t corner : cells[c].corner) {
             if (corner < 0) continue;
