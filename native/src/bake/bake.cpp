@@ -419,8 +419,13 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
                                       std::vector<FinerMesh>* meshes) {
     Stopwatch stage(report.seconds[RB_STAGE_RECONSTRUCTION]);
     const Patches& patches = trace->patches;
-    const ReconstructionInput input{
-        {patches, exchanged.exposed}, in.scene, trace->visibility, lights, in.shown, settings};
+    const ReconstructionInput input{{patches, exchanged.exposed},
+                                    in.scene,
+                                    trace->visibility,
+                                    trace->clusters,
+                                    lights,
+                                    in.shown,
+                                    settings};
     std::vector<InstanceLight> made = reconstruct(input, progress, report);
     std::vector<float> weight = patches.sideAreas();
     const std::vector<float> exposedOfTiles = in.tiles.mean(exchanged.exposed, weight);

@@ -111,8 +111,8 @@ void CornerGather::gatherSources(const ReconstructionInput& input, const Progres
         const double mean = meanLight(scene, surfaces, ranges, lights[k].irradiance);
         others.push_back(settings.finalGather && mean > 0
                              ? std::make_unique<const FinalGather>(
-                                   surfaces, input.visibility, lights[k], lights[k].irradiance,
-                                   float(mean), settings.targetError)
+                                   surfaces, input.visibility, input.clusters, lights[k],
+                                   lights[k].irradiance, float(mean), settings.targetError)
                              : nullptr);
     }
 }

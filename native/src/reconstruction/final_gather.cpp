@@ -74,10 +74,11 @@ double meanLight(const Scene& scene, const LitSurfaces& surfaces,
 }
 
 FinalGather::FinalGather(const LitSurfaces& surfaces, const Visibility& visibility,
-                         const SetLight& light, const Irradiance& irradiance, float meanLight,
-                         float targetError)
+                         const Clusters& clusters, const SetLight& light,
+                         const Irradiance& irradiance, float meanLight, float targetError)
     : surfaces(surfaces),
       visibility(visibility),
+      clusters(clusters),
       light(light),
       irradiance(irradiance),
       emission(light.direct.bundledEmission()),
@@ -191,13 +192,22 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
         sum.nearness += 1 / std::max(distance, surfaces.patches.touchDistance);
         sum.reflected += sent.towards(*hit, -direction);
         if (distance >= width(*hit)) continue;
-        // With many sources, few of the rays sample them, and count for the others.
-        if (nearShare < 1 && float(hash(receiver.seed, i) >> 8) * 0x1p-24f >= nearShare) continue;
         const Receiver met{*hit, surfaces.patches.normal(*hit),
                            *receiver.point + distance * direction, hash(receiver.seed, kParts)};
+        if (world != glm::vec3(0.0f))
+            sum.reflected += surfaces.patches.reflectance[*hit] *
+                             (sampleCarried(met, {u.z, u.w}) -
+                              (irradiance.direct[*hit] - irradiance.ofSources[*hit]));
+        // With many sources, few of the rays sample them, and count for the others.
+        if (nearShare < 1 && float(hash(receiver.seed, i) >> 8) * 0x1p-24f >= nearShare) continue;
         sum.reflected += shotReflectance(surfaces.patches, light.shot, *hit) / nearShare *
                          (light.direct.sample(met, i) - irradiance.ofSources[*hit]);
     }
+}
+
+glm::vec3 FinalGather::sampleCarried(const Receiver& at, const glm::vec2& u) const {
+    const auto hit = visibility.firstHit(at.side, *at.point, cosineDirection(at.normal, u));
+    return hit ? emission[*hit] : world;
 }
 
 bool FinalGather::isNear(const Receiver& receiver) const {
@@ -219,7 +229,7 @@ bool FinalGather::isNear(const Receiver& receiver) const {
 }
 
 float FinalGather::width(uint32_t side) const {
-    return std::sqrt(surfaces.patches.area[patchOf(side)]);
+    return std::sqrt(clusters.patches().area[patchOf(clusters.sideOf(side))]);
 }
 
 std::vector<bool> FinalGather::isWanted(const InstanceRange& range, const SmoothRegions& regions,

@@ -14,10 +14,10 @@
 //   another surface is nearer than patches are wide and the face has too few patches to show
 //   whether it differs. Elsewhere the interpolation is more accurate than rays, whose noise differs
 //   from point to point.
-// - If the distance of the surface that a ray meets is less than the width of the patch there, the
-//   light of the sources is sampled at the end of the ray. The mean over the patch is not the light
-//   that shines into a narrow gap. With more than four sources, only some of these rays sample
-//   them, and count for the others.
+// - If the distance of the surface that a ray meets is less than the width of the patch or cluster
+//   there, the light of the sources and of the world is sampled at the end of the ray. The mean
+//   over the patch is not the light that shines into a narrow gap. With more than four sources,
+//   only some of these rays sample them, and count for the others.
 // - The number of rays depends on the error. The receivers of a vertex share one sequence of Sobol
 //   points, so that receivers with the same normal are stratified together. The spread of the parts
 //   of this sequence gives the error.
@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "direct_light/direct_light.h"
+#include "patches/clusters.h"
 #include "patches/lit_surfaces.h"
 #include "reconstruction/least_squares.h"
 #include "reconstruction/smooth_regions.h"
@@ -49,8 +50,9 @@ class FinalGather {
     // set. `irradiance` is that of `light`, or a sharper version of it. `meanLight` is the RMS of
     // this light over all baked sides, W/m^2. `targetError` is the relative error that is allowed.
     // References must outlive the object.
-    FinalGather(const LitSurfaces& surfaces, const Visibility& visibility, const SetLight& light,
-                const Irradiance& irradiance, float meanLight, float targetError);
+    FinalGather(const LitSurfaces& surfaces, const Visibility& visibility, const Clusters& clusters,
+                const SetLight& light, const Irradiance& irradiance, float meanLight,
+                float targetError);
 
     // Returns the argument of the constructor.
     float meanLight() const { return mean; }
@@ -108,11 +110,16 @@ class FinalGather {
   private:
     void addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
                  uint32_t count, Light& sum) const;
-    // Returns the square root of the area of a side's patch, m.
+    // Returns an estimate by one ray of the irradiance at a point from the world and from emission
+    // that is not a source, W/m^2. `u` holds two random numbers.
+    glm::vec3 sampleCarried(const Receiver& at, const glm::vec2& u) const;
+    // Returns the square root of the area over which the light of a side is known, m: that of its
+    // patch or cluster.
     float width(uint32_t side) const;
 
     const LitSurfaces surfaces;
     const Visibility& visibility;
+    const Clusters& clusters;
     const SetLight& light;
     const Irradiance& irradiance;
     const std::vector<glm::vec3>& emission;  // per side, without sources, W/m^2

@@ -22,9 +22,9 @@ NodeGather::NodeGather(const ReconstructionInput& input, const std::vector<Insta
         const double mean = meanLight(input.scene, surfaces, ranges, light.irradiance);
         if (!(mean > 0)) continue;
         sharp[k] = sharpened(k);
-        others[k] = std::make_unique<const FinalGather>(surfaces, input.visibility, light,
-                                                        sharp[k] ? *sharp[k] : light.irradiance,
-                                                        float(mean), input.settings.targetError);
+        others[k] = std::make_unique<const FinalGather>(
+            surfaces, input.visibility, input.clusters, light,
+            sharp[k] ? *sharp[k] : light.irradiance, float(mean), input.settings.targetError);
     }
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "job/settings.h"
+#include "patches/clusters.h"
 #include "patches/lit_surfaces.h"
 #include "reconstruction/shown_light.h"
 #include "scene/scene.h"
@@ -17,6 +18,7 @@ namespace raybundle {
 struct ReconstructionInput : LitSurfaces {
     const Scene& scene;
     const Visibility& visibility;
+    const Clusters& clusters;  // of the patches, between which light was exchanged
     const SetLights& lights;
     const ShownLight& shown;
     const Settings& settings;
