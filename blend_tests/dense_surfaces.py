@@ -148,10 +148,12 @@ def print_errors(names: Sequence[str], samples: int) -> None:
                       for bake in errors[gathers]]) for gathers in (False, True))
         row[3], row[6] = (f"{100 * np.sqrt(np.mean(each ** 2)):.1f} %"
                           for each in (single, gathered))
-        ratio = np.sqrt(np.mean(gathered ** 2, axis=0)) / single[0]
+        with np.errstate(divide='ignore', invalid='ignore'):
+            ratio = np.sqrt(np.mean(gathered ** 2, axis=0)) / single[0]
         covered = int(np.sum(gathered <= np.array(stated)))
         held, bakes = held + covered, bakes + gathered.size
-        row += [f"{ratio.max():.2f} ({PROPS[int(ratio.argmax())]})", f"{covered}/{gathered.size}"]
+        worst = int(np.nanargmax(ratio))
+        row += [f"{ratio[worst]:.2f} ({PROPS[worst]})", f"{covered}/{gathered.size}"]
         print("| " + " | ".join(row) + " |", flush=True)
     print(f"\nThe stated error holds in {held} of {bakes} cases.")
 

@@ -58,6 +58,24 @@ TEST(IrradianceCache, FollowsLinearLight) {
     }
 }
 
+TEST(IrradianceCache, HasTheSlopeOfLightAmongRecordsOfAnyReach) {
+    IrradianceCache cache(kFar);
+    auto value = [](float x, float y) { return 2 + x - 0.5f * y; };
+    int count = 0;
+    for (float x = -1; x < 1.001f; x += 0.1f)
+        for (float y = -1; y < 1.001f; y += 0.1f)
+            cache.add(onPlane(x, y, ++count % 2 ? 0.5f : 1.2f), lightOf(value(x, y)));
+    cache.update(false);
+    for (float x : {-0.31f, 0.03f, 0.47f}) {
+        const CachePlace place = onPlane(x, 0.7f * x);
+        EXPECT_NEAR(double(cache.at(place).total().x), double(value(x, 0.7f * x)), 0.003);
+        const glm::vec3 off(0.05f, -0.04f, 0.0f);
+        const double slope = double(cache.at(place, off).total().x - cache.at(place).total().x);
+        // The weight of even light pulls the slope by 6 %.
+        EXPECT_NEAR(slope, 0.07, 0.1 * 0.07) << x;
+    }
+}
+
 TEST(IrradianceCache, FollowsLightThatTurnsWithTheNormal) {
     // A ball under a sky that brightens towards the zenith: light 1 + z of the normal.
     IrradianceCache cache(kFar);

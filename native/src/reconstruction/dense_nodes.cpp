@@ -173,10 +173,8 @@ void DenseNodes::addReceivers(size_t instance) {
             }
         }
     }
-    own.gathersAll = true;
-    for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
-        for (const int32_t corner : input.patches.cells[c].corner)
-            if (corner >= 0 && receiverAt(instance, corner) == kNone) own.gathersAll = false;
+    own.isAllDense =
+        std::find(faces.isOther.begin(), faces.isOther.end(), true) == faces.isOther.end();
 }
 
 std::vector<ReceiverPair> DenseNodes::neighbours(size_t instance) const {

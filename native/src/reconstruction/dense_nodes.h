@@ -34,7 +34,7 @@ class DenseNodes {
     struct OfInstance {
         uint32_t first = 0, last = 0;      // its receivers are first to last - 1
         std::vector<uint32_t> receiverOf;  // per node; kNone if the node gathers nothing
-        bool gathersAll = false;           // whether no node is without a receiver
+        bool isAllDense = false;           // whether all of its faces are dense
 
         bool isEmpty() const { return first == last; }
     };

@@ -15,7 +15,9 @@ constexpr float kOffCorner = 1e-4f;
 }  // namespace
 
 void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const ShownLight& shown,
-                   const SetLight& light, float targetError, NodeLight& nodes) {
+                   const LightOfSources& sources, float targetError,
+                   const std::vector<bool>& isKept, NodeLight& nodes) {
+    const SetLight& light = sources.light;
     if (light.direct.lightSources().empty()) return;
     const InstanceRange& range = surface.range;
     const SmoothRegions& regions = surface.regions;
@@ -40,14 +42,14 @@ void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const Sh
         const glm::vec3 middle =
             cell.position(0) + (cell.isTriangle() ? 1 / 3.0f : 0.5f) * (cell.a + cell.b);
         forEachNode(cell, [&](int k, uint32_t node) {
-            isAlone = isAlone && cells[node] == 1;
+            isAlone = isAlone && cells[node] == 1 && (isKept.empty() || !isKept[node]);
             points[count] = glm::mix(cell.position(k), middle, kOffCorner);
             own[count++] = node;
         });
         const uint32_t at = 2 * parent.firstPatch + uint32_t(surface.side);
-        const glm::vec3 ofSources = light.irradiance.ofSources[at];
+        const glm::vec3 arriving = sources.arriving[at];
         // On translucent patches the slopes of the light on both sides would be needed.
-        if (!isAlone || ofSources == glm::vec3(0.0f) ||
+        if (!isAlone || arriving == glm::vec3(0.0f) ||
             patches.translucenceOf(at) != glm::vec3(0.0f))
             continue;
         // Slopes that are small compared with the target error are left out.
@@ -58,7 +60,7 @@ void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const Sh
         for (size_t k = 0; k < count; ++k)
             values[k] = glm::max(mean + (values[k] - mean) / (1 - kOffCorner), 0.0f);
         for (int c = 0; c < 3; ++c)
-            if (mean[c] > 0) share[c] = std::min(1.0f, ofSources[c] / mean[c]);
+            if (mean[c] > 0) share[c] = std::min(1.0f, arriving[c] / mean[c]);
         for (size_t k = 0; k < count; ++k) {
             glm::vec3 &direct = nodes.direct[own[k]], &exitance = nodes.exitance[own[k]];
             const glm::vec3 flat = direct;

@@ -17,12 +17,21 @@
 
 namespace raybundle {
 
+// The light whose slopes are added, and per side its irradiance by sources, W/m^2. References must
+// outlive the object.
+struct LightOfSources {
+    const SetLight& light;
+    const std::vector<glm::vec3>& arriving;
+};
+
 // Adds to each node of a face that has only one patch and shares no node with other faces the
 // difference between the direct light at the node and its mean over the face. The difference is
 // added to the direct irradiance, and multiplied by the shown reflectance (ShownLight::color) to
 // the exitance. `targetError` is relative; sources whose light changes by less than a quarter of it
-// over the patch get no slope. `nodes` is per node of `surface.regions`, W/m^2.
+// over the patch get no slope. Nodes for which `isKept` (per node; empty: none) is true keep their
+// light. `nodes` is per node of `surface.regions`, W/m^2.
 void addFaceSlopes(const Patches& patches, const InstanceSide& surface, const ShownLight& shown,
-                   const SetLight& light, float targetError, NodeLight& nodes);
+                   const LightOfSources& sources, float targetError,
+                   const std::vector<bool>& isKept, NodeLight& nodes);
 
 }  // namespace raybundle

@@ -38,6 +38,9 @@ struct InstanceLight : CornerLight {
     // For sparse results that corners gathered: the noise of the rays of these corners, relative to
     // the RMS of the light. Otherwise empty.
     std::optional<float> gatheredNoise{};
+    // If gatheredNoise is set: the error of light that was gathered at some places and interpolated
+    // at others, relative to the RMS of the light.
+    float gatheredSurplus = 0;
 
     // Return an output of the light of all sources or of the given light, per vertex, W/(m^2 sr).
     // The value is the mean of the vertex's corners, weighted by their angles; 0 if the vertex has

@@ -21,8 +21,10 @@ constexpr float kLeastReach = 0x1p-14f;
 // used.
 constexpr float kAlongNormal = 4;
 // Weight of the assumption that light does not vary, relative to the weight of all records. It
-// decides where there are too few records to tell, or where position and normal vary together.
-constexpr double kEven = 0.05;
+// decides where there are too few records to tell, or where position and normal vary together. With
+// a weight of 0.05, the slopes were half as steep as the light, and the errors of four props in
+// three scenes 1.1 to 1.7 times as large.
+constexpr double kEven = 0.003;
 // More records than this around a place gain nothing, so that their reach is shortened.
 constexpr double kMostAround = 24;
 // A record reaches kShorter times as far as before if the mean squared difference around it exceeds
@@ -99,40 +101,50 @@ void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit)
     }
 }
 
-// The light at a place is the constant part of a linear function of position and normal in the
-// plane of the place, fitted to the records around it. The light is therefore a sum of the light of
+// The light near a place is a linear function of position and normal in the plane of the place,
+// fitted to the records around it. The light is therefore a sum of the light of
 // the records, with factors that add up to 1.
-CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t without) const {
+CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t without,
+                                         const glm::vec3& off) const {
     constexpr int kTerms = 5;
     using Terms = Eigen::Matrix<double, kTerms, 1>;
-    const auto [x, y] = frame(place.normal);
-    auto termsOf = [&, x = x, y = y](const Record& record) {
-        const glm::vec3 off = (record.place.position - place.position) / record.reach;
-        const glm::vec3 turn = record.place.normal / record.angle;
-        Terms terms;
-        terms << 1, double(glm::dot(off, x)), double(glm::dot(off, y)), double(glm::dot(turn, x)),
-            double(glm::dot(turn, y));
-        return terms;
-    };
-    Eigen::Matrix<double, kTerms, kTerms> matrix = Eigen::Matrix<double, kTerms, kTerms>::Zero();
-    double sum = 0;
     struct Around {
         uint32_t record;
         float weight;
     };
     std::vector<Around> around;
+    double sum = 0;
+    float reach = 0, angle = 0;
     forEachAround(place, [&](uint32_t k, float weight) {
         if (k == without) return;
         around.push_back({k, weight});
-        const Terms terms = termsOf(records[k]);
-        matrix += double(weight) * terms * terms.transpose();
         sum += double(weight);
+        reach += weight * records[k].reach;
+        angle += weight * records[k].angle;
     });
     CachedLight light;
     light.variance = INFINITY;
     if (!(sum > 0)) return light;
+    // The terms are relative to what the records reach, so that kEven weighs all of them alike.
+    reach /= float(sum);
+    angle /= float(sum);
+    const auto [x, y] = frame(place.normal);
+    auto termsAt = [&, x = x, y = y](const glm::vec3& from, const glm::vec3& normal) {
+        Terms terms;
+        terms << 1, double(glm::dot(from, x) / reach), double(glm::dot(from, y) / reach),
+            double(glm::dot(normal, x) / angle), double(glm::dot(normal, y) / angle);
+        return terms;
+    };
+    auto termsOf = [&](const Record& record) {
+        return termsAt(record.place.position - place.position, record.place.normal);
+    };
+    Eigen::Matrix<double, kTerms, kTerms> matrix = Eigen::Matrix<double, kTerms, kTerms>::Zero();
+    for (const auto [k, weight] : around) {
+        const Terms terms = termsOf(records[k]);
+        matrix += double(weight) * terms * terms.transpose();
+    }
     for (int k = 1; k < kTerms; ++k) matrix(k, k) += kEven * sum;
-    const Terms solution = matrix.ldlt().solve(Terms::Unit(0));
+    const Terms solution = matrix.ldlt().solve(termsAt(off, place.normal));
     light.variance = 0;
     for (const auto [k, weight] : around) {
         const double factor = double(weight) * solution.dot(termsOf(records[k]));

@@ -58,8 +58,11 @@ class IrradianceCache {
     // of records around which others do not predict the light.
     void update(bool compares);
 
-    // Returns the light at a place. Its variance is infinite if no record reaches the place.
-    CachedLight at(const CachePlace& place) const { return interpolate(place, kNone); }
+    // Returns the light at a place, or at a point off the place in its plane, m. Its variance is
+    // infinite if no record reaches the place.
+    CachedLight at(const CachePlace& place, const glm::vec3& off = glm::vec3(0.0f)) const {
+        return interpolate(place, kNone, off);
+    }
 
     size_t count() const { return records.size(); }
 
@@ -79,8 +82,9 @@ class IrradianceCache {
     struct CellHash {
         size_t operator()(const Cell& cell) const;
     };
-    // Returns the light at a place from all records but one, or from all (kNone).
-    CachedLight interpolate(const CachePlace& place, uint32_t without) const;
+    // Returns the light off a place from all records but one, or from all (kNone).
+    CachedLight interpolate(const CachePlace& place, uint32_t without,
+                            const glm::vec3& off = glm::vec3(0.0f)) const;
     // Returns the weight of a record at a place, 0 to 1. `ownReach` is reachOf(place).
     float weightOf(const Record& record, const CachePlace& place, float ownReach) const;
     float reachOf(const CachePlace& place) const;

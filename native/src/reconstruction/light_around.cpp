@@ -17,6 +17,11 @@ namespace {
 constexpr float kRecordError = 2;
 // The first round looks at one of this many receivers, but at least at kFewestFirst.
 constexpr size_t kFirstShare = 64, kFewestFirst = 16;
+// One of kTestedShare receivers is tested (see surplus()), but at least kFewestTested and at most
+// kMostTested.
+constexpr size_t kTestedShare = 32, kFewestTested = 16, kMostTested = 64;
+// The surplus is above the mean of the tests by this many standard deviations of the mean.
+constexpr double kSureSurplus = 2;
 // No record reaches further than this many edges of tiles.
 constexpr float kReachOfTile = 4;
 // An object whose light is below this share of that of the scene is judged as if it had that much.
@@ -79,18 +84,43 @@ std::vector<CachedLight> LightAround::atReceivers() {
     // What the shortened reaches of the last rounds have left without good light.
     addRecords(wanting(order, 0, count), kRecordError);
     cache.update(false);
-    // Records without others around them have too much noise.
-    std::vector<uint8_t> isNoisy(count);
-    parallelFor(size_t(0), size_t(count),
-                [&](size_t n) { isNoisy[n] = !cache.at(placeOf(order[n])).isGood(); });
-    Receivers noisy;
-    for (size_t n = 0; n < count; ++n)
-        if (isNoisy[n]) noisy.push_back(order[n]);
-    addRecords(noisy, 1);
-    cache.update(false);
     std::vector<CachedLight> result(count);
-    parallelFor(uint32_t(0), count, [&](uint32_t r) { result[r] = cache.at(placeOf(r)); });
+    auto interpolate = [&] {
+        parallelFor(uint32_t(0), count, [&](uint32_t r) { result[r] = cache.at(placeOf(r)); });
+    };
+    interpolate();
+    // Records without others around them have too much noise.
+    Receivers noisy;
+    for (const uint32_t r : order)
+        if (!result[r].isGood()) noisy.push_back(r);
+    if (!noisy.empty()) {
+        addRecords(noisy, 1);
+        cache.update(false);
+        interpolate();
+    }
+    measureSurplus(order, result);
     return result;
+}
+
+// The places were looked at in random order, so that the last ones are a random sample.
+void LightAround::measureSurplus(const Receivers& order, const std::vector<CachedLight>& shown) {
+    const size_t wanted = std::clamp(count / kTestedShare, kFewestTested, kMostTested);
+    const Receivers tested(order.end() - std::ptrdiff_t(std::min(wanted, order.size())),
+                           order.end());
+    const std::vector<CachedLight> found = gatherAt(tested, 1);
+    double sum = 0, squares = 0;
+    for (size_t n = 0; n < tested.size(); ++n) {
+        if (isRecord[tested[n]]) continue;  // what is shown has mostly been gathered here
+        const CachedLight& own = shown[tested[n]];
+        const glm::vec3 difference = own.total() - found[n].total();
+        const double surplus =
+            double(glm::dot(difference, difference)) / 3 - own.variance - found[n].variance;
+        sum += surplus;
+        squares += surplus * surplus;
+    }
+    const double number = double(tested.size()), mean = sum / number;
+    const double deviation = std::sqrt(std::max(0.0, squares / number - mean * mean) / number);
+    squaredSurplus = std::max(0.0, mean + kSureSurplus * deviation);
 }
 
 LightAround::Receivers LightAround::wanting(const Receivers& order, size_t begin,
@@ -110,16 +140,21 @@ LightAround::Receivers LightAround::wanting(const Receivers& order, size_t begin
 }
 
 void LightAround::addRecords(const Receivers& these, float laxity) {
-    if (these.empty()) return;
-    std::vector<Gathered> surrounding(these.size());
-    if (isSurrounded) surrounding = gatherSurrounding(these, laxity);
-    std::vector<CachedLight> found(these.size());
-    parallelFor(size_t(0), these.size(),
-                [&](size_t n) { found[n] = gatherAt(these[n], surrounding[n], laxity); });
+    const std::vector<CachedLight> found = gatherAt(these, laxity);
     for (size_t n = 0; n < these.size(); ++n) {
         cache.add(placeOf(these[n]), found[n]);
         isRecord[these[n]] = true;
     }
+}
+
+std::vector<CachedLight> LightAround::gatherAt(const Receivers& these, float laxity) {
+    std::vector<CachedLight> found(these.size());
+    if (these.empty()) return found;
+    std::vector<Gathered> surrounding(these.size());
+    if (isSurrounded) surrounding = gatherSurrounding(these, laxity);
+    parallelFor(size_t(0), these.size(),
+                [&](size_t n) { found[n] = gatherAt(these[n], surrounding[n], laxity); });
+    return found;
 }
 
 std::vector<Gathered> LightAround::gatherSurrounding(const Receivers& these, float laxity) {
@@ -147,7 +182,13 @@ CachedLight LightAround::gatherAt(uint32_t r, const Gathered& surrounding, float
     result.surrounding =
         input.shown.byAngle(at.side, surrounding.meanAngles()) * surrounding.irradiance;
     result.open = rest.open;
-    result.variance = rest.variance + double(surrounding.variance);
+    // That of the brightest channel. Noise has the colour of the light.
+    const double brightestPart = double(brightest(surrounding.irradiance));
+    const double inChannels =
+        brightestPart > 0 ? double(glm::dot(surrounding.irradiance, surrounding.irradiance)) / 3 /
+                                (brightestPart * brightestPart)
+                          : 1;
+    result.variance = rest.variance + inChannels * double(surrounding.variance);
     result.allowed =
         std::pow(double(finalGather.allowedError(at, brightness)), 2) * (isSurrounded ? 2 : 1);
     return result;

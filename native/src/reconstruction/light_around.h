@@ -35,6 +35,18 @@ class LightAround {
     // DenseNodes::OfInstance::first.
     std::vector<CachedLight> atReceivers();
 
+    // Returns the light at a point in the plane of a receiver, m, relative to Patches::centre. Its
+    // variance is infinite if it is not known. Only after atReceivers().
+    CachedLight at(uint32_t r, const glm::vec3& position) const {
+        return cache.at(placeOf(r), position - nodes.position(own.first + r));
+    }
+
+    // Returns the mean over the receivers of the squared difference between interpolated light and
+    // the light there, without noise, mean over the channels, (W/m^2)^2. It is measured by
+    // gathering at some of the receivers, and is so large that it is too small in one of 40 cases
+    // if what single receivers tell is normally distributed. Only after atReceivers().
+    double surplus() const { return squaredSurplus; }
+
     size_t recordCount() const { return cache.count(); }
     uint64_t shadowRays() const { return rays; }  // cast so far
 
@@ -47,6 +59,10 @@ class LightAround {
     float darkestLight() const;
     // Makes records of these receivers, with `laxity` times the usual error.
     void addRecords(const Receivers& these, float laxity);
+    // Sets surplus(). `shown` is per receiver.
+    void measureSurplus(const Receivers& order, const std::vector<CachedLight>& shown);
+    // Return what receivers gather, with `laxity` times the usual error.
+    std::vector<CachedLight> gatherAt(const Receivers& these, float laxity);
     std::vector<Gathered> gatherSurrounding(const Receivers& these, float laxity);
     CachedLight gatherAt(uint32_t r, const Gathered& surrounding, float laxity) const;
     // Returns those of order[begin] to order[end - 1] that are no records and whose interpolated
@@ -65,6 +81,7 @@ class LightAround {
     std::vector<FinalGather::Probe> probes;  // per receiver
     std::vector<bool> isRecord;              // per receiver
     IrradianceCache cache;
+    double squaredSurplus = 0;  // see surplus()
     uint64_t rays = 0;
 };
 

@@ -2,6 +2,8 @@
 #include "reconstruction/node_gather.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "job/cancellation.h"
 #include "patches/side.h"
@@ -22,9 +24,9 @@ NodeGather::NodeGather(const ReconstructionInput& input, const std::vector<Insta
         const double mean = meanLight(input.scene, surfaces, ranges, light.irradiance);
         if (!(mean > 0)) continue;
         sharp[k] = sharpened(k);
-        others[k] = std::make_unique<const FinalGather>(
-            surfaces, input.visibility, input.clusters, light,
-            sharp[k] ? *sharp[k] : light.irradiance, float(mean), input.settings.targetError);
+        others[k] = std::make_unique<const FinalGather>(surfaces, input.visibility, input.clusters,
+                                                        light, irradiance(k), float(mean),
+                                                        input.settings.targetError);
     }
 }
 
@@ -101,25 +103,30 @@ NodeGather::Outcome NodeGather::replace(size_t instance, size_t k,
     Outcome outcome;
     const DenseNodes::OfInstance& own = nodes[instance];
     if (own.isEmpty()) return outcome;
+    std::optional<LightAround> gather;
     std::vector<CachedLight> around(own.last - own.first);
     if (others[k]) {
-        LightAround gather(input, input.lights[k], *others[k], nodes, instance, lamps[k].arriving);
-        around = gather.atReceivers();
-        outcome.interpolated = around.size() - gather.recordCount();
-        rays += gather.shadowRays();
+        gather.emplace(input, input.lights[k], *others[k], nodes, instance, lamps[k].arriving);
+        around = gather->atReceivers();
+        outcome.interpolated = around.size() - gather->recordCount();
+        rays += gather->shadowRays();
     }
     // The colour and the emission of the faces around each node, weighted by angle.
     const size_t count = own.receiverOf.size();
-    std::vector<glm::vec3> color(count, glm::vec3(0.0f)), emitted(count, glm::vec3(0.0f));
+    std::vector<glm::vec3> color(count, glm::vec3(0.0f)), emitted(count, glm::vec3(0.0f)),
+        where(count);
     std::vector<float> weight(count, 0.0f);
     const InstanceRange& range = ranges[instance];
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         const Parent& parent = input.patches.parents[p];
         const uint32_t side =
             sideOf(parent.firstPatch, uint32_t(input.scene.instances[instance].side));
-        for (const int32_t corner : input.patches.cells[parent.cell].corner) {
+        const Cell& cell = input.patches.cells[parent.cell];
+        for (int c = 0; c < 4; ++c) {
+            const int32_t corner = cell.corner[size_t(c)];
             if (corner < 0) continue;
             const uint32_t node = regions[instance].nodeOf[size_t(corner)];
+            where[node] = cell.position(c);
             const float angle = std::max(cornerAngles[size_t(corner)], 1e-6f);
             color[node] += angle * input.shown.color()[side];
             emitted[node] += angle * emission[side];
@@ -130,7 +137,10 @@ NodeGather::Outcome NodeGather::replace(size_t instance, size_t k,
     for (size_t node = 0; node < count; ++node) {
         const uint32_t receiver = own.receiverOf[node];
         if (receiver == DenseNodes::kNone) continue;
-        const CachedLight& rest = around[receiver - own.first];
+        // The nodes of a face that gathers in its middle get the slope of the light over it.
+        const CachedLight rest = gather && nodes.isWholeFace(receiver)
+                                     ? gather->at(receiver - own.first, where[node])
+                                     : around[receiver - own.first];
         const glm::vec3 share =
             everywhere.empty() ? glm::vec3(1.0f) : everywhere[nodes.receivers()[receiver].side];
         glm::vec3 &direct = light.direct[node], &indirect = light.indirect[node];
@@ -140,7 +150,17 @@ NodeGather::Outcome NodeGather::replace(size_t instance, size_t k,
         ++outcome.nodes;
         outcome.noise += 3 * (double(lamps[k].variance[receiver]) + rest.variance);
     }
+    if (gather) outcome.surplus = 3 * gather->surplus() * double(outcome.nodes);
     return outcome;
+}
+
+std::vector<bool> NodeGather::gatheredThemselves(size_t instance) const {
+    const std::vector<uint32_t>& receiverOf = nodes[instance].receiverOf;
+    std::vector<bool> result(receiverOf.size());
+    for (size_t node = 0; node < result.size(); ++node)
+        result[node] =
+            receiverOf[node] != DenseNodes::kNone && !nodes.isWholeFace(receiverOf[node]);
+    return result;
 }
 
 }  // namespace raybundle

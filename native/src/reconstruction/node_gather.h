@@ -35,21 +35,31 @@ class NodeGather {
                const std::vector<bool>& isDense, const std::vector<SmoothRegions>& regions,
                const LitSurfaces& surfaces, const Progress& progress);
 
-    // Returns whether all nodes of an instance gather.
-    bool gathersAll(size_t instance) const { return nodes[instance].gathersAll; }
+    // Returns whether all faces of an instance are dense.
+    bool isAllDense(size_t instance) const { return nodes[instance].isAllDense; }
 
     // What replace() has done.
     struct Outcome {
         size_t nodes = 0;         // nodes that got gathered light
         size_t interpolated = 0;  // places whose light from around was interpolated
-        double noise = 0;  // sum over these nodes of the variance of their light, summed over RGB,
-                           // (W/m^2)^2
+        // Sums over these nodes, of squares summed over RGB, (W/m^2)^2: the variance of their
+        // light, and its error by interpolation.
+        double noise = 0, surplus = 0;
     };
     // Replaces the light of entry `k` of ReconstructionInput::lights at the dense nodes of an
     // instance. `cornerAngles` is per corner of the mesh, radians. `emission` is per side, exitance
     // of the light, W/m^2. Different instances may be replaced at once.
     Outcome replace(size_t instance, size_t k, const std::vector<float>& cornerAngles,
                     const std::vector<glm::vec3>& emission, NodeLight& light) const;
+
+    // Returns the irradiance that entry `k` of ReconstructionInput::lights gives to the patches,
+    // with the light of lamps on dense faces as their nodes got it, if that is known.
+    const Irradiance& irradiance(size_t k) const {
+        return sharp[k] ? *sharp[k] : input.lights[k].irradiance;
+    }
+    // Returns per node of an instance whether light was gathered at the node itself, and not in the
+    // middle of its face.
+    std::vector<bool> gatheredThemselves(size_t instance) const;
 
     // Returns the number of shadow rays cast so far.
     uint64_t shadowRays() const { return rays; }

@@ -210,11 +210,13 @@ class InstanceReconstruction {
         out.vertexCount = mesh.vertices.size();
         out.cornerAngles = cornerAngles(mesh);
         if (!gathers[i] && !isDense[i]) regionsOf[i] = findRegions(i);
-        const double noise = addLight(i, out);
+        const GatheredErrors errors = addLight(i, out);
         regionsOf[i] = {};
         if (isSparse(i) || isDense[i])
-            if (const double signal = meanSquare(instance, out); signal > 0)
-                out.gatheredNoise = float(std::sqrt(noise / signal));
+            if (const double signal = meanSquare(instance, out); signal > 0) {
+                out.gatheredNoise = float(std::sqrt(errors.noise / signal));
+                out.gatheredSurplus = float(std::sqrt(errors.surplus / signal));
+            }
         if (out.isBaked && isInsideOut(input.patches, ranges[i], instance.side, onSides)) {
             said.status = "baked; no light on this side";
             warnings[i] = {WarningId::NO_LIGHT_ON_SIDE,
@@ -247,6 +249,11 @@ class InstanceReconstruction {
     }
     bool isSparse(size_t i) const { return gathers[i] && atCorners->isSparse(i); }
 
+    // Mean squares of the errors of the light that corners gathered, summed over RGB, (W/m^2)^2; 0
+    // if they gathered none: of its noise, and of its interpolation.
+    struct GatheredErrors {
+        double noise = 0, surplus = 0;
+    };
     // The light that is reconstructed at the nodes of an instance.
     struct AtNodes {
         std::vector<NodeLight> lights;  // per light
@@ -254,26 +261,25 @@ class InstanceReconstruction {
         // shown of light from everywhere (empty: all of it).
         Field color, shownShare;
     };
-    // Computes the light of all light sets at the corners of an instance. Returns the mean square
-    // of the noise of the light that its corners gathered, summed over RGB, (W/m^2)^2; 0 if they
-    // gathered none.
-    double addLight(size_t i, InstanceLight& out) {
+    // Computes the light of all light sets at the corners of an instance. Returns the errors of the
+    // light that its corners gathered.
+    GatheredErrors addLight(size_t i, InstanceLight& out) {
         const InstanceSide surface{ranges[i], regionsOf[i], input.scene.instances[i].side};
         AtNodes nodes = fitted(i, surface);
-        double noise = 0;
+        GatheredErrors errors;
         for (size_t k = 0; k < nodes.lights.size(); ++k) {
             NodeLight& light = nodes.lights[k];
-            if (gathers[i])
-                noise += gather(i, k, out.cornerAngles, nodes);
-            else if (kind.addsSlopes)
-                addFaceSlopes(input.patches, surface, input.shown, input.lights[k],
-                              input.settings.targetError, light);
+            if (gathers[i]) errors.noise += gather(i, k, out.cornerAngles, nodes);
             if (isDense[i]) {
                 const NodeGather::Outcome outcome =
                     atNodes->replace(i, k, out.cornerAngles, onSides[k].emission, light);
-                if (outcome.nodes > 0) noise += outcome.noise / double(outcome.nodes);
+                if (outcome.nodes > 0) {
+                    errors.noise += outcome.noise / double(outcome.nodes);
+                    errors.surplus += outcome.surplus / double(outcome.nodes);
+                }
                 interpolated += outcome.interpolated;
             }
+            if (!gathers[i] && kind.addsSlopes) addSlopes(i, k, surface, light);
             CornerLight atCorner = cornerLight(regionsOf[i], light);
             if (k == 0)
                 static_cast<CornerLight&>(out) = std::move(atCorner);
@@ -281,7 +287,15 @@ class InstanceReconstruction {
                 out.sets.push_back(std::move(atCorner));
         }
         for (const CornerLight& light : out.sets) out.add(light);
-        return noise;
+        return errors;
+    }
+
+    void addSlopes(size_t i, size_t k, const InstanceSide& surface, NodeLight& light) const {
+        const Irradiance& irradiance =
+            isDense[i] ? atNodes->irradiance(k) : input.lights[k].irradiance;
+        addFaceSlopes(input.patches, surface, input.shown, {input.lights[k], irradiance.ofSources},
+                      input.settings.targetError,
+                      isDense[i] ? atNodes->gatheredThemselves(i) : std::vector<bool>(), light);
     }
 
     // Returns the light at the nodes of an instance, reconstructed from the light of the patches.
@@ -305,9 +319,10 @@ class InstanceReconstruction {
         if (gathers[i]) fields.add(input.shown.color(), nodes.color);
         if (gathers[i] && !input.shown.everywhere().empty())
             fields.add(input.shown.everywhere(), nodes.shownShare);
-        // With sparse results, only the few corners that cannot gather show the light of patches.
+        // With sparse results, and on dense faces, only the few corners that cannot gather show the
+        // light of patches.
         const auto fit =
-            isSparse(i) || (isDense[i] && atNodes->gathersAll(i)) ? byAreaAverage : kind.fit;
+            isSparse(i) || (isDense[i] && atNodes->isAllDense(i)) ? byAreaAverage : kind.fit;
         LeastSquaresFit result =
             fit({input.patches, outside}, surface, input.settings, fields.ofSides());
         fields.put(std::move(result.fields));

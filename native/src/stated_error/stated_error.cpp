@@ -236,7 +236,11 @@ class InstanceErrors {
                 const double known = double(whole.smooth - beyond.smooth) +
                                      std::max(0.0, double(whole.step - beyond.step));
                 if (isGathered(at))
-                    body(at, weight, cell, w, 0.0, Surplus{true, 0, 0});
+                    body(at, weight, cell, w, 0.0,
+                         Surplus{true,
+                                 light.gatheredSurplus * light.gatheredSurplus *
+                                     float(square(lightAt(at))),
+                                 0});
                 else
                     body(at, weight, cell, w, square(shown - lightAt(at)) + known, beyond);
             }

@@ -42,8 +42,9 @@ struct SideErrors {
 // If the directions of bundles are independent, the errors of all objects are correlated: all get
 // too much light, or all too little. The halves then give only a single sample, and no object is
 // stated to have less noise than the whole scene.
-// Gathered sparse results (InstanceLight::gatheredNoise) are the light at points, whose only error
-// is noise.
+// Results that corners gathered (InstanceLight::gatheredNoise) are the light at points. Their
+// errors are noise and, where light was interpolated between places that gather, the error of this
+// interpolation (InstanceLight::gatheredSurplus), which counts as discretisation.
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
                  const SideErrors& sides, const Settings& settings,
                  std::vector<InstanceLight>& light, Report& report);
