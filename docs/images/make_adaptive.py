@@ -14,18 +14,18 @@ import tempfile
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scenes")]
+sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scenes"), str(Path(__file__).parent)]
 sys.dont_write_bytecode = True
 
 import attribute_picture  # noqa: E402
 import raybundle  # noqa: E402
 from build import cube_on_plane  # noqa: E402
+from picture_row import save_row  # noqa: E402
 
 ATTRIBUTE = "Radiosity"
-WIDTH, HEIGHT, GAP = 400, 340, 4  # pixels
+WIDTH, HEIGHT = 400, 340  # pixels
 EDGE = 0.012  # m
 
 
@@ -50,27 +50,14 @@ def draw(topology: str, path: Path) -> None:
     attribute_picture.render(bpy.context, baked, ATTRIBUTE, path)
 
 
-def pixels(path: Path) -> np.ndarray:
-    """Returns (HEIGHT, WIDTH, 4), bottom row first."""
-    image = bpy.data.images.load(str(path))
-    values = np.empty(WIDTH * HEIGHT * 4, np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(HEIGHT, WIDTH, 4)
-
-
 def main(out: Path) -> None:
     raybundle.register()
-    parts = []
     with tempfile.TemporaryDirectory() as folder:
+        pictures = []
         for topology in ('KEEP', 'SUBDIVIDE', 'ADAPTIVE'):
-            path = Path(folder) / f"{topology}.png"
-            draw(topology, path)
-            parts += [pixels(path), np.ones((HEIGHT, GAP, 4), np.float32)]
-    sheet = np.concatenate(parts[:-1], axis=1)
-    image = bpy.data.images.new("Topologies", sheet.shape[1], HEIGHT)
-    image.pixels.foreach_set(np.ascontiguousarray(sheet).ravel())
-    image.filepath_raw, image.file_format = str(out), 'PNG'
-    image.save()
+            pictures.append(Path(folder) / f"{topology}.png")
+            draw(topology, pictures[-1])
+        save_row(pictures, out)
 
 
 if __name__ == "__main__":
