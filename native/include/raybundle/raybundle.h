@@ -501,7 +501,8 @@ typedef enum rb_stage RB_INT {
 /* Reports the progress of a bake. The library calls it in the thread that runs rb_execute_bake,
  * with the finished share of a stage (0 to 1), whenever the share changes and every 20 ms. `user`
  * is the pointer given to rb_set_bake_progress. Return false to cancel: the bake then ends within
- * about 10 ms at any point, or about 100 ms in a scene of 300,000 faces. */
+ * about 10 ms at any point, or about 100 ms in a scene of 300,000 faces. It still succeeds if
+ * nothing was left to do. */
 typedef bool (*rb_progress_function)(void* user, rb_stage stage, double fraction);
 
 /* Sets the progress function of a bake, or removes it if `function` is NULL. `user` is passed on to
