@@ -35,8 +35,8 @@ struct InstanceLight : CornerLight {
     std::vector<float> cornerAngles;  // per corner, radians; weights of the mean at a vertex
     std::vector<CornerLight> sets;    // per light set of the scene
     std::vector<float> error;         // per corner, W/(m^2 sr), see rb_get_corner_error
-    // For sparse results that corners gathered: the noise of the rays of these corners, relative to
-    // the RMS of the light. Otherwise empty.
+    // For light that corners gathered, of sparse results and on dense surfaces: the noise of the
+    // rays of these corners, relative to the RMS of the light. Otherwise empty.
     std::optional<float> gatheredNoise{};
     // If gatheredNoise is set: the error of light that was gathered at some places and interpolated
     // at others, relative to the RMS of the light.
