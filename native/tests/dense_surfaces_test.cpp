@@ -211,21 +211,27 @@ TEST(DenseSurfaces, SeeTheShadowsBelowThem) {
         EXPECT_TRUE(skips(report, SkippedWork::DENSE_NODES));
         const std::vector<glm::vec3> light = cornerLight(*bake, 1, RB_OUTPUT_LIGHTING);
         const Mesh& ball = scene.meshes[1];
+        std::vector<double> exact;  // per vertex
+        for (const glm::vec3& vertex : ball.vertices)
+            exact.push_back(exactUnderBall(glm::normalize(glm::dvec3(vertex))));
         double squares = 0, signal = 0, low = 0, exactLow = 0;
         for (size_t c = 0; c < light.size(); ++c) {
-            const glm::dvec3 normal(ball.cornerNormals[c]);
-            const double exact = exactUnderBall(normal), off = double(light[c].x) * kPi - exact;
+            const double wanted = exact[size_t(ball.cornerVertices[c])];
+            const double off = double(light[c].x) * kPi - wanted;
             squares += off * off;
-            signal += exact * exact;
+            signal += wanted * wanted;
             // Below a height of a tenth of the radius, but not where the ball touches the floor.
-            if (normal.z > -0.9 || normal.z < -0.99) continue;
+            const float up = ball.cornerNormals[c].z;
+            if (up > -0.9f || up < -0.99f) continue;
             low += off;
-            exactLow += exact;
+            exactLow += wanted;
         }
         const double error = std::sqrt(squares / signal);
         // Twice the noise of single nodes, of which there are hundreds here. It was 0.15 while the
         // light of the world was read as the mean over a cluster of the floor.
         EXPECT_NEAR(low / exactLow, 0, 0.02) << isImage;
+        // With a quarter of the faces, the light that is lost below faces at shading normals makes
+        // it 0.016 alone.
         EXPECT_LT(error, 0.015) << isImage;
         // The stated error counts noise and interpolation.
         EXPECT_LT(error, double(report["objects"][1]["error"]["total"])) << isImage;
