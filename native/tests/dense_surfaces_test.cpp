@@ -62,6 +62,34 @@ TEST(DenseSurfaces, AreThoseWithManyFacesSmallerThanTiles) {
     EXPECT_EQ(std::count(fine.isDense.begin(), fine.isDense.end(), true), 0);
 }
 
+// Adds a ball to a mesh, and returns its number of faces.
+size_t addBall(Mesh& mesh, int levels, const glm::vec3& centre) {
+    const Mesh ball = icosphere("", 0.1f, levels, false);
+    const int32_t first = int32_t(mesh.vertices.size()), corners = mesh.faceOffsets.back();
+    for (const glm::vec3& vertex : ball.vertices) mesh.vertices.push_back(centre + vertex);
+    for (const int32_t vertex : ball.cornerVertices) mesh.cornerVertices.push_back(first + vertex);
+    for (size_t f = 1; f < ball.faceOffsets.size(); ++f)
+        mesh.faceOffsets.push_back(corners + ball.faceOffsets[f]);
+    mesh.faceMaterials.insert(mesh.faceMaterials.end(), ball.faceMaterials.begin(),
+                              ball.faceMaterials.end());
+    return ball.faceCount();
+}
+
+TEST(DenseSurfaces, AreSmallOnesBesideLargeOnesOfTheirObject) {
+    Mesh head = icosphere("head", 0.4f, 4, false);
+    const size_t faces = head.faceCount();
+    const size_t eyes = addBall(head, 2, {0.6f, 0, 0}) + addBall(head, 2, {0, 0.6f, 0});
+    addBall(head, 1, {0, 0, 0.6f});  // too small beside the others
+    Scene scene = roomWithBoxes(0.5f);
+    place(scene, head, grey("head", 0.5f), glm::translate(glm::dmat4(1), {3.1, 2.3, 2.0}));
+    place(scene, icosphere("eye", 0.1f, 2, false), grey("eye", 0.5f),
+          glm::translate(glm::dmat4(1), {1, 2.6, 1.7}));
+    const Patches patches = subdivide(scene, 0.2f, 100000);
+    EXPECT_EQ(std::count(patches.isDense.begin(), patches.isDense.end(), true), faces + eyes);
+    for (uint32_t patch = 0; patch < patches.count(); ++patch)
+        EXPECT_TRUE(!patches.isDense[patch] || patches.parentAt(2 * patch).instance == kBall);
+}
+
 // A room with 60 balls of 320 faces, which are too few for a dense surface without need.
 Scene roomWithManyBalls() {
     Scene scene = roomWithBoxes(0.5f);

@@ -32,6 +32,8 @@ constexpr float kCoarser = 1.5f, kCoarsest = 64;
 // Steps by which more surfaces count as dense. Small surfaces come first, larger patches later.
 constexpr Density kDensities[] = {{0.5f, 1000}, {0.5f, 64}, {0.5f, 1}, {1, 1},
                                   {2, 1},       {4, 1},     {8, 1},    {16, 1}};
+// Beside a dense surface of their object, others need only one of this many patches to be dense.
+constexpr size_t kBeside = 8;
 
 // Returns the cell of a unit normal, by the octahedral map with `cells` cells along each edge.
 glm::ivec2 cellOf(const glm::vec3& normal, int cells) {
@@ -247,8 +249,16 @@ std::vector<bool> findDense(const Patches& patches, const Density& density) {
         counts.resize(std::max(counts.size(), surface + 1));
         counts[surface] += isDense[patch];
     }
-    for (uint32_t patch = 0; patch < isDense.size(); ++patch)
-        if (counts[patches.parentAt(2 * patch).surface] < density.fewest) isDense[patch] = false;
+    std::vector<bool> hasDense;  // per instance: whether any of its surfaces is dense by itself
+    for (const Parent& parent : patches.parents) {
+        hasDense.resize(std::max(hasDense.size(), size_t(parent.instance) + 1));
+        if (counts[parent.surface] >= density.fewest) hasDense[parent.instance] = true;
+    }
+    for (uint32_t patch = 0; patch < isDense.size(); ++patch) {
+        const Parent& parent = patches.parentAt(2 * patch);
+        const size_t fewest = density.fewest / (hasDense[parent.instance] ? kBeside : 1);
+        if (counts[parent.surface] < fewest) isDense[patch] = false;
+    }
     return isDense;
 }
 
