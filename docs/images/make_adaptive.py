@@ -20,9 +20,10 @@ sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scenes"), str(Path(__file__).pa
 sys.dont_write_bytecode = True
 
 import attribute_picture  # noqa: E402
+import picture_sheet  # noqa: E402
 import raybundle  # noqa: E402
 from build import cube_on_plane  # noqa: E402
-from picture_row import save_row  # noqa: E402
+from mesh_edges import add_edges  # noqa: E402
 
 ATTRIBUTE = "Radiosity"
 WIDTH, HEIGHT = 400, 340  # pixels
@@ -38,13 +39,7 @@ def draw(topology: str, path: Path) -> None:
     print(topology, sum(len(bpy.data.objects[name].data.vertices) for name in baked), "vertices,",
           f"stated error {100 * report.error['total']:.1f} %")
     for name in baked:
-        edges = bpy.data.objects[name].copy()
-        edges.data = edges.data.copy()
-        while edges.data.color_attributes:
-            edges.data.color_attributes.remove(edges.data.color_attributes[0])
-        bars = edges.modifiers.new("Edges", 'WIREFRAME')
-        bars.thickness, bars.use_even_offset = EDGE, False
-        bpy.context.scene.collection.objects.link(edges)
+        add_edges(bpy.data.objects[name], EDGE)
     render = bpy.context.scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
     attribute_picture.render(bpy.context, baked, ATTRIBUTE, path)
@@ -57,7 +52,7 @@ def main(out: Path) -> None:
         for topology in ('KEEP', 'SUBDIVIDE', 'ADAPTIVE'):
             pictures.append(Path(folder) / f"{topology}.png")
             draw(topology, pictures[-1])
-        save_row(pictures, out)
+        picture_sheet.save(pictures, len(pictures), out)
 
 
 if __name__ == "__main__":

@@ -17,17 +17,17 @@ import time
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "addon"))
+sys.path[:0] = [str(ROOT / "addon"), str(Path(__file__).parent)]
+sys.dont_write_bytecode = True
 
 import attribute_picture  # noqa: E402
+import picture_sheet  # noqa: E402
 import raybundle  # noqa: E402
 
 ATTRIBUTE = "Radiosity"
 SCENES_A_ROW = 2
-GAP = 4  # pixels
 
 
 def open_scene(path: Path, width: int) -> bpy.types.Scene:
@@ -66,30 +66,6 @@ def cycles_picture(path: Path, width: int, samples: int, exposure: float, out: P
     print(f"{path.stem}: Cycles in {time.perf_counter() - started:.0f} s", flush=True)
 
 
-def pixels(path: Path) -> np.ndarray:
-    """Returns the pixels of an image file, (height, width, 4) float32 RGBA as stored, bottom row
-    first."""
-    image = bpy.data.images.load(str(path))
-    values = np.empty(4 * image.size[0] * image.size[1], np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(image.size[1], image.size[0], 4)
-
-
-def write(tiles: list[np.ndarray], path: Path) -> None:
-    height, width = tiles[0].shape[:2]
-    columns = 2 * SCENES_A_ROW
-    rows = -(-len(tiles) // columns)
-    sheet = np.ones((rows * (height + GAP) - GAP, columns * (width + GAP) - GAP, 4), np.float32)
-    for k, tile in enumerate(tiles):
-        row, column = rows - 1 - k // columns, k % columns
-        y, x = row * (height + GAP), column * (width + GAP)
-        sheet[y:y + height, x:x + width, :3] = tile[:, :, :3]
-    image = bpy.data.images.new("sheet", sheet.shape[1], sheet.shape[0])
-    image.pixels.foreach_set(sheet.ravel())
-    image.filepath_raw, image.file_format = str(path), 'JPEG'
-    image.save()
-
-
 def main() -> None:
     names = sorted(path.stem for path in (ROOT / "scenes").glob("*.blend"))
     parser = argparse.ArgumentParser()
@@ -99,15 +75,15 @@ def main() -> None:
     parser.add_argument("--scenes", nargs="+", choices=names, default=names)
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
     raybundle.register()
-    tiles = []
+    pictures = []
     with tempfile.TemporaryDirectory() as folder:
         for name in options.scenes:
             path = ROOT / f"scenes/{name}.blend"
             baked, rendered = Path(folder) / f"{name}.png", Path(folder) / f"{name}.cycles.png"
             exposure = bake_picture(path, options.width, baked)
             cycles_picture(path, options.width, options.samples, exposure, rendered)
-            tiles += [pixels(baked), pixels(rendered)]
-    write(tiles, options.out.resolve())
+            pictures += [baked, rendered]
+        picture_sheet.save(pictures, 2 * SCENES_A_ROW, options.out.resolve())
 
 
 if __name__ == "__main__":

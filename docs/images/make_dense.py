@@ -22,10 +22,11 @@ sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scenes"), str(Path(__file__).pa
 sys.dont_write_bytecode = True
 
 import attribute_picture  # noqa: E402
+import picture_sheet  # noqa: E402
 import raybundle  # noqa: E402
 from build.construction import (  # noqa: E402
     Diffuse, add_area_light, add_mesh, add_point_light, material, room, set_camera, set_world)
-from picture_row import save_row  # noqa: E402
+from mesh_edges import add_edges  # noqa: E402
 from raybundle.bake_run import BakeRun  # noqa: E402
 from raybundle.messages import Message  # noqa: E402
 
@@ -77,13 +78,7 @@ def draw_result(path: Path, shows_edges: bool) -> None:
     report = raybundle.bake(bpy.context, output='COMBINED')
     print(f"{len(head.data.polygons):,} faces of the head, {report.patches:,} patches of all")
     if shows_edges:
-        edges = head.copy()
-        edges.data = edges.data.copy()
-        while edges.data.color_attributes:
-            edges.data.color_attributes.remove(edges.data.color_attributes[0])
-        bars = edges.modifiers.new("Edges", 'WIREFRAME')
-        bars.thickness, bars.use_even_offset = EDGE, False
-        bpy.context.scene.collection.objects.link(edges)
+        add_edges(head, EDGE)
     draw([item.name for item in report.objects], path)
 
 
@@ -95,7 +90,7 @@ def main(out: Path) -> None:
         draw_result(edges, shows_edges=True)
         draw_clusters(clusters)
         draw_result(result, shows_edges=False)
-        save_row((edges, clusters, result), out)
+        picture_sheet.save((edges, clusters, result), 3, out)
 
 
 if __name__ == "__main__":

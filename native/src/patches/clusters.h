@@ -42,8 +42,9 @@ std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<boo
 // surface, others with an eighth of the patches are dense too, as the eyes of a head.
 std::vector<bool> findDense(const Patches& patches, const Density& density);
 
-// Sets the density and the dense patches (Patches::isDense) such that at most `most` patches of baked instances are
-// not dense, if possible. `isBaked` is per instance. Without need only large surfaces count.
+// Sets the density and the dense patches (Patches::isDense) such that at most `most` patches of
+// baked instances are not dense, if possible. `isBaked` is per instance. Without need only large
+// surfaces count.
 void chooseDensity(const std::vector<bool>& isBaked, size_t most, Patches& patches);
 
 // The units between which light is exchanged: clusters, and the patches in no cluster. Each of them

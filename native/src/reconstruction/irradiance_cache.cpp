@@ -102,8 +102,8 @@ void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit)
 }
 
 // The light near a place is a linear function of position and normal in the plane of the place,
-// fitted to the records around it. The light is therefore a sum of the light of
-// the records, with factors that add up to 1.
+// fitted to the records around it. The light is therefore a sum of the light of the records, with
+// factors that add up to 1.
 CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t without,
                                          const glm::vec3& off) const {
     constexpr int kTerms = 5;
