@@ -107,9 +107,9 @@ void BundleSolve::look() {
     if (isDraft) tolerance = std::min(tolerance, kDraftTolerance);
     for (size_t k = 0; k < lights.size(); ++k)
         for (size_t h = 0; h < 2; ++h) halves[k][h] = transports[k]->irradiance(Half(h), tolerance);
-    const Halves now = seen();
+    const std::vector<LightOfHalves> now = seen();
     noise.look(now, bundles, tracer.bias());
-    measureCorners(noise, now);
+    measureCorners(noise, now.front());
     errors = noise.relative();
     in.trace.looks = noise.looks();
     throwIfCancelled();
@@ -170,9 +170,9 @@ double BundleSolve::castRays() {
                       hash(uint32_t(in.settings.seed), pass)},
                      samples, lights, halves);
         SetNoise withRays({}, errorOfSets, tileWeight, in.tiles.patches());
-        const Halves withThese = seen();
+        const std::vector<LightOfHalves> withThese = seen();
         withRays.look(withThese, bundles, tracer.bias());
-        measureCorners(withRays, withThese);
+        measureCorners(withRays, withThese.front());
         left = noisyParts->lookWithRays(withRays, kMostPasses - 1 - pass);
         in.progress.report(RB_STAGE_SOLVE, double(pass + 1) / kMostPasses);
         offerLight(in, in.shown, lights, in.trace.exposedShare());
@@ -180,20 +180,19 @@ double BundleSolve::castRays() {
     return left;
 }
 
-// Returns the shown light of both halves, per side of the tiles.
-BundleSolve::Halves BundleSolve::seen() const {
-    Halves result(lights.size());
+// Returns the shown light of both halves, per light.
+std::vector<LightOfHalves> BundleSolve::seen() const {
+    std::vector<LightOfHalves> result(lights.size());
     const std::vector<float> exposed = in.trace.exposedShare();
     for (size_t k = 0; k < lights.size(); ++k) {
         for (size_t h = 0; h < 2; ++h) {
-            throwIfCancelled();
-            result[k][h] = in.shown.of(halves[k][h], exposed);
+            std::vector<glm::vec3> arriving(weight.size());
+            parallelFor(size_t(0), weight.size(),
+                        [&](size_t side) { arriving[side] = halves[k][h].all(side); });
+            result[k][h] = in.shown.of(std::move(arriving), exposed);
         }
         gathered.apply(result[k], weight);
-        for (Irradiance& half : result[k]) {
-            throwIfCancelled();
-            half = meanOver(in.tiles, half, weight);
-        }
+        for (std::vector<glm::vec3>& half : result[k]) half = in.tiles.mean(half, weight);
     }
     return result;
 }
@@ -202,7 +201,7 @@ BundleSolve::Halves BundleSolve::seen() const {
 // earlier bakes, so that equal light gets equal rays whatever was baked before. It is repeated
 // after extra rays, because their noise differs in kind from that of lines. A draft, which may take
 // hundredths of a second, makes do with the noise that is foretold.
-void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen) {
+void BundleSolve::measureCorners(const SetNoise& look, const LightOfHalves& halvesSeen) {
     if (isDraft) {
         shown = {std::vector<double>(growth.size(), kUsuallyOverForetold),
                  std::vector<double>(look.ofLights().front().cells().size(), -1)};
@@ -210,8 +209,7 @@ void BundleSolve::measureCorners(const SetNoise& look, const Halves& halvesSeen)
     }
     shown = shownNoise(
         in.scene, {in.tiles.patches(), in.tiles.mean(in.trace.exposedShare(), patches.sideAreas())},
-        look.ofLights().front(), halvesSeen.front(), in.settings.regularization, growth,
-        allGathered);
+        look.ofLights().front(), halvesSeen, in.settings.regularization, growth, allGathered);
 }
 
 // States the noise that remains, and why no bundles were added.
@@ -275,14 +273,17 @@ SideNoise keepFirstShot(const SolveInput& in, SetLights& lights, std::vector<flo
     for (size_t side = 0; side < weight.size(); ++side) weight[side] *= exposed[side];
     const std::vector<float> tileWeight = in.tiles.sum(weight);
     const GatheredNoise gathered(patches, in.shown);
-    std::vector<std::array<Irradiance, 2>> halves;
+    std::vector<LightOfHalves> halves;
     for (SetLight& light : lights) {
         HandOver first = handOver({patches, exposed}, light.shot);
         light.irradiance.ofSources = first.ofSources;
         light.irradiance.direct = std::move(first.ofSources);
         light.irradiance.indirect = std::move(first.indirect);
-        const Irradiance mean = meanOver(in.tiles, light.irradiance, weight);
-        halves.push_back({mean, mean});
+        std::vector<glm::vec3> all = light.irradiance.direct;
+        for (size_t side = 0; side < all.size(); ++side)
+            all[side] += light.irradiance.indirect[side];
+        all = in.tiles.mean(all, weight);
+        halves.push_back({all, all});
     }
     SetNoise noise({}, gathered.errorsOf(lights, in.tiles), tileWeight, in.tiles.patches());
     noise.look(halves, 1, 0);

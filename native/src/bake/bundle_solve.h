@@ -44,9 +44,6 @@ class BundleSolve {
     SideNoise run(Report& report);
 
   private:
-    // Per light: the estimates of the two halves of the bundles.
-    using Halves = std::vector<std::array<Irradiance, 2>>;
-
     void trace(Report& report);
     void look();
     void offerHalves();
@@ -55,8 +52,8 @@ class BundleSolve {
     void finish();
     SideNoise conclude(Stop stop, Report& report);
     double errorOfWrongLines(Report& report) const;
-    Halves seen() const;
-    void measureCorners(const SetNoise& look, const Halves& halvesSeen);
+    std::vector<LightOfHalves> seen() const;
+    void measureCorners(const SetNoise& look, const LightOfHalves& halvesSeen);
 
     const SolveInput in;
     const Patches& patches;
@@ -79,7 +76,9 @@ class BundleSolve {
     const bool castsRays;
     const bool isDraft;  // whether the mean of the halves will do as the result
 
-    Halves halves;               // light that arrives at sides, not the shown light
+    // Per light: the estimates of the two halves of the bundles. It is the light that arrives at
+    // sides, not the shown light.
+    std::vector<std::array<Irradiance, 2>> halves;
     std::vector<double> errors;  // relative noise: of the sum of all lights, then of each light set
     Report ofFinish;             // notes of the last solve
 };

@@ -39,11 +39,10 @@ Tiles::Tiles(const Patches& cut) : original(cut) {
 std::vector<float> Tiles::sum(const std::vector<float>& weight) const {
     if (!uncut) return weight;
     std::vector<float> result(sideCount(), 0.0f);
-    for (size_t side = 0; side < result.size(); ++side) {
-        throwIfCancelledAt(side);
+    parallelFor(size_t(0), result.size(), [&](size_t side) {
         for (size_t p = first[patchOf(side)]; p < first[patchOf(side) + 1]; ++p)
             result[side] += weight[sideOf(p, isBack(side))];
-    }
+    });
     return result;
 }
 
@@ -51,22 +50,23 @@ template <class Value>
 std::vector<Value> Tiles::meanOf(const std::vector<Value>& values,
                                  const std::vector<float>& weight) const {
     if (!uncut) return values;
-    const std::vector<float> total = sum(weight);
     std::vector<Value> result(sideCount(), Value(0.0f));
-    for (size_t side = 0; side < result.size(); ++side) {
-        throwIfCancelledAt(side);
+    parallelFor(size_t(0), result.size(), [&](size_t side) {
         const size_t tile = patchOf(side);
         if (levels[tile] == 0) {
             result[side] = values[sideOf(first[tile], isBack(side))];
-            continue;
+            return;
         }
+        float total = 0;
+        for (size_t p = first[tile]; p < first[tile + 1]; ++p)
+            total += weight[sideOf(p, isBack(side))];
         for (size_t p = first[tile]; p < first[tile + 1]; ++p) {
             const size_t at = sideOf(p, isBack(side));
             const float share =
-                total[side] > 0 ? weight[at] / total[side] : original.area[p] / uncut->area[tile];
+                total > 0 ? weight[at] / total : original.area[p] / uncut->area[tile];
             result[side] += share * values[at];
         }
-    }
+    });
     return result;
 }
 
@@ -83,8 +83,7 @@ std::vector<glm::vec3> Tiles::mean(const std::vector<glm::vec3>& values,
 std::vector<float> Tiles::errorOfMean(const std::vector<float>& errors) const {
     if (!uncut) return errors;
     std::vector<float> result(sideCount(), 0.0f);
-    for (size_t side = 0; side < result.size(); ++side) {
-        throwIfCancelledAt(side);
+    parallelFor(size_t(0), result.size(), [&](size_t side) {
         const size_t tile = patchOf(side);
         float variance = 0;
         for (size_t p = first[tile]; p < first[tile + 1]; ++p) {
@@ -93,7 +92,7 @@ std::vector<float> Tiles::errorOfMean(const std::vector<float>& errors) const {
             variance += part * part;
         }
         result[side] = std::sqrt(variance);
-    }
+    });
     return result;
 }
 

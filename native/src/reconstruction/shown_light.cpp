@@ -117,6 +117,12 @@ Irradiance ShownLight::of(Irradiance light, const std::vector<float>& exposed) c
     return light;
 }
 
+std::vector<glm::vec3> ShownLight::of(std::vector<glm::vec3> light,
+                                      const std::vector<float>& exposed) const {
+    if (!isOwnAlone()) mixSides(light, light, exposed);
+    return light;
+}
+
 Irradiance ShownLight::of(const SetLight& light, const std::vector<float>& exposed) const {
     Irradiance own = light.irradiance;
     for (size_t side = 0; side < fromEverywhere.size(); ++side) {
@@ -138,13 +144,15 @@ Irradiance ShownLight::of(const SetLights& lights, const std::vector<float>& exp
 
 void ShownLight::mixSides(Irradiance& own, const Irradiance& arriving,
                           const std::vector<float>& exposed) const {
-    auto mix = [&](std::vector<glm::vec3>& shownOf, std::vector<glm::vec3> others) {
-        for (size_t side = 0; side < shownOf.size(); ++side)
-            shownOf[side] = of(side, shownOf[side], others[opposite(side)], exposed);
-    };
-    mix(own.direct, arriving.direct);
-    mix(own.ofSources, arriving.ofSources);
-    mix(own.indirect, arriving.indirect);
+    mixSides(own.direct, arriving.direct, exposed);
+    mixSides(own.ofSources, arriving.ofSources, exposed);
+    mixSides(own.indirect, arriving.indirect, exposed);
+}
+
+void ShownLight::mixSides(std::vector<glm::vec3>& own, std::vector<glm::vec3> arriving,
+                          const std::vector<float>& exposed) const {
+    for (size_t side = 0; side < own.size(); ++side)
+        own[side] = of(side, own[side], arriving[opposite(side)], exposed);
 }
 
 }  // namespace raybundle

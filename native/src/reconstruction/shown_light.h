@@ -85,6 +85,8 @@ class ShownLight {
     // Returns the irradiance that all sides show, W/m^2, where `light` is the irradiance that
     // arrives. All light counts fully, whatever its angle.
     Irradiance of(Irradiance light, const std::vector<float>& exposed) const;
+    std::vector<glm::vec3> of(std::vector<glm::vec3> light,
+                              const std::vector<float>& exposed) const;
     // Return the irradiance that all sides show of the light of one set, or of several. The angle
     // of the light is taken into account.
     Irradiance of(const SetLight& light, const std::vector<float>& exposed) const;
@@ -92,10 +94,12 @@ class ShownLight {
 
   private:
     const Material& materialOf(size_t side) const;
-    // Mixes the light of the two sides of each patch. `own` holds, per side, what the side shows of
+    // Mix the light of the two sides of each patch. `own` holds, per side, what the side shows of
     // the light that reaches it, and receives the result. `arriving` is the light that reaches the
     // sides.
     void mixSides(Irradiance& own, const Irradiance& arriving,
+                  const std::vector<float>& exposed) const;
+    void mixSides(std::vector<glm::vec3>& own, std::vector<glm::vec3> arriving,
                   const std::vector<float>& exposed) const;
 
     const Scene& scene;

@@ -26,26 +26,24 @@ GatheredNoise::GatheredNoise(const Patches& patches, const ShownLight& shown) {
     partCount = parts.count;
 }
 
-void GatheredNoise::apply(std::array<Irradiance, 2>& halves,
-                          const std::vector<float>& weight) const {
-    auto bringTogether = [&](std::vector<glm::vec3>& a, std::vector<glm::vec3>& b) {
-        std::vector<glm::dvec3> difference(partCount, glm::dvec3(0.0));
-        std::vector<double> weights(partCount, 0.0);
-        for (const auto& [side, part] : sides) {
-            const double w = double(weight[side]);
-            difference[part] += w * glm::dvec3(a[side] - b[side]);
-            weights[part] += w;
-        }
-        for (const auto& [side, part] : sides) {
-            if (!(weights[part] > 0)) continue;
-            const glm::vec3 mean = 0.5f * (a[side] + b[side]);
-            const glm::vec3 half = 0.5f * kShare * glm::vec3(difference[part] / weights[part]);
-            a[side] = mean + half;
-            b[side] = mean - half;
-        }
-    };
-    bringTogether(halves[0].direct, halves[1].direct);
-    bringTogether(halves[0].indirect, halves[1].indirect);
+void GatheredNoise::apply(LightOfHalves& halves, const std::vector<float>& weight) const {
+    std::vector<glm::vec3>&a = halves[0], &b = halves[1];
+    std::vector<glm::dvec3> difference(partCount, glm::dvec3(0.0));
+    std::vector<double> weights(partCount, 0.0);
+    for (const auto& [side, part] : sides) {
+        const double w = double(weight[side]);
+        if (!(w > 0)) continue;
+        difference[part] += w * glm::dvec3(a[side] - b[side]);
+        weights[part] += w;
+    }
+    parallelFor(size_t(0), sides.size(), [&](size_t k) {
+        const auto& [side, part] = sides[k];
+        if (!(weights[part] > 0)) return;
+        const glm::vec3 mean = 0.5f * (a[side] + b[side]);
+        const glm::vec3 half = 0.5f * kShare * glm::vec3(difference[part] / weights[part]);
+        a[side] = mean + half;
+        b[side] = mean - half;
+    });
 }
 
 std::vector<std::vector<float>> GatheredNoise::errorsOf(const SetLights& lights,

@@ -7,13 +7,13 @@
 // object have in common.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "patches/patches.h"
 #include "patches/tiles.h"
 #include "reconstruction/shown_light.h"
+#include "stated_error/noise.h"
 #include "transport/set_light.h"
 
 namespace raybundle {
@@ -27,7 +27,7 @@ class GatheredNoise {
     // Changes two estimates of the light (per side of the patches, W/m^2) so that on gathered sides
     // their difference is that of the light which corners gather. Their mean is kept. `weight` is
     // per side: the exposed area of sides with a result, otherwise 0, m^2.
-    void apply(std::array<Irradiance, 2>& halves, const std::vector<float>& weight) const;
+    void apply(LightOfHalves& halves, const std::vector<float>& weight) const;
 
     // Returns for each light, per side of the tiles, the standard error of the first shot, W/m^2.
     // It is 0 on gathered sides, because their corners have errors of their own.

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "stated_error/noise.h"
 
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "job/cancellation.h"
 #include "patches/side.h"
@@ -19,91 +22,110 @@ constexpr double kLeastOfBundles = 0.6;
 // Weight of the earlier looks in the average.
 constexpr double kMemory = 0.5;
 
-// Returns per side of the tiles the index of its cell and side: 2 * cell, + 1 for backs.
-std::vector<uint32_t> cellsOf(const Patches& tiles) {
-    std::vector<uint32_t> cells(tiles.sideCount());
-    for (uint32_t side = 0; side < cells.size(); ++side)
-        cells[side] = 2 * tiles.parentAt(side).cell + isBack(side);
-    return cells;
-}
+// Number of cells whose noise one task sums up. Sums do not depend on the number of threads, because
+// this number is fixed.
+constexpr size_t kCellsOfTask = 4096;
+
+// Sums over sides, as relative squares multiplied by the signal: the noise of bundles, that of the
+// first shot, and that of the first shot in the means over cells; and the signal.
+struct SceneSums {
+    double ofBundles = 0, direct = 0, directOfCells = 0, signal = 0;
+
+    friend SceneSums operator+(const SceneSums& a, const SceneSums& b) {
+        return {a.ofBundles + b.ofBundles, a.direct + b.direct, a.directOfCells + b.directOfCells,
+                a.signal + b.signal};
+    }
+};
+
+// Sums over the sides of a cell. `weight`: of the weight w. `difference` and `light`: of w times
+// half the difference, and times the mean, of the halves. `direct`: of w^2 times the variance of
+// the first shot. `squares0` to `squares2`: of w^2 times the powers of half the difference, for the
+// noise that differs from side to side. `sides`: number of sides with a weight.
+struct CellSums {
+    double weight = 0, direct = 0, sides = 0;
+    glm::dvec3 difference{0.0}, light{0.0};
+    double squares0 = 0, squares2 = 0;
+    glm::dvec3 squares1{0.0};
+
+    // Returns `weight` times the part of the squared noise of the cell's mean that is caused by
+    // random differences between its sides.
+    double random() const {
+        if (sides < 2) return 0;
+        const glm::dvec3 mean = difference / weight;
+        const double sum =
+            squares2 - 2 * glm::dot(mean, squares1) + glm::dot(mean, mean) * squares0;
+        return std::max(0.0, sum) / weight * sides / (sides - 1);
+    }
+};
 
 }  // namespace
 
+SidesOfCells::SidesOfCells(const Patches& tiles)
+    : sides(tiles.sideCount()), first(2 * tiles.cells.size() + 2, 0) {
+    auto cellAt = [&](uint32_t side) { return 2 * tiles.parentAt(side).cell + isBack(side); };
+    for (uint32_t side = 0; side < sides.size(); ++side) ++first[cellAt(side) + 2];
+    for (size_t c = 2; c < first.size(); ++c) first[c] += first[c - 1];
+    for (uint32_t side = 0; side < sides.size(); ++side) sides[first[cellAt(side) + 1]++] = side;
+    first.pop_back();
+}
+
 Noise::Noise(const Looks& before, const std::vector<float>& weight,
-             const std::vector<float>& directError, const std::vector<uint32_t>& cellOf)
+             const std::vector<float>& directError, const SidesOfCells& cells)
     : weight(weight),
       directError(directError),
-      cellOf(cellOf),
+      sidesOf(cells),
       looked(before.count),
       before(before) {}
 
-void Noise::measure(const std::array<Irradiance, 2>& half) {
-    const size_t n = weight.size();
-    difference.resize(n);
-    // Sums over the sides of a cell. `weight`: of the weight w. `difference` and `light`: of w
-    // times half the difference, and times the mean, of the halves. `direct`: of w^2 times the
-    // variance of the first shot. `squares0` to `squares2`: of w^2 times the powers of half the
-    // difference, for the noise that differs from side to side. `sides`: number of sides with a
-    // weight.
-    struct Cell {
-        double weight = 0, direct = 0, sides = 0;
-        glm::dvec3 difference{0.0}, light{0.0};
-        double squares0 = 0, squares2 = 0;
-        glm::dvec3 squares1{0.0};
-
-        // Returns `weight` times the part of the squared noise of the cell's mean that is caused by
-        // random differences between its sides.
-        double random() const {
-            if (sides < 2) return 0;
-            const glm::dvec3 mean = difference / weight;
-            const double sum =
-                squares2 - 2 * glm::dot(mean, squares1) + glm::dot(mean, mean) * squares0;
-            return std::max(0.0, sum) / weight * sides / (sides - 1);
+void Noise::measure(const LightOfHalves& half) {
+    difference.resize(weight.size());
+    ofCells.resize(sidesOf.count());
+    auto measureCell = [&](size_t c, SceneSums& sums) {
+        CellSums cell;
+        for (size_t k = sidesOf.first[c]; k < sidesOf.first[c + 1]; ++k) {
+            const uint32_t side = sidesOf.sides[k];
+            const glm::dvec3 a(half[0][side]), b(half[1][side]);
+            difference[side] = glm::vec3(0.5 * (a - b));
+            const double w = double(weight[side]);
+            if (!(w > 0)) continue;
+            const double variance = 3 * double(directError[side]) * double(directError[side]);
+            const double squares = 0.25 * glm::dot(a - b, a - b);
+            sums.ofBundles += w * squares;
+            sums.direct += w * variance;
+            sums.signal += w * 0.25 * glm::dot(a + b, a + b);
+            cell.weight += w;
+            cell.difference += w * 0.5 * (a - b);
+            cell.light += w * 0.5 * (a + b);
+            cell.direct += w * w * variance;
+            ++cell.sides;
+            cell.squares0 += w * w;
+            cell.squares1 += w * w * 0.5 * (a - b);
+            cell.squares2 += w * w * squares;
         }
-    };
-    std::vector<Cell> cells(n > 0 ? *std::max_element(cellOf.begin(), cellOf.end()) + 1 : 0);
-    double squares = 0, direct = 0;
-    signal = 0;
-    for (size_t side = 0; side < n; ++side) {
-        throwIfCancelledAt(side);
-        const glm::dvec3 a(half[0].direct[side] + half[0].indirect[side]);
-        const glm::dvec3 b(half[1].direct[side] + half[1].indirect[side]);
-        const double w = double(weight[side]);
-        const double variance = 3 * double(directError[side]) * double(directError[side]);
-        difference[side] = glm::vec3(0.5 * (a - b));
-        squares += w * 0.25 * glm::dot(a - b, a - b);
-        direct += w * variance;
-        signal += w * 0.25 * glm::dot(a + b, a + b);
-        Cell& cell = cells[cellOf[side]];
-        cell.weight += w;
-        cell.difference += w * 0.5 * (a - b);
-        cell.light += w * 0.5 * (a + b);
-        cell.direct += w * w * variance;
-        if (!(w > 0)) continue;
-        ++cell.sides;
-        cell.squares0 += w * w;
-        cell.squares1 += w * w * 0.5 * (a - b);
-        cell.squares2 += w * w * 0.25 * glm::dot(a - b, a - b);
-    }
-    double variance = 0;
-    ofCells.assign(cells.size(), {});
-    for (size_t c = 0; c < cells.size(); ++c) {
-        throwIfCancelledAt(c);
-        const Cell& cell = cells[c];
-        if (!(cell.weight > 0)) continue;
+        ofCells[c] = {};
+        if (!(cell.weight > 0)) return;
         const double noise = glm::dot(cell.difference, cell.difference) / cell.weight;
-        variance += cell.direct / cell.weight;
+        sums.directOfCells += cell.direct / cell.weight;
         ofCells[c] = {cell.weight, noise / cell.weight, cell.random() / cell.weight,
                       cell.direct / (cell.weight * cell.weight),
                       glm::dot(cell.light, cell.light) / (cell.weight * cell.weight)};
-    }
+    };
+    const SceneSums sums = tbb::parallel_deterministic_reduce(
+        tbb::blocked_range<size_t>(0, ofCells.size(), kCellsOfTask), SceneSums{},
+        [&](const auto& range, SceneSums before) {
+            for (size_t c = range.begin(); c < range.end(); ++c) measureCell(c, before);
+            return before;
+        },
+        std::plus<SceneSums>());
+    throwIfCancelled();
+    signal = sums.signal;
     const double scale = signal > 0 ? 1 / signal : 0;
-    bundleNoise = squares * scale;
-    directNoise = direct * scale;
-    directOfCells = variance * scale;
+    bundleNoise = sums.ofBundles * scale;
+    directNoise = sums.direct * scale;
+    directOfCells = sums.directOfCells * scale;
 }
 
-void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double sharedBias) {
+void Noise::look(const LightOfHalves& half, uint32_t count, double sharedBias) {
     measure(half);
     bias = sharedBias;
     if (bundles == 0 && count == before.bundles) {
@@ -119,7 +141,7 @@ void Noise::look(const std::array<Irradiance, 2>& half, uint32_t count, double s
     bundles = count;
 }
 
-void Noise::lookAgain(const std::array<Irradiance, 2>& half) {
+void Noise::lookAgain(const LightOfHalves& half) {
     const double share = looks().share;
     measure(half);
     pooled = share * bundleNoise;
@@ -156,44 +178,39 @@ std::vector<glm::vec3> Noise::perSide() const {
 
 SetNoise::SetNoise(const Looks& before, std::vector<std::vector<float>> errors,
                    const std::vector<float>& weight, const Patches& tiles)
-    : errorOfSets(std::move(errors)), cellOf(cellsOf(tiles)), directError(weight.size()) {
+    : errorOfSets(std::move(errors)), sidesOf(tiles), directError(weight.size()) {
     for (size_t side = 0; side < directError.size(); ++side) {
         double variance = 0;
         for (const std::vector<float>& error : errorOfSets)
             variance += double(error[side]) * double(error[side]);
         directError[side] = float(std::sqrt(variance));
     }
-    noises.emplace_back(before, weight, directError, cellOf);
+    noises.emplace_back(before, weight, directError, sidesOf);
     for (size_t k = 1; k < errorOfSets.size(); ++k)
-        noises.emplace_back(before, weight, errorOfSets[k], cellOf);
+        noises.emplace_back(before, weight, errorOfSets[k], sidesOf);
 }
 
 template <class Look>
-void SetNoise::lookAtAll(const std::vector<std::array<Irradiance, 2>>& halves, const Look& look) {
+void SetNoise::lookAtAll(const std::vector<LightOfHalves>& halves, const Look& look) {
     throwIfCancelled();
     if (halves.size() == 1) return look(noises.front(), halves.front());
-    std::array<Irradiance, 2> all = halves.front();
+    LightOfHalves all = halves.front();
     for (size_t k = 1; k < halves.size(); ++k) {
         look(noises[k], halves[k]);
         for (size_t h = 0; h < 2; ++h)
-            for (size_t side = 0; side < directError.size(); ++side) {
-                all[h].direct[side] += halves[k][h].direct[side];
-                all[h].indirect[side] += halves[k][h].indirect[side];
-            }
+            parallelFor(size_t(0), all[h].size(),
+                        [&](size_t side) { all[h][side] += halves[k][h][side]; });
     }
     look(noises.front(), all);
 }
 
-void SetNoise::look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles,
-                    double bias) {
-    lookAtAll(halves, [&](Noise& noise, const std::array<Irradiance, 2>& half) {
-        noise.look(half, bundles, bias);
-    });
+void SetNoise::look(const std::vector<LightOfHalves>& halves, uint32_t bundles, double bias) {
+    lookAtAll(halves,
+              [&](Noise& noise, const LightOfHalves& half) { noise.look(half, bundles, bias); });
 }
 
-void SetNoise::lookAgain(const std::vector<std::array<Irradiance, 2>>& halves) {
-    lookAtAll(halves,
-              [](Noise& noise, const std::array<Irradiance, 2>& half) { noise.lookAgain(half); });
+void SetNoise::lookAgain(const std::vector<LightOfHalves>& halves) {
+    lookAtAll(halves, [](Noise& noise, const LightOfHalves& half) { noise.lookAgain(half); });
 }
 
 std::vector<double> SetNoise::relative() const {

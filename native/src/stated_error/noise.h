@@ -26,6 +26,22 @@
 
 namespace raybundle {
 
+// An estimate of the light by each half of the bundles: direct and indirect irradiance together, per
+// side of the patches or of the tiles, W/m^2.
+using LightOfHalves = std::array<std::vector<glm::vec3>, 2>;
+
+// The sides of the tiles, ordered by the side of a cell that shows their light. Sides of cells are
+// numbered 2 * cell for fronts and 2 * cell + 1 for backs.
+struct SidesOfCells {
+    explicit SidesOfCells(const Patches& tiles);
+
+    size_t count() const { return first.size() - 1; }
+
+    std::vector<uint32_t> sides;
+    // Per side of a cell: the index in `sides` of its first side. One more entry at the end.
+    std::vector<uint32_t> first;
+};
+
 // What all looks at the halves of a set of lines have found, for the next bake with the same lines.
 struct Looks {
     // Number of looks, and number of bundles at the last look.
@@ -43,17 +59,15 @@ class Noise {
     // Prepares the measurement. `before` holds the looks of earlier bakes with these lines. The
     // other arguments are per side of the tiles. `weight` is the exposed area of sides with a
     // result, otherwise 0, m^2. `directError` is the standard error of the first shot, W/m^2,
-    // independent between sides. `cellOf` is the index of the cell and side that shows the side's
-    // light. The last three must outlive the object.
+    // independent between sides. The last three must outlive the object.
     Noise(const Looks& before, const std::vector<float>& weight,
-          const std::vector<float>& directError, const std::vector<uint32_t>& cellOf);
+          const std::vector<float>& directError, const SidesOfCells& cells);
 
-    // Measures the noise from the two halves (irradiance per side of the tiles, W/m^2) after
-    // `bundles` bundles. `bias` is the relative error that both halves share, see
-    // Transport::bias().
-    void look(const std::array<Irradiance, 2>& half, uint32_t bundles, double bias);
+    // Measures the noise from the two halves (per side of the tiles) after `bundles` bundles.
+    // `bias` is the relative error that both halves share, see Transport::bias().
+    void look(const LightOfHalves& half, uint32_t bundles, double bias);
     // Measures again with the same bundles, after other work (extra rays) has improved the halves.
-    void lookAgain(const std::array<Irradiance, 2>& half);
+    void lookAgain(const LightOfHalves& half);
 
     // Returns the noise of bundles and first shot on the sides at the last look, relative.
     double relative() const;
@@ -79,12 +93,12 @@ class Noise {
         double area = 0;  // exposed area with a result, m^2; 0 if there is none
         double noise = 0, random = 0, direct = 0, light = 0;
     };
-    // Returns the noise of the cells, indexed by 2 * cell for fronts and 2 * cell + 1 for backs.
+    // Returns the noise of the cells, numbered as in SidesOfCells.
     const std::vector<OfCell>& cells() const { return ofCells; }
 
   private:
     // Sets all members that depend on the last look alone.
-    void measure(const std::array<Irradiance, 2>& half);
+    void measure(const LightOfHalves& half);
     // Returns the relative noise of bundles on the sides, with the error that both halves share.
     double ofBundles() const;
     // Returns the factor by which the noise is increased while there are few looks.
@@ -92,7 +106,7 @@ class Noise {
 
     const std::vector<float>& weight;
     const std::vector<float>& directError;
-    const std::vector<uint32_t>& cellOf;
+    const SidesOfCells& sidesOf;
 
     std::vector<glm::vec3> difference;  // per side: half the difference of the halves, W/m^2
     std::vector<OfCell> ofCells;
@@ -132,10 +146,10 @@ class SetNoise {
 
     // Measures the noise of all lights. `halves` is per entry of SetLights. For the other arguments
     // see Noise::look().
-    void look(const std::vector<std::array<Irradiance, 2>>& halves, uint32_t bundles, double bias);
+    void look(const std::vector<LightOfHalves>& halves, uint32_t bundles, double bias);
 
     // Measures again with the same bundles, after other work (extra rays) has improved the halves.
-    void lookAgain(const std::vector<std::array<Irradiance, 2>>& halves);
+    void lookAgain(const std::vector<LightOfHalves>& halves);
 
     // Returns the relative noise at the last look, of the light of all sources and then of each
     // light set.
@@ -153,10 +167,10 @@ class SetNoise {
     // Calls look(noise, halves) for the light of each light set, and then for the light of all
     // sources.
     template <class Look>
-    void lookAtAll(const std::vector<std::array<Irradiance, 2>>& halves, const Look& look);
+    void lookAtAll(const std::vector<LightOfHalves>& halves, const Look& look);
 
     const std::vector<std::vector<float>> errorOfSets;
-    const std::vector<uint32_t> cellOf;
+    const SidesOfCells sidesOf;
     std::vector<float> directError;  // of the light of all sources, per side, W/m^2
     std::vector<Noise> noises;
 };

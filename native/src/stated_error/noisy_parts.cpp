@@ -184,9 +184,9 @@ std::vector<double> NoisyParts::foretold(const Noise& noise, const std::vector<d
     for (size_t i = 0; i < usual.size(); ++i) {
         std::vector<std::pair<double, double>>& all = ofInstance[i];
         if (all.empty()) continue;
-        std::sort(all.begin(), all.end());
         const size_t count = std::min(size_t(std::ceil(kUsual * double(all.size()))),
                                       std::max(all.size() - 1, size_t(1)));
+        std::nth_element(all.begin(), all.begin() + std::ptrdiff_t(count - 1), all.end());
         double sum = 0, weight = 0;
         for (size_t k = 0; k < count; ++k) {
             sum += all[k].first * all[k].second;

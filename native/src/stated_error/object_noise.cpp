@@ -48,17 +48,11 @@ std::vector<double> cornerGrowth(const Scene& scene, const Patches& patches,
 }
 
 ShownNoise shownNoise(const Scene& scene, const LitSurfaces& surfaces, const Noise& noise,
-                      const std::array<Irradiance, 2>& halves, float regularization,
+                      const LightOfHalves& halves, float regularization,
                       const std::vector<double>& growth, const std::vector<bool>& isGathered) {
     const Patches& tiles = surfaces.patches;
     const std::vector<InstanceRange> ranges = instanceRanges(scene, tiles);
     const std::vector<Noise::OfCell>& cells = noise.cells();
-    std::array<std::vector<glm::vec3>, 2> light = {halves[0].direct, halves[1].direct};
-    for (size_t h = 0; h < 2; ++h)
-        for (size_t side = 0; side < light[h].size(); ++side) {
-            throwIfCancelledAt(side);
-            light[h][side] += halves[h].indirect[side];
-        }
     ShownNoise result{std::vector<double>(growth.size(), kUsuallyOverForetold),
                       std::vector<double>(cells.size(), -1)};
     parallelFor(size_t(0), growth.size(), [&](size_t i) {
@@ -72,7 +66,7 @@ ShownNoise shownNoise(const Scene& scene, const LitSurfaces& surfaces, const Noi
         const SmoothRegions regions = smoothRegions(scene.meshes[instance.mesh], tiles.cells,
                                                     range.firstCell, range.lastCell);
         const LeastSquaresFit fit = leastSquares(surfaces, {range, regions, instance.side},
-                                                 regularization, {&light[0], &light[1]});
+                                                 regularization, {&halves[0], &halves[1]});
         double shown = 0, foretold = 0, count = 0;
         for (uint32_t c = range.firstCell; c < range.lastCell; ++c)
             for (uint32_t back = 0; back < 2; ++back) {

@@ -61,7 +61,7 @@ struct ShownNoise {
 // true are not measured, because their corners show other light than that of the patches; they have
 // the noise that is foretold.
 ShownNoise shownNoise(const Scene& scene, const LitSurfaces& tiles, const Noise& noise,
-                      const std::array<Irradiance, 2>& halves, float regularization,
+                      const LightOfHalves& halves, float regularization,
                       const std::vector<double>& growth, const std::vector<bool>& isGathered);
 
 // The noise at corners relative to the RMS of the light, with the noise of the first shot.
