@@ -31,7 +31,9 @@ Rasteriser::Rasteriser(const Patches& patches, float pixelSize, SmallPatches sma
     };
     for (uint32_t i = 0; i < patches.sheets.loose.size(); ++i) {
         const Parent& parent = patches.parents[patches.sheets.loose[i]];
-        islands[parent.island].loose.push_back(patches.sheets.loose[i]);
+        std::array<uint32_t, 4> vertex = parent.vertex;
+        if (parent.isTriangle) vertex[3] = vertex[0];
+        islands[parent.island].loose.push_back({patches.sheets.loose[i], vertex});
         useAll(parent);
     }
     if (all)
@@ -110,10 +112,8 @@ void Rasteriser::findBounds(Island& island) {
     island.looseBounds.clear();
     island.groupBounds.assign((island.loose.size() + kGroup - 1) / kGroup, Bounds());
     for (size_t k = 0; k < island.loose.size(); ++k) {
-        const Parent& parent = patches.parents[island.loose[k]];
         Bounds bounds;
-        for (size_t v = 0; v < (parent.isTriangle ? 3 : 4); ++v)
-            bounds.add(projected[parent.vertex[v]]);
+        for (uint32_t vertex : island.loose[k].vertex) bounds.add(projected[vertex]);
         island.looseBounds.push_back(bounds);
         island.groupBounds[k / kGroup].add(bounds);
     }

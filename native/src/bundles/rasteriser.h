@@ -17,6 +17,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -117,7 +118,7 @@ class Rasteriser {
                     ++drawn;
                 }
             forEachLooseInView(own, [&](size_t k) {
-                sampleParent(patches.parents[own.loose[k]], visit);
+                sampleParent(patches.parents[own.loose[k].parent], visit);
                 ++drawn;
             });
         }
@@ -158,6 +159,11 @@ class Rasteriser {
     struct Rectangle {
         glm::dvec2 low{std::numeric_limits<double>::max()},
             high{-std::numeric_limits<double>::max()};
+
+        void add(const glm::dvec2& point) {
+            low = glm::min(low, point);
+            high = glm::max(high, point);
+        }
     };
     // A rectangle, enlarged by the rounding to float, in half the memory.
     struct Bounds {
@@ -169,10 +175,16 @@ class Rasteriser {
             high = glm::max(high, other.high);
         }
     };
+    // A parent in no sheet. The vertices stand here again, so that most parents of a dense mesh,
+    // which have no pixels, are left out without a look at the parent.
+    struct Loose {
+        uint32_t parent;
+        std::array<uint32_t, 4> vertex;  // that of a triangle repeats the first one
+    };
     // The content of an island, and its projection along the current bundle.
     struct Island {
         std::vector<uint32_t> sheets;    // indices into Patches::sheets
-        std::vector<uint32_t> loose;     // parents in no sheet, in the order of the mesh
+        std::vector<Loose> loose;        // in the order of the mesh
         std::vector<uint32_t> vertices;  // all vertices except those inside of sheets
         // Bounds of each sheet, of each loose parent, and of groups of loose parents. Only set if
         // there are windows.
@@ -199,10 +211,13 @@ class Rasteriser {
         return isInView(Rectangle{glm::dvec2(b.low), glm::dvec2(b.high)});
     }
     // Returns false if no pixel of the view has its centre inside the bounds.
-    bool mayHavePixels(const Bounds& b) const {
-        const glm::dvec2 low = glm::dvec2(b.low) * zoom - corner - kSlack;
-        const glm::dvec2 high = glm::dvec2(b.high) * zoom - corner + kSlack;
+    bool mayHavePixels(const Rectangle& r) const {
+        const glm::dvec2 low = r.low * zoom - corner - kSlack;
+        const glm::dvec2 high = r.high * zoom - corner + kSlack;
         return hasPixels(low.x, high.x, width) && hasPixels(low.y, high.y, height);
+    }
+    bool mayHavePixels(const Bounds& b) const {
+        return mayHavePixels(Rectangle{glm::dvec2(b.low), glm::dvec2(b.high)});
     }
     static bool hasPixels(double low, double high, int count) {
         return std::max(0.0, std::ceil(low - 0.5)) < std::min(double(count), std::ceil(high - 0.5));
@@ -211,7 +226,11 @@ class Rasteriser {
     template <class Visit>
     void forEachLooseInView(const Island& island, const Visit& visit) const {
         if (windows.empty()) {
-            for (size_t k = 0; k < island.loose.size(); ++k) visit(k);
+            for (size_t k = 0; k < island.loose.size(); ++k) {
+                Rectangle shadow;
+                for (uint32_t vertex : island.loose[k].vertex) shadow.add(projected[vertex]);
+                if (mayHavePixels(shadow)) visit(k);
+            }
             return;
         }
         for (size_t group = 0; group < island.groupBounds.size(); ++group) {
