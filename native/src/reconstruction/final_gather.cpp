@@ -141,12 +141,12 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers, floa
     return mean;
 }
 
-FinalGather::Probe FinalGather::probe(const Receiver& receiver) const {
-    const SobolPoints points(hash(receiver.seed, kParts + 1));
+FinalGather::Probe FinalGather::probe(const Receiver* const* receivers, size_t count) const {
+    const SobolPoints points(hash(receivers[0]->seed, kParts + 1));
     Probe probe;
     for (uint32_t i = 0; i < kProbeRays; ++i) {
         Light one;
-        addRays(receiver, points, i, 1, one);
+        addRays(*receivers[i % count], points, i, 1, one);
         probe.light += one.total() / float(kProbeRays);
         probe.square += square(one.total()) / kProbeRays;
         probe.nearness += one.nearness / float(kProbeRays);

@@ -88,9 +88,10 @@ class FinalGather {
     // light that the error is relative to, brightest channel, W/m^2: about all light there, or more
     // where that is dark. The error that is allowed is `laxity` times as large as usual.
     Light gather(const std::vector<Share>& receivers, float brightness, float laxity = 1) const;
-    // Returns what few rays from a receiver find. The estimate has much noise. It tells whether
-    // other light arrives than is expected, and how near other surfaces are.
-    Probe probe(const Receiver& receiver) const;
+    // Returns what few rays find that start in turn from `count` receivers beside each other. The
+    // estimate has much noise. It tells whether other light arrives than is expected, and how near
+    // other surfaces are.
+    Probe probe(const Receiver* const* receivers, size_t count) const;
     // Returns the standard error that gather() allows with this brightness and a laxity of 1,
     // W/m^2.
     float allowedError(const Receiver& receiver, float brightness) const;

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "job/cancellation.h"
 #include "sampling/mix_bits.h"
@@ -57,7 +58,6 @@ float IrradianceCache::weightOf(const Record& record, const CachePlace& place,
     const glm::vec3 off = place.position - record.place.position;
     const float reach = std::min(record.reach, ownReach);
     const float apart = glm::dot(off, off);
-    if (apart >= reach * reach) return 0;
     const float along = kAlongNormal * glm::dot(off, record.place.normal + place.normal) / 2;
     const float distance = std::sqrt(apart + along * along);
     if (distance >= reach) return 0;
@@ -84,21 +84,37 @@ void IrradianceCache::buildIndex() {
                          high = cellAt(record.place.position + record.reach, width);
         for (int x = low.x; x <= high.x; ++x)
             for (int y = low.y; y <= high.y; ++y)
-                for (int z = low.z; z <= high.z; ++z) cells[{level, {x, y, z}}].push_back(k);
+                for (int z = low.z; z <= high.z; ++z)
+                    cells[{level, {x, y, z}}].push_back({record.place.position, record.reach, k});
     }
 }
 
 template <class Visit>
-void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit) const {
+void IrradianceCache::forEachAround(const CachePlace& place, size_t before,
+                                    const Visit& visit) const {
     const float ownReach = reachOf(place);
     for (int level = -32; level < 32; ++level) {
         if (!hasLevel[size_t(level + 32)]) continue;
         const auto found = cells.find({level, cellAt(place.position, std::ldexp(1.0f, level))});
         if (found == cells.end()) continue;
-        for (const uint32_t k : found->second)
-            if (const float weight = weightOf(records[k], place, ownReach); weight > 0)
-                visit(k, weight);
+        const std::vector<Found>& of = found->second;  // in the order of the records
+        for (auto one = of.rbegin(); one != of.rend() && one->record >= before; ++one) {
+            const glm::vec3 off = place.position - one->position;
+            const float reach = std::min(one->reach, ownReach);
+            if (glm::dot(off, off) >= reach * reach) continue;
+            const float weight = weightOf(records[one->record], place, ownReach);
+            if (weight > 0 && !visit(one->record, weight)) return;
+        }
     }
+}
+
+bool IrradianceCache::isReachedSince(size_t before, const CachePlace& place) const {
+    bool isReached = false;
+    forEachAround(place, before, [&](uint32_t, float) {
+        isReached = true;
+        return false;
+    });
+    return isReached;
 }
 
 // The light near a place is a linear function of position and normal in the plane of the place,
@@ -107,20 +123,23 @@ void IrradianceCache::forEachAround(const CachePlace& place, const Visit& visit)
 CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t without,
                                          const glm::vec3& off) const {
     constexpr int kTerms = 5;
-    using Terms = Eigen::Matrix<double, kTerms, 1>;
+    using Terms = std::array<double, kTerms>;
     struct Around {
-        uint32_t record;
-        float weight;
+        const Record* record;
+        double weight;
+        Terms terms;
     };
     std::vector<Around> around;
+    around.reserve(size_t(2 * kMostAround));
     double sum = 0;
     float reach = 0, angle = 0;
-    forEachAround(place, [&](uint32_t k, float weight) {
-        if (k == without) return;
-        around.push_back({k, weight});
+    forEachAround(place, 0, [&](uint32_t k, float weight) {
+        if (k == without) return true;
+        around.push_back({&records[k], double(weight), Terms{}});
         sum += double(weight);
         reach += weight * records[k].reach;
         angle += weight * records[k].angle;
+        return true;
     });
     CachedLight light;
     light.variance = INFINITY;
@@ -130,31 +149,31 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
     angle /= float(sum);
     const auto [x, y] = frame(place.normal);
     auto termsAt = [&, x = x, y = y](const glm::vec3& from, const glm::vec3& normal) {
-        Terms terms;
-        terms << 1, double(glm::dot(from, x) / reach), double(glm::dot(from, y) / reach),
-            double(glm::dot(normal, x) / angle), double(glm::dot(normal, y) / angle);
-        return terms;
+        return Terms{1, double(glm::dot(from, x) / reach), double(glm::dot(from, y) / reach),
+                     double(glm::dot(normal, x) / angle), double(glm::dot(normal, y) / angle)};
     };
-    auto termsOf = [&](const Record& record) {
-        return termsAt(record.place.position - place.position, record.place.normal);
-    };
+    // Only the lower half of the symmetric matrix is set.
     Eigen::Matrix<double, kTerms, kTerms> matrix = Eigen::Matrix<double, kTerms, kTerms>::Zero();
-    for (const auto [k, weight] : around) {
-        const Terms terms = termsOf(records[k]);
-        matrix += double(weight) * terms * terms.transpose();
+    for (auto& [record, weight, terms] : around) {
+        terms = termsAt(record->place.position - place.position, record->place.normal);
+        for (int i = 0; i < kTerms; ++i)
+            for (int j = 0; j <= i; ++j) matrix(i, j) += weight * terms[i] * terms[j];
     }
     for (int k = 1; k < kTerms; ++k) matrix(k, k) += kEven * sum;
-    const Terms solution = matrix.ldlt().solve(termsAt(off, place.normal));
+    const Terms wanted = termsAt(off, place.normal);
+    const Eigen::Matrix<double, kTerms, 1> solution =
+        matrix.llt().solve(Eigen::Map<const Eigen::Matrix<double, kTerms, 1>>(wanted.data()));
     light.variance = 0;
-    for (const auto [k, weight] : around) {
-        const double factor = double(weight) * solution.dot(termsOf(records[k]));
-        const CachedLight& own = records[k].light;
+    for (const auto& [record, weight, terms] : around) {
+        const double factor =
+            weight * std::inner_product(terms.begin(), terms.end(), solution.data(), 0.0);
+        const CachedLight& own = record->light;
         light.carried += float(factor) * own.carried;
         light.reflected += float(factor) * own.reflected;
         light.surrounding += float(factor) * own.surrounding;
         light.open += float(factor) * own.open;
         light.variance += factor * factor * own.variance;
-        light.allowed += double(weight) / sum * own.allowed;
+        light.allowed += weight / sum * own.allowed;
     }
     for (glm::vec3* part : {&light.carried, &light.reflected, &light.surrounding})
         *part = glm::max(*part, 0.0f);
@@ -181,13 +200,14 @@ void IrradianceCache::update(bool compares) {
     std::vector<uint8_t> isShortened(records.size());
     parallelFor(size_t(0), records.size(), [&](size_t k) {
         double surplus = 0, noise = 0, sum = 0, squares = 0, count = 0;
-        forEachAround(records[k].place, [&](uint32_t other, float weight) {
+        forEachAround(records[k].place, 0, [&](uint32_t other, float weight) {
             ++count;
-            if (tests[other].noise < 0) return;
+            if (tests[other].noise < 0) return true;
             surplus += double(weight) * tests[other].surplus;
             noise += double(weight) * tests[other].noise;
             sum += double(weight);
             squares += double(weight * weight);
+            return true;
         });
         // The number of records around a place grows with the square of their reach.
         factor[k] = float(std::sqrt(std::min(1.0, kMostAround / std::max(1.0, count))));

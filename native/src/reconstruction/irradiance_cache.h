@@ -65,6 +65,8 @@ class IrradianceCache {
     }
 
     size_t count() const { return records.size(); }
+    // Returns whether any record reaches a place that was added after the first `before` ones.
+    bool isReachedSince(size_t before, const CachePlace& place) const;
 
   private:
     static constexpr uint32_t kNone = UINT32_MAX;
@@ -82,21 +84,28 @@ class IrradianceCache {
     struct CellHash {
         size_t operator()(const Cell& cell) const;
     };
+    // A record found in a cell, with what tells most places that it does not reach them.
+    struct Found {
+        glm::vec3 position;  // m
+        float reach;         // m
+        uint32_t record;
+    };
     // Returns the light off a place from all records but one, or from all (kNone).
     CachedLight interpolate(const CachePlace& place, uint32_t without,
                             const glm::vec3& off = glm::vec3(0.0f)) const;
     // Returns the weight of a record at a place, 0 to 1. `ownReach` is reachOf(place).
     float weightOf(const Record& record, const CachePlace& place, float ownReach) const;
     float reachOf(const CachePlace& place) const;
-    // Calls visit(index, weight) for each record that reaches a place.
+    // Calls visit(index, weight) for each record that reaches a place, except for the first `before`
+    // records, until it returns false.
     template <class Visit>
-    void forEachAround(const CachePlace& place, const Visit& visit) const;
+    void forEachAround(const CachePlace& place, size_t before, const Visit& visit) const;
     glm::ivec3 cellAt(const glm::vec3& position, float width) const;
     void buildIndex();
 
     const float largestReach;
     std::vector<Record> records;
-    std::unordered_map<Cell, std::vector<uint32_t>, CellHash> cells;
+    std::unordered_map<Cell, std::vector<Found>, CellHash> cells;
     std::array<bool, 64> hasLevel{};  // per level plus 32: whether any record is found there
 };
 

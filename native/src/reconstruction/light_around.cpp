@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reconstruction/light_around.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -22,6 +24,8 @@ constexpr size_t kFirstShare = 64, kFewestFirst = 16;
 constexpr size_t kTestedShare = 32, kFewestTested = 16, kMostTested = 64;
 // The surplus is above the mean of the tests by this many standard deviations of the mean.
 constexpr double kSureSurplus = 2;
+// The largest number of probes of a cluster.
+constexpr size_t kProbesOfCluster = 16;
 // No record reaches further than this many edges of tiles.
 constexpr float kReachOfTile = 4;
 // An object whose light is below this share of that of the scene is judged as if it had that much.
@@ -65,9 +69,50 @@ CachePlace LightAround::placeOf(uint32_t r) const {
     return {nodes.position(own.first + r), receiver(r).normal, probes[r].nearness};
 }
 
+void LightAround::probe() {
+    Receivers sorted(count);
+    std::iota(sorted.begin(), sorted.end(), 0u);
+    auto clusterOf = [&](uint32_t r) { return input.clusters.sideOf(receiver(r).side); };
+    tbb::parallel_sort(sorted.begin(), sorted.end(), [&](uint32_t a, uint32_t b) {
+        return std::make_pair(clusterOf(a), a) < std::make_pair(clusterOf(b), b);
+    });
+    std::vector<uint32_t> first;  // in `sorted`, of each cluster; one more entry at the end
+    for (uint32_t n = 0; n < count; ++n)
+        if (n == 0 || clusterOf(sorted[n]) != clusterOf(sorted[n - 1])) first.push_back(n);
+    first.push_back(count);
+    parallelFor(size_t(1), first.size(), [&](size_t c) {
+        probe(&sorted[first[c - 1]], sorted.data() + first[c], kProbesOfCluster);
+    });
+}
+
+// Halves the receivers where they spread most, until there are as many parts as probes.
+void LightAround::probe(uint32_t* first, uint32_t* last, size_t most) {
+    if (most > 1 && last - first > 1) {
+        glm::vec3 low(INFINITY), high(-INFINITY);
+        for (const uint32_t* r = first; r < last; ++r) {
+            low = glm::min(low, nodes.position(own.first + *r));
+            high = glm::max(high, nodes.position(own.first + *r));
+        }
+        const glm::vec3 spread = high - low;
+        const int axis = spread.x >= std::max(spread.y, spread.z) ? 0
+                         : spread.y >= spread.z                   ? 1
+                                                                  : 2;
+        uint32_t* const middle = first + (last - first) / 2;
+        std::nth_element(first, middle, last, [&](uint32_t a, uint32_t b) {
+            return nodes.position(own.first + a)[axis] < nodes.position(own.first + b)[axis];
+        });
+        probe(first, middle, most / 2);
+        probe(middle, last, most - most / 2);
+        return;
+    }
+    std::vector<const Receiver*> these;
+    for (const uint32_t* r = first; r < last; ++r) these.push_back(&receiver(*r));
+    const FinalGather::Probe found = finalGather.probe(these.data(), these.size());
+    for (const uint32_t* r = first; r < last; ++r) probes[*r] = found;
+}
+
 std::vector<CachedLight> LightAround::atReceivers() {
-    parallelFor(uint32_t(0), count,
-                [&](uint32_t r) { probes[r] = finalGather.probe(receiver(r)); });
+    probe();
     Receivers order(count);
     std::iota(order.begin(), order.end(), 0u);
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
@@ -76,28 +121,27 @@ std::vector<CachedLight> LightAround::atReceivers() {
     });
     for (size_t begin = 0, end = std::max(kFewestFirst, count / kFirstShare); begin < count;
          begin = end, end *= 2) {
-        const Receivers these = wanting(order, begin, std::min(end, size_t(count)));
-        if (these.empty()) continue;
-        addRecords(these, kRecordError);
-        cache.update(true);
+        std::vector<uint8_t> wants(count, false);
+        parallelFor(begin, std::min(end, size_t(count)),
+                    [&](size_t n) { wants[order[n]] = wantsRecord(order[n], at(order[n])); });
+        if (addRecords(order, wants, kRecordError)) cache.update(true);
     }
-    // What the shortened reaches of the last rounds have left without good light.
-    addRecords(wanting(order, 0, count), kRecordError);
-    cache.update(false);
     std::vector<CachedLight> result(count);
-    auto interpolate = [&] {
-        parallelFor(uint32_t(0), count, [&](uint32_t r) { result[r] = cache.at(placeOf(r)); });
-    };
-    interpolate();
-    // Records without others around them have too much noise.
-    Receivers noisy;
-    for (const uint32_t r : order)
-        if (!result[r].isGood()) noisy.push_back(r);
-    if (!noisy.empty()) {
-        addRecords(noisy, 1);
+    parallelFor(uint32_t(0), count, [&](uint32_t r) { result[r] = at(r); });
+    auto addMore = [&](float laxity, const auto& isWanting) {
+        std::vector<uint8_t> wants(count);
+        for (uint32_t r = 0; r < count; ++r) wants[r] = isWanting(r);
+        const size_t before = cache.count();
+        if (!addRecords(order, wants, laxity)) return;
         cache.update(false);
-        interpolate();
-    }
+        parallelFor(uint32_t(0), count, [&](uint32_t r) {
+            if (cache.isReachedSince(before, placeOf(r))) result[r] = at(r);
+        });
+    };
+    // What the shortened reaches of the last rounds have left without good light.
+    addMore(kRecordError, [&](uint32_t r) { return wantsRecord(r, result[r]); });
+    // Records without others around them have too much noise.
+    addMore(1, [&](uint32_t r) { return !result[r].isGood(); });
     measureSurplus(order, result);
     return result;
 }
@@ -123,28 +167,23 @@ void LightAround::measureSurplus(const Receivers& order, const std::vector<Cache
     squaredSurplus = std::max(0.0, mean + kSureSurplus * deviation);
 }
 
-LightAround::Receivers LightAround::wanting(const Receivers& order, size_t begin,
-                                            size_t end) const {
-    std::vector<uint8_t> wants(end - begin);
-    parallelFor(begin, end, [&](size_t n) {
-        const uint32_t r = order[n];
-        if (isRecord[r]) return;
-        const CachedLight found = cache.at(placeOf(r));
-        wants[n - begin] = !found.isGood() || probes[r].contradicts(found.carried + found.reflected,
-                                                                    found.open, found.allowed);
-    });
-    Receivers these;
-    for (size_t n = begin; n < end; ++n)
-        if (wants[n - begin]) these.push_back(order[n]);
-    return these;
+bool LightAround::wantsRecord(uint32_t r, const CachedLight& found) const {
+    return !isRecord[r] &&
+           (!found.isGood() ||
+            probes[r].contradicts(found.carried + found.reflected, found.open, found.allowed));
 }
 
-void LightAround::addRecords(const Receivers& these, float laxity) {
+bool LightAround::addRecords(const Receivers& order, const std::vector<uint8_t>& wants,
+                             float laxity) {
+    Receivers these;
+    for (const uint32_t r : order)
+        if (wants[r]) these.push_back(r);
     const std::vector<CachedLight> found = gatherAt(these, laxity);
     for (size_t n = 0; n < these.size(); ++n) {
         cache.add(placeOf(these[n]), found[n]);
         isRecord[these[n]] = true;
     }
+    return !these.empty();
 }
 
 std::vector<CachedLight> LightAround::gatherAt(const Receivers& these, float laxity) {

@@ -9,9 +9,10 @@
 // - Records are not added in the order in which places are looked at. Receivers are looked at in
 //   random order, in rounds of which each looks at as many as all rounds before. The receivers of a
 //   round are independent of each other, and the result does not depend on the number of threads.
-// - Every receiver casts a few rays of its own. They tell how near other surfaces are, and they
-//   contradict interpolated light that is far from what arrives, as in a hollow that no record has
-//   been in.
+// - A few rays probe the surroundings of every receiver. They tell how near other surfaces are, and
+//   they contradict interpolated light that is far from what arrives, as in a hollow that no record
+//   has been in. Where a mesh is so dense that a cluster of its patches has many receivers,
+//   receivers beside each other share their rays.
 #pragma once
 
 #include <cstdint>
@@ -57,17 +58,22 @@ class LightAround {
     CachePlace placeOf(uint32_t r) const;
     float lightAt(uint32_t r) const;
     float darkestLight() const;
-    // Makes records of these receivers, with `laxity` times the usual error.
-    void addRecords(const Receivers& these, float laxity);
+    // Set `probes`, of all receivers or of those of one cluster, with at most `most` probes.
+    void probe();
+    void probe(uint32_t* first, uint32_t* last, size_t most);
+    // Returns the light that is interpolated at a receiver.
+    CachedLight at(uint32_t r) const { return cache.at(placeOf(r)); }
+    // Returns whether a receiver is no record and interpolated light is not good enough there.
+    bool wantsRecord(uint32_t r, const CachedLight& found) const;
+    // Makes records of the receivers with `wants`, in the given order, with `laxity` times the
+    // usual error. Returns whether there are any.
+    bool addRecords(const Receivers& order, const std::vector<uint8_t>& wants, float laxity);
     // Sets surplus(). `shown` is per receiver.
     void measureSurplus(const Receivers& order, const std::vector<CachedLight>& shown);
     // Return what receivers gather, with `laxity` times the usual error.
     std::vector<CachedLight> gatherAt(const Receivers& these, float laxity);
     std::vector<Gathered> gatherSurrounding(const Receivers& these, float laxity);
     CachedLight gatherAt(uint32_t r, const Gathered& surrounding, float laxity) const;
-    // Returns those of order[begin] to order[end - 1] that are no records and whose interpolated
-    // light is not good enough.
-    Receivers wanting(const Receivers& order, size_t begin, size_t end) const;
 
     const ReconstructionInput& input;
     const SetLight& light;
