@@ -59,7 +59,8 @@ BundleSolve::BundleSolve(const SolveInput& input, SetLights& lights, const Trans
       weight(patches.sideCount(), 0),
       tileWeight(input.tiles.sideCount(), 0),
       errorOfSets(gathered.errorsOf(lights, input.tiles)),
-      noise(input.trace.looks, errorOfSets, tileWeight, input.tiles.patches()),
+      cells(input.tiles.patches()),
+      noise(input.trace.looks, errorOfSets, tileWeight, cells),
       allGathered(input.shown.instancesAllGathered()),
       growth(cornerGrowth(input.scene, input.tiles.patches(), allGathered)),
       rule(input.settings, mostBundles(patches, input.trace.density), tracer.bundleCount()),
@@ -169,7 +170,7 @@ double BundleSolve::castRays() {
                       rays,
                       hash(uint32_t(in.settings.seed), pass)},
                      samples, lights, halves);
-        SetNoise withRays({}, errorOfSets, tileWeight, in.tiles.patches());
+        SetNoise withRays({}, errorOfSets, tileWeight, cells);
         const std::vector<LightOfHalves> withThese = seen();
         withRays.look(withThese, bundles, tracer.bias());
         measureCorners(withRays, withThese.front());
@@ -285,7 +286,8 @@ SideNoise keepFirstShot(const SolveInput& in, SetLights& lights, std::vector<flo
         all = in.tiles.mean(all, weight);
         halves.push_back({all, all});
     }
-    SetNoise noise({}, gathered.errorsOf(lights, in.tiles), tileWeight, in.tiles.patches());
+    const SidesOfCells cells(in.tiles.patches());
+    SetNoise noise({}, gathered.errorsOf(lights, in.tiles), tileWeight, cells);
     noise.look(halves, 1, 0);
     const std::vector<double> errors = noise.relative();
     report.estimatedError = errors.front();

@@ -303,7 +303,7 @@ glm::vec3 sampleEach(const LightSources& sources, const Patches& patches,
     for (size_t k = 0; k < sources.size(); ++k) {
         const glm::vec4 u = sobolPoint(index, hash(seed, hash(receiver.seed, uint32_t(k))));
         const glm::vec3 point = place.at({u.x, u.y});
-        const LightSample sample = sources[k]->sample(point, place.normal, {u.z, u.w});
+        const LightSample sample = sources[k]->sampleAlone(point, place.normal, {u.z, u.w});
         if (brightest(sample.irradiance) <= 0) continue;
         const float share = sources[k]->castsShadows
                                 ? visibility.visibleShare(receiver.side, sample.ray(point))

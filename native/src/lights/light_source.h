@@ -104,6 +104,13 @@ class LightSource {
     virtual LightSample sample(const glm::vec3& point, const glm::vec3& normal,
                                glm::vec2 uv) const = 0;
 
+    // Returns a sample where it is the only one for this normal. It has the expectation of sample()
+    // and may have more noise, but a source need not prepare for more samples.
+    virtual LightSample sampleAlone(const glm::vec3& point, const glm::vec3& normal,
+                                    glm::vec2 uv) const {
+        return sample(point, normal, uv);
+    }
+
     // Returns for each part of the source the parts that touch it. Each part may be visible or not
     // (direct_light/outlook.h). Empty if the source is not divided into parts.
     virtual const PartNeighbours& parts() const {

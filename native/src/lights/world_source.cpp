@@ -273,6 +273,14 @@ LightSample WorldSource::sample(const glm::vec3&, const glm::vec3& normal, glm::
     return sampleOf(chooseFacing(0, uv, 1, normal), normal);
 }
 
+// look() would visit all regions at the horizon, of which the sample needs those on its way.
+LightSample WorldSource::sampleAlone(const glm::vec3&, const glm::vec3& normal,
+                                     glm::vec2 uv) const {
+    return sampleOf(
+        choose(0, uv, 1, [&](uint32_t region) { return weightOf(regions[region], normal); }),
+        normal);
+}
+
 std::vector<float> WorldSource::sumOfSeen(const glm::vec3& normal,
                                           const std::vector<float>& seen) const {
     const Facing& facing = facingOf(normal);

@@ -39,6 +39,8 @@ class WorldSource : public LightSource {
 
     LightSample sample(const glm::vec3& point, const glm::vec3& normal,
                        glm::vec2 uv) const override;
+    LightSample sampleAlone(const glm::vec3& point, const glm::vec3& normal,
+                            glm::vec2 uv) const override;
     std::optional<glm::vec3> irradiance(const glm::vec3& point,
                                         const glm::vec3& normal) const override;
     const PartNeighbours& parts() const override { return partNeighbours; }

@@ -53,15 +53,15 @@ void IrradianceCache::add(const CachePlace& place, const CachedLight& light) {
     records.push_back({place, light, reachOf(place), kAngle});
 }
 
-float IrradianceCache::weightOf(const Record& record, const CachePlace& place,
-                                float ownReach) const {
-    const glm::vec3 off = place.position - record.place.position;
+float IrradianceCache::weightOf(const Found& record, const CachePlace& place, float ownReach) {
+    const glm::vec3 off = place.position - record.position;
     const float reach = std::min(record.reach, ownReach);
     const float apart = glm::dot(off, off);
-    const float along = kAlongNormal * glm::dot(off, record.place.normal + place.normal) / 2;
+    if (apart >= reach * reach) return 0;
+    const float along = kAlongNormal * glm::dot(off, record.normal + place.normal) / 2;
     const float distance = std::sqrt(apart + along * along);
     if (distance >= reach) return 0;
-    const float turn = glm::distance(record.place.normal, place.normal);
+    const float turn = glm::distance(record.normal, place.normal);
     return (1 - distance / reach) * std::max(0.0f, 1 - turn / record.angle);
 }
 
@@ -72,45 +72,57 @@ glm::ivec3 IrradianceCache::cellAt(const glm::vec3& position, float width) const
 
 void IrradianceCache::buildIndex() {
     cells.clear();
-    hasLevel.fill(false);
+    levelsIn.clear();
+    // The width of the cells is between two and four times the reach.
+    auto levelOf = [](const Record& record) {
+        return std::clamp(int(std::ceil(std::log2(2 * record.reach))), -kLevels / 2,
+                          kLevels / 2 - 1);
+    };
+    largestLevel = -kLevels / 2;
+    for (const Record& record : records) largestLevel = std::max(largestLevel, levelOf(record));
     for (uint32_t k = 0; k < records.size(); ++k) {
         throwIfCancelledAt(k);
         const Record& record = records[k];
-        // The width of the cells is between two and four times the reach.
-        const int level = std::clamp(int(std::ceil(std::log2(2 * record.reach))), -32, 31);
+        const glm::vec3& position = record.place.position;
+        const int level = levelOf(record), outer = std::min(largestLevel - level, 31);
         const float width = std::ldexp(1.0f, level);
-        hasLevel[size_t(level + 32)] = true;
-        const glm::ivec3 low = cellAt(record.place.position - record.reach, width),
-                         high = cellAt(record.place.position + record.reach, width);
+        const glm::ivec3 low = cellAt(position - record.reach, width),
+                         high = cellAt(position + record.reach, width);
         for (int x = low.x; x <= high.x; ++x)
             for (int y = low.y; y <= high.y; ++y)
-                for (int z = low.z; z <= high.z; ++z)
-                    cells[{level, {x, y, z}}].push_back({record.place.position, record.reach, k});
+                for (int z = low.z; z <= high.z; ++z) {
+                    cells[{level, {x, y, z}}].push_back(
+                        {position, record.place.normal, record.reach, record.angle, k});
+                    levelsIn[{largestLevel, {x >> outer, y >> outer, z >> outer}}] |=
+                        uint64_t(1) << (level + kLevels / 2);
+                }
     }
 }
 
 template <class Visit>
 void IrradianceCache::forEachAround(const CachePlace& place, size_t before,
                                     const Visit& visit) const {
+    if (records.empty()) return;
+    const auto levels =
+        levelsIn.find({largestLevel, cellAt(place.position, std::ldexp(1.0f, largestLevel))});
+    if (levels == levelsIn.end()) return;
     const float ownReach = reachOf(place);
-    for (int level = -32; level < 32; ++level) {
-        if (!hasLevel[size_t(level + 32)]) continue;
+    for (int k = 0; k < kLevels; ++k) {
+        if (!(levels->second >> k & 1)) continue;
+        const int level = k - kLevels / 2;
         const auto found = cells.find({level, cellAt(place.position, std::ldexp(1.0f, level))});
         if (found == cells.end()) continue;
         const std::vector<Found>& of = found->second;  // in the order of the records
         for (auto one = of.rbegin(); one != of.rend() && one->record >= before; ++one) {
-            const glm::vec3 off = place.position - one->position;
-            const float reach = std::min(one->reach, ownReach);
-            if (glm::dot(off, off) >= reach * reach) continue;
-            const float weight = weightOf(records[one->record], place, ownReach);
-            if (weight > 0 && !visit(one->record, weight)) return;
+            const float weight = weightOf(*one, place, ownReach);
+            if (weight > 0 && !visit(*one, weight)) return;
         }
     }
 }
 
 bool IrradianceCache::isReachedSince(size_t before, const CachePlace& place) const {
     bool isReached = false;
-    forEachAround(place, before, [&](uint32_t, float) {
+    forEachAround(place, before, [&](const Found&, float) {
         isReached = true;
         return false;
     });
@@ -125,7 +137,7 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
     constexpr int kTerms = 5;
     using Terms = std::array<double, kTerms>;
     struct Around {
-        const Record* record;
+        const Found* found;
         double weight;
         Terms terms;
     };
@@ -133,12 +145,12 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
     around.reserve(size_t(2 * kMostAround));
     double sum = 0;
     float reach = 0, angle = 0;
-    forEachAround(place, 0, [&](uint32_t k, float weight) {
-        if (k == without) return true;
-        around.push_back({&records[k], double(weight), Terms{}});
+    forEachAround(place, 0, [&](const Found& found, float weight) {
+        if (found.record == without) return true;
+        around.push_back({&found, double(weight), Terms{}});
         sum += double(weight);
-        reach += weight * records[k].reach;
-        angle += weight * records[k].angle;
+        reach += weight * found.reach;
+        angle += weight * found.angle;
         return true;
     });
     CachedLight light;
@@ -154,8 +166,8 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
     };
     // Only the lower half of the symmetric matrix is set.
     Eigen::Matrix<double, kTerms, kTerms> matrix = Eigen::Matrix<double, kTerms, kTerms>::Zero();
-    for (auto& [record, weight, terms] : around) {
-        terms = termsAt(record->place.position - place.position, record->place.normal);
+    for (auto& [found, weight, terms] : around) {
+        terms = termsAt(found->position - place.position, found->normal);
         for (int i = 0; i < kTerms; ++i)
             for (int j = 0; j <= i; ++j) matrix(i, j) += weight * terms[i] * terms[j];
     }
@@ -164,10 +176,10 @@ CachedLight IrradianceCache::interpolate(const CachePlace& place, uint32_t witho
     const Eigen::Matrix<double, kTerms, 1> solution =
         matrix.llt().solve(Eigen::Map<const Eigen::Matrix<double, kTerms, 1>>(wanted.data()));
     light.variance = 0;
-    for (const auto& [record, weight, terms] : around) {
+    for (const auto& [found, weight, terms] : around) {
         const double factor =
             weight * std::inner_product(terms.begin(), terms.end(), solution.data(), 0.0);
-        const CachedLight& own = record->light;
+        const CachedLight& own = records[found->record].light;
         light.carried += float(factor) * own.carried;
         light.reflected += float(factor) * own.reflected;
         light.surrounding += float(factor) * own.surrounding;
@@ -200,11 +212,12 @@ void IrradianceCache::update(bool compares) {
     std::vector<uint8_t> isShortened(records.size());
     parallelFor(size_t(0), records.size(), [&](size_t k) {
         double surplus = 0, noise = 0, sum = 0, squares = 0, count = 0;
-        forEachAround(records[k].place, 0, [&](uint32_t other, float weight) {
+        forEachAround(records[k].place, 0, [&](const Found& other, float weight) {
             ++count;
-            if (tests[other].noise < 0) return true;
-            surplus += double(weight) * tests[other].surplus;
-            noise += double(weight) * tests[other].noise;
+            const Test& test = tests[other.record];
+            if (test.noise < 0) return true;
+            surplus += double(weight) * test.surplus;
+            noise += double(weight) * test.noise;
             sum += double(weight);
             squares += double(weight * weight);
             return true;

@@ -16,7 +16,6 @@
 //   is more than noise, records reach less far.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <unordered_map>
@@ -70,6 +69,7 @@ class IrradianceCache {
 
   private:
     static constexpr uint32_t kNone = UINT32_MAX;
+    static constexpr int kLevels = 64;
     struct Record {
         CachePlace place;
         CachedLight light;
@@ -84,20 +84,20 @@ class IrradianceCache {
     struct CellHash {
         size_t operator()(const Cell& cell) const;
     };
-    // A record found in a cell, with what tells most places that it does not reach them.
+    // A record as it is found in a cell, with all that its weight depends on.
     struct Found {
-        glm::vec3 position;  // m
-        float reach;         // m
+        glm::vec3 position, normal;
+        float reach, angle;  // as in Record
         uint32_t record;
     };
     // Returns the light off a place from all records but one, or from all (kNone).
     CachedLight interpolate(const CachePlace& place, uint32_t without,
                             const glm::vec3& off = glm::vec3(0.0f)) const;
     // Returns the weight of a record at a place, 0 to 1. `ownReach` is reachOf(place).
-    float weightOf(const Record& record, const CachePlace& place, float ownReach) const;
+    static float weightOf(const Found& record, const CachePlace& place, float ownReach);
     float reachOf(const CachePlace& place) const;
-    // Calls visit(index, weight) for each record that reaches a place, except for the first `before`
-    // records, until it returns false.
+    // Calls visit(found, weight) for each record that reaches a place, except for the first
+    // `before` records, until it returns false.
     template <class Visit>
     void forEachAround(const CachePlace& place, size_t before, const Visit& visit) const;
     glm::ivec3 cellAt(const glm::vec3& position, float width) const;
@@ -106,7 +106,10 @@ class IrradianceCache {
     const float largestReach;
     std::vector<Record> records;
     std::unordered_map<Cell, std::vector<Found>, CellHash> cells;
-    std::array<bool, 64> hasLevel{};  // per level plus 32: whether any record is found there
+    // Per cell of the largest level: bit k is set if any record is found inside of it in cells of
+    // level k - kLevels / 2.
+    std::unordered_map<Cell, uint64_t, CellHash> levelsIn;
+    int largestLevel = 0;
 };
 
 }  // namespace raybundle

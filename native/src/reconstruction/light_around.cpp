@@ -119,11 +119,14 @@ std::vector<CachedLight> LightAround::atReceivers() {
         return std::make_pair(hash(receiver(a).seed, 7), a) <
                std::make_pair(hash(receiver(b).seed, 7), b);
     });
+    std::vector<size_t> placeInOrder(count);
+    for (size_t n = 0; n < count; ++n) placeInOrder[order[n]] = n;
     for (size_t begin = 0, end = std::max(kFewestFirst, count / kFirstShare); begin < count;
          begin = end, end *= 2) {
-        std::vector<uint8_t> wants(count, false);
-        parallelFor(begin, std::min(end, size_t(count)),
-                    [&](size_t n) { wants[order[n]] = wantsRecord(order[n], at(order[n])); });
+        std::vector<uint8_t> wants(count);
+        parallelFor(uint32_t(0), count, [&](uint32_t r) {
+            wants[r] = placeInOrder[r] >= begin && placeInOrder[r] < end && wantsRecord(r, at(r));
+        });
         if (addRecords(order, wants, kRecordError)) cache.update(true);
     }
     std::vector<CachedLight> result(count);

@@ -177,17 +177,17 @@ std::vector<glm::vec3> Noise::perSide() const {
 }
 
 SetNoise::SetNoise(const Looks& before, std::vector<std::vector<float>> errors,
-                   const std::vector<float>& weight, const Patches& tiles)
-    : errorOfSets(std::move(errors)), sidesOf(tiles), directError(weight.size()) {
+                   const std::vector<float>& weight, const SidesOfCells& cells)
+    : errorOfSets(std::move(errors)), directError(weight.size()) {
     for (size_t side = 0; side < directError.size(); ++side) {
         double variance = 0;
         for (const std::vector<float>& error : errorOfSets)
             variance += double(error[side]) * double(error[side]);
         directError[side] = float(std::sqrt(variance));
     }
-    noises.emplace_back(before, weight, directError, sidesOf);
+    noises.emplace_back(before, weight, directError, cells);
     for (size_t k = 1; k < errorOfSets.size(); ++k)
-        noises.emplace_back(before, weight, errorOfSets[k], sidesOf);
+        noises.emplace_back(before, weight, errorOfSets[k], cells);
 }
 
 template <class Look>

@@ -138,10 +138,10 @@ struct SideNoise {
 class SetNoise {
   public:
     // Prepares the measurement. See Noise for `before` and `weight`. `errorOfSets` is, per entry of
-    // SetLights, the standard error of the first shot per side of the tiles, W/m^2. `weight` must
-    // outlive the object; `tiles`, whose patches are the tiles, need not.
+    // SetLights, the standard error of the first shot per side of the tiles, W/m^2. `weight` and
+    // `cells` must outlive the object.
     SetNoise(const Looks& before, std::vector<std::vector<float>> errorOfSets,
-             const std::vector<float>& weight, const Patches& tiles);
+             const std::vector<float>& weight, const SidesOfCells& cells);
     SetNoise(const SetNoise&) = delete;
 
     // Measures the noise of all lights. `halves` is per entry of SetLights. For the other arguments
@@ -170,7 +170,6 @@ class SetNoise {
     void lookAtAll(const std::vector<LightOfHalves>& halves, const Look& look);
 
     const std::vector<std::vector<float>> errorOfSets;
-    const SidesOfCells sidesOf;
     std::vector<float> directError;  // of the light of all sources, per side, W/m^2
     std::vector<Noise> noises;
 };

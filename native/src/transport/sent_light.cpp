@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "transport/sent_light.h"
 
+#include "job/cancellation.h"
 #include "patches/side.h"
 #include "surfaces/translucence.h"
 #include "transport/scattered_light.h"
@@ -15,7 +16,7 @@ SentLight::SentLight(const LitSurfaces& surfaces, const FirstShot& shot,
       directed(surfaces.patches, shot, of) {
     const Patches& patches = surfaces.patches;
     const bool isBeyond = of == Of::BEYOND_FIRST_SHOT && !shot.unshot.empty();
-    for (size_t side = 0; side < mean.size(); ++side) {
+    parallelFor(size_t(0), mean.size(), [&](size_t side) {
         glm::vec3 arriving =
             irradiance.direct[side] - irradiance.ofSources[side] + irradiance.indirect[side];
         glm::vec3 sent = shotReflectance(patches, shot, side) * irradiance.ofSources[side];
@@ -26,7 +27,7 @@ SentLight::SentLight(const LitSurfaces& surfaces, const FirstShot& shot,
         }
         mean[side] = sent + patches.reflectance[side] * arriving +
                      passedOn(surfaces, side, irradiance.all(opposite(side)));
-    }
+    });
     for (size_t side = 0; side < irradiance.byAngle.size(); ++side)
         mean[side] += irradiance.byAngle[side];
 }
