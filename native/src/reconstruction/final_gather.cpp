@@ -94,7 +94,7 @@ float FinalGather::allowedError(const Receiver& receiver, float brightness) cons
 }
 
 FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers, float brightness,
-                                       float laxity) const {
+                                       float laxity, bool followsOn) const {
     // What is `laxity` times as noisy counts only together with laxity^2 others.
     const float factor = laxity * laxity * receivers[0].receiver->targetFactor;
     const double tolerance = std::pow(
@@ -117,7 +117,7 @@ FinalGather::Light FinalGather::gather(const std::vector<Share>& receivers, floa
         const uint32_t each = wanted - done;
         for (uint32_t k = 0; k < count; ++k) {
             const Share& one = receivers[k / parts];
-            addRays(*one.receiver, points, done * count + k * each, each, sums[k]);
+            addRays(*one.receiver, points, done * count + k * each, each, followsOn, sums[k]);
             const float share = one.share / float(parts * wanted);
             mean.carried += share * sums[k].carried;
             mean.reflected += share * sums[k].reflected;
@@ -146,7 +146,7 @@ FinalGather::Probe FinalGather::probe(const Receiver* const* receivers, size_t c
     Probe probe;
     for (uint32_t i = 0; i < kProbeRays; ++i) {
         Light one;
-        addRays(*receivers[i % count], points, i, 1, one);
+        addRays(*receivers[i % count], points, i, 1, false, one);
         probe.light += one.total() / float(kProbeRays);
         probe.square += square(one.total()) / kProbeRays;
         probe.nearness += one.nearness / float(kProbeRays);
@@ -170,7 +170,7 @@ bool FinalGather::Probe::contradicts(const glm::vec3& expected, float expectedOp
 // Adds to `sum` the light that rays bring to a receiver. The rays use `count` points of the
 // sequence, starting with the one at index `first`.
 void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
-                          uint32_t count, Light& sum) const {
+                          uint32_t count, bool followsOn, Light& sum) const {
     const glm::vec3 side = surfaces.patches.normal(receiver.side);
     for (uint32_t i = first; i < first + count; ++i) {
         const glm::vec4 u = points[i];
@@ -194,10 +194,12 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
         if (distance >= width(*hit)) continue;
         const Receiver met{*hit, surfaces.patches.normal(*hit),
                            *receiver.point + distance * direction, hash(receiver.seed, kParts)};
-        if (world != glm::vec3(0.0f))
+        if (followsOn || world != glm::vec3(0.0f)) {
+            glm::vec3 known = irradiance.direct[*hit] - irradiance.ofSources[*hit];
+            if (followsOn) known += irradiance.indirect[*hit];
             sum.reflected += surfaces.patches.reflectance[*hit] *
-                             (sampleCarried(met, {u.z, u.w}) -
-                              (irradiance.direct[*hit] - irradiance.ofSources[*hit]));
+                             (sampleOne(met, {u.z, u.w}, followsOn) - known);
+        }
         // With many sources, few of the rays sample them, and count for the others.
         if (nearShare < 1 && float(hash(receiver.seed, i) >> 8) * 0x1p-24f >= nearShare) continue;
         sum.reflected += shotReflectance(surfaces.patches, light.shot, *hit) / nearShare *
@@ -205,9 +207,11 @@ void FinalGather::addRays(const Receiver& receiver, const SobolPoints& points, u
     }
 }
 
-glm::vec3 FinalGather::sampleCarried(const Receiver& at, const glm::vec2& u) const {
-    const auto hit = visibility.firstHit(at.side, *at.point, cosineDirection(at.normal, u));
-    return hit ? emission[*hit] : world;
+glm::vec3 FinalGather::sampleOne(const Receiver& at, const glm::vec2& u, bool withReflected) const {
+    const glm::vec3 direction = cosineDirection(at.normal, u);
+    const auto hit = visibility.firstHit(at.side, *at.point, direction);
+    if (!hit) return world;
+    return emission[*hit] + (withReflected ? sent.towards(*hit, -direction) : glm::vec3(0.0f));
 }
 
 bool FinalGather::isNear(const Receiver& receiver) const {

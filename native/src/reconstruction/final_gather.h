@@ -86,8 +86,12 @@ class FinalGather {
     };
     // Returns the mean light of the receivers, whose shares must sum to 1. `brightness` is the
     // light that the error is relative to, brightest channel, W/m^2: about all light there, or more
-    // where that is dark. The error that is allowed is `laxity` times as large as usual.
-    Light gather(const std::vector<Share>& receivers, float brightness, float laxity = 1) const;
+    // where that is dark. The error that is allowed is `laxity` times as large as usual. With
+    // `followsOn`, each ray that meets a surface nearby is followed by one more ray, instead of
+    // reading the mean of the reflected light that arrives there. This is more accurate beside
+    // other surfaces, and has much more noise.
+    Light gather(const std::vector<Share>& receivers, float brightness, float laxity = 1,
+                 bool followsOn = false) const;
     // Returns what few rays find that start in turn from `count` receivers beside each other. The
     // estimate has much noise. It tells whether other light arrives than is expected, and how near
     // other surfaces are.
@@ -110,10 +114,11 @@ class FinalGather {
 
   private:
     void addRays(const Receiver& receiver, const SobolPoints& points, uint32_t first,
-                 uint32_t count, Light& sum) const;
+                 uint32_t count, bool followsOn, Light& sum) const;
     // Returns an estimate by one ray of the irradiance at a point from the world and from emission
-    // that is not a source, W/m^2. `u` holds two random numbers.
-    glm::vec3 sampleCarried(const Receiver& at, const glm::vec2& u) const;
+    // that is not a source, and of reflected light if `withReflected`, W/m^2. `u` holds two random
+    // numbers.
+    glm::vec3 sampleOne(const Receiver& at, const glm::vec2& u, bool withReflected) const;
     // Returns the square root of the area over which the light of a side is known, m: that of its
     // patch or cluster.
     float width(uint32_t side) const;

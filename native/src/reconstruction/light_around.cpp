@@ -14,14 +14,18 @@
 namespace raybundle {
 namespace {
 
-// Standard error that a record may have, relative to what a node may have. The light of a node is
-// the mean of several records.
-constexpr float kRecordError = 2;
 // The first round looks at one of this many receivers, but at least at kFewestFirst.
 constexpr size_t kFirstShare = 64, kFewestFirst = 16;
-// One of kTestedShare receivers is tested (see surplus()), but at least kFewestTested and at most
-// kMostTested.
+// One of kTestedShare receivers near other surfaces is tested (see surplus()), and one of as many
+// others, but at least kFewestTested and at most kMostTested of each. Receivers are near others if
+// the mean inverse distance of the surfaces around is above kNear over the edge of a tile.
 constexpr size_t kTestedShare = 32, kFewestTested = 16, kMostTested = 64;
+constexpr float kNear = 0.5f;
+// Share of the estimated variance that is taken off the squared difference between shown and tested
+// light. Some of these estimates are too large by half.
+constexpr double kSureNoise = 0.5;
+// Seed of the rays of tests.
+constexpr uint32_t kTestRays = 8;
 // The surplus is above the mean of the tests by this many standard deviations of the mean.
 constexpr double kSureSurplus = 2;
 // The largest number of probes of a cluster.
@@ -32,6 +36,18 @@ constexpr float kReachOfTile = 4;
 constexpr float kLeastLight = 0.01f;
 
 }  // namespace
+
+struct LightAround::Effort {
+    // Standard error that the light may have, relative to what that of a node may have.
+    float laxity;
+    // Whether the light is compared with what is shown. It is then gathered by other rays than
+    // those of records, and more accurately beside other surfaces.
+    bool isTest;
+};
+
+// The light of a node is the mean of several records.
+constexpr LightAround::Effort LightAround::kRecord{2, false}, LightAround::kSingle{1, false},
+    LightAround::kTest{1, true};
 
 LightAround::LightAround(const ReconstructionInput& input, const SetLight& light,
                          const FinalGather& gather, const DenseNodes& nodes, size_t instance,
@@ -127,47 +143,55 @@ std::vector<CachedLight> LightAround::atReceivers() {
         parallelFor(uint32_t(0), count, [&](uint32_t r) {
             wants[r] = placeInOrder[r] >= begin && placeInOrder[r] < end && wantsRecord(r, at(r));
         });
-        if (addRecords(order, wants, kRecordError)) cache.update(true);
+        if (addRecords(order, wants, kRecord)) cache.update(true);
     }
     std::vector<CachedLight> result(count);
     parallelFor(uint32_t(0), count, [&](uint32_t r) { result[r] = at(r); });
-    auto addMore = [&](float laxity, const auto& isWanting) {
+    auto addMore = [&](const Effort& effort, const auto& isWanting) {
         std::vector<uint8_t> wants(count);
         for (uint32_t r = 0; r < count; ++r) wants[r] = isWanting(r);
         const size_t before = cache.count();
-        if (!addRecords(order, wants, laxity)) return;
+        if (!addRecords(order, wants, effort)) return;
         cache.update(false);
         parallelFor(uint32_t(0), count, [&](uint32_t r) {
             if (cache.isReachedSince(before, placeOf(r))) result[r] = at(r);
         });
     };
     // What the shortened reaches of the last rounds have left without good light.
-    addMore(kRecordError, [&](uint32_t r) { return wantsRecord(r, result[r]); });
+    addMore(kRecord, [&](uint32_t r) { return wantsRecord(r, result[r]); });
     // Records without others around them have too much noise.
-    addMore(1, [&](uint32_t r) { return !result[r].isGood(); });
+    addMore(kSingle, [&](uint32_t r) { return !result[r].isGood(); });
     measureSurplus(order, result);
     return result;
 }
 
-// The places were looked at in random order, so that the last ones are a random sample.
+// The light of few receivers near other surfaces may be far off, so that they are tested apart from
+// the others. `order` is random, so that the first of each kind are a random sample.
 void LightAround::measureSurplus(const Receivers& order, const std::vector<CachedLight>& shown) {
-    const size_t wanted = std::clamp(count / kTestedShare, kFewestTested, kMostTested);
-    const Receivers tested(order.end() - std::ptrdiff_t(std::min(wanted, order.size())),
-                           order.end());
-    const std::vector<CachedLight> found = gatherAt(tested, 1);
-    double sum = 0, squares = 0;
-    for (size_t n = 0; n < tested.size(); ++n) {
-        if (isRecord[tested[n]]) continue;  // what is shown has mostly been gathered here
-        const CachedLight& own = shown[tested[n]];
-        const glm::vec3 difference = own.total() - found[n].total();
-        const double surplus =
-            double(glm::dot(difference, difference)) / 3 - own.variance - found[n].variance;
-        sum += surplus;
-        squares += surplus * surplus;
+    const float near = kNear / input.patches.islandAt(receiver(0).side).size;
+    double sum = 0, variance = 0;
+    for (bool isNear : {false, true}) {
+        Receivers these;
+        for (const uint32_t r : order)
+            if ((probes[r].nearness > near) == isNear) these.push_back(r);
+        const double share = double(these.size()) / double(order.size());
+        these.resize(std::min(these.size(),
+                              std::clamp(these.size() / kTestedShare, kFewestTested, kMostTested)));
+        if (these.empty()) continue;
+        const std::vector<CachedLight> found = gatherAt(these, kTest);
+        double mean = 0, squares = 0;
+        for (size_t n = 0; n < these.size(); ++n) {
+            const CachedLight& own = shown[these[n]];
+            const glm::vec3 difference = own.total() - found[n].total();
+            const double surplus = double(glm::dot(difference, difference)) / 3 -
+                                   kSureNoise * (own.variance + found[n].variance);
+            mean += surplus / double(these.size());
+            squares += surplus * surplus / double(these.size());
+        }
+        sum += share * mean;
+        variance += share * share * std::max(0.0, squares - mean * mean) / double(these.size());
     }
-    const double number = double(tested.size()), mean = sum / number;
-    const double deviation = std::sqrt(std::max(0.0, squares / number - mean * mean) / number);
-    squaredSurplus = std::max(0.0, mean + kSureSurplus * deviation);
+    squaredSurplus = std::max(0.0, sum + kSureSurplus * std::sqrt(variance));
 }
 
 bool LightAround::wantsRecord(uint32_t r, const CachedLight& found) const {
@@ -177,11 +201,11 @@ bool LightAround::wantsRecord(uint32_t r, const CachedLight& found) const {
 }
 
 bool LightAround::addRecords(const Receivers& order, const std::vector<uint8_t>& wants,
-                             float laxity) {
+                             const Effort& effort) {
     Receivers these;
     for (const uint32_t r : order)
         if (wants[r]) these.push_back(r);
-    const std::vector<CachedLight> found = gatherAt(these, laxity);
+    const std::vector<CachedLight> found = gatherAt(these, effort);
     for (size_t n = 0; n < these.size(); ++n) {
         cache.add(placeOf(these[n]), found[n]);
         isRecord[these[n]] = true;
@@ -189,24 +213,30 @@ bool LightAround::addRecords(const Receivers& order, const std::vector<uint8_t>&
     return !these.empty();
 }
 
-std::vector<CachedLight> LightAround::gatherAt(const Receivers& these, float laxity) {
+Receiver LightAround::receiverFor(uint32_t r, const Effort& effort) const {
+    Receiver result = receiver(r);
+    if (effort.isTest) result.seed = hash(result.seed, kTestRays);
+    return result;
+}
+
+std::vector<CachedLight> LightAround::gatherAt(const Receivers& these, const Effort& effort) {
     std::vector<CachedLight> found(these.size());
     if (these.empty()) return found;
     std::vector<Gathered> surrounding(these.size());
-    if (isSurrounded) surrounding = gatherSurrounding(these, laxity);
+    if (isSurrounded) surrounding = gatherSurrounding(these, effort);
     parallelFor(size_t(0), these.size(),
-                [&](size_t n) { found[n] = gatherAt(these[n], surrounding[n], laxity); });
+                [&](size_t n) { found[n] = gatherAt(these[n], surrounding[n], effort); });
     return found;
 }
 
-std::vector<Gathered> LightAround::gatherSurrounding(const Receivers& these, float laxity) {
+std::vector<Gathered> LightAround::gatherSurrounding(const Receivers& these, const Effort& effort) {
     std::vector<Gathered> gathered = light.direct.gather(
         these.size(),
         [&](size_t n) {
-            Receiver result = receiver(these[n]);
+            Receiver result = receiverFor(these[n], effort);
             result.of = Receiver::Of::SURROUNDING;
             result.otherLight = lightAt(these[n]);
-            result.errorFactor *= laxity;
+            result.errorFactor *= effort.laxity;
             return result;
         },
         input.settings.targetError, [](double) { throwIfCancelled(); });
@@ -214,10 +244,12 @@ std::vector<Gathered> LightAround::gatherSurrounding(const Receivers& these, flo
     return gathered;
 }
 
-CachedLight LightAround::gatherAt(uint32_t r, const Gathered& surrounding, float laxity) const {
-    const Receiver& at = receiver(r);
+CachedLight LightAround::gatherAt(uint32_t r, const Gathered& surrounding,
+                                  const Effort& effort) const {
+    const Receiver at = receiverFor(r, effort);
     const float brightness = std::max(least, lightAt(r) + brightest(surrounding.irradiance));
-    const FinalGather::Light rest = finalGather.gather({{&at, 1.0f}}, brightness, laxity);
+    const FinalGather::Light rest =
+        finalGather.gather({{&at, 1.0f}}, brightness, effort.laxity, effort.isTest);
     CachedLight result;
     result.carried = rest.carried;
     result.reflected = rest.reflected;

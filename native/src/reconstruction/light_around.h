@@ -65,15 +65,20 @@ class LightAround {
     CachedLight at(uint32_t r) const { return cache.at(placeOf(r)); }
     // Returns whether a receiver is no record and interpolated light is not good enough there.
     bool wantsRecord(uint32_t r, const CachedLight& found) const;
-    // Makes records of the receivers with `wants`, in the given order, with `laxity` times the
-    // usual error. Returns whether there are any.
-    bool addRecords(const Receivers& order, const std::vector<uint8_t>& wants, float laxity);
+    // How accurately receivers gather: as one of several records, as a single one, or as a test.
+    struct Effort;
+    static const Effort kRecord, kSingle, kTest;
+    // Makes records of the receivers with `wants`, in the given order. Returns whether there are
+    // any.
+    bool addRecords(const Receivers& order, const std::vector<uint8_t>& wants,
+                    const Effort& effort);
     // Sets surplus(). `shown` is per receiver.
     void measureSurplus(const Receivers& order, const std::vector<CachedLight>& shown);
-    // Return what receivers gather, with `laxity` times the usual error.
-    std::vector<CachedLight> gatherAt(const Receivers& these, float laxity);
-    std::vector<Gathered> gatherSurrounding(const Receivers& these, float laxity);
-    CachedLight gatherAt(uint32_t r, const Gathered& surrounding, float laxity) const;
+    // Return what receivers gather.
+    std::vector<CachedLight> gatherAt(const Receivers& these, const Effort& effort);
+    std::vector<Gathered> gatherSurrounding(const Receivers& these, const Effort& effort);
+    CachedLight gatherAt(uint32_t r, const Gathered& surrounding, const Effort& effort) const;
+    Receiver receiverFor(uint32_t r, const Effort& effort) const;
 
     const ReconstructionInput& input;
     const SetLight& light;
