@@ -43,9 +43,9 @@ class LightAround {
     }
 
     // Returns the mean over the receivers of the squared difference between interpolated light and
-    // the light there, without noise, mean over the channels, (W/m^2)^2. It is measured by
-    // gathering at some of the receivers, and is so large that it is too small in one of 40 cases
-    // if what single receivers tell is normally distributed. Only after atReceivers().
+    // the light there, without half of the noise, mean over the channels, (W/m^2)^2. It is measured
+    // by gathering at some of the receivers, and is so large that it is too small in one of 40
+    // cases if what single receivers tell is normally distributed. Only after atReceivers().
     double surplus() const { return squaredSurplus; }
 
     size_t recordCount() const { return cache.count(); }
