@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+#include <vector>
 
 namespace raybundle {
 namespace {
@@ -129,6 +131,43 @@ TEST(IrradianceCache, FindsRecordsFarFromTheOriginAndInNarrowGaps) {
         for (int k = 0; k < 50; ++k) cache.update(true);
         EXPECT_NEAR(double(cache.at(far).total().x), 0.5, 1e-6) << nearness;
     }
+}
+
+// Records of reaches from 0.001 to 3 m, which lie in grids of a dozen widths.
+TEST(IrradianceCache, TellsWhereNewRecordsHaveChangedTheLight) {
+    IrradianceCache cache(kFar);
+    std::mt19937 random(1);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    auto anyPlace = [&] {
+        return onPlane(uniform(random), uniform(random), std::pow(10.0f, 1.5f * uniform(random)));
+    };
+    std::vector<CachePlace> places;
+    for (int k = 0; k < 400; ++k) places.push_back(anyPlace());
+    auto lightThere = [&] {
+        std::vector<float> light;
+        for (const CachePlace& place : places) light.push_back(cache.at(place).total().x);
+        return light;
+    };
+    auto add = [&](int count) {
+        for (int k = 0; k < count; ++k) cache.add(anyPlace(), lightOf(1 + uniform(random)));
+        cache.update(false);
+    };
+    add(300);
+    const std::vector<float> before = lightThere();
+    add(40);
+    const std::vector<float> after = lightThere();
+    int changed = 0, unchanged = 0;
+    for (size_t k = 0; k < places.size(); ++k) {
+        EXPECT_TRUE(cache.isReachedSince(0, places[k]) || after[k] == 0.0f);
+        if (cache.isReachedSince(300, places[k])) {
+            changed += before[k] != after[k];
+            continue;
+        }
+        EXPECT_EQ(before[k], after[k]);
+        ++unchanged;
+    }
+    EXPECT_GT(changed, 40);
+    EXPECT_GT(unchanged, 40);
 }
 
 TEST(IrradianceCache, ReachesLessFarWhereLightHasAStep) {

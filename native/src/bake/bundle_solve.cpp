@@ -181,17 +181,12 @@ double BundleSolve::castRays() {
     return left;
 }
 
-// Returns the shown light of both halves, per light.
+// Returns per light the light that both halves show, per side of the tiles.
 std::vector<LightOfHalves> BundleSolve::seen() const {
     std::vector<LightOfHalves> result(lights.size());
     const std::vector<float> exposed = in.trace.exposedShare();
     for (size_t k = 0; k < lights.size(); ++k) {
-        for (size_t h = 0; h < 2; ++h) {
-            std::vector<glm::vec3> arriving(weight.size());
-            parallelFor(size_t(0), weight.size(),
-                        [&](size_t side) { arriving[side] = halves[k][h].all(side); });
-            result[k][h] = in.shown.of(std::move(arriving), exposed);
-        }
+        for (size_t h = 0; h < 2; ++h) result[k][h] = in.shown.of(halves[k][h].all(), exposed);
         gathered.apply(result[k], weight);
         for (std::vector<glm::vec3>& half : result[k]) half = in.tiles.mean(half, weight);
     }
@@ -280,11 +275,8 @@ SideNoise keepFirstShot(const SolveInput& in, SetLights& lights, std::vector<flo
         light.irradiance.ofSources = first.ofSources;
         light.irradiance.direct = std::move(first.ofSources);
         light.irradiance.indirect = std::move(first.indirect);
-        std::vector<glm::vec3> all = light.irradiance.direct;
-        for (size_t side = 0; side < all.size(); ++side)
-            all[side] += light.irradiance.indirect[side];
-        all = in.tiles.mean(all, weight);
-        halves.push_back({all, all});
+        const std::vector<glm::vec3> mean = in.tiles.mean(light.irradiance.all(), weight);
+        halves.push_back({mean, mean});
     }
     const SidesOfCells cells(in.tiles.patches());
     SetNoise noise({}, gathered.errorsOf(lights, in.tiles), tileWeight, cells);

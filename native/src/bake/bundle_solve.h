@@ -67,7 +67,7 @@ class BundleSolve {
     std::vector<float> tileWeight;  // per side of the tiles: sum of `weight`, m^2
     // Per light and side of the tiles: standard error of the first shot, W/m^2.
     std::vector<std::vector<float>> errorOfSets;
-    const SidesOfCells cells;
+    const SidesOfCells cells;  // of the tiles
     SetNoise noise;
     const std::vector<bool> allGathered;   // per instance, see ShownLight::instancesAllGathered
     const std::vector<double> growth;      // per instance, see cornerGrowth

@@ -64,12 +64,13 @@ class IrradianceCache {
     }
 
     size_t count() const { return records.size(); }
-    // Returns whether any record reaches a place that was added after the first `before` ones.
+    // Returns whether any record but the first `before` ones reaches a place, so that they have
+    // changed the light there.
     bool isReachedSince(size_t before, const CachePlace& place) const;
 
   private:
     static constexpr uint32_t kNone = UINT32_MAX;
-    static constexpr int kLevels = 64;
+    static constexpr int kLevels = 64;  // from -kLevels / 2 on
     struct Record {
         CachePlace place;
         CachedLight light;

@@ -82,7 +82,7 @@ class ShownLight {
     // share that nothing covers, 0 to 1.
     glm::vec3 of(size_t side, const glm::vec3& own, const glm::vec3& others,
                  const std::vector<float>& exposed) const;
-    // Returns the irradiance that all sides show, W/m^2, where `light` is the irradiance that
+    // Return the irradiance that all sides show, W/m^2, where `light` is the irradiance that
     // arrives. All light counts fully, whatever its angle.
     Irradiance of(Irradiance light, const std::vector<float>& exposed) const;
     std::vector<glm::vec3> of(std::vector<glm::vec3> light,

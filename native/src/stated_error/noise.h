@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "bundles/directions.h"
-#include "transport/set_light.h"
+#include "patches/patches.h"
 
 namespace raybundle {
 

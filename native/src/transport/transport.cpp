@@ -3,6 +3,7 @@
 
 #include <cassert>
 
+#include "job/cancellation.h"
 #include "patches/clusters.h"
 
 namespace raybundle {
@@ -22,6 +23,12 @@ constexpr Kind kKinds[] = {
 static_assert(hasEveryValue(kKinds));
 
 }  // namespace
+
+std::vector<glm::vec3> Irradiance::all() const {
+    std::vector<glm::vec3> result(direct.size());
+    parallelFor(size_t(0), result.size(), [&](size_t side) { result[side] = all(side); });
+    return result;
+}
 
 HandOver handOver(const LitSurfaces& surfaces, const FirstShot& shot) {
     const auto& [patches, exposed] = surfaces;

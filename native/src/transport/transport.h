@@ -49,6 +49,8 @@ struct Irradiance {
 
     // Returns the direct plus the indirect irradiance of a side, W/m^2.
     glm::vec3 all(size_t side) const { return direct[side] + indirect[side]; }
+    // Returns the same of all sides.
+    std::vector<glm::vec3> all() const;
     // Adds the light of another estimate of the same sides. Leaves `byAngle` and `scattered` as
     // they are.
     void add(const Irradiance& other) {
