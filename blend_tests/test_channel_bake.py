@@ -39,7 +39,7 @@ def corner(new_object, new_material, new_light):
                       new_material("Lamp", (0.2, 0.3, 0.6), (0.5, 0.2, 0.1)))
     new_light("Light", 'AREA', 100.0, (0.5, 0, 3), size=1.0)
     settings = bpy.context.scene.raybundle
-    settings.max_patches, settings.max_bundles, settings.target_error = 500, 64, 0.001
+    settings.max_patches, settings.max_bundles, settings.target_error = 500, 64, 0.01
     settings.max_vertices = 200  # few, for the time that the target takes
     return [floor, wall]
 

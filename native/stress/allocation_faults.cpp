@@ -8,7 +8,8 @@
 //
 //   allocation_faults [STEP [FIRST]]
 //
-// Lets every STEP-th allocation fail (default 1), from the FIRST-th on (default 0).
+// Lets every STEP-th allocation fail (default 1), from the FIRST-th on (default 0). Each series of
+// bakes begins a few allocations after the one before, so that they reach others.
 //
 // The program replaces malloc and related functions of the C library, and mmap, for all libraries,
 // so that allocations of oneTBB, its allocator and Embree fail too. Each failing allocation has a
@@ -114,7 +115,8 @@ using namespace raybundle::test;
 // wrong.
 enum Outcome { FAILED_WELL, DID_WITHOUT, NOT_REACHED, WRONG };
 
-constexpr unsigned kHangs = 60;  // time limit, s; a bake takes some hundredths of a second
+constexpr int64_t kNextSeries = 7;  // allocations from the first of a series to that of the next
+constexpr unsigned kHangs = 60;     // time limit, s; a bake takes some hundredths of a second
 
 bool holds(bool condition, const char* what, int64_t at) {
     if (!condition)
@@ -241,13 +243,19 @@ int main(int count, char** arguments) {
     const int64_t step = count > 1 ? std::max(1, std::atoi(arguments[1])) : 1;
     const int64_t from = count > 2 ? std::max(0, std::atoi(arguments[2])) : 0;
     bool isWell = true;
+    // Each series begins at another allocation, so that together they reach more of them.
+    int64_t first = from;
+    const auto runSeries = [&](const char* reconstruction, Mode mode, bool isFirst) {
+        isWell = failEach(reconstruction, mode, isFirst, step, first) && isWell;
+        first = from + (first - from + kNextSeries) % step;
+    };
     for (bool all : {false, true}) {
         stays = all;
         for (bool isFirst : {true, false}) {
             if (isFirst && step != 1) continue;
             for (const char* reconstruction : {"LEAST_SQUARES", "POINT"})
-                isWell = failEach(reconstruction, Mode::WAITED_FOR, isFirst, step, from) && isWell;
-            isWell = failEach("LEAST_SQUARES", Mode::IN_BACKGROUND, isFirst, step, from) && isWell;
+                runSeries(reconstruction, Mode::WAITED_FOR, isFirst);
+            runSeries("LEAST_SQUARES", Mode::IN_BACKGROUND, isFirst);
         }
     }
     return isWell ? 0 : 1;

@@ -193,6 +193,7 @@ TEST(AdaptedMeshes, EveryObjectOfAMeshGetsItsOwn) {
     place(scene, box("cube", {-0.5f, -0.5f, 0.5f}, {0.5f, 0.5f, 1}, false), grey("grey", 0.3f));
     scene.addLight(sunLight(kToSun, glm::dvec3(kSun)));
     Bake bake;
+    setQuick(bake);
     bake.settings.adaptMeshes = 1;
     bake.run(scene);
     EXPECT_GT(bake.adaptedMesh(0).vertices.size(), 50u);
