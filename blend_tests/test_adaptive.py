@@ -82,7 +82,15 @@ def test_vertices_follow_the_shadow(cube_on_plane):
 def test_vertices_are_counted_before_one_decides(cube_on_plane):
     counted = bake(topology='KEEP', count_adaptive=True)
     assert not counted.vertices and len(cube_on_plane.data.vertices) == 6
-    assert bake().vertices['after'] == pytest.approx(counted.adaptive_vertices, rel=0.05)
+    kept = {item.name: item for item in counted.objects}
+    assert kept["Cube"].vertices == 8 and kept[cube_on_plane.name].vertices == 6
+    # The plane loses the shadow.
+    assert kept[cube_on_plane.name].error['mesh'] > 0.05
+    report = bake()
+    assert report.vertices['after'] == pytest.approx(counted.adaptive_vertices, rel=0.05)
+    for item in report.objects:
+        assert item.adaptive_vertices == pytest.approx(
+            kept[item.name.removesuffix(" (Radiosity)")].adaptive_vertices, rel=0.05)
 
 
 def test_there_is_neither_a_gap_nor_a_t_junction(cube_on_plane):

@@ -60,7 +60,8 @@ def floor(new_object, new_material):
 
 def test_there_is_no_panel_without_a_report():
     for panel in (report_panel.RAYBUNDLE_PT_last_bake, report_panel.RAYBUNDLE_PT_warnings,
-                  report_panel.RAYBUNDLE_PT_left_out, report_panel.RAYBUNDLE_PT_skipped):
+                  report_panel.RAYBUNDLE_PT_mesh_error, report_panel.RAYBUNDLE_PT_left_out,
+                  report_panel.RAYBUNDLE_PT_skipped):
         assert not panel.poll(bpy.context)
     settings().report = "no JSON"
     assert not report_panel.RAYBUNDLE_PT_last_bake.poll(bpy.context)
@@ -94,6 +95,39 @@ def test_the_noisiest_object_is_named():
         "Noisiest", "3.1 %, B"]
     store(objects=[entry("A", 0.02)])
     assert "Noisiest" not in drawn(report_panel.RAYBUNDLE_PT_last_bake).texts()
+
+
+def mesh_entry(name: str, error: float, vertices: int, adaptive: int) -> dict:
+    return {'name': name, 'corners': 4, 'status': "baked", 'error': {'noise': 0.01, 'mesh': error},
+            'vertices': vertices, 'adaptive_vertices': adaptive}
+
+
+def test_meshes_that_lose_light_are_listed(floor):
+    panel = report_panel.RAYBUNDLE_PT_mesh_error
+    store(objects=[mesh_entry("B", 0.031, 1200, 0), mesh_entry("floor", 0.16, 4, 1310),
+                   mesh_entry("C", 0.019, 8, 8), mesh_entry("A", 0.031, 1200, 1200),
+                   {'name': "D", 'corners': 0, 'status': "hidden in renders", 'error': {}}])
+    assert settings().target_error == pytest.approx(0.02) and panel.poll(bpy.context)
+    layout = drawn(panel)
+    assert [text for text in layout.texts() if text] == [
+        "floor", "16 %", "4 \N{RIGHTWARDS ARROW} 1,310", "A", "3.1 %", "1,200", "B", "3.1 %",
+        "1,200"]
+    enabled = [made.enabled for method, _, _, made, _ in layout.record if method == 'operator']
+    assert enabled == [True, False, False]
+    assert layout.props() == ["count_adaptive"]
+    assert drawn(panel, method='draw_header_preset').texts() == ["3  "]
+    # One button chooses the topology.
+    assert [arguments[1:] for method, arguments, *_ in layout.record if method == 'prop_enum'] == [
+        ("topology", 'ADAPTIVE')]
+    settings().target_error = 0.2
+    assert not panel.poll(bpy.context)
+    store(objects=[{'name': "old", 'corners': 4, 'status': "baked", 'error': {'mesh': 0.3}}])
+    assert drawn(panel).texts()[:3] == ["old", "30 %", "0"]
+
+
+def test_many_meshes_that_lose_light_are_counted():
+    store(objects=[mesh_entry(str(k), 0.1, 4, 0) for k in range(60)])
+    assert "and 10 more" in drawn(report_panel.RAYBUNDLE_PT_mesh_error).texts()
 
 
 def test_warnings_are_in_lines():

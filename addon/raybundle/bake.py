@@ -435,9 +435,10 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
             color_attribute.write_error(receiver.data, settings.attribute, settings.domain,
                                         item.error)
         # The native library lists its objects by instance.
-        status = native_report['objects'][item.target.instance]['status']
-        error = native_report['objects'][item.target.instance]['error']
-        reports.append(ObjectReport(receiver.name, len(receiver.data.loops), status, error))
+        own = native_report['objects'][item.target.instance]
+        reports.append(ObjectReport(
+            receiver.name, len(receiver.data.loops), own['status'], own['error'],
+            len(receiver.data.vertices), own['adaptive_vertices']))
     for original, copy in copies.items():
         export.last.share(original, copy)
     names = {settings.attribute, *(name for item in lights for name in item.set_lights)}

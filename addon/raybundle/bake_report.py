@@ -26,6 +26,9 @@ class ObjectReport:
     status: str  # 'baked', optionally with a remark, or the reason why the object was not baked
     # Keys as in BakeReport.error. {}: not baked.
     error: dict[str, float] = field(default_factory=dict)
+    vertices: int = 0  # number, of the mesh that was written to; 0: not baked
+    # Number that its mesh has, or would have, with the topology 'ADAPTIVE'. 0: not counted.
+    adaptive_vertices: int = 0
 
 
 @dataclass

@@ -71,6 +71,16 @@ def noisiest_object(report: dict) -> tuple[float, str] | None:
     return max(noises) if len(noises) > 1 else None
 
 
+def mesh_errors(report: dict) -> list[tuple[str, float, int, int]]:
+    """Returns each baked object's name, the error that its mesh causes, relative to its own light,
+    its number of vertices, and that with the topology ADAPTIVE, 0 if they were not counted. The
+    objects with the largest error come first."""
+    found = [(item['name'], item['error']['mesh'], item.get('vertices', 0),
+              item.get('adaptive_vertices', 0))
+             for item in report.get('objects', []) if item.get('error')]
+    return sorted(found, key=lambda item: (-item[1], item[0]))
+
+
 def time_text(seconds: float) -> str:
     """Returns a time with two digits and its unit, which are the same in all languages."""
     if seconds < 100.0:

@@ -9,8 +9,8 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from .library_messages import recognised
 from .messages import translated
-from .report_data import (Line, as_message, left_out_objects, noisiest_object, read_report,
-                          time_text, warning_lines)
+from .report_data import (Line, as_message, left_out_objects, mesh_errors, noisiest_object,
+                          read_report, time_text, warning_lines)
 from .report_remedies import (advice_text, advised_settings, exist, is_about_error, is_about_side,
                               is_applied)
 from .text_wrap import draw_wrapped
@@ -116,6 +116,45 @@ def _draw_remedies(layout: bpy.types.UILayout, context: bpy.types.Context, line:
                      icon='CHECKMARK', translate=False).index = index
 
 
+def _coarse_objects(scene: bpy.types.Scene) -> list[tuple[str, float, int, int]]:
+    """Returns those of mesh_errors() whose error is larger than the noise that is aimed for."""
+    return [item for item in mesh_errors(read_report(scene))
+            if item[1] > scene.raybundle.target_error]
+
+
+class RAYBUNDLE_PT_mesh_error(_LastBakePanel, bpy.types.Panel):
+    bl_label = "Mesh Error by Object"
+    bl_parent_id = "RAYBUNDLE_PT_last_bake"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and bool(_coarse_objects(context.scene))
+
+    def draw_header_preset(self, context):
+        self.layout.label(text=f"{len(_coarse_objects(context.scene))}  ", translate=False)
+
+    def draw(self, context):
+        settings = context.scene.raybundle
+        objects = _coarse_objects(context.scene)
+        column = self.layout.column(align=True)
+        for name, error, vertices, adaptive in objects[:_MOST_ROWS]:
+            row = column.row(align=True)
+            row.label(text=name, translate=False)
+            row.label(text=percent(error), translate=False)
+            row.label(text=f"{vertices:,} \N{RIGHTWARDS ARROW} {adaptive:,}"
+                      if adaptive > vertices else f"{vertices:,}", icon='VERTEXSEL',
+                      translate=False)
+            row = row.row(align=True)
+            row.enabled = exist('object', [name])
+            row.operator("raybundle.select_named", text="",
+                         icon='RESTRICT_SELECT_OFF').object_name = name
+        _draw_rest(self.layout, len(objects))
+        row = self.layout.row(align=True)
+        row.prop_enum(settings, "topology", 'ADAPTIVE')
+        row.prop(settings, "count_adaptive", toggle=True)
+
+
 class RAYBUNDLE_PT_left_out(_LastBakePanel, bpy.types.Panel):
     bl_label = "Objects Left Out"
     bl_parent_id = "RAYBUNDLE_PT_last_bake"
@@ -136,9 +175,14 @@ class RAYBUNDLE_PT_left_out(_LastBakePanel, bpy.types.Panel):
             button.enabled = exist('object', [name])
             button.operator("raybundle.select_named", text="",
                             icon='RESTRICT_SELECT_OFF').object_name = name
-        if len(objects) > _MOST_ROWS:
-            self.layout.label(text=iface_("and {count} more").format(
-                count=len(objects) - _MOST_ROWS), translate=False)
+        _draw_rest(self.layout, len(objects))
+
+
+def _draw_rest(layout: bpy.types.UILayout, count: int) -> None:
+    """Draws how many of `count` rows are not shown."""
+    if count > _MOST_ROWS:
+        layout.label(text=iface_("and {count} more").format(count=count - _MOST_ROWS),
+                     translate=False)
 
 
 class RAYBUNDLE_PT_skipped(_LastBakePanel, bpy.types.Panel):
@@ -159,6 +203,7 @@ class RAYBUNDLE_PT_skipped(_LastBakePanel, bpy.types.Panel):
 register, unregister = bpy.utils.register_classes_factory((
     RAYBUNDLE_PT_last_bake,
     RAYBUNDLE_PT_warnings,
+    RAYBUNDLE_PT_mesh_error,
     RAYBUNDLE_PT_left_out,
     RAYBUNDLE_PT_skipped,
 ))

@@ -177,12 +177,18 @@ TEST(AdaptedMeshes, AreCountedBeforeOneDecides) {
     Bake bake;
     bake.settings.countAdaptive = 1;
     bake.run(scene);
-    const size_t counted = reportOf(bake)["adaptive_vertices"];
+    const Json before = reportOf(bake);
+    const size_t counted = before["adaptive_vertices"];
     EXPECT_EQ(cornerLight(bake, 0, RB_OUTPUT_LIGHTING).size(), 4u);
     bake.settings.adaptMeshes = 1;
     bake.run(scene);
     EXPECT_EQ(vertexCount(bake, scene), counted);
-    EXPECT_EQ(size_t(reportOf(bake)["adaptive_vertices"]), counted);
+    const Json after = reportOf(bake);
+    EXPECT_EQ(size_t(after["adaptive_vertices"]), counted);
+    for (int32_t i = 0; i < int32_t(scene.instances.size()); ++i)
+        for (const Json& report : {before, after})
+            EXPECT_EQ(size_t(report["objects"][size_t(i)]["adaptive_vertices"]),
+                      bake.adaptedMesh(i).vertices.size());
 }
 
 TEST(AdaptedMeshes, EveryObjectOfAMeshGetsItsOwn) {

@@ -72,7 +72,8 @@ void addFirstPass(const Report& first, Report& second) {
         second.seconds[stage] += first.seconds[stage];
     second.totalSeconds += first.totalSeconds;
     second.shadowRays += first.shadowRays;
-    second.adaptiveVertices = first.adaptiveVertices;
+    for (size_t i = 0; i < second.objects.size(); ++i)
+        second.objects[i].adaptiveVertices = first.objects[i].adaptiveVertices;
     for (const Warning& warning : first.warnings)
         if (warning.id == WarningId::MAX_VERTICES) second.warnings.push_back(warning);
 }

@@ -442,7 +442,8 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
     if (meshes || (settings.countAdaptive && !settings.adaptMeshes)) {
         std::vector<FinerMesh> adapted =
             adaptMeshes({input, in.tiles, sides}, ranges, progress, report);
-        for (const FinerMesh& mesh : adapted) report.adaptiveVertices += mesh.vertices.size();
+        for (size_t i = 0; i < adapted.size(); ++i)
+            report.objects[i].adaptiveVertices = adapted[i].vertices.size();
         if (meshes) *meshes = std::move(adapted);
     }
     fillLeftOutCorners(patches, ranges, made, report);

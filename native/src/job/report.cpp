@@ -13,6 +13,7 @@
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <utility>
 
 namespace raybundle {
@@ -87,6 +88,12 @@ double Report::balanceError() const {
     return emitted > 0 ? std::abs(lost) / emitted : 0;
 }
 
+size_t Report::adaptiveVertices() const {
+    return std::accumulate(
+        objects.begin(), objects.end(), size_t(0),
+        [](size_t sum, const Object& one) { return sum + one.adaptiveVertices; });
+}
+
 void Report::addNotesOf(Report other) {
     warnings.insert(warnings.end(), std::make_move_iterator(other.warnings.begin()),
                     std::make_move_iterator(other.warnings.end()));
@@ -119,7 +126,7 @@ std::string Report::json() const {
                             {"escaped", text(sum(energy.escaped))},
                             {"balance_error", text(balanceError())}})},
          {"peak_memory_bytes", text(peakMemoryBytes())},
-         {"adaptive_vertices", text(adaptiveVertices)},
+         {"adaptive_vertices", text(adaptiveVertices())},
          {"light_sets", array(lightSets,
                               [](const LightSet& set) {
                                   return object({{"name", text(set.name)},
@@ -130,7 +137,8 @@ std::string Report::json() const {
                                return object({{"name", text(one.name)},
                                               {"corners", text(one.corners)},
                                               {"status", text(one.status)},
-                                              {"error", errors(one.error)}});
+                                              {"error", errors(one.error)},
+                                              {"adaptive_vertices", text(one.adaptiveVertices)}});
                            })},
          {"warnings", array(warnings, [](const Warning& warning) { return text(warning.text); })},
          {"warning_ids",

@@ -32,6 +32,8 @@ struct Report {
         size_t corners = 0;
         std::string status;
         Errors error{};  // relative to the object's own light
+        // Number of vertices that its mesh has if it is adapted to the light. 0: not counted.
+        size_t adaptiveVertices = 0;
     };
     // The power that sources emit, that surfaces absorb, and that leaves the scene, W, RGB.
     struct Energy {
@@ -74,8 +76,6 @@ struct Report {
     std::vector<Object> objects;
     Warnings warnings;
     std::vector<Skip> skipped;
-    // Number of vertices that all meshes have if they are adapted to the light. 0: not counted.
-    size_t adaptiveVertices = 0;
 
     // Adds a warning.
     void warn(WarningId id, std::string text) { warnings.push_back({id, std::move(text)}); }
@@ -84,6 +84,9 @@ struct Report {
     // Appends the warnings and the skipped work of another report.
     void addNotesOf(Report other);
 
+    // Returns the number of vertices that all meshes have if they are adapted to the light, or 0 if
+    // they were not counted.
+    size_t adaptiveVertices() const;
     // Returns |emitted - absorbed - escaped| / emitted, each summed over the channels, or 0 if
     // nothing is emitted.
     double balanceError() const;
