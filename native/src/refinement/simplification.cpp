@@ -1,0 +1,399 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "refinement/simplification.h"
+
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <numeric>
+#include <optional>
+#include <queue>
+
+#include "job/error.h"
+#include "refinement/collapsing_mesh.h"
+
+namespace raybundle {
+namespace {
+
+using Triangle = CollapsingTriangle;
+using VertexHandle = CollapsingMesh::Mesh3::VertexHandle;
+using HalfedgeHandle = CollapsingMesh::Mesh3::HalfedgeHandle;
+
+// Least cosine between the normals of a triangle before and after a collapse.
+constexpr double kLeastTurn = 0.5;
+// Least height of a triangle over its longest edge, unless triangles were thinner before.
+constexpr double kThin = 0.05;
+// Weight of the length of the collapsed edge, relative to the largest extent of the mesh, in the
+// order of the collapses. Among those that change nothing, short edges come first.
+constexpr float kByLength = 0.01f;
+
+// Returns the point of a triangle that is nearest to a point, by the weights of its corners.
+// Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.5.
+glm::dvec3 nearestIn(const std::array<glm::dvec3, 3>& t, const glm::dvec3& p) {
+    const glm::dvec3 ab = t[1] - t[0], ac = t[2] - t[0], ap = p - t[0];
+    const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
+    if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
+    const glm::dvec3 bp = p - t[1];
+    const double d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
+    if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
+    const double vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {d3 / (d3 - d1), d1 / (d1 - d3), 0};
+    const glm::dvec3 cp = p - t[2];
+    const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+    if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
+    const double vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {d6 / (d6 - d2), 0, d2 / (d2 - d6)};
+    const double va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 >= d3 && d5 >= d6) {
+        const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return {0, 1 - w, w};
+    }
+    return glm::dvec3(va, vb, vc) / (va + vb + vc);
+}
+
+double shapeOf(const std::array<glm::dvec3, 3>& t) {
+    const double across = glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
+    const double longest =
+        std::max({glm::dot(t[1] - t[0], t[1] - t[0]), glm::dot(t[2] - t[0], t[2] - t[0]),
+                  glm::dot(t[2] - t[1], t[2] - t[1])});
+    return longest > 0 ? across / longest : 0;
+}
+
+class Simplifier {
+  public:
+    Simplifier(const Mesh& source, const SimplificationLimits& limits)
+        : source(source), limits(limits), surface(source, limits) {}
+
+    void run();
+    SimplifiedMesh result() const;
+
+  private:
+    // The triangles on one side of a collapse, between two features or all around.
+    struct Side {
+        std::vector<int32_t> changing;   // get the other end of the edge
+        std::vector<int32_t> vanishing;  // beside the edge
+        // Of the vertex that is removed, and of the one that stays.
+        int32_t corner = -1, other = -1;
+    };
+    struct Entry {
+        float priority;
+        int32_t vertex;
+        uint32_t version;
+        bool operator<(const Entry& e) const {
+            return priority != e.priority ? priority > e.priority : vertex > e.vertex;
+        }
+    };
+    // The nearest place among triangles: its squared distance and weights.
+    struct Place {
+        double distance2 = INFINITY;
+        size_t triangle = 0;
+        glm::dvec3 weights{0.0};
+    };
+
+    std::array<int32_t, 3> cornersAfter(const Side& side, int32_t triangle, int32_t vertex) const;
+
+    // Returns the sides of a collapse, or nothing if features forbid it.
+    std::optional<std::vector<Side>> sidesOf(HalfedgeHandle edge) const;
+    // Returns the largest change relative to its limit, or a negative number if the edge must not
+    // be collapsed.
+    float priorityOf(HalfedgeHandle edge) const;
+    bool mayCollapse(HalfedgeHandle edge) const;
+    float changeOn(const Side& side, int32_t vertex) const;
+    Place nearest(const std::vector<std::array<glm::dvec3, 3>>& triangles,
+                  const glm::dvec3& p) const;
+    float changeAt(int32_t corner, const std::array<int32_t, 3>& corners, const Place& place) const;
+    void queueBest(int32_t vertex);
+    void collapse(HalfedgeHandle edge);
+
+    const Mesh& source;
+    const SimplificationLimits& limits;
+    CollapsingMesh surface;
+    CollapsingMesh::Mesh3& mesh = surface.mesh;
+    std::vector<Triangle>& triangles = surface.triangles;
+    std::vector<HalfedgeHandle> best;  // per vertex: the edge to collapse
+    std::vector<uint32_t> version;     // per vertex: of its entry in the queue
+    std::priority_queue<Entry> queue;
+};
+
+std::optional<std::vector<Simplifier::Side>> Simplifier::sidesOf(HalfedgeHandle edge) const {
+    const VertexHandle v0 = mesh.from_vertex_handle(edge), v1 = mesh.to_vertex_handle(edge);
+    const int32_t count = surface.featureCounts[size_t(v0.idx())];
+    const bool isAlong = count == 2 && surface.isFeature(v0.idx(), v1.idx());
+    if (surface.isLocked[size_t(v0.idx())] || (count != 0 && !isAlong)) return std::nullopt;
+    std::vector<Side> sides;
+    // Around the vertex, from the edge to the left until the next feature, and to the right.
+    for (const bool isLeft : {true, false}) {
+        Side side;
+        HalfedgeHandle spoke = edge;
+        for (;;) {
+            const HalfedgeHandle inside = isLeft ? spoke : mesh.opposite_halfedge_handle(spoke);
+            const auto face = mesh.face_handle(inside);
+            if (!face.is_valid()) break;
+            const int32_t t = surface.triangleOf[size_t(face.idx())];
+            spoke = isLeft ? mesh.opposite_halfedge_handle(mesh.prev_halfedge_handle(inside))
+                           : mesh.next_halfedge_handle(inside);
+            if (side.vanishing.empty()) {
+                const Triangle& triangle = triangles[size_t(t)];
+                side.corner = triangle.corner[size_t(triangle.at(v0.idx()))];
+                side.other = triangle.corner[size_t(triangle.at(v1.idx()))];
+            }
+            const bool isBeside = side.vanishing.empty() || spoke == edge;
+            (isBeside ? side.vanishing : side.changing).push_back(t);
+            const int32_t end = mesh.to_vertex_handle(spoke).idx();
+            if (spoke == edge || surface.isFeature(v0.idx(), end)) break;
+        }
+        if (side.vanishing.empty()) continue;  // beyond the border of the mesh
+        if (side.changing.empty()) return std::nullopt;
+        sides.push_back(std::move(side));
+        if (count == 0) break;  // all around
+    }
+    return sides;
+}
+
+std::array<int32_t, 3> Simplifier::cornersAfter(const Side& side, int32_t triangle,
+                                                int32_t vertex) const {
+    const Triangle& t = triangles[size_t(triangle)];
+    std::array<int32_t, 3> corners = t.corner;
+    corners[size_t(t.at(vertex))] = side.other;
+    return corners;
+}
+
+Simplifier::Place Simplifier::nearest(const std::vector<std::array<glm::dvec3, 3>>& candidates,
+                                      const glm::dvec3& p) const {
+    Place place;
+    for (size_t n = 0; n < candidates.size(); ++n) {
+        const auto& t = candidates[n];
+        const glm::dvec3 weights = nearestIn(t, p);
+        const glm::dvec3 off = weights[0] * t[0] + weights[1] * t[1] + weights[2] * t[2] - p;
+        const double distance2 = glm::dot(off, off);
+        if (distance2 < place.distance2) place = {distance2, n, weights};
+    }
+    return place;
+}
+
+// Returns the largest change at a corner of the source, relative to its limit.
+float Simplifier::changeAt(int32_t corner, const std::array<int32_t, 3>& corners,
+                           const Place& place) const {
+    float most = float(std::sqrt(place.distance2)) / limits.distance;
+    const size_t width = limits.tolerances.size();
+    for (size_t k = 0; k < width; ++k) {
+        double value = 0;
+        for (size_t c = 0; c < 3; ++c)
+            value += place.weights[int(c)] * limits.values[size_t(corners[c]) * width + k];
+        most = std::max(most, float(std::abs(value - limits.values[size_t(corner) * width + k])) /
+                                  limits.tolerances[k]);
+    }
+    return most;
+}
+
+float Simplifier::changeOn(const Side& side, int32_t vertex) const {
+    std::vector<std::array<glm::dvec3, 3>> after;
+    std::vector<std::array<int32_t, 3>> corners;
+    double thinnest = 1;
+    for (int32_t t : side.changing) {
+        corners.push_back(cornersAfter(side, t, vertex));
+        after.push_back(surface.pointsOf(corners.back()));
+        const std::array<glm::dvec3, 3> before = surface.pointsOf(triangles[size_t(t)].corner);
+        thinnest = std::min(thinnest, shapeOf(before));
+        const glm::dvec3 was = glm::cross(before[1] - before[0], before[2] - before[0]),
+                         is = glm::cross(after.back()[1] - after.back()[0],
+                                         after.back()[2] - after.back()[0]);
+        if (glm::dot(was, is) < kLeastTurn * glm::length(was) * glm::length(is)) return -1;
+    }
+    for (const auto& t : after)
+        if (!(shapeOf(t) >= std::min(kThin, thinnest)) || shapeOf(t) <= 0) return -1;
+    float most = 0;
+    auto test = [&](int32_t corner) {
+        const Place place = nearest(after, surface.positionOf(corner));
+        most = std::max(most, changeAt(corner, corners[place.triangle], place));
+        return most <= 1;
+    };
+    if (!test(side.corner)) return -1;
+    for (const std::vector<int32_t>* these : {&side.changing, &side.vanishing})
+        for (int32_t t : *these)
+            for (int32_t corner : triangles[size_t(t)].removed)
+                if (!test(corner)) return -1;
+    return most;
+}
+
+// Returns whether the surface stays one: no two of its faces meet.
+bool Simplifier::mayCollapse(HalfedgeHandle edge) const {
+    if (!mesh.is_collapse_ok(edge)) return false;
+    const HalfedgeHandle back = mesh.opposite_halfedge_handle(edge);
+    if (mesh.is_boundary(edge) || mesh.is_boundary(back)) return true;
+    const VertexHandle left = mesh.to_vertex_handle(mesh.next_halfedge_handle(edge)),
+                       right = mesh.to_vertex_handle(mesh.next_halfedge_handle(back));
+    return mesh.valence(left) > 3 || mesh.valence(right) > 3 ||
+           !mesh.find_halfedge(left, right).is_valid();
+}
+
+float Simplifier::priorityOf(HalfedgeHandle edge) const {
+    const auto sides = sidesOf(edge);
+    if (!sides || !mayCollapse(edge)) return -1;
+    const VertexHandle v0 = mesh.from_vertex_handle(edge);
+    float most = 0;
+    for (const Side& side : *sides) {
+        const float change = changeOn(side, v0.idx());
+        if (change < 0) return -1;
+        most = std::max(most, change);
+    }
+    return most + kByLength * float(mesh.calc_edge_length(edge)) / surface.extent;
+}
+
+// Queues a vertex with the best edge from it, if there is any.
+void Simplifier::queueBest(int32_t vertex) {
+    const size_t v = size_t(vertex);
+    ++version[v];
+    best[v] = HalfedgeHandle();
+    float least = INFINITY;
+    for (const auto edge : mesh.voh_range(VertexHandle(vertex))) {
+        const float priority = priorityOf(edge);
+        if (priority < 0 || priority >= least) continue;
+        least = priority;
+        best[v] = edge;
+    }
+    if (best[v].is_valid()) queue.push({least, vertex, version[v]});
+}
+
+void Simplifier::collapse(HalfedgeHandle edge) {
+    const int32_t v0 = mesh.from_vertex_handle(edge).idx(), v1 = mesh.to_vertex_handle(edge).idx();
+    const std::vector<Side> sides = *sidesOf(edge);
+    if (surface.featureCounts[size_t(v0)] > 0) {
+        int32_t next = -1;
+        for (const auto other : mesh.vv_range(VertexHandle(v0)))
+            if (other.idx() != v1 && surface.isFeature(v0, other.idx())) next = other.idx();
+        surface.features[CollapsingMesh::pairKey(v1, next)] =
+            surface.features[CollapsingMesh::pairKey(v0, next)];
+        surface.features.erase(CollapsingMesh::pairKey(v0, next));
+        surface.features.erase(CollapsingMesh::pairKey(v0, v1));
+    }
+    for (const Side& side : sides) {
+        std::vector<int32_t> removed = {side.corner};
+        for (const std::vector<int32_t>* these : {&side.changing, &side.vanishing})
+            for (int32_t t : *these) {
+                std::vector<int32_t>& own = triangles[size_t(t)].removed;
+                removed.insert(removed.end(), own.begin(), own.end());
+                own.clear();
+            }
+        std::vector<std::array<glm::dvec3, 3>> after;
+        for (int32_t t : side.changing) {
+            Triangle& triangle = triangles[size_t(t)];
+            triangle.corner = cornersAfter(side, t, v0);
+            triangle.vertex[size_t(triangle.at(v0))] = v1;
+            triangle.isChanged = true;
+            after.push_back(surface.pointsOf(triangle.corner));
+        }
+        for (int32_t t : side.vanishing) triangles[size_t(t)].isRemoved = true;
+        for (int32_t corner : removed)
+            triangles[size_t(side.changing[nearest(after, surface.positionOf(corner)).triangle])]
+                .removed.push_back(corner);
+    }
+    mesh.collapse(edge);
+    queueBest(v1);
+    for (const auto other : mesh.vv_range(VertexHandle(v1))) queueBest(other.idx());
+}
+
+void Simplifier::run() {
+    mesh.request_vertex_status();
+    mesh.request_edge_status();
+    mesh.request_halfedge_status();
+    mesh.request_face_status();
+    best.resize(mesh.n_vertices());
+    version.resize(mesh.n_vertices());
+    for (const auto vertex : mesh.vertices()) queueBest(vertex.idx());
+    while (!queue.empty()) {
+        const Entry entry = queue.top();
+        queue.pop();
+        const size_t v = size_t(entry.vertex);
+        if (entry.version != version[v]) continue;
+        // Collapses elsewhere may have brought the ends of the edge together on another way.
+        if (mayCollapse(best[v]))
+            collapse(best[v]);
+        else
+            queueBest(entry.vertex);
+    }
+}
+
+SimplifiedMesh Simplifier::result() const {
+    SimplifiedMesh made;
+    std::vector<std::vector<const Triangle*>> ofFace(source.faceCount());
+    for (const Triangle& t : triangles) ofFace[size_t(t.face)].push_back(&t);
+    const size_t width = limits.tolerances.size();
+    std::vector<double> squares(width);
+    size_t removed = 0;
+    auto addFace = [&](int32_t face, const auto& corners, const auto& edges) {
+        made.sourceCorners.insert(made.sourceCorners.end(), corners.begin(), corners.end());
+        made.sourceEdges.insert(made.sourceEdges.end(), edges.begin(), edges.end());
+        made.faceOffsets.push_back(int32_t(made.sourceCorners.size()));
+        made.sourceFaces.push_back(face);
+    };
+    for (size_t f = 0; f < ofFace.size(); ++f) {
+        const bool isWhole = std::none_of(
+            ofFace[f].begin(), ofFace[f].end(),
+            [](const Triangle* t) { return t->isChanged || t->isRemoved || !t->removed.empty(); });
+        if (isWhole) {
+            std::vector<int32_t> corners(size_t(source.faceOffsets[f + 1] - source.faceOffsets[f]));
+            std::iota(corners.begin(), corners.end(), source.faceOffsets[f]);
+            addFace(int32_t(f), corners, corners);
+            continue;
+        }
+        for (const Triangle* t : ofFace[f]) {
+            if (t->isRemoved) continue;
+            std::array<int32_t, 3> edges;
+            for (size_t k = 0; k < 3; ++k) {
+                const auto feature = surface.features.find(
+                    CollapsingMesh::pairKey(t->vertex[k], t->vertex[(k + 1) % 3]));
+                edges[k] = feature == surface.features.end() ? -1 : feature->second;
+            }
+            addFace(int32_t(f), t->corner, edges);
+            for (int32_t corner : t->removed) {
+                const Place place =
+                    nearest({surface.pointsOf(t->corner)}, surface.positionOf(corner));
+                ++removed;
+                for (size_t k = 0; k < width; ++k) {
+                    double change = -double(limits.values[size_t(corner) * width + k]);
+                    for (size_t c = 0; c < 3; ++c)
+                        change += place.weights[int(c)] *
+                                  double(limits.values[size_t(t->corner[c]) * width + k]);
+                    squares[k] += change * change;
+                }
+            }
+        }
+    }
+    std::vector<int32_t> kept;
+    for (int32_t corner : made.sourceCorners) kept.push_back(source.cornerVertices[size_t(corner)]);
+    std::sort(kept.begin(), kept.end());
+    const size_t count = size_t(std::unique(kept.begin(), kept.end()) - kept.begin()) + removed;
+    for (double sum : squares)
+        made.changes.push_back(float(std::sqrt(sum / double(std::max<size_t>(1, count)))));
+    return made;
+}
+
+void check(const Mesh& source, const SimplificationLimits& limits) {
+    const auto need = [](bool isRight, const char* what) {
+        if (!isRight) throw invalidArgument(what);
+    };
+    need(limits.distance > 0 && std::isfinite(limits.distance), "the distance must be positive");
+    for (float tolerance : limits.tolerances)
+        need(tolerance > 0 && std::isfinite(tolerance), "all tolerances must be positive");
+    need(limits.faceKinds.empty() || limits.faceKinds.size() == source.faceCount(),
+         "there must be a kind per face");
+    need(limits.keptEdges.empty() || limits.keptEdges.size() == source.cornerCount(),
+         "there must be a mark per corner");
+    need(limits.values.size() == source.cornerCount() * limits.tolerances.size(),
+         "there must be as many values per corner as tolerances");
+    need(std::all_of(limits.values.begin(), limits.values.end(),
+                     [](float value) { return std::isfinite(value); }),
+         "all values must be finite");
+}
+
+}  // namespace
+
+SimplifiedMesh simplify(const Mesh& source, const SimplificationLimits& limits) {
+    check(source, limits);
+    omerr().disable();  // its messages are of no use to the caller
+    Simplifier simplifier(source, limits);
+    simplifier.run();
+    return simplifier.result();
+}
+
+}  // namespace raybundle
