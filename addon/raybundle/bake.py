@@ -6,6 +6,7 @@ The user's data is changed only after the native library has computed all of the
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -28,6 +29,7 @@ from .properties import BakeSettings, read_settings
 from .quality import OBJECT_FACTORS, full_bake
 from .scene_data import MeshData
 from .scene_export import BakeTarget, SceneExport, export_lamps_again, export_scene
+from .simplified_mesh import Simplifier
 from .warning_lines import listed
 
 
@@ -86,12 +88,13 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
 def prepare(context: bpy.types.Context, overrides: dict[str, object], is_draft: bool = False
             ) -> PreparedBake:
     """Exports the context's scene, in Object Mode. is_draft: the library's setting `draft`. A draft
-    of adapted meshes keeps those that there are. overrides, and errors: as in bake()."""
+    of adapted or simplified meshes keeps those that there are. overrides, and errors: as in bake()."""
     started = time.perf_counter()
     scene = context.scene
     settings = _read_settings(scene, overrides)
-    if is_draft and settings.topology == 'ADAPTIVE' and find_copies(scene):
-        settings = replace(settings, topology='KEEP')
+    if (is_draft and (settings.topology == 'ADAPTIVE' or settings.simplify)
+            and find_copies(scene)):
+        settings = replace(settings, topology='KEEP', simplify=False)
     light_sets = read_light_sets(scene, settings.attribute)
     _check(scene, settings, light_sets)
     export, finer = _export(context, settings, light_sets)
@@ -154,11 +157,12 @@ def write_results(context: bpy.types.Context, prepared: PreparedBake,
     _check_unchanged(prepared.scene, export, native_bake)
     lights = _read_results(prepared)
     native_report = native_bake.report()
-    objects = _write(context, lights, prepared.settings, export, native_report)
+    objects, change = _write(context, lights, prepared.settings, export, native_report)
     report = BakeReport.from_native(native_report)
+    report.error = _with_change(report.error, change)
     for entry, light_set in zip(report.light_sets, prepared.light_sets):
         entry['attribute'] = light_set.attribute
-    report.vertices = _vertex_counts(lights)
+    report.vertices = _vertex_counts(lights, objects)
     report.objects = objects + [ObjectReport(name, 0, status)
                                 for name, status in export.statuses.items()]
     # The library's warnings come first, because one of lost or created light is the first of them
@@ -249,14 +253,14 @@ def _export(context: bpy.types.Context, settings: BakeSettings, light_sets: list
         raise BakeError(_nothing_to_bake(settings, export))
     if settings.topology == 'SUBDIVIDE':
         return export, _refine(export, settings)
-    if settings.topology == 'KEEP':
+    if not writes_copies(settings):
         _want_written_corners(export)
     return export, {}
 
 
 def writes_copies(settings: BakeSettings) -> bool:
-    """Returns whether the light is written to finer copies of the objects."""
-    return settings.topology != 'KEEP'
+    """Returns whether the light is written to copies of the objects with other meshes."""
+    return settings.topology != 'KEEP' or settings.simplify
 
 
 def _nothing_to_bake(settings: BakeSettings, export: SceneExport) -> Message:
@@ -360,6 +364,8 @@ def _read_results(prepared: PreparedBake) -> list[TargetLight]:
         if settings.topology == 'ADAPTIVE':
             finer = adapted(mesh, native_bake.adapted_mesh(target.instance))
             mesh = finer.data
+        elif settings.simplify and finer is None:
+            finer = FinerMesh.of(mesh)
         corner_map = target.corner_map if finer is None else CornerMap(mesh.corner_count)
 
         def read_light(light_set: int | None = None) -> np.ndarray:
@@ -410,15 +416,19 @@ def _read_error(native_bake: native.Bake, target: BakeTarget, mesh: MeshData,
 
 
 def _write(context: bpy.types.Context, lights: list[TargetLight], settings: BakeSettings,
-           export: SceneExport, native_report: dict) -> list[ObjectReport]:
-    """Writes the light to the targets, or to their finer copies. Returns a report for each
-    target."""
+           export: SceneExport, native_report: dict) -> tuple[list[ObjectReport], float]:
+    """Writes the light to the targets, or to their finer copies. Returns a report for each target,
+    and what simplifying the copies has changed, relative to the light."""
     copies: dict[bpy.types.Object, bpy.types.Object] = {}
+    simplifier = _simplifier(lights, settings) if settings.simplify else None
     if writes_copies(settings):
         copies, warnings = create_copies(
-            context, {item.target.object: item.finer for item in lights})
+            context, {item.target.object: item.finer for item in lights},
+            simplifier and simplifier.simplify)
         for warning in warnings:
             export.warnings.add(warning)
+        if simplifier is not None:
+            lights = [_left(item, simplifier, settings.domain) for item in lights]
     else:
         lights = _resolve_shared_meshes(lights, settings, export)
     lights = [replace(item, light=exposed(item.light, settings)) for item in lights]
@@ -437,23 +447,49 @@ def _write(context: bpy.types.Context, lights: list[TargetLight], settings: Bake
         # The native library lists its objects by instance.
         own = native_report['objects'][item.target.instance]
         reports.append(ObjectReport(
-            receiver.name, len(receiver.data.loops), own['status'], own['error'],
+            receiver.name, len(receiver.data.loops), own['status'],
+            _with_change(own['error'],
+                         simplifier.changes[item.target.object] if simplifier else 0.0),
             len(receiver.data.vertices), own['adaptive_vertices']))
     for original, copy in copies.items():
         export.last.share(original, copy)
     names = {settings.attribute, *(name for item in lights for name in item.set_lights)}
     export.last.write(names)
     _warn_of_clipping(lights, settings, export)
-    return reports
+    return reports, simplifier.change() if simplifier else 0.0
 
 
-def _vertex_counts(lights: list[TargetLight]) -> dict[str, int]:
+def _simplifier(lights: list[TargetLight], settings: BakeSettings) -> Simplifier:
+    light = {}
+    for item in lights:
+        together = np.concatenate([item.light, *item.set_lights.values()], axis=1)
+        light[item.target.object] = (together if settings.domain == 'CORNER'
+                                     else together[item.finer.data.corner_vertices])
+    return Simplifier(settings.target_error, light)
+
+
+def _left(item: TargetLight, simplifier: Simplifier, domain: str) -> TargetLight:
+    """Returns what is left of the light of a target whose mesh was simplified."""
+    original = item.target.object
+    return replace(
+        item, light=simplifier.left(original, item.light, domain),
+        error=None if item.error is None else simplifier.left(original, item.error, domain),
+        set_lights={name: simplifier.left(original, light, domain)
+                    for name, light in item.set_lights.items()})
+
+
+def _with_change(error: dict[str, float], change: float) -> dict[str, float]:
+    """Returns the parts of a stated error, with what simplifying the mesh has changed."""
+    return {**error, **{name: math.hypot(error[name], change) for name in ('mesh', 'total')}}
+
+
+def _vertex_counts(lights: list[TargetLight], objects: list[ObjectReport]) -> dict[str, int]:
     """Returns BakeReport.vertices."""
     copied = [item for item in lights if item.finer is not None]
     if not copied:
         return {}
     return {'before': sum(item.finer.source_vertex_count for item in copied),
-            'after': sum(len(item.finer.data.vertices) for item in copied)}
+            'after': sum(item.vertices for item in objects)}
 
 
 def exposed(light: np.ndarray, settings: BakeSettings) -> np.ndarray:

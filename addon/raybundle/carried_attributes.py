@@ -100,6 +100,25 @@ def _carry_edges(source: bpy.types.Mesh, mesh: bpy.types.Mesh, finer: FinerMesh)
             mesh.edges.foreach_set(name, carried)
 
 
+def edge_values(source: bpy.types.Mesh, finer: FinerMesh) -> np.ndarray:
+    """Returns per corner of the finer mesh and property whether the edge from it to the next corner
+    has the property, such as a seam or a crease, (c, properties)."""
+    values = [read(source.edges, name, dtype) != 0 for name, dtype in _OF_EDGES.items()
+              if name in bpy.types.MeshEdge.bl_rna.properties]
+    for attribute in source.attributes:
+        if (attribute.domain == 'EDGE' and attribute.data_type in _TYPES
+                and _is_carried(source, attribute)):
+            name, dtype, width, _ = _TYPES[attribute.data_type]
+            values.append(read(attribute.data, name, dtype, width).reshape(
+                len(source.edges), -1).any(axis=1))
+    found = np.zeros((finer.data.corner_count, len(values)), bool)
+    if finer.source_edges is not None and values:
+        on_edge = finer.source_edges >= 0
+        of_corners = read(source.loops, 'edge_index', np.int32)
+        found[on_edge] = np.column_stack(values)[of_corners[finer.source_edges[on_edge]]]
+    return found
+
+
 def _edge_pairs(source: bpy.types.Mesh, mesh: bpy.types.Mesh, finer: FinerMesh
                 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the edges of the finer mesh that lie on edges of the source, and these edges."""
@@ -152,8 +171,8 @@ def _at_vertices(source: bpy.types.Mesh, finer: FinerMesh, values: np.ndarray, c
                  ) -> np.ndarray:
     """Returns values at the vertices of the source at those of the finer mesh."""
     carried = np.zeros((len(finer.data.vertices), *values.shape[1:]), values.dtype)
-    if finer.source_edges is not None:
-        # The source's vertices come first, also those without a face.
+    if finer.has_source_vertices:
+        # They come first, also those without a face.
         carried[:len(values)] = values
     carried[finer.data.corner_vertices] = _at_corners(
         finer, values[corner_vertices(source)], can_mix)

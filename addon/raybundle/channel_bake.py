@@ -55,7 +55,7 @@ def bake_channels(context: bpy.types.Context, progress: Progress | None = None) 
         attribute = _part_attribute(scene, output)
         with _unnamed_sets(scene):
             report = bake(context, progress, output=output, attribute=attribute,
-                          data_type='FLOAT_COLOR')
+                          data_type='FLOAT_COLOR', simplify=False)
         parts[output] = _taken(scene, attribute)
         # All bakes write the light sets. Those of Lighting are kept.
         for number, item in enumerate(scene.raybundle.light_sets, 1):
@@ -66,7 +66,7 @@ def bake_channels(context: bpy.types.Context, progress: Progress | None = None) 
         attribute = _part_attribute(scene, AO)
         with _white_world(scene, f"{attribute} World"):
             report = bake(context, progress, output='DIRECT', attribute=attribute,
-                          data_type='FLOAT_COLOR', exposure=0.0)
+                          data_type='FLOAT_COLOR', exposure=0.0, simplify=False)
         _taken(scene, attribute)
         parts[AO] = _taken(scene, f"{attribute} World")
     _write(scene, sources, parts)

@@ -7,7 +7,7 @@ raybundle.source is the original, so that the next bake replaces the copy and Cl
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -40,26 +40,32 @@ def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
             item.hide_viewport, item.hide_render = hide_viewport, hide_render
 
 
-def create_copies(context: bpy.types.Context, meshes: dict[bpy.types.Object, FinerMesh]
+# Returns the mesh of a copy, of the original object, its evaluated mesh and the finer mesh.
+Change = Callable[[bpy.types.Object, bpy.types.Mesh, FinerMesh], FinerMesh]
+
+
+def create_copies(context: bpy.types.Context, meshes: dict[bpy.types.Object, FinerMesh],
+                  change: Change | None = None
                   ) -> tuple[dict[bpy.types.Object, bpy.types.Object], list[Message]]:
     """Creates a finer copy of each object, hides the original and removes an earlier copy.
 
-    meshes: by original object. Returns the copies by original, and warnings of what the copies do
-    not have.
+    meshes: by original object. change: what is done to them first. Returns the copies by original,
+    and warnings of what the copies do not have.
     """
     # Blender does not evaluate hidden objects, so show all originals for one evaluation.
     with originals_shown(context.scene):
         depsgraph = context.evaluated_depsgraph_get()
-        built = {original: _evaluated_copy(original.evaluated_get(depsgraph), depsgraph, finer)
+        built = {original: _evaluated_copy(original.evaluated_get(depsgraph), depsgraph, finer,
+                                           change)
                  for original, finer in meshes.items()}
     earlier = find_copies(context.scene)
     copies, warnings = {}, []
-    for original, (mesh, groups, missing) in built.items():
+    for original, (finer, mesh, groups, missing) in built.items():
         if original in earlier:
             _remove_copy(earlier[original])
         copy = _place_copy(context, original, mesh)
         carried_attributes.write_vertex_groups(copy, original, groups)
-        if not carried_attributes.carry_shape_keys(original, copy, meshes[original]):
+        if not carried_attributes.carry_shape_keys(original, copy, finer):
             missing.append("shape keys")
         if missing:
             warnings.append(Message(
@@ -71,19 +77,23 @@ def create_copies(context: bpy.types.Context, meshes: dict[bpy.types.Object, Fin
     return copies, warnings
 
 
-def _evaluated_copy(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph, finer: FinerMesh
-                    ) -> tuple[bpy.types.Mesh, carried_attributes.Weights, list[str]]:
-    """Returns the mesh of a copy, the weights of its vertex groups, and what it does not have."""
+def _evaluated_copy(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph, finer: FinerMesh,
+                    change: Change | None
+                    ) -> tuple[FinerMesh, bpy.types.Mesh, carried_attributes.Weights, list[str]]:
+    """Returns the finer mesh after the change, the mesh of a copy, the weights of its vertex groups,
+    and what it does not have."""
     # Without this argument, the mesh has no vertex groups and only the active UV map.
     source = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
     try:
+        if change is not None:
+            finer = change(evaluated.original, source, finer)
         mesh, missing = carried_attributes.build_mesh(evaluated.name + NAME_SUFFIX, source, finer)
         groups = carried_attributes.read_vertex_groups(evaluated.original, source, finer)
     finally:
         evaluated.to_mesh_clear()
     for slot in evaluated.original.material_slots:
         mesh.materials.append(slot.material)
-    return mesh, groups, missing
+    return finer, mesh, groups, missing
 
 
 def _place_copy(context: bpy.types.Context, original: bpy.types.Object, mesh: bpy.types.Mesh

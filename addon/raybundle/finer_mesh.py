@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes that are finer than those of the user, for light that the user's vertices cannot show: cut
-evenly (topology 'SUBDIVIDE'), or where the light needs it (topology 'ADAPTIVE')."""
+evenly (topology 'SUBDIVIDE'), or where the light needs it (topology 'ADAPTIVE'). simplified_mesh.py
+removes vertices of them."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from .scene_data import MeshData
 
 @dataclass(frozen=True)
 class FinerMesh:
-    """A mesh of c corners and f faces that lie on the faces of a source mesh."""
+    """A mesh of c corners and f faces that lie on the faces of a source mesh, or close to them if it
+    is simplified."""
 
     data: MeshData  # of the finer mesh, in object space
     source_faces: np.ndarray  # (f,) int32, the source face that contains each face
@@ -28,6 +30,18 @@ class FinerMesh:
     # (c,) int32: the source's corner at which the source's edge begins on which the edge from the
     # corner to the next lies; -1: it lies on none. None: not known.
     source_edges: np.ndarray | None = None
+    # Whether the first vertices are all those of the source.
+    has_source_vertices: bool = False
+
+    @classmethod
+    def of(cls, mesh: MeshData) -> FinerMesh:
+        """Returns a mesh as it is."""
+        corners = np.arange(mesh.corner_count, dtype=np.int32)
+        weights = np.zeros((mesh.corner_count, 3), np.float32)
+        weights[:, 0] = 1.0
+        return cls(mesh, np.arange(mesh.face_count, dtype=np.int32),
+                   np.repeat(corners[:, None], 3, axis=1), weights, mesh.corner_count,
+                   len(mesh.vertices), corners, has_source_vertices=True)
 
     def interpolated(self, values: np.ndarray) -> np.ndarray:
         """Interpolates values at the corners of the source mesh, (source corners, n), at the
@@ -70,7 +84,7 @@ def adapted(mesh: MeshData, finer: AdaptedMesh) -> FinerMesh:
     """Returns the mesh that the native library has adapted to the light. mesh: its source."""
     return _with_attributes(
         FinerMesh(mesh, finer.source_faces, finer.source_corners, finer.source_weights,
-                  mesh.corner_count, len(mesh.vertices), finer.source_edges),
+                  mesh.corner_count, len(mesh.vertices), finer.source_edges, has_source_vertices=True),
         finer.vertices, finer.corner_vertices, finer.face_offsets)
 
 

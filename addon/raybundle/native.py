@@ -212,6 +212,10 @@ _FALLIBLE: dict[str, Sequence[object]] = {
     'rb_new_subdivision': (_floats, _size, _ints, _size, _ints, _size, _float, _out(_handle)),
     'rb_get_subdivision_size': (_handle, _out(_size), _out(_size)),
     'rb_get_subdivision': (_handle, _floats, _size, _ints, _ints, _ints, _floats, _size),
+    'rb_new_simplification': (_floats, _size, _ints, _size, _ints, _size, _ints, _ints, _floats,
+                              _floats, _size, _float, _out(_handle)),
+    'rb_get_simplification_size': (_handle, _out(_size), _out(_size)),
+    'rb_get_simplification': (_handle, _ints, _ints, _size, _ints, _ints, _size, _floats, _size),
 }
 
 # Result type and argument types of the functions that cannot fail.
@@ -224,6 +228,7 @@ _INFALLIBLE: dict[str, tuple[object, Sequence[object]]] = {
     'rb_release_run': (None, (_handle,)),
     'rb_get_setting_count': (_size, ()),
     'rb_release_subdivision': (None, (_handle,)),
+    'rb_release_simplification': (None, (_handle,)),
 }
 
 _library: ctypes.CDLL | None = None
@@ -895,3 +900,54 @@ class Subdivision(_Handle):
             self._pointer, _as_floats(self.vertices), len(self.vertices),
             _as_ints(self.triangles), _as_ints(self.source_faces), _as_ints(self.source_corners),
             _as_floats(self.source_weights), count)
+
+
+class Simplification(_Handle):
+    """A mesh without the vertices of a source mesh that its shape and the values at its corners do
+    not need. It has c corners and f faces: those of the source from which nothing was removed, and
+    triangles.
+
+    source_corners  (c,) int32, the source's corner with the vertex and the values of each corner
+    source_edges    (c,) int32, the source's corner at which an edge begins that stays one and on
+                    which the edge from the corner to the next lies; -1: there is none
+    face_offsets    (f + 1,) int32, the first corner of each face
+    source_faces    (f,) int32, a face of the source with the kind of each face
+    changes         (v,) float32, RMS over the vertices of the change of each value
+
+    The source has n corners and m faces. face_kinds: (m,), faces of different kinds stay apart.
+    kept_edges: (n,), whether the edge from each corner to the next stays one. values: (n, v).
+    tolerances: (v,), the largest change of each value at any vertex. distance: of removed vertices
+    from the surface, m.
+    """
+
+    _release = 'rb_release_simplification'
+
+    def __init__(self, vertices: np.ndarray, corner_vertices: np.ndarray, face_offsets: np.ndarray,
+                 face_kinds: np.ndarray, kept_edges: np.ndarray, values: np.ndarray,
+                 tolerances: np.ndarray, distance: float) -> None:
+        super().__init__()
+        vertices = _float_array(vertices, (None, 3), "vertices")
+        corner_vertices = _int_array(corner_vertices, (None,), "corner_vertices")
+        face_offsets = _int_array(face_offsets, (None,), "face_offsets")
+        corners, faces = len(corner_vertices), len(face_offsets) - 1
+        face_kinds = _int_array(face_kinds, (faces,), "face_kinds")
+        kept_edges = _int_array(kept_edges, (corners,), "kept_edges")
+        tolerances = _float_array(tolerances, (None,), "tolerances")
+        values = _float_array(values, (corners, len(tolerances)), "values")
+        self._library.rb_new_simplification(
+            _as_floats(vertices), len(vertices), _as_ints(corner_vertices), corners,
+            _as_ints(face_offsets), faces, _as_ints(face_kinds), _as_ints(kept_edges),
+            _as_floats(values), _as_floats(tolerances), len(tolerances), distance,
+            ctypes.byref(self._pointer))
+        corner_count, face_count = _size(), _size()
+        self._library.rb_get_simplification_size(
+            self._pointer, ctypes.byref(corner_count), ctypes.byref(face_count))
+        self.source_corners = np.empty(corner_count.value, np.int32)
+        self.source_edges = np.empty(corner_count.value, np.int32)
+        self.face_offsets = np.empty(face_count.value + 1, np.int32)
+        self.source_faces = np.empty(face_count.value, np.int32)
+        self.changes = np.empty(len(tolerances), np.float32)
+        self._library.rb_get_simplification(
+            self._pointer, _as_ints(self.source_corners), _as_ints(self.source_edges),
+            corner_count.value, _as_ints(self.face_offsets), _as_ints(self.source_faces),
+            face_count.value, _as_floats(self.changes), len(self.changes))

@@ -166,6 +166,7 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
         row = layout.row()
         row.active = settings.topology == 'ADAPTIVE'
         row.prop(settings, "max_vertices")
+        layout.prop(settings, "simplify")
         row = layout.row()
         row.active = settings.topology != 'ADAPTIVE'
         row.prop(settings, "count_adaptive")
@@ -250,7 +251,7 @@ class RAYBUNDLE_PT_output(RaybundleRenderPanel, bpy.types.Panel):
             layout.prop(settings, name)
         column = layout.column()
         # Finer copies never share a mesh.
-        column.active = settings.topology == 'KEEP'
+        column.active = settings.topology == 'KEEP' and not settings.simplify
         column.prop(settings, "shared_meshes")
 
 

@@ -314,6 +314,11 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         description="Maximum number of vertices of all adapted meshes together; meshes that have "
                     "more keep theirs",
         default=100_000, min=1, max=2 ** 26, soft_max=10_000_000)
+    simplify: BoolProperty(
+        name="Simplify",
+        description="Write the light to copies without the vertices that neither it nor the shape "
+                    "needs at the target noise, for export to small devices. Bake Channels does not "
+                    "simplify")
     count_adaptive: BoolProperty(
         name="Count Adaptive",
         description="Count the vertices that the topology Adaptive would need, without changing "
@@ -485,6 +490,7 @@ class BakeSettings:
     write_error: bool
     topology: str
     max_vertices: int
+    simplify: bool
     count_adaptive: bool
     shared_meshes: str
     patch_size: float

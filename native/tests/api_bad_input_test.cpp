@@ -69,12 +69,19 @@ TEST(ApiNull, HandlesAreRefusedEverywhere) {
     expectInvalid(rb_get_subdivision_size(nullptr, &count, &count), "subdivision");
     expectInvalid(rb_get_subdivision(nullptr, rgb, 1, values, values, values, rgb, 1),
                   "subdivision");
+    expectInvalid(rb_new_simplification(kVertices, 8, kCorners, 24, kFaces, 6, nullptr, nullptr,
+                                        nullptr, nullptr, 0, 1, nullptr),
+                  "simplification");
+    expectInvalid(rb_get_simplification_size(nullptr, &count, &count), "simplification");
+    expectInvalid(rb_get_simplification(nullptr, values, values, 1, values, values, 1, rgb, 1),
+                  "simplification");
     EXPECT_EQ(id, 77) << "outputs are untouched on failure";
     EXPECT_EQ(number, 77);
     EXPECT_EQ(subdivision, nullptr);
     rb_release_scene(nullptr);
     rb_release_bake(nullptr);
     rb_release_subdivision(nullptr);
+    rb_release_simplification(nullptr);
 }
 
 TEST_F(Api, NullArraysAndOutputsAreRefusedByName) {
@@ -434,6 +441,32 @@ TEST(ApiSubdivision, RefusesWhatCannotBeCut) {
     EXPECT_EQ(rb_get_subdivision_size(subdivision, &vertices, &triangles), RB_ERROR_NONE);
     EXPECT_EQ(vertices + triangles, 0u);
     rb_release_subdivision(subdivision);
+}
+
+TEST(ApiSimplification, RefusesWhatDoesNotFit) {
+    rb_simplification made = nullptr;
+    std::vector<float> values(24), tolerances = {1};
+    const auto simplified = [&](float distance) {
+        return rb_new_simplification(kVertices, 8, kCorners, 24, kFaces, 6, nullptr, nullptr,
+                                     values.data(), tolerances.data(), 1, distance, &made);
+    };
+    for (float distance : {0.0f, -1.0f, NAN}) expectInvalid(simplified(distance), "distance");
+    values[3] = NAN;
+    expectInvalid(simplified(1), "values must be finite");
+    values[3] = 0;
+    tolerances[0] = 0;
+    expectInvalid(simplified(1), "tolerances must be positive");
+    expectInvalid(rb_new_simplification(kVertices, 8, kCorners, 24, kFaces, 6, nullptr, nullptr,
+                                        nullptr, tolerances.data(), 1, 1, &made),
+                  "values");
+    EXPECT_EQ(made, nullptr);
+    ASSERT_EQ(rb_new_simplification(nullptr, 0, nullptr, 0, nullptr, 0, nullptr, nullptr, nullptr,
+                                    nullptr, 0, 1, &made),
+              RB_ERROR_NONE);
+    size_t corners = 7, faces = 7;
+    EXPECT_EQ(rb_get_simplification_size(made, &corners, &faces), RB_ERROR_NONE);
+    EXPECT_EQ(corners + faces, 0u);
+    rb_release_simplification(made);
 }
 
 }  // namespace

@@ -57,9 +57,13 @@ TEST_F(ApiHandles, OfAnotherKindOrNeverGivenTheyAreRefused) {
         expectInvalid(rb_set_bake_int(static_cast<rb_bake>(madeUp), "seed", 1), "bake");
         expectInvalid(rb_get_subdivision_size(static_cast<rb_subdivision>(madeUp), &count, &count),
                       "subdivision");
+        expectInvalid(
+            rb_get_simplification_size(static_cast<rb_simplification>(madeUp), &count, &count),
+            "simplification");
         rb_release_bake(static_cast<rb_bake>(madeUp));
         rb_release_scene(static_cast<rb_scene>(madeUp));
         rb_release_subdivision(static_cast<rb_subdivision>(madeUp));
+        rb_release_simplification(static_cast<rb_simplification>(madeUp));
     }
     EXPECT_EQ(rb_set_bake_int(bake, "seed", 1), RB_ERROR_NONE) << message();
 }

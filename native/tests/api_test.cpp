@@ -322,5 +322,36 @@ TEST(ApiSubdivision, CutsAMeshForTheCaller) {
     rb_release_subdivision(subdivision);
 }
 
+TEST(ApiSimplification, TakesVerticesOutForTheCaller) {
+    // Three vertices in a row on one side of a triangle, cut into two faces.
+    const float points[12] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 0, 2, 0};
+    const int32_t corners[6] = {0, 1, 3, 1, 2, 3}, offsets[3] = {0, 3, 6};
+    const float values[6] = {0, 1, 0, 1, 2.1f, 0};
+    for (const float tolerance : {0.04f, 0.06f}) {
+        rb_simplification made = nullptr;
+        ASSERT_EQ(rb_new_simplification(points, 4, corners, 6, offsets, 2, nullptr, nullptr, values,
+                                        &tolerance, 1, 1e-3f, &made),
+                  RB_ERROR_NONE);
+        size_t cornerCount = 0, faceCount = 0;
+        ASSERT_EQ(rb_get_simplification_size(made, &cornerCount, &faceCount), RB_ERROR_NONE);
+        ASSERT_EQ(faceCount, tolerance < 0.05f ? 2u : 1u);
+        ASSERT_EQ(cornerCount, 3 * faceCount);
+        std::vector<int32_t> from(cornerCount), edges(cornerCount), starts(faceCount + 1),
+            faces(faceCount);
+        float change = 77;
+        expectInvalid(rb_get_simplification(made, from.data(), edges.data(), cornerCount,
+                                            starts.data(), faces.data(), faceCount, &change, 2),
+                      "value_count");
+        ASSERT_EQ(rb_get_simplification(made, from.data(), edges.data(), cornerCount, starts.data(),
+                                        faces.data(), faceCount, &change, 1),
+                  RB_ERROR_NONE);
+        // The vertex in the middle changes by 0.05, and the three others by nothing.
+        EXPECT_NEAR(change, faceCount == 2 ? 0 : 0.025, 1e-6);
+        for (int32_t corner : from) EXPECT_TRUE(faceCount == 2 || corners[corner] != 1);
+        EXPECT_EQ(starts.back(), int32_t(cornerCount));
+        rb_release_simplification(made);
+    }
+}
+
 }  // namespace
 }  // namespace raybundle

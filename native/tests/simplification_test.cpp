@@ -6,6 +6,7 @@
 #include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 #include <map>
+#include <random>
 #include <set>
 
 #include "job/error.h"
@@ -218,6 +219,45 @@ TEST(Simplification, KeepsFacesWithThreeAtAnEdge) {
         const bool isBorder = (p.x == q.x && (p.x == 0 || p.x == 4)) ||
                               (p.y == q.y && (p.y == 0 || p.y == 4)) || p.z + q.z > 0;
         EXPECT_TRUE(isBorder) << p.x << " " << p.y << " to " << q.x << " " << q.y;
+    }
+}
+
+// Random holes, flipped faces, doubled faces, faces that share only a vertex, and degenerate faces:
+// whatever a mesh is, what is left of it is made of its corners and lies within the limits.
+TEST(Simplification, RandomMeshesSurvive) {
+    for (uint32_t seed = 0; seed < 60; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        std::mt19937 random{seed};
+        const auto upTo = [&](size_t count) { return int32_t(random() % count); };
+        Mesh mesh = grid("floor", {0, 0, 0}, {4, 0, 0}, {0, 4, 0}, 7, 6);
+        for (glm::vec3& v : mesh.vertices) v.z = seed % 3 ? 0 : 0.02f * float(upTo(3));
+        std::vector<std::vector<int32_t>> faces;
+        for (size_t f = 0; f < mesh.faceCount(); ++f) {
+            std::vector<int32_t> face(mesh.cornerVertices.begin() + mesh.faceOffsets[f],
+                                      mesh.cornerVertices.begin() + mesh.faceOffsets[f + 1]);
+            const int32_t fate = upTo(12);
+            if (fate == 0) continue;
+            if (fate == 1) std::reverse(face.begin(), face.end());
+            if (fate == 2) faces.push_back(face);
+            if (fate == 3) face[0] = upTo(mesh.vertices.size());
+            if (fate == 4) face.pop_back();
+            faces.push_back(face);
+        }
+        mesh = polygons("random", mesh.vertices, faces);
+        constexpr float kDistance = 0.03f;
+        const SimplificationLimits limits = limitsOf(
+            mesh, [](const glm::vec3& p) { return std::sin(p.x) * p.y; }, 0.3f, kDistance);
+        const SimplifiedMesh made = simplify(mesh, limits);
+        ASSERT_EQ(made.sourceCorners.size(), made.sourceEdges.size());
+        ASSERT_EQ(size_t(made.faceOffsets.back()), made.sourceCorners.size());
+        for (int32_t corner : made.sourceCorners)
+            ASSERT_TRUE(corner >= 0 && size_t(corner) < mesh.cornerCount());
+        std::set<int32_t> used(mesh.cornerVertices.begin(), mesh.cornerVertices.end());
+        if (seed % 5) continue;  // the search takes long
+        for (int32_t v : used)
+            EXPECT_LT(nearestOn(mesh, made, limits.values, mesh.vertices[size_t(v)]).distance,
+                      kDistance + 0.05)
+                << v;
     }
 }
 

@@ -666,6 +666,56 @@ RB_API rb_error rb_get_subdivision(rb_subdivision subdivision, float* vertices, 
                                    int32_t* source_corners, float* source_weights,
                                    size_t triangle_count);
 
+/* ------------------------------------------------------------------------------------------------
+ * Simplification of a mesh, for callers whose mesh has more vertices than its light and shape need
+ * --------------------------------------------------------------------------------------------- */
+
+typedef struct rb_simplification_impl* rb_simplification;
+
+/* Removes vertices of a mesh (arrays as in rb_add_mesh) as long as, at each removed vertex, no value
+ * changes by more than its tolerance, and the surface moves by at most `distance`, in the unit of
+ * the vertices. Values that differ across an edge, such as light across a sharp one, stay apart. At
+ * edges with more than two faces nothing is removed. Writes the handle of the result to
+ * *simplification; the caller releases it.
+ *   face_kinds  one number per face, such as its material: faces of different kinds stay apart;
+ *               NULL: all are alike
+ *   kept_edges  per corner, whether the edge to the next corner of its face stays an edge, with
+ *               vertices removed at most along it; NULL: none
+ *   values      value_count values per corner: light, texture coordinates, normals
+ *   tolerances  the tolerance of each value, positive
+ *   distance    positive */
+RB_API rb_error rb_new_simplification(const float* vertices, size_t vertex_count,
+                                      const int32_t* corner_vertices, size_t corner_count,
+                                      const int32_t* face_offsets, size_t face_count,
+                                      const int32_t* face_kinds, const int32_t* kept_edges,
+                                      const float* values, const float* tolerances,
+                                      size_t value_count, float distance,
+                                      rb_simplification* simplification);
+
+/* Frees a simplification. If another call is using it, it is freed when that call ends. A NULL
+ * handle is ignored. */
+RB_API void rb_release_simplification(rb_simplification simplification);
+
+/* Writes the number of corners and of faces of a simplified mesh. */
+RB_API rb_error rb_get_simplification_size(rb_simplification simplification, size_t* corner_count,
+                                           size_t* face_count);
+
+/* Copies a simplified mesh into arrays of the caller. The counts must be those of
+ * rb_get_simplification_size and rb_new_simplification. Faces from which no vertex was removed are
+ * those of the source; the others are triangles.
+ *   source_corners  the corner of the source with the vertex and the values of each corner,
+ *                   corner_count corner indices
+ *   source_edges    if the edge from a corner to the next of its face lies on an edge of the source
+ *                   that stays one: a corner at which such an edge begins in its face; otherwise -1;
+ *                   corner_count values
+ *   face_offsets    as in rb_add_mesh, face_count + 1 values
+ *   source_faces    a face of the source with the kind of each face, face_count values
+ *   changes         per value, RMS over the vertices of its change, value_count floats */
+RB_API rb_error rb_get_simplification(rb_simplification simplification, int32_t* source_corners,
+                                      int32_t* source_edges, size_t corner_count,
+                                      int32_t* face_offsets, int32_t* source_faces,
+                                      size_t face_count, float* changes, size_t value_count);
+
 #ifdef __cplusplus
 }
 #endif

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <glm/glm.hpp>
 #include <numeric>
-#include <optional>
 #include <queue>
 
 #include "job/error.h"
@@ -73,13 +72,19 @@ class Simplifier {
         std::vector<int32_t> vanishing;  // beside the edge
         // Of the vertex that is removed, and of the one that stays.
         int32_t corner = -1, other = -1;
+
+        void clear() {
+            changing.clear();
+            vanishing.clear();
+        }
     };
+    // An edge that may be collapsed, from the vertex that is removed.
     struct Entry {
         float priority;
-        int32_t vertex;
+        HalfedgeHandle edge;
         uint32_t version;
         bool operator<(const Entry& e) const {
-            return priority != e.priority ? priority > e.priority : vertex > e.vertex;
+            return priority != e.priority ? priority > e.priority : edge.idx() > e.edge.idx();
         }
     };
     // The nearest place among triangles: its squared distance and weights.
@@ -91,17 +96,19 @@ class Simplifier {
 
     std::array<int32_t, 3> cornersAfter(const Side& side, int32_t triangle, int32_t vertex) const;
 
-    // Returns the sides of a collapse, or nothing if features forbid it.
-    std::optional<std::vector<Side>> sidesOf(HalfedgeHandle edge) const;
-    // Returns the largest change relative to its limit, or a negative number if the edge must not
-    // be collapsed.
-    float priorityOf(HalfedgeHandle edge) const;
+    // Finds the sides of a collapse. Returns false if features forbid it.
+    bool findSides(HalfedgeHandle edge);
     bool mayCollapse(HalfedgeHandle edge) const;
-    float changeOn(const Side& side, int32_t vertex) const;
+    // Returns the largest change by a collapse relative to its limit, or a negative number if it
+    // must not be made. `all`: as in changeOn().
+    float changeBy(HalfedgeHandle edge, bool all);
+    // Returns the largest change on one side relative to its limit, or a negative number if it is
+    // beyond. `all`: at all vertices removed so far, and not only at `vertex`.
+    float changeOn(const Side& side, int32_t vertex, bool all);
     Place nearest(const std::vector<std::array<glm::dvec3, 3>>& triangles,
                   const glm::dvec3& p) const;
     float changeAt(int32_t corner, const std::array<int32_t, 3>& corners, const Place& place) const;
-    void queueBest(int32_t vertex);
+    void queueEdgesFrom(VertexHandle vertex);
     void collapse(HalfedgeHandle edge);
 
     const Mesh& source;
@@ -109,20 +116,24 @@ class Simplifier {
     CollapsingMesh surface;
     CollapsingMesh::Mesh3& mesh = surface.mesh;
     std::vector<Triangle>& triangles = surface.triangles;
-    std::vector<HalfedgeHandle> best;  // per vertex: the edge to collapse
-    std::vector<uint32_t> version;     // per vertex: of its entry in the queue
+    // Of the collapse that is looked at: its sides, the last of which may be empty, and the triangles
+    // of one side afterwards.
+    std::array<Side, 2> sides;
+    std::vector<std::array<glm::dvec3, 3>> after;
+    std::vector<std::array<int32_t, 3>> cornersThere;
+    std::vector<uint32_t> version;  // per vertex: of the entries of its edges
     std::priority_queue<Entry> queue;
 };
 
-std::optional<std::vector<Simplifier::Side>> Simplifier::sidesOf(HalfedgeHandle edge) const {
+bool Simplifier::findSides(HalfedgeHandle edge) {
     const VertexHandle v0 = mesh.from_vertex_handle(edge), v1 = mesh.to_vertex_handle(edge);
     const int32_t count = surface.featureCounts[size_t(v0.idx())];
     const bool isAlong = count == 2 && surface.isFeature(v0.idx(), v1.idx());
-    if (surface.isLocked[size_t(v0.idx())] || (count != 0 && !isAlong)) return std::nullopt;
-    std::vector<Side> sides;
+    if (surface.isLocked[size_t(v0.idx())] || (count != 0 && !isAlong)) return false;
+    for (Side& side : sides) side.clear();
     // Around the vertex, from the edge to the left until the next feature, and to the right.
     for (const bool isLeft : {true, false}) {
-        Side side;
+        Side& side = sides[isLeft ? 0 : 1];
         HalfedgeHandle spoke = edge;
         for (;;) {
             const HalfedgeHandle inside = isLeft ? spoke : mesh.opposite_halfedge_handle(spoke);
@@ -142,11 +153,10 @@ std::optional<std::vector<Simplifier::Side>> Simplifier::sidesOf(HalfedgeHandle 
             if (spoke == edge || surface.isFeature(v0.idx(), end)) break;
         }
         if (side.vanishing.empty()) continue;  // beyond the border of the mesh
-        if (side.changing.empty()) return std::nullopt;
-        sides.push_back(std::move(side));
+        if (side.changing.empty()) return false;
         if (count == 0) break;  // all around
     }
-    return sides;
+    return true;
 }
 
 std::array<int32_t, 3> Simplifier::cornersAfter(const Side& side, int32_t triangle,
@@ -185,13 +195,13 @@ float Simplifier::changeAt(int32_t corner, const std::array<int32_t, 3>& corners
     return most;
 }
 
-float Simplifier::changeOn(const Side& side, int32_t vertex) const {
-    std::vector<std::array<glm::dvec3, 3>> after;
-    std::vector<std::array<int32_t, 3>> corners;
+float Simplifier::changeOn(const Side& side, int32_t vertex, bool all) {
+    after.clear();
+    cornersThere.clear();
     double thinnest = 1;
     for (int32_t t : side.changing) {
-        corners.push_back(cornersAfter(side, t, vertex));
-        after.push_back(surface.pointsOf(corners.back()));
+        cornersThere.push_back(cornersAfter(side, t, vertex));
+        after.push_back(surface.pointsOf(cornersThere.back()));
         const std::array<glm::dvec3, 3> before = surface.pointsOf(triangles[size_t(t)].corner);
         thinnest = std::min(thinnest, shapeOf(before));
         const glm::dvec3 was = glm::cross(before[1] - before[0], before[2] - before[0]),
@@ -204,10 +214,11 @@ float Simplifier::changeOn(const Side& side, int32_t vertex) const {
     float most = 0;
     auto test = [&](int32_t corner) {
         const Place place = nearest(after, surface.positionOf(corner));
-        most = std::max(most, changeAt(corner, corners[place.triangle], place));
+        most = std::max(most, changeAt(corner, cornersThere[place.triangle], place));
         return most <= 1;
     };
     if (!test(side.corner)) return -1;
+    if (!all) return most;
     for (const std::vector<int32_t>* these : {&side.changing, &side.vanishing})
         for (int32_t t : *these)
             for (int32_t corner : triangles[size_t(t)].removed)
@@ -226,47 +237,45 @@ bool Simplifier::mayCollapse(HalfedgeHandle edge) const {
            !mesh.find_halfedge(left, right).is_valid();
 }
 
-float Simplifier::priorityOf(HalfedgeHandle edge) const {
-    const auto sides = sidesOf(edge);
-    if (!sides || !mayCollapse(edge)) return -1;
-    const VertexHandle v0 = mesh.from_vertex_handle(edge);
+float Simplifier::changeBy(HalfedgeHandle edge, bool all) {
+    if (!findSides(edge)) return -1;
     float most = 0;
-    for (const Side& side : *sides) {
-        const float change = changeOn(side, v0.idx());
+    for (const Side& side : sides) {
+        if (side.changing.empty()) continue;
+        const float change = changeOn(side, mesh.from_vertex_handle(edge).idx(), all);
         if (change < 0) return -1;
         most = std::max(most, change);
     }
-    return most + kByLength * float(mesh.calc_edge_length(edge)) / surface.extent;
+    return mayCollapse(edge) ? most : -1;
 }
 
-// Queues a vertex with the best edge from it, if there is any.
-void Simplifier::queueBest(int32_t vertex) {
-    const size_t v = size_t(vertex);
-    ++version[v];
-    best[v] = HalfedgeHandle();
-    float least = INFINITY;
-    for (const auto edge : mesh.voh_range(VertexHandle(vertex))) {
-        const float priority = priorityOf(edge);
-        if (priority < 0 || priority >= least) continue;
-        least = priority;
-        best[v] = edge;
+// Queues the edges from a vertex along which it may be removed. Their order follows from what
+// happens at this vertex. What happens at vertices that were removed before is tested later, for
+// the few edges whose turn comes.
+void Simplifier::queueEdgesFrom(VertexHandle vertex) {
+    const uint32_t now = ++version[size_t(vertex.idx())];
+    for (const auto edge : mesh.voh_range(vertex)) {
+        const float change = changeBy(edge, false);
+        if (change < 0) continue;
+        const float length = float(mesh.calc_edge_length(edge)) / surface.extent;
+        queue.push({change + kByLength * length, edge, now});
     }
-    if (best[v].is_valid()) queue.push({least, vertex, version[v]});
 }
 
 void Simplifier::collapse(HalfedgeHandle edge) {
     const int32_t v0 = mesh.from_vertex_handle(edge).idx(), v1 = mesh.to_vertex_handle(edge).idx();
-    const std::vector<Side> sides = *sidesOf(edge);
+    findSides(edge);
     if (surface.featureCounts[size_t(v0)] > 0) {
         int32_t next = -1;
         for (const auto other : mesh.vv_range(VertexHandle(v0)))
             if (other.idx() != v1 && surface.isFeature(v0, other.idx())) next = other.idx();
-        surface.features[CollapsingMesh::pairKey(v1, next)] =
-            surface.features[CollapsingMesh::pairKey(v0, next)];
+        const int32_t beginsAt = surface.features[CollapsingMesh::pairKey(v0, next)];
         surface.features.erase(CollapsingMesh::pairKey(v0, next));
         surface.features.erase(CollapsingMesh::pairKey(v0, v1));
+        surface.features[CollapsingMesh::pairKey(v1, next)] = beginsAt;
     }
     for (const Side& side : sides) {
+        if (side.changing.empty()) continue;
         std::vector<int32_t> removed = {side.corner};
         for (const std::vector<int32_t>* these : {&side.changing, &side.vanishing})
             for (int32_t t : *these) {
@@ -274,7 +283,7 @@ void Simplifier::collapse(HalfedgeHandle edge) {
                 removed.insert(removed.end(), own.begin(), own.end());
                 own.clear();
             }
-        std::vector<std::array<glm::dvec3, 3>> after;
+        after.clear();
         for (int32_t t : side.changing) {
             Triangle& triangle = triangles[size_t(t)];
             triangle.corner = cornersAfter(side, t, v0);
@@ -288,8 +297,8 @@ void Simplifier::collapse(HalfedgeHandle edge) {
                 .removed.push_back(corner);
     }
     mesh.collapse(edge);
-    queueBest(v1);
-    for (const auto other : mesh.vv_range(VertexHandle(v1))) queueBest(other.idx());
+    queueEdgesFrom(VertexHandle(v1));
+    for (const auto other : mesh.vv_range(VertexHandle(v1))) queueEdgesFrom(other);
 }
 
 void Simplifier::run() {
@@ -297,19 +306,16 @@ void Simplifier::run() {
     mesh.request_edge_status();
     mesh.request_halfedge_status();
     mesh.request_face_status();
-    best.resize(mesh.n_vertices());
     version.resize(mesh.n_vertices());
-    for (const auto vertex : mesh.vertices()) queueBest(vertex.idx());
+    for (const auto vertex : mesh.vertices()) queueEdgesFrom(vertex);
     while (!queue.empty()) {
-        const Entry entry = queue.top();
+        const Entry next = queue.top();
         queue.pop();
-        const size_t v = size_t(entry.vertex);
-        if (entry.version != version[v]) continue;
-        // Collapses elsewhere may have brought the ends of the edge together on another way.
-        if (mayCollapse(best[v]))
-            collapse(best[v]);
-        else
-            queueBest(entry.vertex);
+        // Entries of vertices that were removed, or around which anything has changed, are old.
+        if (mesh.status(next.edge).deleted() ||
+            next.version != version[size_t(mesh.from_vertex_handle(next.edge).idx())])
+            continue;
+        if (changeBy(next.edge, true) >= 0) collapse(next.edge);
     }
 }
 
