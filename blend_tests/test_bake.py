@@ -145,7 +145,8 @@ def test_operator_in_background(closed_box):
     assert SECONDS_KEYS <= set(report["seconds"])
     for item in report["objects"]:
         assert set(item.pop("error")) == set(report["error"])
-    assert report["objects"] == [{"name": "Box", "corners": 24, "status": "baked"}]
+    assert report["objects"] == [{"name": "Box", "corners": 24, "status": "baked", "vertices": 8,
+                                  "adaptive_vertices": 0}]
     assert report["seconds"]["total"] >= report["seconds"]["export"] > 0.0
 
 

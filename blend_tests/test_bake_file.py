@@ -42,7 +42,8 @@ def test_writes_blend_picture_and_report(saved_box, tmp_path):
     report = json.loads((out / "box.json").read_text())
     for item in report["objects"]:
         assert set(item.pop("error")) == set(report["error"])
-    assert report["objects"] == [{"name": "Box", "corners": 24, "status": "baked"}]
+    assert report["objects"] == [{"name": "Box", "corners": 24, "status": "baked", "vertices": 8,
+                                  "adaptive_vertices": 0}]
 
     picture = bpy.data.images.load(str(out / "box.png"))
     assert picture.size[0] <= 960 and picture.size[1] <= 720
