@@ -173,6 +173,12 @@ def test_all_attributes_fit_the_copy(floor):
         read_colors(copy_of(floor)), rel=1e-4)
 
 
+def test_broken_texture_coordinates_are_no_matter(floor):
+    for index, value in ((3, float('nan')), (50, float('inf'))):
+        floor.data.uv_layers["UVMap"].data[index].uv = (value, 0.0)
+    assert bake(target_error=0.1).vertices['after'] < (CELLS + 1) ** 2
+
+
 def test_clear_shows_the_originals(floor):
     bake()
     bpy.ops.raybundle.clear()

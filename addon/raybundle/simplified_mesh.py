@@ -47,7 +47,9 @@ class Simplifier:
         tolerances = [np.full(light.shape[1], _LIGHT * self.target_error * size),
                       np.full(3, _NORMAL)]
         for layer in source.uv_layers:
-            uvs = finer.interpolated(read(layer.data, 'uv', np.float32, 2))
+            # Broken texture coordinates must not end a bake.
+            uvs = finer.interpolated(np.nan_to_num(
+                read(layer.data, 'uv', np.float32, 2), posinf=0.0, neginf=0.0))
             values.append(uvs)
             tolerances.append(np.full(
                 2, _UV * self.target_error * np.ptp(uvs, axis=0).max(initial=0.0)))
