@@ -115,7 +115,9 @@ def test_what_the_mesh_has_is_carried_over(floor):
     for vertex in floor.data.vertices:
         group.add([vertex.index], 0.5 + 0.05 * vertex.co.x, 'REPLACE')
     floor.shape_key_add(name="Basis")
-    for point in floor.shape_key_add(name="Raised").data:
+    raised = floor.shape_key_add(name="Raised")
+    raised.value = 0.0  # which is 1 in new versions
+    for point in raised.data:
         point.co.z += 1.0 + 0.1 * point.co.y
     for edge in floor.data.edges:
         ends = [floor.data.vertices[vertex].co for vertex in edge.vertices]
@@ -127,8 +129,8 @@ def test_what_the_mesh_has_is_carried_over(floor):
     assert len(copy.vertices) < 0.6 * len(floor.data.vertices)
     for vertex in copy.vertices:
         assert vertex.groups[0].weight == pytest.approx(0.5 + 0.05 * vertex.co.x, abs=1e-5)
-        raised = copy.shape_keys.key_blocks["Raised"].data[vertex.index].co
-        assert raised.z == pytest.approx(1.0 + 0.1 * vertex.co.y, abs=1e-5)
+        place = copy.shape_keys.key_blocks["Raised"].data[vertex.index].co
+        assert place.z == pytest.approx(1.0 + 0.1 * vertex.co.y, abs=1e-5)
     for loop in copy.loops:
         assert np.array(copy.uv_layers["UVMap"].data[loop.index].uv) == pytest.approx(
             np.array(copy.vertices[loop.vertex_index].co.xy) * 0.1, abs=1e-6)
