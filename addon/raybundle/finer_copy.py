@@ -40,12 +40,12 @@ def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
             item.hide_viewport, item.hide_render = hide_viewport, hide_render
 
 
-# Returns the mesh of a copy, of the original object, its evaluated mesh and the finer mesh.
-Change = Callable[[bpy.types.Object, bpy.types.Mesh, FinerMesh], FinerMesh]
+_Meshes = dict[bpy.types.Object, FinerMesh]  # by original object
+# Returns the meshes of copies, of the evaluated meshes of the originals and the finer meshes.
+Change = Callable[[dict[bpy.types.Object, bpy.types.Mesh], _Meshes], _Meshes]
 
 
-def create_copies(context: bpy.types.Context, meshes: dict[bpy.types.Object, FinerMesh],
-                  change: Change | None = None
+def create_copies(context: bpy.types.Context, meshes: _Meshes, change: Change | None = None
                   ) -> tuple[dict[bpy.types.Object, bpy.types.Object], list[Message]]:
     """Creates a finer copy of each object, hides the original and removes an earlier copy.
 
@@ -55,17 +55,19 @@ def create_copies(context: bpy.types.Context, meshes: dict[bpy.types.Object, Fin
     # Blender does not evaluate hidden objects, so show all originals for one evaluation.
     with originals_shown(context.scene):
         depsgraph = context.evaluated_depsgraph_get()
-        built = {original: _evaluated_copy(original.evaluated_get(depsgraph), depsgraph, finer,
-                                           change)
-                 for original, finer in meshes.items()}
+        with _evaluated_meshes(depsgraph, list(meshes)) as sources:
+            if change is not None:
+                meshes = change(sources, meshes)
+            built = {original: _built_copy(original, sources[original], finer)
+                     for original, finer in meshes.items()}
     earlier = find_copies(context.scene)
     copies, warnings = {}, []
-    for original, (finer, mesh, groups, missing) in built.items():
+    for original, (mesh, groups, missing) in built.items():
         if original in earlier:
             _remove_copy(earlier[original])
         copy = _place_copy(context, original, mesh)
         carried_attributes.write_vertex_groups(copy, original, groups)
-        if not carried_attributes.carry_shape_keys(original, copy, finer):
+        if not carried_attributes.carry_shape_keys(original, copy, meshes[original]):
             missing.append("shape keys")
         if missing:
             warnings.append(Message(
@@ -77,23 +79,28 @@ def create_copies(context: bpy.types.Context, meshes: dict[bpy.types.Object, Fin
     return copies, warnings
 
 
-def _evaluated_copy(evaluated: bpy.types.Object, depsgraph: bpy.types.Depsgraph, finer: FinerMesh,
-                    change: Change | None
-                    ) -> tuple[FinerMesh, bpy.types.Mesh, carried_attributes.Weights, list[str]]:
-    """Returns the finer mesh after the change, the mesh of a copy, the weights of its vertex groups,
-    and what it does not have."""
-    # Without this argument, the mesh has no vertex groups and only the active UV map.
-    source = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+@contextmanager
+def _evaluated_meshes(depsgraph: bpy.types.Depsgraph, originals: list[bpy.types.Object]
+                      ) -> Iterator[dict[bpy.types.Object, bpy.types.Mesh]]:
+    """Gives the evaluated mesh of each object, which exists in the with block."""
+    evaluated = [original.evaluated_get(depsgraph) for original in originals]
     try:
-        if change is not None:
-            finer = change(evaluated.original, source, finer)
-        mesh, missing = carried_attributes.build_mesh(evaluated.name + NAME_SUFFIX, source, finer)
-        groups = carried_attributes.read_vertex_groups(evaluated.original, source, finer)
+        # Without this argument, the meshes have no vertex groups and only the active UV map.
+        yield {item.original: item.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+               for item in evaluated}
     finally:
-        evaluated.to_mesh_clear()
-    for slot in evaluated.original.material_slots:
+        for item in evaluated:
+            item.to_mesh_clear()
+
+
+def _built_copy(original: bpy.types.Object, source: bpy.types.Mesh, finer: FinerMesh
+                ) -> tuple[bpy.types.Mesh, carried_attributes.Weights, list[str]]:
+    """Returns the mesh of a copy, the weights of its vertex groups, and what it does not have."""
+    mesh, missing = carried_attributes.build_mesh(original.name + NAME_SUFFIX, source, finer)
+    groups = carried_attributes.read_vertex_groups(original, source, finer)
+    for slot in original.material_slots:
         mesh.materials.append(slot.material)
-    return finer, mesh, groups, missing
+    return mesh, groups, missing
 
 
 def _place_copy(context: bpy.types.Context, original: bpy.types.Object, mesh: bpy.types.Mesh

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import bpy
@@ -36,15 +38,26 @@ class Simplifier:
     changes: dict[bpy.types.Object, float] = field(default_factory=dict)
     areas: dict[bpy.types.Object, float] = field(default_factory=dict)
 
-    def simplify(self, original: bpy.types.Object, source: bpy.types.Mesh, finer: FinerMesh
-                 ) -> FinerMesh:
-        """Returns a mesh without the vertices that are not needed. source: the evaluated mesh that
-        is the source of `finer`. Raises RaybundleError if the native library fails."""
+    def simplify(self, sources: dict[bpy.types.Object, bpy.types.Mesh],
+                 meshes: dict[bpy.types.Object, FinerMesh]) -> dict[bpy.types.Object, FinerMesh]:
+        """Returns the meshes of objects without the vertices that are not needed. sources: the
+        evaluated mesh of each object, which is the source of the finer mesh. Raises RaybundleError
+        if the native library fails."""
+        limits = {original: self._limits(original, sources[original], finer)
+                  for original, finer in meshes.items()}
+        # The library works outside of Python, on several objects at once.
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            made = threads.map(lambda arguments: Simplification(*arguments), limits.values())
+            return {original: self._simplified(original, meshes[original], simplification)
+                    for original, simplification in zip(limits, made)}
+
+    def _limits(self, original: bpy.types.Object, source: bpy.types.Mesh, finer: FinerMesh
+                ) -> tuple:
+        """Returns the arguments of Simplification."""
         data, light = finer.data, self.light[original]
         extent = float(np.linalg.norm(np.ptp(data.vertices, axis=0))) if len(data.vertices) else 0.0
-        size = np.sqrt(np.mean(np.square(light), axis=0)).max(initial=0.0)
         values = [light, data.corner_normals]
-        tolerances = [np.full(light.shape[1], _LIGHT * self.target_error * size),
+        tolerances = [np.full(light.shape[1], _LIGHT * self.target_error * _size(light)),
                       np.full(3, _NORMAL)]
         for layer in source.uv_layers:
             # Broken texture coordinates must not end a bake.
@@ -56,20 +69,23 @@ class Simplifier:
         _, kinds = np.unique(np.column_stack([
             read(source.polygons, 'material_index', np.int32)[finer.source_faces],
             data.face_smooth]), axis=0, return_inverse=True)
-        made = Simplification(
-            data.vertices, data.corner_vertices, data.face_offsets, kinds.ravel(),
-            edge_values(source, finer).any(axis=1), np.concatenate(values, axis=1),
-            np.maximum(np.concatenate(tolerances), _LEAST),
-            max(_DISTANCE * self.target_error * extent, _LEAST))
+        scale = abs(original.matrix_world.to_3x3().determinant()) ** (2 / 3)
+        self.areas[original] = float(scale * read(source.polygons, 'area', np.float32).sum())
+        return (data.vertices, data.corner_vertices, data.face_offsets, kinds.ravel(),
+                edge_values(source, finer).any(axis=1), np.concatenate(values, axis=1),
+                np.maximum(np.concatenate(tolerances), _LEAST),
+                max(_DISTANCE * self.target_error * extent, _LEAST))
+
+    def _simplified(self, original: bpy.types.Object, finer: FinerMesh, made: Simplification
+                    ) -> FinerMesh:
+        """Returns what is left of a mesh, and remembers which corners and vertices."""
+        data, light = finer.data, self.light[original]
         with made:
             corners = made.source_corners
             kept, corner_vertices = np.unique(data.corner_vertices[corners], return_inverse=True)
             self.corners[original], self.vertices[original] = corners, kept
             change = made.changes[:light.shape[1]].max(initial=0.0)
-            self.changes[original] = float(change / max(size, _LEAST))
-            scale = abs(original.matrix_world.to_3x3().determinant()) ** (2 / 3)
-            self.areas[original] = float(
-                scale * read(source.polygons, 'area', np.float32).sum())
+            self.changes[original] = float(change / max(_size(light), _LEAST))
             return replace(
                 finer, data=replace(
                     data, vertices=data.vertices[kept],
@@ -96,3 +112,8 @@ class Simplifier:
     def left(self, original: bpy.types.Object, light: np.ndarray, domain: str) -> np.ndarray:
         """Returns what is left of values at the corners or vertices of an object's mesh."""
         return light[(self.corners if domain == 'CORNER' else self.vertices)[original]]
+
+
+def _size(light: np.ndarray) -> float:
+    """Returns the RMS over the corners of the brightest channel of light, (c, n)."""
+    return float(np.sqrt(np.mean(np.square(light), axis=0)).max(initial=0.0))

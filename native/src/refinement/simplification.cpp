@@ -396,7 +396,9 @@ void check(const Mesh& source, const SimplificationLimits& limits) {
 
 SimplifiedMesh simplify(const Mesh& source, const SimplificationLimits& limits) {
     check(source, limits);
-    omerr().disable();  // its messages are of no use to the caller
+    // Its messages are of no use to the caller. Several threads may simplify at once.
+    static const bool isQuiet = (omerr().disable(), true);
+    static_cast<void>(isQuiet);
     Simplifier simplifier(source, limits);
     simplifier.run();
     return simplifier.result();
