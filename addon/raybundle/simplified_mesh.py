@@ -19,7 +19,7 @@ from .native import Simplification
 # over the object; of the surface, relative to the diagonal of the object; of texture coordinates,
 # relative to their extent.
 _LIGHT, _DISTANCE, _UV = 2.0, 0.1, 0.5
-# The same of each component of normals, which light that is added later needs.
+# The largest change of each component of normals, which light that is added later needs.
 _NORMAL = 0.2
 _LEAST = 1e-12  # tolerances are positive
 
